@@ -1,0 +1,47 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+
+# Nothing that runs from here leaves this machine, unless you say otherwise.
+export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
+
+.PHONY: help demo test setup bench lint clean
+.NOTPARALLEL:
+.DEFAULT_GOAL := help
+
+help:
+	@echo 'make demo    simulated drives and the bridge in one process; ARGS="..." goes to drive_can demo'
+	@echo 'make test    types and all tests; ARGS="..." goes to pytest'
+	@echo 'make bench   measurements; ARGS="..." goes to bench/run.py'
+	@echo 'make lint    style'
+	@echo 'make setup   only the virtual environment that all of them use, in $(VENV)'
+	@echo 'make clean   removes it and everything else that was built'
+	@echo
+	@echo 'With ROS 2 Jazzy sourced, that one is used; otherwise it comes as wheels (Linux on x86-64).'
+	@echo 'PYTHON=... says which Python, 3.10 to 3.13.'
+
+setup:
+	@.ci/setup '$(PYTHON)' '$(VENV)'
+
+# Ctrl-C ends the demo, which ends well, and so does make.
+demo: setup
+	@exec $(BIN)/python .ci/foreground $(BIN)/drive_can demo $(ARGS)
+
+# The tests run even when the types are wrong: one run shows everything.
+test: setup
+	@echo 'mypy:'; $(BIN)/python -m mypy; types=$$?; \
+	$(BIN)/python -m pytest $(ARGS); tests=$$?; \
+	[ $$types = 0 ] || echo 'mypy found errors, see above'; \
+	[ $$types = 0 ] && [ $$tests = 0 ]
+
+bench: setup
+	@exec $(BIN)/python .ci/foreground $(BIN)/python bench/run.py $(ARGS)
+
+lint: setup
+	@.ci/lint '$(VENV)'
+
+clean:
+	rm -rf $(VENV) build install log dist *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
