@@ -1,0 +1,103 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The checked configuration, as the rest of the program receives it.
+
+Times are seconds. Everything in here has passed every check: nobody downstream checks again.
+"""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.profile import Profile
+
+
+@dataclass(frozen=True)
+class BusConfiguration:
+    """
+    One CAN bus.
+
+    :param interface: python-can interface name.
+    :param channel: as the interface wants it; digits stay a string unless given as an integer.
+    :param bitrate: bit/s.
+    :param reconnect_period: s between attempts to open a lost bus.
+    :param options: every other key, handed to python-can as it is.
+    """
+
+    name: str
+    interface: str
+    channel: str | int
+    bitrate: int = 125_000
+    reconnect_period: float = 1.0
+    options: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class JointConfiguration:
+    """
+    The ``joint`` section of a drive: which parameters are a joint's quantities.
+
+    The ``…_factor`` fields convert a physical value in the profile's unit into the joint's SI
+    value: ``si = value * factor`` (gear ratio, pole pairs and unit are in it).
+    """
+
+    name: str
+    position: str | None = None
+    velocity: str | None = None
+    effort: str | None = None
+    position_command: str | None = None
+    velocity_command: str | None = None
+    effort_command: str | None = None
+    gear_ratio: float = 1.0
+    pole_pairs: int = 1
+    #: parameter name -> factor, for every parameter named above
+    factors: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class DriveConfiguration:
+    """
+    One drive on a bus.
+
+    :param cyclic_request: parameters sent each cycle, in slot order (control word included where
+        the configuration lists it).
+    :param cyclic_response: parameters received each cycle, in slot order.
+    :param family_options: the keys that only this protocol family has, with defaults filled in.
+    :param profile_key: the profile as the configuration names it.
+    """
+
+    name: str
+    bus: str
+    protocol: str
+    station: int
+    profile: Profile
+    period: float = 0.02
+    cyclic_request: tuple[Parameter, ...] = ()
+    cyclic_response: tuple[Parameter, ...] = ()
+    missed_limit: int = 3
+    command_timeout: float = 0.5
+    rearm_immediate: bool = False
+    parameter_timeout: float = 0.1
+    parameter_retries: int = 2
+    verify_writes: bool = True
+    control_timeout: float = 2.0
+    joint: JointConfiguration | None = None
+    family_options: dict[str, Any] = field(default_factory=dict)
+    profile_key: str = ''
+
+
+@dataclass(frozen=True)
+class BridgeConfiguration:
+    """
+    Everything one bridge process does.
+
+    :param warnings: readable lines about what is allowed but suspicious (bus load over 70 %,
+        a key that the adapter does not know).
+    """
+
+    autostart: bool = True
+    diagnostics_period: float = 1.0
+    buses: dict[str, BusConfiguration] = field(default_factory=dict)
+    drives: dict[str, DriveConfiguration] = field(default_factory=dict)
+    profile_directories: tuple[str, ...] = ('',)
+    warnings: tuple[str, ...] = ()

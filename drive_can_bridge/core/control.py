@@ -1,0 +1,455 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The machine behind ``~/enable``, ``~/reset_fault`` and ``~/quick_stop`` of one drive.
+
+It decides which control word is sent now. The session of the drive sends that word, reports that
+it left (:meth:`~ControlMachine.word_sent`) and what status words come back, and hands the outcome
+of each request to whoever asked. What a request does:
+
+.. code-block:: text
+
+    request      control word                     goes on, or is answered, when the status says
+    -----------  -------------------------------  ---------------------------------------------
+    ENABLE       disable                          ready, not enabled, no fault: goes on
+                 enable                           enabled: success, the word stays
+    DISABLE      disable                          not enabled: success
+    QUICK_STOP   quick_stop                       not enabled: success, disable
+    RESET_FAULT  disable (sent once: a new edge)  fault: goes on; no fault: success
+                 reset_fault                      no fault: success, disable
+
+Every other end of a request (time-out, fault, withdrawal, replacement) is a failure and leaves
+``disable``. So ``enable`` is on the bus only for the sake of an ENABLE that nothing has ended
+since; a fault, or a drive that drops out of ``enabled`` by itself, ends it like a stop does.
+
+*Which status counts.* A status word confirms something only if it arrived after the current
+control word had left; what was on its way before that tells of older times. A fault counts
+always. For the same reason an enabled drive is found "enabled already" only while the control
+word is ``enable``: under ``disable`` such a status is about to be outdated, and ENABLE waits for
+the drive to let go first.
+
+*A request while another is under way.* The same request again joins the first, and both are
+answered together, at the first one's deadline at the latest. Of two different ones:
+
+* DISABLE and QUICK_STOP take effect at once, whatever they interrupt, each other included: the
+  newest word of somebody who wants the drive to stop is the one to obey.
+* ENABLE and RESET_FAULT are refused while a DISABLE or QUICK_STOP is under way: no start cuts a
+  stop short. (A RESET_FAULT with nothing to reset succeeds without disturbing the stop.)
+* RESET_FAULT replaces an ENABLE, and the other way round as far as there is no fault.
+
+A request that is refused changes nothing.
+
+*Quick stop of a drive that does not run* is a DISABLE: answered at once where that is known, and
+otherwise as soon as the drive confirms it. The same goes for a faulted drive, whose control word
+is ``disable`` in any case.
+
+*What a profile does not tell.* Where a condition is missing in the profile, having sent the word
+is all the confirmation there is, and the answer says so. A quick stop then keeps its word for the
+whole time-out, although it is answered at once: ``disable`` right after it would end the braking
+before it began. A drive that does not report faults gets the reset pulse in any case.
+"""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+from enum import Enum
+import math
+
+from drive_can_bridge.core.profile import ControlTable, StatusPattern
+
+
+class ControlAction(Enum):
+    """What can be asked of a drive; also names the control words of a profile."""
+
+    ENABLE = 'enable'
+    DISABLE = 'disable'
+    QUICK_STOP = 'quick_stop'
+    RESET_FAULT = 'reset_fault'
+
+
+_STOPS = (ControlAction.DISABLE, ControlAction.QUICK_STOP)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ControlTicket:
+    """Stands for one request until its outcome is there. Equal only to itself."""
+
+    action: ControlAction
+
+
+@dataclass(frozen=True, slots=True)
+class ControlCompleted:
+    """
+    The outcome of a request; each ticket gets exactly one.
+
+    :param message: the state reached, or why it was not, for the answer of the service.
+    """
+
+    ticket: ControlTicket
+    success: bool
+    message: str
+
+
+class ControlMachine(ABC):
+    """
+    Bring one drive to the state that was asked for.
+
+    Without input or output: time is the argument ``now``, in seconds of a steady clock. After any
+    call, look at :attr:`word`, :meth:`take_completed`, :meth:`take_notes`, :meth:`next_timer`.
+    """
+
+    @property
+    @abstractmethod
+    def word(self) -> int:
+        """Control word to send now."""
+
+    @property
+    @abstractmethod
+    def word_due(self) -> bool:
+        """The current word has not left since it changed, or since :meth:`withdraw`."""
+
+    @property
+    @abstractmethod
+    def state(self) -> str:
+        """State of the drive in words, as far as it is known."""
+
+    @property
+    @abstractmethod
+    def fault(self) -> bool:
+        """The drive reports a fault, or did when it was last heard."""
+
+    @property
+    @abstractmethod
+    def pending(self) -> bool:
+        """A request, or a quick stop that is answered already, is under way."""
+
+    @abstractmethod
+    def request(self, action: ControlAction, now: float) -> ControlTicket:
+        """Ask for something; the outcome may be there when this returns."""
+
+    @abstractmethod
+    def word_sent(self, now: float) -> None:
+        """
+        Take note that the current word left.
+
+        Call it each time the word is sent, before the response can arrive; where a write is
+        acknowledged, at the acknowledgement. A word that meanwhile is not the current one any
+        more does not count.
+        """
+
+    @abstractmethod
+    def status_received(self, raw: int | None, now: float) -> None:
+        """
+        Take a status word.
+
+        :param raw: None when a response arrived that should hold a status word, but did not.
+        """
+
+    @abstractmethod
+    def handle_timer(self, now: float) -> None:
+        """End what is overdue. Calling it early or late does no harm."""
+
+    @abstractmethod
+    def next_timer(self) -> float:
+        """Return when :meth:`handle_timer` has something to do; ``math.inf`` if never."""
+
+    @abstractmethod
+    def withdraw(self, reason: str, now: float) -> None:
+        """
+        Go back to ``disable``: the drive went offline or restarted, or the bridge stops.
+
+        Open requests fail with the reason. The status is forgotten, and the word counts as not
+        sent: it is :attr:`word_due` again.
+        """
+
+    @abstractmethod
+    def take_completed(self) -> list[ControlCompleted]:
+        """Return the outcomes since the last call."""
+
+    @abstractmethod
+    def take_notes(self) -> list[str]:
+        """Return what the log should say of the drive since the last call."""
+
+
+@dataclass(slots=True)
+class _Operation:
+    """What is under way, and the tickets that wait for it."""
+
+    action: ControlAction
+    deadline: float
+    tickets: list[ControlTicket] = field(default_factory=list)
+
+
+class ProfileControl(ControlMachine):
+    """
+    The machine for a drive whose profile has a ``control`` section.
+
+    :param timeout: seconds until an unconfirmed request fails.
+    """
+
+    def __init__(self, table: ControlTable, *, timeout: float) -> None:
+        self._table = table
+        self._timeout = timeout
+        self._words = {
+            ControlAction.DISABLE: table.disable,
+            ControlAction.ENABLE: table.enable,
+        }
+        if table.quick_stop is not None:
+            self._words[ControlAction.QUICK_STOP] = table.quick_stop
+        if table.reset_fault is not None:
+            self._words[ControlAction.RESET_FAULT] = table.reset_fault
+        self._reports = any((table.ready, table.enabled, table.fault))
+        self._sending = ControlAction.DISABLE   # by name: two words may have the same bits
+        self._sent = False                      # the current word left at least once
+        self._raw: int | None = None            # the last status word
+        self._answer: int | None = None         # the last one since the current word left
+        self._fault: bool | None = None         # None: not known
+        self._reached = False                   # enabled was confirmed for this enable word
+        self._operation: _Operation | None = None
+        self._completed: list[ControlCompleted] = []
+        self._notes: list[str] = []
+
+    # -- what the session and diagnostics look at -----------------------------------------------
+
+    @property
+    def word(self) -> int:
+        return self._words[self._sending]
+
+    @property
+    def word_due(self) -> bool:
+        return not self._sent
+
+    @property
+    def state(self) -> str:
+        """
+        State of the drive in words.
+
+        ``fault``, ``enabled``, ``ready``, ``not ready``, ``disabled`` (where the profile has no
+        condition for ready), ``enable sent`` and the like (where the drive does not report), or
+        ``unknown``.
+        """
+        table = self._table
+        if self._reports and self._raw is None:
+            return 'unknown'
+        if self._says(table.fault):
+            return 'fault'
+        if self._says(table.enabled):
+            return 'enabled'
+        if table.ready is not None and (
+                table.enabled is not None or self._sending is ControlAction.DISABLE):
+            return 'ready' if self._says(table.ready) else 'not ready'
+        if table.enabled is not None:
+            return 'disabled'
+        return f'{self._sending.value} sent' if self._sent else 'unknown'
+
+    @property
+    def fault(self) -> bool:
+        return self._fault is True
+
+    @property
+    def pending(self) -> bool:
+        return self._operation is not None
+
+    def take_completed(self) -> list[ControlCompleted]:
+        completed, self._completed = self._completed, []
+        return completed
+
+    def take_notes(self) -> list[str]:
+        notes, self._notes = self._notes, []
+        return notes
+
+    # -- inputs ---------------------------------------------------------------------------------
+
+    def request(self, action: ControlAction, now: float) -> ControlTicket:
+        self.handle_timer(now)
+        ticket = ControlTicket(action)
+        refusal = self._refusal(action)
+        if refusal is not None:
+            self._complete(ticket, False, refusal)
+            return ticket
+        under_way = self._operation
+        if under_way is None or under_way.action is not action:
+            if action is ControlAction.RESET_FAULT and self._fault is False and (
+                    under_way is None or under_way.action in _STOPS):
+                self._complete(ticket, True, self.state)
+                return ticket
+            may_run = self._may_run
+            if under_way is not None:
+                self._end(False, f'replaced by {action.value}')
+            under_way = self._operation = _Operation(action, now + self._timeout)
+            if action is ControlAction.QUICK_STOP and may_run and not self._fault:
+                self._send(ControlAction.QUICK_STOP)
+            elif action is not ControlAction.ENABLE:    # of an enabled drive: nothing to do
+                self._send(ControlAction.DISABLE)
+        under_way.tickets.append(ticket)
+        self._advance()
+        return ticket
+
+    def word_sent(self, now: float) -> None:
+        self._sent = True           # before the timer, which may change the word
+        self.handle_timer(now)
+        self._advance()
+
+    def status_received(self, raw: int | None, now: float) -> None:
+        self.handle_timer(now)
+        self._raw = raw
+        if self._sent:
+            self._answer = raw
+        if raw is not None:
+            self._watch_fault(raw)
+            self._watch_enabled(raw)
+            self._advance()
+
+    def handle_timer(self, now: float) -> None:
+        if now >= self.next_timer():
+            self._end(False, self._overdue_text())
+
+    def next_timer(self) -> float:
+        return math.inf if self._operation is None else self._operation.deadline
+
+    def withdraw(self, reason: str, now: float) -> None:
+        self.handle_timer(now)
+        if self._reached:
+            self._notes.append(f'enable withdrawn: {reason}; only ~/enable starts the drive again')
+        self._end(False, reason)
+        self._sent = False
+        self._raw = self._answer = None
+        if not self._fault:         # a known fault stands until the drive says otherwise
+            self._fault = None
+
+    # -- rules ----------------------------------------------------------------------------------
+
+    def _refusal(self, action: ControlAction) -> str | None:
+        """Return why a request cannot be taken, in words."""
+        if action not in self._words:
+            if action is ControlAction.QUICK_STOP:
+                return ('no quick stop: the profile has no quick_stop word; '
+                        '~/enable false disables the drive')
+            return 'no fault reset: the profile has no reset_fault word'
+        if action is ControlAction.ENABLE and self._fault:
+            return 'fault: reset it first'
+        under_way = self._operation
+        if under_way is None or under_way.action not in _STOPS or action in _STOPS:
+            return None
+        if action is ControlAction.RESET_FAULT and self._fault is False:
+            return None
+        return f'{under_way.action.value} under way: try {action.value} again when it has ended'
+
+    def _advance(self) -> None:
+        """Take the next step of what is under way, if the drive confirms the last one."""
+        under_way = self._operation
+        if under_way is None:
+            return
+        table = self._table
+        if under_way.action is ControlAction.ENABLE:
+            if self._sending is ControlAction.DISABLE:
+                if (self._confirmed(table.fault, False) and self._confirmed(table.enabled, False)
+                        and self._confirmed(table.ready, True)):
+                    self._send(ControlAction.ENABLE)
+            elif self._confirmed(table.enabled, True):
+                self._reached = True
+                self._end(True, self._success_text(table.enabled, 'its state'))
+        elif under_way.action is ControlAction.RESET_FAULT:
+            if self._sending is ControlAction.DISABLE and self._confirmed(table.fault, True):
+                self._send(ControlAction.RESET_FAULT)
+            elif self._confirmed(table.fault, False):
+                self._end(True, self._success_text(table.fault, 'faults'))
+        elif self._confirmed(table.enabled, False):
+            message = self._success_text(table.enabled, 'its state')
+            if table.enabled is None and self._sending is ControlAction.QUICK_STOP:
+                self._answer_tickets(under_way, True, message)      # keeps braking
+            else:
+                self._end(True, message)
+
+    def _watch_fault(self, raw: int) -> None:
+        """Note a fault that comes or goes; it ends everything but stops and resets."""
+        if self._table.fault is None:
+            return
+        had_fault, self._fault = self._fault, self._table.fault.matches(raw)
+        if not self._fault:
+            if had_fault:
+                self._notes.append(f'fault gone ({self._status_text})')
+            return
+        if not had_fault:
+            again = '; only ~/enable starts the drive again' if self._reached else ''
+            self._notes.append(f'fault ({self._status_text}){again}')
+        under_way = self._operation
+        if under_way is not None and under_way.action is ControlAction.ENABLE:
+            self._end(False, f'fault while enabling ({self._status_text}): reset it first')
+        elif self._sending is not ControlAction.RESET_FAULT:
+            self._send(ControlAction.DISABLE)
+
+    def _watch_enabled(self, raw: int) -> None:
+        """Withdraw the enable word from a drive that dropped out by itself."""
+        enabled = self._table.enabled
+        if self._reached and enabled is not None and not enabled.matches(raw):
+            text = f'no longer enabled, by itself ({self._status_text})'
+            self._notes.append(f'{text}; only ~/enable starts the drive again')
+            self._end(False, text)
+
+    @property
+    def _may_run(self) -> bool:
+        """Whether a stop has anything to do, as far as is known."""
+        return (self._sending in (ControlAction.ENABLE, ControlAction.QUICK_STOP)
+                or not self._confirmed(self._table.enabled, False))
+
+    def _says(self, pattern: StatusPattern | None) -> bool:
+        """Tell whether the last status word fulfils a condition."""
+        return pattern is not None and self._raw is not None and pattern.matches(self._raw)
+
+    def _confirmed(self, pattern: StatusPattern | None, wanted: bool) -> bool:
+        """Tell whether the drive, knowing the current word, reports a condition (or cannot)."""
+        if pattern is None:
+            return self._sent
+        return self._answer is not None and pattern.matches(self._answer) is wanted
+
+    # -- effects --------------------------------------------------------------------------------
+
+    def _send(self, action: ControlAction) -> None:
+        """Make the word of this name the current one."""
+        if self._words[action] != self.word:
+            self._sent = False
+            self._answer = None
+        self._sending = action
+        self._reached = self._reached and action is ControlAction.ENABLE
+
+    def _end(self, success: bool, message: str) -> None:
+        """Answer what is under way, if anything; only a successful ENABLE keeps its word."""
+        under_way, self._operation = self._operation, None
+        if under_way is not None:
+            self._answer_tickets(under_way, success, message)
+            if success and under_way.action is ControlAction.ENABLE:
+                return
+        self._send(ControlAction.DISABLE)
+
+    def _answer_tickets(self, operation: _Operation, success: bool, message: str) -> None:
+        for ticket in operation.tickets:
+            self._complete(ticket, success, message)
+        operation.tickets.clear()
+
+    def _complete(self, ticket: ControlTicket, success: bool, message: str) -> None:
+        self._completed.append(ControlCompleted(ticket, success, message))
+
+    # -- words ----------------------------------------------------------------------------------
+
+    @property
+    def _status_text(self) -> str:
+        return 'no status word' if self._raw is None else f'status word {self._raw:04X}h'
+
+    def _success_text(self, pattern: StatusPattern | None, what: str) -> str:
+        """Name the state reached, or say that nobody knows."""
+        if pattern is None:
+            return f'{self._sending.value} sent; the drive does not report {what}'
+        return self.state
+
+    def _overdue_text(self) -> str:
+        """Say where the drive is stuck."""
+        if self._sending is ControlAction.RESET_FAULT and self._answer is not None:
+            return f'fault still present after {self._timeout:g} s ({self._status_text})'
+        text = (f'no confirmation in {self._timeout:g} s: '
+                f'stuck in state {self.state} ({self._status_text})')
+        if not self._sent:
+            return f'{text}; control word {self.word:04X}h could not be sent'
+        if self._answer is None:
+            return f'{text}; no status word since control word {self.word:04X}h'
+        if self._says(self._table.enabled):
+            return f'{text}; it does not follow control word {self.word:04X}h'
+        return text

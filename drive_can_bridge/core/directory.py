@@ -1,0 +1,101 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+Find a drive's parameters by name, and turn users' values into raw integers.
+
+A raw name (``p30``) of a parameter that the profile lists obeys the listed one's rules: access,
+storage, limits. Only its value is raw: the unsigned integer on the wire.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+import difflib
+
+from drive_can_bridge.core.errors import ValueRefused
+from drive_can_bridge.core.parameters import Access, Parameter, Storage, ValueKind
+
+
+# Strictest first: where several listed parameters have one address, a raw name obeys them all.
+_ACCESS = (Access.READ_ONLY, Access.WRITE_ONLY, Access.READ_WRITE)
+_STORAGE = (Storage.EEPROM, None, Storage.RAM)
+
+
+class ParameterDirectory:
+    """
+    All parameters of one drive.
+
+    :param listed: the profile's table.
+    :param raw_parameter: the family's way to resolve a raw name; None for other names.
+    """
+
+    def __init__(self, listed: dict[str, Parameter],
+                 raw_parameter: Callable[[str], Parameter | None]) -> None:
+        self.listed = listed
+        self._raw_parameter = raw_parameter
+
+    def find(self, name: str) -> Parameter | None:
+        """Return a parameter by profile name or raw name; None if there is no such thing."""
+        if name in self.listed:
+            return self.listed[name]
+        raw = self._raw_parameter(name)
+        if raw is None:
+            return None
+        twins = self.twins(raw)
+        if twins:
+            access = {twin.access for twin in twins}
+            storage = {twin.storage for twin in twins}
+            raw = replace(raw, access=next(entry for entry in _ACCESS if entry in access),
+                          storage=next(entry for entry in _STORAGE if entry in storage))
+        return raw
+
+    def twins(self, parameter: Parameter) -> list[Parameter]:
+        """Return the listed parameters whose rules apply: itself, or those of its address."""
+        if parameter.listed:
+            return [parameter]
+        return [other for other in self.listed.values()
+                if (other.number, other.subindex, other.index)
+                == (parameter.number, parameter.subindex, parameter.index)]
+
+    def unknown(self, name: str) -> str:
+        """Say that a name is unknown, with the nearest known one."""
+        near = difflib.get_close_matches(name, self.listed, n=1)
+        return f'unknown parameter {name}' + (f', did you mean {near[0]}?' if near else '')
+
+    def raw_from_user(self, parameter: Parameter, value: object) -> int:
+        """
+        Return the raw integer for a value that a user wants to set.
+
+        :raises ValueRefused: read-only, wrong type, out of range or not representable, in words.
+        """
+        if not parameter.writable:
+            raise ValueRefused('read-only')
+        kind = parameter.kind
+        if kind is ValueKind.BOOL:
+            right = isinstance(value, bool)
+        elif kind is ValueKind.DOUBLE:
+            right = isinstance(value, (int, float)) and not isinstance(value, bool)
+        else:
+            right = isinstance(value, int) and not isinstance(value, bool)
+        if not right:
+            raise ValueRefused(f'wrong type: {_type_name(value)}, expected {kind.value}')
+        if parameter.listed:
+            return parameter.raw_from_value(value)  # type: ignore[arg-type]
+        return self._raw_from_integer(parameter, value)  # type: ignore[arg-type]
+
+    def _raw_from_integer(self, parameter: Parameter, value: int) -> int:
+        high = parameter.type.raw_range[1]
+        if not -(high + 1) // 2 <= value <= high:
+            raise ValueRefused(f'{value} is not representable in {parameter.type.bits} bits: '
+                               f'{-(high + 1) // 2} to {high}')
+        word = parameter.word_from_raw(value)
+        for twin in self.twins(parameter):
+            twin.check_limits(twin.value_from_raw(twin.raw_from_word(word)))
+        return word
+
+
+def _type_name(value: object) -> str:
+    if value is None:
+        return 'not set'
+    if isinstance(value, (list, tuple)) or hasattr(value, 'typecode'):
+        return 'array'
+    return {bool: 'bool', int: 'integer', float: 'double', str: 'string'}.get(
+        type(value), type(value).__name__)

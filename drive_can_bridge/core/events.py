@@ -1,0 +1,88 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""What a session tells the outside. Times are ``now`` of the call that caused the event."""
+
+from dataclasses import dataclass
+from typing import NamedTuple, Union
+
+from drive_can_bridge.core.requests import Outcome, Request
+
+
+class ProcessDataReceived(NamedTuple):
+    """
+    One sample of the mapped response parameters.
+
+    A named tuple: it is made once per exchange.
+
+    :param raws: raw integers in the order of ``cyclic_response``; fewer than configured when the
+        response was too short.
+    :param received_at: receive time of the frame (steady clock, s).
+    """
+
+    raws: tuple[int, ...]
+    received_at: float
+
+
+@dataclass(frozen=True)
+class StationFound:
+    """The drive exchanges process data: it is online."""
+
+
+@dataclass(frozen=True)
+class StationLost:
+    """The drive is offline; ``reason`` says in words what was missing."""
+
+    reason: str
+
+
+@dataclass(frozen=True)
+class MappingDiffered:
+    """The drive's maps are not the configured ones: no cyclic frame is sent."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class MappingWritten:
+    """The drive's maps were rewritten (``mapping: configure``)."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class SetpointsExpired:
+    """No fresh command: these setpoints went neutral and want re-arming."""
+
+    names: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class RequestCompleted:
+    """A request ended; one outcome per parameter, in the order asked."""
+
+    request: Request
+    outcomes: tuple[Outcome, ...]
+
+
+@dataclass(frozen=True)
+class FrameRejected:
+    """A frame on the drive's own response identifiers was malformed or unasked."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class ForeignMasterSeen:
+    """Somebody else sends requests to this drive."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class Noted:
+    """Anything else that belongs into the log."""
+
+    text: str
+
+
+Event = Union[ProcessDataReceived, StationFound, StationLost, MappingDiffered, MappingWritten,
+              SetpointsExpired, RequestCompleted, FrameRejected, ForeignMasterSeen, Noted]

@@ -1,0 +1,47 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""The classical CAN data frame, as the protocols see it."""
+
+from typing import NamedTuple
+
+STANDARD_IDENTIFIER_MAX = 0x7FF
+EXTENDED_IDENTIFIER_MAX = 0x1FFFFFFF
+
+
+class Frame(NamedTuple):
+    """
+    A classical CAN data frame with 0 to 8 bytes.
+
+    A named tuple, because one is made for every frame on the bus and tuples are the cheapest
+    immutable record that Python has. Remote, error and CAN FD frames never become a ``Frame``:
+    the transport sorts them out.
+
+    :param identifier: 11-bit identifier, or 29-bit when ``extended``.
+    :param data: payload, BYTE0 first.
+    :param extended: the frame format. 29-bit 000003F1h is *not* 11-bit 3F1h.
+    """
+
+    identifier: int
+    data: bytes
+    extended: bool
+
+    def __str__(self) -> str:
+        """Write the frame the way candump does: ``003FFFF0#05DC000000000000``."""
+        width = 8 if self.extended else 3
+        return f'{self.identifier:0{width}X}#{self.data.hex().upper()}'
+
+
+class Route(NamedTuple):
+    """
+    A set of identifiers: those whose masked bits equal ``identifier``'s, in one frame format.
+
+    Serves as acceptance filter of the bus and as routing entry to the session of a drive.
+    """
+
+    identifier: int
+    mask: int
+    extended: bool
+
+    def matches(self, frame: Frame) -> bool:
+        """Tell whether this route takes the frame."""
+        return (frame.extended == self.extended
+                and frame.identifier & self.mask == self.identifier & self.mask)

@@ -1,0 +1,235 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+A parameter of a drive, and the way between its raw integer and its physical value.
+
+``word``
+    what stands on the wire: an unsigned integer of the type's width.
+``raw``
+    the same bits read by the parameter's type: ``FA24h`` of an int16 is -1500.
+``value``
+    what users see. ``raw * scale + offset`` as float where the parameter has a scale, an offset or
+    a unit; a bool for ``type: bool``; the raw integer otherwise.
+"""
+
+from dataclasses import dataclass
+from enum import Enum
+import math
+from typing import Union
+
+from drive_can_bridge.core.errors import ValueRefused
+
+Value = Union[float, int, bool]
+
+# Physical limits are compared with this much tolerance, relative to one raw step, so that
+# 30000 * 0.1 = 3000.0000000000005 does not fall out of "maximum: 3000".
+_STEP_TOLERANCE = 1e-6
+
+
+class ParameterType(Enum):
+    """Width and sign of a parameter on the wire."""
+
+    BOOL = 'bool'
+    INT16 = 'int16'
+    UINT16 = 'uint16'
+    INT32 = 'int32'
+    UINT32 = 'uint32'
+
+    @property
+    def bits(self) -> int:
+        """Width on the wire, in bits."""
+        return 32 if self in (ParameterType.INT32, ParameterType.UINT32) else 16
+
+    @property
+    def signed(self) -> bool:
+        """Two's complement, or not."""
+        return self in (ParameterType.INT16, ParameterType.INT32)
+
+    @property
+    def raw_range(self) -> tuple[int, int]:
+        """Smallest and largest raw integer."""
+        if self is ParameterType.BOOL:
+            return 0, 1
+        if self.signed:
+            return -(1 << self.bits - 1), (1 << self.bits - 1) - 1
+        return 0, (1 << self.bits) - 1
+
+
+class ValueKind(Enum):
+    """The one rule for types everywhere: topics, commands, services."""
+
+    DOUBLE = 'double'
+    INTEGER = 'integer'
+    BOOL = 'bool'
+
+
+class Access(Enum):
+    """What a user may do with a parameter."""
+
+    READ_ONLY = 'ro'
+    READ_WRITE = 'rw'
+    WRITE_ONLY = 'wo'
+
+
+class Storage(Enum):
+    """Where the drive keeps a written value."""
+
+    RAM = 'ram'
+    EEPROM = 'eeprom'
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """
+    One row of a drive's parameter table.
+
+    :param name: profile name, or the raw name (``p30``, ``p465``, ``x2004.10``) it was asked by.
+    :param number: parameter number (PNU, register); None where only process data carry it.
+    :param scale: physical units per raw step; not zero.
+    :param offset: physical value of raw 0.
+    :param unit: unit of the physical value, as written in the profile.
+    :param storage: None means the profile does not say.
+    :param minimum: smallest allowed physical value.
+    :param maximum: largest allowed physical value.
+    :param neutral: value sent while there is no fresh command; None means what encodes to raw 0.
+    :param bits: named bits, (name, bit number).
+    :param subindex: array index (CANnord) or CANopen sub-index.
+    :param index: CANopen index.
+    :param listed: stands in the profile; False for a parameter addressed by its raw name.
+    :param word_order: 32-bit values: ``high_first`` or ``low_first``; None: as the drive says.
+    """
+
+    name: str
+    type: ParameterType = ParameterType.UINT16
+    number: int | None = None
+    scale: float = 1.0
+    offset: float = 0.0
+    unit: str = ''
+    access: Access = Access.READ_WRITE
+    storage: Storage | None = None
+    minimum: float | None = None
+    maximum: float | None = None
+    neutral: float | None = None
+    description: str = ''
+    bits: tuple[tuple[str, int], ...] = ()
+    subindex: int | None = None
+    index: int | None = None
+    word_order: str | None = None
+    scaled: bool = False
+    listed: bool = True
+
+    @property
+    def kind(self) -> ValueKind:
+        """Double, integer or bool (one rule, everywhere)."""
+        if self.scaled:
+            return ValueKind.DOUBLE
+        if self.type is ParameterType.BOOL:
+            return ValueKind.BOOL
+        return ValueKind.INTEGER
+
+    @property
+    def readable(self) -> bool:
+        """Can be read by a service."""
+        return self.access is not Access.WRITE_ONLY
+
+    @property
+    def writable(self) -> bool:
+        """Can be written by a service or command."""
+        return self.access is not Access.READ_ONLY
+
+    @property
+    def address(self) -> str:
+        """Name the parameter as the drive's manual does: ``P30``, ``P613.5``, ``2004h.06h``."""
+        if self.number is not None:
+            suffix = '' if self.subindex is None else f'.{self.subindex}'
+            return f'P{self.number}{suffix}'
+        if self.index is not None:
+            return f'{self.index:04X}h.{self.subindex or 0:02X}h'
+        return 'process data'
+
+    @property
+    def neutral_raw(self) -> int:
+        """Raw integer that is sent while there is no fresh command."""
+        return 0 if self.neutral is None else self.raw_from_value(self.neutral)
+
+    # -- raw <-> word ---------------------------------------------------------------------------
+
+    def raw_from_word(self, word: int) -> int:
+        """Read an unsigned wire word by this parameter's type."""
+        if self.type.signed and word >> self.type.bits - 1:
+            return word - (1 << self.type.bits)
+        return word
+
+    def word_from_raw(self, raw: int) -> int:
+        """Return the unsigned wire word of a raw integer."""
+        return raw & (1 << self.type.bits) - 1
+
+    # -- raw <-> value --------------------------------------------------------------------------
+
+    def value_from_raw(self, raw: int) -> Value:
+        """Return the physical value of a raw integer."""
+        if self.scaled:
+            return raw * self.scale + self.offset
+        if self.type is ParameterType.BOOL:
+            return raw != 0
+        return raw
+
+    def raw_from_value(self, value: Value) -> int:
+        """
+        Return the raw integer nearest to a physical value.
+
+        :raises ValueRefused: not finite, wrong type, outside ``minimum..maximum``, or outside
+            what the type can represent. Nothing is ever clamped.
+        """
+        if self.type is ParameterType.BOOL:
+            if value is True or value is False:
+                return int(value)
+            raise ValueRefused(f'{value!r} is not a bool')
+        if isinstance(value, bool):
+            raise ValueRefused(f'{value!r} is a bool, not a number')
+        if isinstance(value, float) and not math.isfinite(value):
+            raise ValueRefused(f'{value} is not a finite number')
+        self.check_limits(value)
+        if not self.scaled:
+            if isinstance(value, float) and not value.is_integer():
+                raise ValueRefused(f'{value:g} is not an integer')
+            raw = int(value)
+        else:
+            steps = (value - self.offset) / self.scale
+            # beyond any integer type, and beyond what floor() can turn into an integer
+            raw = math.floor(steps + 0.5) if abs(steps) < 1e18 else int(math.copysign(1e18, steps))
+        low, high = self.type.raw_range
+        if not low <= raw <= high:
+            ends = sorted((low * self.scale + self.offset, high * self.scale + self.offset))
+            raise ValueRefused(
+                f'{value:g} is not representable: {self.type.value} carries '
+                f'{ends[0]:g} to {ends[1]:g}{self._unit_suffix}')
+        return raw
+
+    def check_limits(self, value: float) -> None:
+        """
+        Compare a physical value with the profile's limits.
+
+        :raises ValueRefused: with the range in words.
+        """
+        slack = abs(self.scale) * _STEP_TOLERANCE
+        below = self.minimum is not None and value < self.minimum - slack
+        above = self.maximum is not None and value > self.maximum + slack
+        if below or above:
+            raise ValueRefused(f'{value:g} is out of range: {self.range_text}')
+
+    @property
+    def range_text(self) -> str:
+        """Allowed physical range in words, ``-3000 to 3000 rpm``."""
+        if self.minimum is None and self.maximum is None:
+            low, high = self.type.raw_range
+            ends = sorted((low * self.scale + self.offset, high * self.scale + self.offset))
+            return f'{ends[0]:g} to {ends[1]:g}{self._unit_suffix}'
+        if self.minimum is None:
+            return f'at most {self.maximum:g}{self._unit_suffix}'
+        if self.maximum is None:
+            return f'at least {self.minimum:g}{self._unit_suffix}'
+        return f'{self.minimum:g} to {self.maximum:g}{self._unit_suffix}'
+
+    @property
+    def _unit_suffix(self) -> str:
+        return f' {self.unit}' if self.unit else ''

@@ -1,0 +1,61 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""The parameter table of a drive type, and how its control and status words are used."""
+
+from dataclasses import dataclass, field
+
+from drive_can_bridge.core.parameters import Parameter
+
+
+@dataclass(frozen=True)
+class StatusPattern:
+    """A condition on the status word: ``raw & mask == value``."""
+
+    mask: int
+    value: int
+
+    def matches(self, raw: int) -> bool:
+        """Tell whether a status word fulfils the condition."""
+        return raw & self.mask == self.value
+
+
+@dataclass(frozen=True)
+class ControlTable:
+    """
+    The ``control`` section of a profile.
+
+    :param parameter: name of the parameter that carries the control word.
+    :param disable: control word that keeps the drive without torque; sent from the start.
+    :param enable: control word that lets it run.
+    :param quick_stop: None where the drive has none.
+    :param reset_fault: None where the drive has none.
+    :param status_parameter: name of the parameter that carries the status word, or None.
+    """
+
+    parameter: str
+    disable: int
+    enable: int
+    quick_stop: int | None = None
+    reset_fault: int | None = None
+    status_parameter: str | None = None
+    ready: StatusPattern | None = None
+    enabled: StatusPattern | None = None
+    fault: StatusPattern | None = None
+
+
+@dataclass(frozen=True)
+class Profile:
+    """
+    What is known of a drive type.
+
+    :param name: file name without ``.yaml``.
+    :param path: where it was read from.
+    :param protocols: the families the drive type speaks.
+    :param parameters: the table, in the order of the file, by name.
+    """
+
+    name: str
+    path: str
+    description: str
+    protocols: tuple[str, ...]
+    parameters: dict[str, Parameter] = field(default_factory=dict)
+    control: ControlTable | None = None

@@ -1,0 +1,254 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+A session: the conversation with one drive, as a state machine without input or output.
+
+Whoever drives it (see :mod:`drive_can_bridge.exchange`) hands in frames, requests and the time,
+and collects frames to send and events:
+
+.. code-block:: python
+
+    session.receive_frame(frame, now)
+    session.handle_timer(now)          # when next_timer() says so
+    for frame in session.take_frames(): ...
+    for event in session.take_events(): ...
+
+A session never blocks, never raises on anything a drive sends, and sends nothing before
+``activate``, after ``deactivate`` has run its course, or while the bus is down.
+"""
+
+from abc import ABC, abstractmethod
+from dataclasses import replace
+from enum import Enum
+
+from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.control import (
+    ControlAction, ControlCompleted, ControlMachine, ControlTicket,
+)
+from drive_can_bridge.core.events import Event, RequestCompleted
+from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.parameters import Parameter, Value
+from drive_can_bridge.core.requests import (
+    BRIDGE_INACTIVE, BUS_DOWN, BUSY, Failure, Outcome, Request, Written,
+)
+from drive_can_bridge.core.setpoints import CommandOutcome, Setpoints
+from drive_can_bridge.core.statistics import DriveStatistics
+
+#: requests of one drive that may wait behind the one being served
+WAITING_REQUESTS_MAX = 64
+#: cyclic frames with neutral setpoints that are sent before a drive is left alone
+STOP_CYCLES = 3
+
+
+class DriveState(Enum):
+    """The state of a drive in one word, as diagnostics shows it."""
+
+    OFFLINE = 'offline'
+    MAPPING_DIFFERS = 'mapping differs'
+    NOT_ARMED = 'not armed'
+    ONLINE = 'online'
+    FAULT = 'fault'
+
+
+class Session(ABC):
+    """
+    What all families share: setpoints, statistics, the outboxes, the life cycle.
+
+    :ivar drive: the configuration.
+    :ivar setpoints: every ``cyclic_request`` parameter but the control word, in slot order.
+    :ivar control: the control and status word machine, or None.
+    :ivar online: the drive exchanges process data.
+    :ivar ever_online: it did so at least once since activation.
+    """
+
+    def __init__(self, drive: DriveConfiguration, control: ControlMachine | None) -> None:
+        self.drive = drive
+        self.control = control
+        control_table = drive.profile.control
+        self._control_name = control_table.parameter if control_table and control else ''
+        self.setpoints = Setpoints(
+            tuple(parameter for parameter in drive.cyclic_request
+                  if parameter.name != self._control_name),
+            timeout=drive.command_timeout, rearm_immediate=drive.rearm_immediate)
+        self.statistics = DriveStatistics()
+        self.online = False
+        self.ever_online = False
+        self.active = False
+        self.bus_available = False
+        self._frames: list[Frame] = []
+        self._events: list[Event] = []
+        self._cyclic_names = {parameter.name for parameter in drive.cyclic_request}
+
+    # -- life cycle -----------------------------------------------------------------------------
+
+    @abstractmethod
+    def activate(self, now: float) -> None:
+        """Begin to exchange (as soon as the bus is there)."""
+
+    @abstractmethod
+    def deactivate(self, now: float) -> None:
+        """Begin the safe stop: neutral setpoints, ``disable``; then silence."""
+
+    @property
+    @abstractmethod
+    def stopped(self) -> bool:
+        """Nothing more will be sent until the next ``activate``."""
+
+    @abstractmethod
+    def bus_up(self, now: float) -> None:
+        """The bus was opened."""
+
+    @abstractmethod
+    def bus_down(self, now: float, reason: str) -> None:
+        """Handle the loss of the bus: requests fail, the drive is offline."""
+
+    @abstractmethod
+    def time_lost(self, now: float) -> None:
+        """Handle a process that stood still: nothing stale goes out, setpoints want re-arming."""
+
+    # -- traffic --------------------------------------------------------------------------------
+
+    @abstractmethod
+    def receive_frame(self, frame: Frame, now: float) -> None:
+        """Take a frame that one of the drive's routes matched."""
+
+    @abstractmethod
+    def handle_timer(self, now: float) -> None:
+        """Do what is due. Safe to call at any time."""
+
+    @abstractmethod
+    def next_timer(self) -> float:
+        """Return when ``handle_timer`` wants to be called next; infinity: never."""
+
+    def take_frames(self) -> list[Frame]:
+        """Return the frames to be sent now, in order."""
+        frames = self._frames
+        if frames:
+            self._frames = []
+        return frames
+
+    def take_events(self) -> list[Event]:
+        """Return what happened since the last call."""
+        events = self._events
+        if events:
+            self._events = []
+        return events
+
+    # -- users ----------------------------------------------------------------------------------
+
+    def command(self, index: int, value: Value, now: float) -> CommandOutcome:
+        """
+        Take a setpoint command (index into ``setpoints.items``).
+
+        :raises ValueRefused: the value cannot be sent; counted, nothing else changes.
+        """
+        try:
+            return self.setpoints.command(index, value, now)
+        except ValueError:
+            self.statistics.commands_refused += 1
+            raise
+
+    def submit(self, request: Request, now: float) -> None:
+        """Take a parameter request. It is answered by exactly one ``RequestCompleted``."""
+        refusal = self._refusal()
+        if refusal:
+            self._complete(request, (Failure(refusal),) * len(request))
+        elif not len(request):
+            self._complete(request, ())
+        else:
+            self._enqueue(request, now)
+
+    def _refusal(self) -> str:
+        if not self.active:
+            return BRIDGE_INACTIVE
+        if not self.bus_available:
+            return BUS_DOWN
+        if self._waiting_requests() >= WAITING_REQUESTS_MAX:
+            return BUSY
+        return ''
+
+    def write_refusal(self, parameter: Parameter) -> str:
+        """Say why users may not write this parameter now; '' if they may."""
+        if self._control_name and parameter.name == self._control_name:
+            return 'use ~/enable'
+        if parameter.name in self._cyclic_names:
+            return f'sent cyclically: publish ~/command/{parameter.name}'
+        return ''
+
+    @abstractmethod
+    def _enqueue(self, request: Request, now: float) -> None:
+        """Queue a request that may be served."""
+
+    @abstractmethod
+    def _waiting_requests(self) -> int:
+        """Return how many user requests wait behind the one being served."""
+
+    def _complete(self, request: Request, outcomes: tuple[Outcome, ...]) -> None:
+        for outcome in outcomes:
+            if isinstance(outcome, Failure):
+                self.statistics.requests_failed += 1
+            else:
+                self.statistics.requests_ok += 1
+        self._events.append(RequestCompleted(request, outcomes))
+
+    def reconfigure(self, *, command_timeout: float | None = None,
+                    rearm_immediate: bool | None = None,
+                    parameter_timeout: float | None = None) -> None:
+        """Change what may change while running; None leaves a value alone."""
+        if command_timeout is not None:
+            self.drive = replace(self.drive, command_timeout=command_timeout)
+            self.setpoints.timeout = command_timeout
+        if rearm_immediate is not None:
+            self.drive = replace(self.drive, rearm_immediate=rearm_immediate)
+            self.setpoints.rearm_immediate = rearm_immediate
+        if parameter_timeout is not None:
+            self.drive = replace(self.drive, parameter_timeout=parameter_timeout)
+
+    # -- control --------------------------------------------------------------------------------
+
+    def request_control(self, action: ControlAction, now: float) -> ControlTicket | str:
+        """
+        Ask for a control action.
+
+        :return: a ticket whose outcome comes from ``take_control_outcomes``; or why not.
+        """
+        if self.control is None:
+            return 'the profile has no control section'
+        if not self.active:
+            return BRIDGE_INACTIVE
+        if not self.bus_available:
+            return BUS_DOWN
+        if not self.online:
+            return 'drive offline'
+        ticket = self.control.request(action, now)
+        self._control_changed(now)
+        return ticket
+
+    def take_control_outcomes(self) -> list[ControlCompleted]:
+        """Return the control requests that ended since the last call."""
+        return self.control.take_completed() if self.control is not None else []
+
+    def _control_changed(self, now: float) -> None:  # noqa: B027  optional hook
+        """React to a control word that may have changed."""
+
+    # -- state ----------------------------------------------------------------------------------
+
+    @property
+    def state(self) -> DriveState:
+        """The state in one word."""
+        if not self.online:
+            return DriveState.OFFLINE
+        if self.control is not None and self.control.fault:
+            return DriveState.FAULT
+        if self.setpoints.waiting:
+            return DriveState.NOT_ARMED
+        return DriveState.ONLINE
+
+    @property
+    @abstractmethod
+    def offline_advice(self) -> str:
+        """While not online: what is missing and what to look at; '' while online."""
+
+
+def successes(count: int, note: str = '') -> tuple[Written, ...]:
+    """Return ``count`` successful write outcomes."""
+    return (Written(note),) * count

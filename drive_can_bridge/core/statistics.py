@@ -1,0 +1,75 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Statistics that cost an exchange next to nothing: one store, two additions."""
+
+from array import array
+from dataclasses import dataclass, field
+import math
+
+WINDOW = 1024
+
+
+class Statistic:
+    """
+    Mean and maximum since the start, 99th percentile over the last 1,024 samples.
+
+    Sorting happens only when somebody asks, about once a second.
+    """
+
+    __slots__ = ('_window', 'count', 'maximum', 'total')
+
+    def __init__(self) -> None:
+        self._window = array('d', bytes(8 * WINDOW))
+        self.count = 0
+        self.total = 0.0
+        self.maximum = math.nan
+
+    def add(self, sample: float) -> None:
+        """Take one sample."""
+        self._window[self.count % WINDOW] = sample
+        self.count += 1
+        self.total += sample
+        if not sample <= self.maximum:
+            self.maximum = sample
+
+    @property
+    def mean(self) -> float:
+        """Mean of all samples; NaN without any."""
+        return self.total / self.count if self.count else math.nan
+
+    @property
+    def p99(self) -> float:
+        """Return the 99th percentile of the window; NaN without samples."""
+        if not self.count:
+            return math.nan
+        samples = sorted(self._window[:min(self.count, WINDOW)])
+        return samples[min(len(samples) - 1, math.ceil(0.99 * len(samples)) - 1)]
+
+    def samples(self) -> list[float]:
+        """Return the samples of the window, in no particular order (for benches)."""
+        return list(self._window[:min(self.count, WINDOW)])
+
+
+@dataclass
+class DriveStatistics:
+    """
+    What a session counts. Times in s.
+
+    :ivar exchanges: complete request/response exchanges.
+    :ivar missed: responses that did not come in time.
+    :ivar rejected: frames on the drive's own response identifiers that are malformed or unasked.
+    :ivar short: responses with fewer than 8 bytes that still held what was needed.
+    :ivar commands_refused: setpoint commands with a value that cannot be sent.
+    :ivar latency: from request to response.
+    :ivar period_error: absolute difference between the real and the configured period.
+    """
+
+    exchanges: int = 0
+    missed: int = 0
+    rejected: int = 0
+    short: int = 0
+    commands_refused: int = 0
+    requests_ok: int = 0
+    requests_failed: int = 0
+    last_request_error: str = ''
+    latency: Statistic = field(default_factory=Statistic)
+    period_error: Statistic = field(default_factory=Statistic)

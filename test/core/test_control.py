@@ -1,0 +1,1083 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Conversations with the machine behind ``~/enable``, ``~/reset_fault`` and ``~/quick_stop``."""
+
+from collections.abc import Callable
+from dataclasses import FrozenInstanceError, replace
+import math
+
+from hypothesis import settings, strategies as st
+from hypothesis.stateful import initialize, invariant, rule, RuleBasedStateMachine
+import pytest
+
+from drive_can_bridge.core.control import (
+    ControlAction, ControlMachine, ControlTicket, ProfileControl)
+from drive_can_bridge.core.profile import ControlTable, StatusPattern
+
+ENABLE = ControlAction.ENABLE
+DISABLE = ControlAction.DISABLE
+QUICK_STOP = ControlAction.QUICK_STOP
+RESET_FAULT = ControlAction.RESET_FAULT
+
+# Control words and status words of the example profile.
+OFF, RUN, STOP, RESET = 0x0000, 0x0001, 0x0002, 0x0080
+NOT_READY, READY, ENABLED, FAULT = 0x0000, 0x0001, 0x0003, 0x0008
+
+FULL = ControlTable(
+    parameter='control_word', disable=OFF, enable=RUN, quick_stop=STOP, reset_fault=RESET,
+    status_parameter='status_word', ready=StatusPattern(0x0001, 0x0001),
+    enabled=StatusPattern(0x0002, 0x0002), fault=StatusPattern(0x0008, 0x0008))
+NO_READY = replace(FULL, ready=None)
+NO_FAULT = replace(FULL, fault=None)
+ONLY_READY = replace(FULL, enabled=None, fault=None)
+ONLY_FAULT = replace(FULL, ready=None, enabled=None)
+SILENT = replace(FULL, status_parameter=None, ready=None, enabled=None, fault=None)
+BARE = ControlTable(parameter='control_word', disable=OFF, enable=RUN)
+
+
+def machine(table: ControlTable = FULL) -> ProfileControl:
+    return ProfileControl(table, timeout=2.0)
+
+
+def cycle(control: ProfileControl, raw: int | None, now: float) -> int:
+    """Send the current word, then receive a status; return the word that was sent."""
+    word = control.word
+    control.word_sent(now)
+    control.status_received(raw, now + 0.005)
+    return word
+
+
+def outcomes(control: ProfileControl) -> list[tuple[ControlAction, bool, str]]:
+    return [(done.ticket.action, done.success, done.message)
+            for done in control.take_completed()]
+
+
+def enabled(table: ControlTable = FULL) -> ProfileControl:
+    """Return a machine whose drive was enabled at 0.06 s."""
+    control = machine(table)
+    cycle(control, READY, 0.0)
+    control.request(ENABLE, 0.01)
+    cycle(control, READY, 0.02)
+    cycle(control, READY, 0.04)
+    cycle(control, ENABLED, 0.06)
+    assert control.word == RUN
+    assert [success for _, success, _ in outcomes(control)] == [True]
+    control.take_notes()
+    return control
+
+
+def faulted(table: ControlTable = FULL) -> ProfileControl:
+    """Return a machine whose drive reported a fault at 0 s."""
+    control = machine(table)
+    cycle(control, FAULT, 0.0)
+    control.take_notes()
+    return control
+
+
+# -- the start ----------------------------------------------------------------------------------
+
+def test_starts_with_disable_and_knows_nothing() -> None:
+    control = machine()
+    assert isinstance(control, ControlMachine)
+    assert (control.word, control.word_due) == (OFF, True)
+    assert (control.state, control.fault, control.pending) == ('unknown', False, False)
+    assert control.next_timer() == math.inf
+    assert control.take_completed() == []
+    assert control.take_notes() == []
+
+
+def test_interface_is_abstract() -> None:
+    with pytest.raises(TypeError):
+        ControlMachine()  # type: ignore[abstract]
+
+
+def test_no_status_and_no_time_starts_a_drive() -> None:
+    control = machine()
+    for step, raw in enumerate((READY, ENABLED, FAULT, READY, None, ENABLED)):
+        assert cycle(control, raw, step * 10.0) == OFF
+        control.handle_timer(step * 10.0 + 5.0)
+    assert control.word == OFF
+
+
+def test_ticket_is_opaque_and_equal_only_to_itself() -> None:
+    ticket, other = ControlTicket(ENABLE), ControlTicket(ENABLE)
+    assert ticket != other
+    assert len({ticket, other}) == 2
+    with pytest.raises(FrozenInstanceError):
+        ticket.action = DISABLE  # type: ignore[misc]
+
+
+@pytest.mark.parametrize(('table', 'raw', 'state'), [
+    (FULL, NOT_READY, 'not ready'),
+    (FULL, READY, 'ready'),
+    (FULL, ENABLED, 'enabled'),
+    (FULL, FAULT, 'fault'),
+    (FULL, FAULT | ENABLED, 'fault'),
+    (FULL, None, 'unknown'),
+    (NO_READY, READY, 'disabled'),
+    (NO_READY, ENABLED, 'enabled'),
+    (NO_FAULT, FAULT, 'not ready'),
+    (ONLY_READY, NOT_READY, 'not ready'),
+    (ONLY_READY, READY, 'ready'),
+    (ONLY_FAULT, FAULT, 'fault'),
+    (ONLY_FAULT, READY, 'disable sent'),
+    (ONLY_FAULT, None, 'unknown'),
+    (SILENT, None, 'disable sent'),
+])
+def test_state_in_words(table: ControlTable, raw: int | None, state: str) -> None:
+    control = machine(table)
+    assert control.state == 'unknown'
+    cycle(control, raw, 0.0)
+    assert control.state == state
+    assert control.fault == (state == 'fault')
+
+
+# -- enable -------------------------------------------------------------------------------------
+
+def test_enable_waits_for_ready_then_for_enabled() -> None:
+    control = machine()
+    cycle(control, NOT_READY, 0.0)
+    ticket = control.request(ENABLE, 0.01)
+    assert control.pending
+    assert control.next_timer() == 2.01
+    assert cycle(control, NOT_READY, 0.02) == OFF
+    assert cycle(control, READY, 0.04) == OFF
+    assert (control.word, control.word_due) == (RUN, True)
+    assert cycle(control, READY, 0.06) == RUN
+    assert not control.word_due
+    assert control.take_completed() == []
+    assert cycle(control, ENABLED, 0.08) == RUN
+    completed, = control.take_completed()
+    assert completed.ticket is ticket
+    assert (completed.success, completed.message) == (True, 'enabled')
+    assert (control.word, control.state, control.pending) == (RUN, 'enabled', False)
+    assert control.next_timer() == math.inf
+    assert control.take_notes() == []
+
+
+def test_enable_of_a_drive_that_is_ready_goes_on_at_once() -> None:
+    control = machine()
+    cycle(control, READY, 0.0)
+    control.request(ENABLE, 0.01)
+    assert control.word == RUN
+    assert control.pending
+
+
+def test_status_from_before_the_disable_word_left_confirms_nothing() -> None:
+    control = machine()
+    control.request(ENABLE, 0.0)
+    control.status_received(READY, 0.01)
+    assert control.word == OFF
+    control.word_sent(0.02)
+    assert control.word == OFF
+    control.status_received(READY, 0.03)
+    assert control.word == RUN
+
+
+def test_status_from_before_the_enable_word_left_confirms_nothing() -> None:
+    control = machine()
+    cycle(control, READY, 0.0)
+    control.request(ENABLE, 0.01)
+    control.status_received(ENABLED, 0.02)
+    assert control.take_completed() == []
+    control.word_sent(0.03)
+    assert control.take_completed() == []
+    control.status_received(ENABLED, 0.04)
+    assert outcomes(control) == [(ENABLE, True, 'enabled')]
+
+
+def test_missing_status_word_confirms_nothing() -> None:
+    control = machine()
+    control.request(ENABLE, 0.0)
+    assert cycle(control, None, 0.02) == OFF
+    assert cycle(control, None, 0.04) == OFF
+    assert control.word == OFF
+    cycle(control, READY, 0.06)
+    cycle(control, None, 0.08)
+    assert control.take_completed() == []
+    cycle(control, ENABLED, 0.10)
+    assert outcomes(control) == [(ENABLE, True, 'enabled')]
+
+
+def test_enable_without_a_ready_condition_still_sends_disable_first() -> None:
+    control = machine(NO_READY)
+    control.request(ENABLE, 0.0)
+    assert cycle(control, NOT_READY, 0.0) == OFF
+    assert cycle(control, ENABLED, 0.02) == RUN
+    assert outcomes(control) == [(ENABLE, True, 'enabled')]
+
+
+def test_enable_without_an_enabled_condition_succeeds_when_sent() -> None:
+    control = machine(ONLY_READY)
+    control.request(ENABLE, 0.0)
+    cycle(control, READY, 0.0)
+    assert (control.word, control.state) == (RUN, 'unknown')
+    control.word_sent(0.02)
+    message = 'enable sent; the drive does not report its state'
+    assert outcomes(control) == [(ENABLE, True, message)]
+    assert (control.word, control.state) == (RUN, 'enable sent')
+    control.request(ENABLE, 0.03)
+    assert outcomes(control) == [(ENABLE, True, message)]
+
+
+def test_enable_with_only_a_fault_condition_looks_for_a_fault_first() -> None:
+    control = machine(ONLY_FAULT)
+    control.request(ENABLE, 0.0)
+    control.word_sent(0.0)
+    assert control.word == OFF
+    control.status_received(READY, 0.01)
+    assert control.word == RUN
+
+
+@pytest.mark.parametrize('table', [SILENT, BARE])
+def test_enable_without_any_status_succeeds_when_sent(table: ControlTable) -> None:
+    control = machine(table)
+    control.request(ENABLE, 0.0)
+    assert cycle(control, None, 0.0) == OFF
+    assert control.take_completed() == []
+    assert cycle(control, None, 0.02) == RUN
+    message = 'enable sent; the drive does not report its state'
+    assert outcomes(control) == [(ENABLE, True, message)]
+    assert cycle(control, None, 0.04) == RUN
+
+
+def test_enable_of_an_enabled_drive_succeeds_at_once() -> None:
+    control = enabled()
+    control.request(ENABLE, 1.0)
+    assert outcomes(control) == [(ENABLE, True, 'enabled')]
+    assert (control.word, control.pending) == (RUN, False)
+
+
+def test_enable_of_an_enabled_drive_waits_while_its_status_is_missing() -> None:
+    control = enabled()
+    cycle(control, None, 1.0)
+    control.request(ENABLE, 1.01)
+    assert (control.take_completed(), control.word) == ([], RUN)
+    cycle(control, ENABLED, 1.02)
+    assert outcomes(control) == [(ENABLE, True, 'enabled')]
+    cycle(control, None, 2.0)
+    control.request(ENABLE, 2.01)
+    cycle(control, READY, 2.02)
+    assert outcomes(control) == [
+        (ENABLE, False, 'no longer enabled, by itself (status word 0001h)')]
+    assert control.word == OFF
+
+
+def test_enabled_under_the_disable_word_is_outdated_and_not_taken_for_success() -> None:
+    control = machine()
+    cycle(control, ENABLED, 0.0)
+    control.request(ENABLE, 0.01)
+    assert cycle(control, ENABLED, 0.02) == OFF
+    assert control.word == OFF
+    assert cycle(control, READY, 0.04) == OFF
+    assert cycle(control, ENABLED, 0.06) == RUN
+    assert outcomes(control) == [(ENABLE, True, 'enabled')]
+
+
+def test_enable_is_refused_while_faulted() -> None:
+    control = faulted()
+    control.request(ENABLE, 1.0)
+    assert outcomes(control) == [(ENABLE, False, 'fault: reset it first')]
+    assert (control.word, control.pending) == (OFF, False)
+
+
+@pytest.mark.parametrize(('steps', 'text'), [
+    (((NOT_READY, 0.02),),
+     'stuck in state not ready (status word 0000h)'),
+    (((READY, 0.02), (READY, 0.04)),
+     'stuck in state ready (status word 0001h)'),
+    (((ENABLED, 0.02),),
+     'stuck in state enabled (status word 0003h); it does not follow control word 0000h'),
+    (((READY, 0.02),),
+     'stuck in state ready (status word 0001h); control word 0001h could not be sent'),
+    (((None, 0.02),),
+     'stuck in state unknown (no status word); no status word since control word 0000h'),
+    ((), 'stuck in state unknown (no status word); control word 0000h could not be sent'),
+])
+def test_enable_that_is_not_confirmed_is_withdrawn(
+        steps: tuple[tuple[int | None, float], ...], text: str) -> None:
+    control = machine()
+    control.request(ENABLE, 0.0)
+    for raw, now in steps:
+        cycle(control, raw, now)
+    control.handle_timer(1.999)
+    assert control.pending
+    control.handle_timer(2.0)
+    assert outcomes(control) == [(ENABLE, False, f'no confirmation in 2 s: {text}')]
+    assert (control.word, control.pending) == (OFF, False)
+    assert control.next_timer() == math.inf
+    cycle(control, READY, 2.1)
+    cycle(control, ENABLED, 2.2)
+    assert control.word == OFF
+    assert control.take_completed() == []
+
+
+def test_status_after_the_deadline_comes_too_late() -> None:
+    control = machine()
+    cycle(control, READY, 0.0)
+    control.request(ENABLE, 0.0)
+    control.word_sent(0.02)
+    control.status_received(ENABLED, 2.0)
+    (_, success, _), = outcomes(control)
+    assert (success, control.word) == (False, OFF)
+
+
+def test_word_that_leaves_after_the_deadline_is_not_taken_for_the_next_one() -> None:
+    control = machine()
+    cycle(control, READY, 0.0)
+    control.request(ENABLE, 0.0)
+    assert control.word == RUN
+    control.word_sent(2.0)
+    assert (control.word, control.word_due) == (OFF, True)
+    (_, success, message), = outcomes(control)
+    assert not success
+    assert message.endswith('no status word since control word 0001h')
+
+
+def test_request_after_the_deadline_does_not_find_the_old_one() -> None:
+    control = machine()
+    control.request(ENABLE, 0.0)
+    control.request(ENABLE, 2.5)
+    assert [success for _, success, _ in outcomes(control)] == [False]
+    assert control.next_timer() == 4.5
+
+
+def test_second_enable_joins_the_first() -> None:
+    control = machine()
+    first = control.request(ENABLE, 0.0)
+    cycle(control, READY, 0.02)
+    second = control.request(ENABLE, 1.0)
+    assert control.word == RUN
+    assert control.next_timer() == 2.0
+    assert control.take_completed() == []
+    cycle(control, ENABLED, 1.02)
+    completed = control.take_completed()
+    assert [done.ticket for done in completed] == [first, second]
+    assert [done.message for done in completed] == ['enabled', 'enabled']
+
+
+# -- faults and drives that drop out ------------------------------------------------------------
+
+@pytest.mark.parametrize('before', [(), ((READY, 0.02),)])
+def test_fault_while_enabling_ends_it(before: tuple[tuple[int, float], ...]) -> None:
+    control = machine()
+    control.request(ENABLE, 0.0)
+    for raw, now in before:
+        cycle(control, raw, now)
+    control.status_received(FAULT, 0.03)
+    assert outcomes(control) == [
+        (ENABLE, False, 'fault while enabling (status word 0008h): reset it first')]
+    assert control.take_notes() == ['fault (status word 0008h)']
+    assert (control.word, control.fault, control.pending) == (OFF, True, False)
+
+
+def test_fault_while_enabled_puts_the_word_back() -> None:
+    control = enabled()
+    cycle(control, FAULT | ENABLED, 1.0)
+    assert (control.word, control.state, control.fault) == (OFF, 'fault', True)
+    assert control.take_notes() == [
+        'fault (status word 000Bh); only ~/enable starts the drive again']
+    cycle(control, READY, 1.02)
+    cycle(control, ENABLED, 1.04)
+    assert control.word == OFF
+    assert control.take_completed() == []
+
+
+def test_fault_is_noted_once_when_it_comes_and_once_when_it_goes() -> None:
+    control = machine()
+    for now, raw in enumerate((READY, FAULT, FAULT, None, FAULT | READY)):
+        cycle(control, raw, float(now))
+    assert control.take_notes() == ['fault (status word 0008h)']
+    assert control.state == 'fault'
+    cycle(control, READY, 10.0)
+    cycle(control, READY, 11.0)
+    assert control.take_notes() == ['fault gone (status word 0001h)']
+    assert not control.fault
+    cycle(control, FAULT, 12.0)
+    assert control.take_notes() == ['fault (status word 0008h)']
+
+
+def test_drive_that_drops_out_is_not_started_again() -> None:
+    control = enabled()
+    cycle(control, READY, 1.0)
+    assert (control.word, control.pending) == (OFF, False)
+    assert control.take_notes() == [
+        'no longer enabled, by itself (status word 0001h); only ~/enable starts the drive again']
+    cycle(control, ENABLED, 1.02)
+    assert control.word == OFF
+    assert control.take_notes() == []
+    assert control.take_completed() == []
+
+
+def test_enabled_drive_survives_a_missing_status_word() -> None:
+    control = enabled()
+    assert cycle(control, None, 1.0) == RUN
+    assert cycle(control, ENABLED, 1.02) == RUN
+    assert control.word == RUN
+
+
+def test_dropping_out_needs_a_condition_for_enabled() -> None:
+    control = machine(ONLY_READY)
+    control.request(ENABLE, 0.0)
+    cycle(control, READY, 0.0)
+    cycle(control, READY, 0.02)
+    cycle(control, NOT_READY, 0.04)
+    assert control.word == RUN
+
+
+# -- disable ------------------------------------------------------------------------------------
+
+def test_disable_waits_until_not_enabled() -> None:
+    control = enabled()
+    control.request(DISABLE, 1.0)
+    assert control.word == OFF
+    control.status_received(READY, 1.01)
+    assert control.take_completed() == []
+    assert cycle(control, ENABLED, 1.02) == OFF
+    assert control.take_completed() == []
+    assert cycle(control, READY, 1.04) == OFF
+    assert outcomes(control) == [(DISABLE, True, 'ready')]
+    assert control.take_notes() == []
+
+
+def test_disable_of_a_disabled_drive_succeeds_at_once() -> None:
+    control = machine(NO_READY)
+    cycle(control, READY, 0.0)
+    control.request(DISABLE, 0.01)
+    assert outcomes(control) == [(DISABLE, True, 'disabled')]
+
+
+def test_disable_of_a_faulted_drive_names_the_fault() -> None:
+    control = faulted()
+    control.request(DISABLE, 0.01)
+    assert outcomes(control) == [(DISABLE, True, 'fault')]
+
+
+def test_disable_that_is_not_confirmed_fails_and_stays() -> None:
+    control = enabled()
+    control.request(DISABLE, 1.0)
+    cycle(control, ENABLED, 1.02)
+    control.handle_timer(3.0)
+    assert outcomes(control) == [(
+        DISABLE, False, 'no confirmation in 2 s: stuck in state enabled (status word 0003h); '
+        'it does not follow control word 0000h')]
+    assert control.word == OFF
+
+
+def test_disable_without_a_status_succeeds_when_sent() -> None:
+    control = machine(BARE)
+    control.request(DISABLE, 0.0)
+    assert control.take_completed() == []
+    control.word_sent(0.02)
+    message = 'disable sent; the drive does not report its state'
+    assert outcomes(control) == [(DISABLE, True, message)]
+
+
+@pytest.mark.parametrize('steps', [(), ((READY, 0.02),)])
+def test_disable_wins_over_enable(steps: tuple[tuple[int, float], ...]) -> None:
+    control = machine()
+    control.request(ENABLE, 0.0)
+    for raw, now in steps:
+        cycle(control, raw, now)
+    control.request(DISABLE, 0.1)
+    assert control.word == OFF
+    cycle(control, READY, 0.12)
+    assert outcomes(control) == [(ENABLE, False, 'replaced by disable'), (DISABLE, True, 'ready')]
+    cycle(control, READY, 0.14)
+    assert control.word == OFF
+
+
+def test_disable_wins_over_a_quick_stop() -> None:
+    control = enabled()
+    control.request(QUICK_STOP, 1.0)
+    control.request(DISABLE, 1.01)
+    assert control.word == OFF
+    assert outcomes(control) == [(QUICK_STOP, False, 'replaced by disable')]
+
+
+def test_disable_wins_over_a_fault_reset() -> None:
+    control = faulted()
+    control.request(RESET_FAULT, 0.01)
+    control.word_sent(0.02)
+    control.request(DISABLE, 0.03)
+    assert control.word == OFF
+    cycle(control, FAULT, 0.04)
+    assert outcomes(control) == [
+        (RESET_FAULT, False, 'replaced by disable'), (DISABLE, True, 'fault')]
+
+
+# -- quick stop ---------------------------------------------------------------------------------
+
+def test_quick_stop_brakes_until_not_enabled_then_disables() -> None:
+    control = enabled()
+    control.request(QUICK_STOP, 1.0)
+    assert control.word == STOP
+    control.status_received(READY, 1.01)
+    assert control.word == STOP
+    assert cycle(control, ENABLED, 1.02) == STOP
+    assert control.take_completed() == []
+    assert cycle(control, READY, 1.04) == STOP
+    assert outcomes(control) == [(QUICK_STOP, True, 'ready')]
+    assert (control.word, control.pending) == (OFF, False)
+    assert control.take_notes() == []
+
+
+def test_quick_stop_of_a_disabled_drive_succeeds_at_once() -> None:
+    control = machine()
+    cycle(control, READY, 0.0)
+    control.request(QUICK_STOP, 0.01)
+    assert outcomes(control) == [(QUICK_STOP, True, 'ready')]
+    assert (control.word, control.pending) == (OFF, False)
+
+
+@pytest.mark.parametrize('sent', [False, True])
+def test_quick_stop_of_a_drive_that_is_about_to_run_brakes(sent: bool) -> None:
+    control = machine()
+    cycle(control, READY, 0.0)
+    control.request(ENABLE, 0.01)
+    if sent:
+        cycle(control, READY, 0.02)
+    control.request(QUICK_STOP, 0.03)
+    assert control.word == STOP
+    assert outcomes(control) == [(ENABLE, False, 'replaced by quick_stop')]
+
+
+def test_quick_stop_before_the_enable_word_needs_no_braking() -> None:
+    control = machine()
+    cycle(control, NOT_READY, 0.0)
+    control.request(ENABLE, 0.01)
+    control.request(QUICK_STOP, 0.02)
+    assert outcomes(control) == [
+        (ENABLE, False, 'replaced by quick_stop'), (QUICK_STOP, True, 'not ready')]
+    assert control.word == OFF
+
+
+def test_quick_stop_of_a_drive_that_still_runs_under_disable_brakes() -> None:
+    control = enabled()
+    control.request(DISABLE, 1.0)
+    control.request(QUICK_STOP, 1.01)
+    assert control.word == STOP
+    assert outcomes(control) == [(DISABLE, False, 'replaced by quick_stop')]
+    control.request(DISABLE, 1.02)
+    cycle(control, ENABLED, 1.03)
+    control.request(QUICK_STOP, 1.04)
+    assert control.word == STOP
+
+
+def test_quick_stop_of_a_drive_nobody_knows_brakes() -> None:
+    control = machine()
+    control.request(QUICK_STOP, 0.0)
+    assert control.word == STOP
+    cycle(control, READY, 0.02)
+    assert outcomes(control) == [(QUICK_STOP, True, 'ready')]
+
+
+def test_quick_stop_that_is_not_confirmed_fails_and_disables() -> None:
+    control = enabled()
+    control.request(QUICK_STOP, 1.0)
+    cycle(control, ENABLED, 1.02)
+    control.handle_timer(3.0)
+    assert outcomes(control) == [(
+        QUICK_STOP, False, 'no confirmation in 2 s: stuck in state enabled (status word 0003h); '
+        'it does not follow control word 0002h')]
+    assert (control.word, control.pending) == (OFF, False)
+
+
+def test_fault_during_a_quick_stop_disables_and_the_stop_is_still_watched() -> None:
+    control = enabled()
+    control.request(QUICK_STOP, 1.0)
+    cycle(control, FAULT | ENABLED, 1.02)
+    assert (control.word, control.pending) == (OFF, True)
+    cycle(control, FAULT, 1.04)
+    assert outcomes(control) == [(QUICK_STOP, True, 'fault')]
+
+
+def test_second_quick_stop_joins_the_first() -> None:
+    control = enabled()
+    control.request(QUICK_STOP, 1.0)
+    control.request(QUICK_STOP, 1.5)
+    assert control.next_timer() == 3.0
+    cycle(control, READY, 1.52)
+    assert outcomes(control) == [(QUICK_STOP, True, 'ready')] * 2
+
+
+def test_quick_stop_ends_a_fault_reset() -> None:
+    control = faulted()
+    control.request(RESET_FAULT, 0.01)
+    cycle(control, FAULT, 0.02)
+    assert control.word == RESET
+    control.request(QUICK_STOP, 0.03)
+    assert control.word == OFF
+    cycle(control, FAULT, 0.04)
+    assert outcomes(control) == [
+        (RESET_FAULT, False, 'replaced by quick_stop'), (QUICK_STOP, True, 'fault')]
+
+
+def test_quick_stop_of_a_faulted_drive_that_still_runs_is_a_disable() -> None:
+    control = machine()
+    cycle(control, FAULT | ENABLED, 0.0)
+    control.request(QUICK_STOP, 0.01)
+    assert (control.word, control.pending) == (OFF, True)
+    cycle(control, FAULT, 0.02)
+    assert outcomes(control) == [(QUICK_STOP, True, 'fault')]
+
+
+def test_quick_stop_without_a_word_is_refused_and_disturbs_nothing() -> None:
+    control = enabled(replace(FULL, quick_stop=None))
+    control.request(QUICK_STOP, 1.0)
+    assert outcomes(control) == [(
+        QUICK_STOP, False, 'no quick stop: the profile has no quick_stop word; '
+        '~/enable false disables the drive')]
+    assert (control.word, control.pending) == (RUN, False)
+
+
+def test_quick_stop_without_a_status_is_answered_when_sent_and_keeps_braking() -> None:
+    control = machine(SILENT)
+    control.request(ENABLE, 0.0)
+    cycle(control, None, 0.0)
+    cycle(control, None, 0.02)
+    control.take_completed()
+    control.request(QUICK_STOP, 1.0)
+    assert control.take_completed() == []
+    assert cycle(control, None, 1.02) == STOP
+    message = 'quick_stop sent; the drive does not report its state'
+    assert outcomes(control) == [(QUICK_STOP, True, message)]
+    assert (control.word, control.pending, control.next_timer()) == (STOP, True, 3.0)
+    assert control.state == 'quick_stop sent'
+    control.request(QUICK_STOP, 1.5)
+    assert outcomes(control) == [(QUICK_STOP, True, message)]
+    control.request(ENABLE, 1.6)
+    assert outcomes(control) == [
+        (ENABLE, False, 'quick_stop under way: try enable again when it has ended')]
+    control.handle_timer(3.0)
+    assert (control.word, control.pending) == (OFF, False)
+    assert control.take_completed() == []
+
+
+def test_quick_stop_without_a_status_after_disable_was_sent_succeeds_at_once() -> None:
+    control = machine(SILENT)
+    control.word_sent(0.0)
+    control.request(QUICK_STOP, 0.01)
+    message = 'disable sent; the drive does not report its state'
+    assert outcomes(control) == [(QUICK_STOP, True, message)]
+    assert (control.word, control.pending) == (OFF, False)
+
+
+def test_fault_ends_the_braking_of_a_drive_that_reports_only_faults() -> None:
+    control = machine(ONLY_FAULT)
+    control.request(QUICK_STOP, 0.0)
+    cycle(control, READY, 0.0)
+    assert (control.word, control.pending) == (STOP, True)
+    control.take_completed()
+    cycle(control, FAULT, 0.02)
+    assert control.word == OFF
+    cycle(control, FAULT, 0.04)
+    assert not control.pending
+    assert control.take_completed() == []
+
+
+def test_quick_stop_whose_word_is_the_disable_word() -> None:
+    control = enabled(replace(FULL, quick_stop=OFF))
+    control.request(QUICK_STOP, 1.0)
+    assert cycle(control, ENABLED, 1.02) == OFF
+    assert cycle(control, READY, 1.04) == OFF
+    assert outcomes(control) == [(QUICK_STOP, True, 'ready')]
+    assert not control.word_due
+
+
+@pytest.mark.parametrize('stop', [DISABLE, QUICK_STOP])
+@pytest.mark.parametrize('start', [ENABLE, RESET_FAULT])
+def test_no_start_cuts_a_stop_short(stop: ControlAction, start: ControlAction) -> None:
+    control = enabled(NO_FAULT)
+    control.request(stop, 1.0)
+    word = control.word
+    control.request(start, 1.01)
+    assert outcomes(control) == [(
+        start, False, f'{stop.value} under way: try {start.value} again when it has ended')]
+    assert control.word == word
+    cycle(control, READY, 1.02)
+    assert outcomes(control) == [(stop, True, 'ready')]
+    assert control.word == OFF
+
+
+def test_fault_reset_with_nothing_to_reset_does_not_disturb_a_stop() -> None:
+    control = enabled()
+    control.request(QUICK_STOP, 1.0)
+    control.request(RESET_FAULT, 1.01)
+    assert outcomes(control) == [(RESET_FAULT, True, 'enabled')]
+    assert (control.word, control.pending) == (STOP, True)
+    cycle(control, FAULT | ENABLED, 1.02)
+    control.request(RESET_FAULT, 1.03)
+    assert outcomes(control) == [(
+        RESET_FAULT, False, 'quick_stop under way: try reset_fault again when it has ended')]
+
+
+# -- fault reset --------------------------------------------------------------------------------
+
+def test_reset_pulses_until_the_fault_is_gone_then_disables() -> None:
+    control = faulted()
+    control.request(RESET_FAULT, 0.01)
+    assert control.word == RESET
+    assert cycle(control, FAULT, 0.02) == RESET
+    assert cycle(control, FAULT, 0.04) == RESET
+    assert control.take_completed() == []
+    assert cycle(control, READY, 0.06) == RESET
+    assert outcomes(control) == [(RESET_FAULT, True, 'ready')]
+    assert control.take_notes() == ['fault gone (status word 0001h)']
+    assert (control.word, control.pending) == (OFF, False)
+    cycle(control, READY, 0.08)
+    control.request(ENABLE, 0.09)
+    assert control.word == RUN
+
+
+def test_fault_gone_before_the_pulse_left_confirms_nothing_yet() -> None:
+    control = faulted()
+    control.request(RESET_FAULT, 0.01)
+    control.status_received(READY, 0.02)
+    assert (control.word, control.take_completed()) == (RESET, [])
+    cycle(control, READY, 0.03)
+    assert outcomes(control) == [(RESET_FAULT, True, 'ready')]
+
+
+@pytest.mark.parametrize(('build', 'raw'), [(enabled, ENABLED), (machine, READY)])
+def test_reset_without_a_fault_succeeds_and_changes_nothing(
+        build: Callable[[], ProfileControl], raw: int) -> None:
+    control = build()
+    cycle(control, raw, 1.0)
+    word, state = control.word, control.state
+    control.request(RESET_FAULT, 1.01)
+    assert outcomes(control) == [(RESET_FAULT, True, state)]
+    assert (control.word, control.pending) == (word, False)
+
+
+def test_reset_that_does_not_help_fails_and_disables() -> None:
+    control = faulted()
+    control.request(RESET_FAULT, 0.0)
+    cycle(control, FAULT, 0.02)
+    control.handle_timer(2.0)
+    assert outcomes(control) == [
+        (RESET_FAULT, False, 'fault still present after 2 s (status word 0008h)')]
+    assert (control.word, control.fault, control.pending) == (OFF, True, False)
+
+
+def test_reset_that_could_not_be_sent_says_so() -> None:
+    control = faulted()
+    control.request(RESET_FAULT, 0.0)
+    control.handle_timer(2.0)
+    assert outcomes(control) == [(
+        RESET_FAULT, False, 'no confirmation in 2 s: stuck in state fault (status word 0008h); '
+        'control word 0080h could not be sent')]
+
+
+def test_each_reset_is_one_rising_edge() -> None:
+    control = faulted()
+    control.request(RESET_FAULT, 0.0)
+    cycle(control, FAULT, 0.02)
+    control.request(RESET_FAULT, 1.0)
+    assert cycle(control, FAULT, 1.02) == RESET
+    control.handle_timer(2.0)
+    assert [success for _, success, _ in outcomes(control)] == [False, False]
+    control.request(RESET_FAULT, 2.01)
+    assert control.word == OFF
+    control.status_received(FAULT, 2.02)
+    assert control.word == OFF
+    assert cycle(control, FAULT, 2.03) == OFF
+    assert cycle(control, FAULT, 2.05) == RESET
+
+
+def test_reset_of_a_drive_nobody_knows_looks_first() -> None:
+    control = machine()
+    control.request(RESET_FAULT, 0.0)
+    control.word_sent(0.0)
+    assert control.word == OFF
+    control.status_received(READY, 0.01)
+    assert outcomes(control) == [(RESET_FAULT, True, 'ready')]
+    control = machine()
+    control.request(RESET_FAULT, 0.0)
+    cycle(control, FAULT, 0.0)
+    assert control.word == RESET
+
+
+def test_reset_without_a_word_is_refused() -> None:
+    control = faulted(replace(FULL, reset_fault=None))
+    control.request(RESET_FAULT, 0.01)
+    assert outcomes(control) == [
+        (RESET_FAULT, False, 'no fault reset: the profile has no reset_fault word')]
+    assert (control.word, control.pending) == (OFF, False)
+
+
+@pytest.mark.parametrize('table', [SILENT, NO_FAULT])
+def test_reset_of_a_drive_that_reports_no_faults_is_one_pulse(table: ControlTable) -> None:
+    control = machine(table)
+    control.request(RESET_FAULT, 0.0)
+    assert cycle(control, READY, 0.0) == OFF
+    assert control.take_completed() == []
+    assert cycle(control, READY, 0.02) == RESET
+    message = 'reset_fault sent; the drive does not report faults'
+    assert outcomes(control) == [(RESET_FAULT, True, message)]
+    assert (control.word, control.pending) == (OFF, False)
+
+
+def test_reset_of_an_enabled_drive_that_reports_no_faults_disables_it() -> None:
+    control = enabled(NO_FAULT)
+    control.request(RESET_FAULT, 1.0)
+    assert [cycle(control, READY, 1.0 + n) for n in range(3)] == [OFF, RESET, OFF]
+
+
+def test_reset_replaces_an_enable() -> None:
+    control = machine()
+    cycle(control, READY, 0.0)
+    control.request(ENABLE, 0.01)
+    cycle(control, READY, 0.02)
+    control.request(RESET_FAULT, 0.03)
+    assert control.word == OFF
+    cycle(control, READY, 0.04)
+    assert outcomes(control) == [
+        (ENABLE, False, 'replaced by reset_fault'), (RESET_FAULT, True, 'ready')]
+    cycle(control, READY, 0.06)
+    assert control.word == OFF
+
+
+def test_enable_is_refused_during_a_reset_and_does_not_disturb_it() -> None:
+    control = faulted()
+    control.request(RESET_FAULT, 0.01)
+    control.request(ENABLE, 0.02)
+    assert outcomes(control) == [(ENABLE, False, 'fault: reset it first')]
+    assert (control.word, control.pending) == (RESET, True)
+
+
+def test_enable_replaces_a_reset_where_no_fault_is_known() -> None:
+    control = machine(NO_FAULT)
+    control.request(RESET_FAULT, 0.0)
+    cycle(control, READY, 0.0)
+    assert control.word == RESET
+    control.request(ENABLE, 0.01)
+    assert control.word == OFF
+    assert outcomes(control) == [(RESET_FAULT, False, 'replaced by enable')]
+    cycle(control, READY, 0.02)
+    assert control.word == RUN
+
+
+# -- withdraw -----------------------------------------------------------------------------------
+
+def test_withdraw_puts_an_enabled_drive_back() -> None:
+    control = enabled()
+    control.withdraw('drive offline', 1.0)
+    assert (control.word, control.word_due, control.state) == (OFF, True, 'unknown')
+    assert control.take_notes() == [
+        'enable withdrawn: drive offline; only ~/enable starts the drive again']
+    assert control.take_completed() == []
+    cycle(control, READY, 1.02)
+    cycle(control, ENABLED, 1.04)
+    assert control.word == OFF
+    control.withdraw('bridge stops', 2.0)
+    assert control.take_notes() == []
+
+
+@pytest.mark.parametrize('action', [ENABLE, DISABLE, QUICK_STOP])
+def test_withdraw_fails_what_is_under_way(action: ControlAction) -> None:
+    control = machine()
+    control.request(action, 0.0)
+    control.request(action, 0.01)
+    control.withdraw('drive offline', 1.0)
+    assert outcomes(control) == [(action, False, 'drive offline')] * 2
+    assert (control.word, control.pending, control.next_timer()) == (OFF, False, math.inf)
+    assert control.take_notes() == []
+
+
+def test_withdraw_fails_a_reset_and_remembers_the_fault() -> None:
+    control = faulted()
+    control.request(RESET_FAULT, 0.01)
+    control.withdraw('drive offline', 1.0)
+    assert outcomes(control) == [(RESET_FAULT, False, 'drive offline')]
+    assert (control.word, control.fault) == (OFF, True)
+    control.request(ENABLE, 2.0)
+    assert outcomes(control) == [(ENABLE, False, 'fault: reset it first')]
+    cycle(control, FAULT, 3.0)
+    assert control.take_notes() == []
+    cycle(control, READY, 4.0)
+    assert control.take_notes() == ['fault gone (status word 0001h)']
+
+
+def test_withdraw_forgets_that_there_was_no_fault() -> None:
+    control = machine()
+    cycle(control, READY, 0.0)
+    control.withdraw('drive offline', 1.0)
+    control.request(RESET_FAULT, 2.0)
+    assert (control.take_completed(), control.word, control.pending) == ([], OFF, True)
+
+
+def test_withdraw_after_the_deadline_names_the_deadline() -> None:
+    control = machine()
+    control.request(ENABLE, 0.0)
+    control.withdraw('drive offline', 2.0)
+    (_, _, message), = outcomes(control)
+    assert message.startswith('no confirmation in 2 s')
+
+
+def test_status_from_before_a_withdrawal_confirms_nothing() -> None:
+    control = machine()
+    cycle(control, READY, 0.0)
+    control.withdraw('drive offline', 1.0)
+    control.request(ENABLE, 1.01)
+    assert control.word == OFF
+    control.status_received(READY, 1.02)
+    control.word_sent(1.025)
+    assert control.word == OFF
+    cycle(control, READY, 1.03)
+    assert control.word == RUN
+
+
+def test_withdraw_ends_the_braking_of_a_drive_that_does_not_report() -> None:
+    control = machine(SILENT)
+    control.request(QUICK_STOP, 0.0)
+    control.word_sent(0.02)
+    control.take_completed()
+    control.withdraw('bridge stops', 0.03)
+    assert (control.word, control.pending) == (OFF, False)
+    assert control.take_completed() == []
+
+
+# -- whatever happens ---------------------------------------------------------------------------
+
+class AnyConversation(RuleBasedStateMachine):
+    """Requests, words, statuses and time in any order, held against the rules of safety."""
+
+    @initialize(table=st.sampled_from(
+        [FULL, NO_READY, NO_FAULT, ONLY_READY, ONLY_FAULT, SILENT, BARE]))
+    def start(self, table: ControlTable) -> None:
+        self.table = table
+        self.control = ProfileControl(table, timeout=2.0)
+        self.now = 0.0
+        self.open: dict[ControlTicket, float] = {}
+        self.closed: set[ControlTicket] = set()
+        self.may_enable = False     # an ENABLE that nothing has ended since
+        self.last_sent: int | None = None
+
+    def collect(self) -> None:
+        for done in self.control.take_completed():
+            assert done.ticket in self.open, 'no outcome without request, none twice'
+            assert done.message
+            del self.open[done.ticket]
+            self.closed.add(done.ticket)
+            if done.ticket.action is ENABLE and not done.success and not self.refused:
+                self.may_enable = False
+        self.refused = False
+
+    refused = False
+
+    @rule(action=st.sampled_from(ControlAction))
+    def request(self, action: ControlAction) -> None:
+        self.expire()
+        word, pending = self.control.word, self.control.pending
+        running = word == self.table.enable
+        stopping = pending and not self.open or any(
+            ticket.action in (DISABLE, QUICK_STOP) for ticket in self.open)
+        ticket = self.control.request(action, self.now)
+        self.open[ticket] = self.now + 2.0
+        completed = self.control.take_completed()
+        by_ticket = {done.ticket: done for done in completed}
+        assert len(by_ticket) == len(completed), 'no outcome twice'
+        mine = by_ticket.get(ticket)
+        refused = mine is not None and not mine.success
+        if refused:
+            assert len(completed) == 1
+            assert self.control.word == word, 'a refused request changes nothing'
+            assert self.control.pending == pending
+        elif action is ENABLE:
+            assert not self.control.fault
+            assert not stopping, 'no start cuts a stop short'
+            self.may_enable = True
+        elif action in (DISABLE, QUICK_STOP):
+            assert self.control.word != self.table.enable, 'a stop takes effect at once'
+            if action is QUICK_STOP and running:    # a faulted drive does not get here
+                assert self.control.word == self.table.quick_stop
+            self.may_enable = False
+        for done in completed:
+            assert done.ticket in self.open
+            del self.open[done.ticket]
+            self.closed.add(done.ticket)
+            if done.message.startswith('replaced by'):
+                assert not refused
+                self.may_enable = action is ENABLE
+
+    @rule()
+    def send(self) -> None:
+        word = self.control.word
+        if word == RESET and self.table.reset_fault == RESET:
+            assert self.last_sent in (OFF, RESET), 'the pulse has a rising edge'
+        if word == RUN:
+            assert self.last_sent in (OFF, RUN), 'enable follows disable'
+        self.last_sent = word
+        self.control.word_sent(self.now)
+        self.collect()
+
+    @rule(raw=st.one_of(st.none(), st.sampled_from(
+        [NOT_READY, READY, ENABLED, FAULT, FAULT | ENABLED])))
+    def receive(self, raw: int | None) -> None:
+        self.expire()
+        self.control.status_received(raw, self.now)
+        fault = self.table.fault
+        if raw is not None and fault is not None:
+            assert self.control.fault == fault.matches(raw)
+            if self.control.fault:
+                self.may_enable = False
+        self.collect()
+
+    @rule(seconds=st.sampled_from([0.0, 0.02, 0.5, 1.0, 2.0]))
+    def wait(self, seconds: float) -> None:
+        self.now += seconds
+        self.expire()
+
+    def expire(self) -> None:
+        self.control.handle_timer(self.now)
+        self.collect()
+        assert all(deadline > self.now for deadline in self.open.values())
+        assert self.control.next_timer() > self.now
+
+    @rule()
+    def withdraw(self) -> None:
+        self.control.withdraw('drive offline', self.now)
+        self.may_enable = False
+        self.collect()
+        assert not self.open
+        assert (self.control.word, self.control.word_due) == (OFF, True)
+
+    @rule()
+    def follow(self) -> None:
+        """Play a healthy drive for some cycles: whatever was asked must come true."""
+        wanted = {ticket.action for ticket in self.open}
+        state = READY
+        for _ in range(6):
+            word = self.control.word
+            self.send()
+            state = {OFF: READY, RUN: ENABLED, STOP: READY, RESET: READY}[word]
+            self.control.status_received(state, self.now)
+            completed = self.control.take_completed()
+            for done in completed:
+                assert done.success, done.message
+                assert done.ticket in self.open
+                del self.open[done.ticket]
+        assert not self.open
+        if ENABLE in wanted:
+            assert self.control.word == RUN
+
+    @invariant()
+    def enable_only_for_an_enable(self) -> None:
+        if self.control.word == RUN:
+            assert self.may_enable
+
+    @invariant()
+    def faulted_drive_is_never_enabled(self) -> None:
+        if self.control.fault:
+            assert self.control.word in (OFF, RESET)
+
+    @invariant()
+    def open_tickets_are_watched(self) -> None:
+        assert not self.open or self.control.pending
+        assert self.control.pending == (self.control.next_timer() < math.inf)
+        assert self.control.state
+        assert all(self.control.take_notes())
+
+
+TestAnyConversation = AnyConversation.TestCase
+TestAnyConversation.settings = settings(max_examples=150, stateful_step_count=40, deadline=None)

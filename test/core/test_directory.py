@@ -1,0 +1,131 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Names of parameters, listed and raw, and what users may set."""
+
+from array import array
+
+from builders import (
+    ACTUAL, BOOL, drive, EEPROM, FLAG, GAIN, INT16, ORDER, parameter, RAM, RAMP, RO, RW, SPEED,
+    TABLE, WO,
+)
+import pytest
+
+from drive_can_bridge.core.directory import ParameterDirectory
+from drive_can_bridge.core.errors import ValueRefused
+from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.protocols.families import FAMILIES
+
+
+def directory(*table: Parameter) -> ParameterDirectory:
+    family = FAMILIES['datamodel_extended']
+    configuration = drive(table=table or TABLE)
+    return ParameterDirectory(configuration.profile.parameters,
+                              lambda name: family.raw_parameter(configuration, name))
+
+
+def test_finds_listed_and_raw_names() -> None:
+    names = directory()
+    assert names.find('ramp_time') is RAMP
+    raw = names.find('p600')
+    assert raw == parameter('p600', 600, listed=False)
+    assert names.find('no_such_thing') is None
+    assert names.find('p65536') is None
+
+
+def test_raw_name_of_a_listed_parameter_obeys_its_rules() -> None:
+    names = directory()
+    for name, twin in (('p209', ACTUAL), ('p30', RAMP), ('p43', ORDER), ('p40', GAIN)):
+        raw = names.find(name)
+        assert raw is not None
+        assert (raw.access, raw.storage) == (twin.access, twin.storage)
+        assert not raw.listed
+        assert names.twins(raw) == [twin]
+    assert names.twins(RAMP) == [RAMP]
+
+
+@pytest.mark.parametrize('first, second, access, storage', [
+    (dict(access=RO, storage=RAM), dict(access=RW, storage=EEPROM), RO, EEPROM),
+    (dict(access=RW, storage=EEPROM), dict(access=RO, storage=RAM), RO, EEPROM),
+    (dict(access=RW, storage=RAM), dict(access=WO, storage=None), WO, None),
+    (dict(access=WO, storage=None), dict(access=RW, storage=RAM), WO, None),
+    (dict(access=RW, storage=RAM), dict(access=RW, storage=RAM), RW, RAM),
+])
+def test_two_listed_parameters_with_one_number(first: dict[str, object], second: dict[str, object],
+                                               access: object, storage: object) -> None:
+    raw = directory(parameter('a', 70, **first), parameter('b', 70, **second)).find('p70')
+    assert raw is not None
+    assert (raw.access, raw.storage) == (access, storage)
+
+
+def test_unknown_names_get_a_hint() -> None:
+    names = directory()
+    assert names.unknown('ramp_tme') == 'unknown parameter ramp_tme, did you mean ramp_time?'
+    assert names.unknown('zzz') == 'unknown parameter zzz'
+
+
+@pytest.mark.parametrize('entry, value, raw', [
+    (RAMP, 1.5, 150), (RAMP, 2, 200), (GAIN, 7, 7), (FLAG, True, 1), (SPEED, -1, -10),
+])
+def test_values_of_users(entry: Parameter, value: object, raw: int) -> None:
+    assert directory().raw_from_user(entry, value) == raw
+
+
+@pytest.mark.parametrize('entry, value, text', [
+    (ACTUAL, 1.0, 'read-only'),
+    (RAMP, '1.5', 'wrong type: string, expected double'),
+    (RAMP, True, 'wrong type: bool, expected double'),
+    (GAIN, 7.0, 'wrong type: double, expected integer'),
+    (GAIN, False, 'wrong type: bool, expected integer'),
+    (FLAG, 1, 'wrong type: integer, expected bool'),
+    (GAIN, None, 'wrong type: not set, expected integer'),
+    (GAIN, [1], 'wrong type: array, expected integer'),
+    (GAIN, array('q', [1]), 'wrong type: array, expected integer'),
+    (GAIN, b'1', 'wrong type: bytes, expected integer'),
+    (RAMP, 61.0, '61 is out of range: 0.01 to 60 s'),
+    (RAMP, float('nan'), 'not a finite number'),
+])
+def test_refused_values(entry: Parameter, value: object, text: str) -> None:
+    with pytest.raises(ValueRefused, match=text):
+        directory().raw_from_user(entry, value)
+
+
+@pytest.mark.parametrize('value, word', [(0, 0), (65535, 65535), (-1, 65535), (-32768, 32768)])
+def test_raw_values_are_words(value: int, word: int) -> None:
+    names = directory()
+    raw = names.find('p600')
+    assert raw is not None
+    assert names.raw_from_user(raw, value) == word
+
+
+@pytest.mark.parametrize('value', [65536, -32769, 2**63 - 1, -2**63])
+def test_raw_values_that_do_not_fit(value: int) -> None:
+    names = directory()
+    raw = names.find('p600')
+    assert raw is not None
+    with pytest.raises(ValueRefused, match='not representable in 16 bits: -32768 to 65535'):
+        names.raw_from_user(raw, value)
+
+
+def test_raw_name_does_not_get_around_the_limits() -> None:
+    names = directory()
+    raw = names.find('p30')
+    assert raw is not None
+    assert names.raw_from_user(raw, 6000) == 6000
+    with pytest.raises(ValueRefused, match='60.01 is out of range: 0.01 to 60 s'):
+        names.raw_from_user(raw, 6001)
+    with pytest.raises(ValueRefused, match='out of range'):
+        names.raw_from_user(raw, 0)
+    with pytest.raises(ValueRefused, match='wrong type: double, expected integer'):
+        names.raw_from_user(raw, 1.5)
+
+
+def test_raw_name_of_a_signed_parameter() -> None:
+    signed = parameter('signed', 70, type=INT16, scale=0.1, minimum=-5.0, maximum=5.0)
+    names = directory(signed, parameter('flag', 71, type=BOOL))
+    raw, flag = names.find('p70'), names.find('p71')
+    assert raw is not None
+    assert flag is not None
+    assert names.raw_from_user(raw, -50) == 0xFFCE
+    assert names.raw_from_user(raw, 0xFFCE) == 0xFFCE
+    assert names.raw_from_user(flag, 1) == 1
+    with pytest.raises(ValueRefused, match='-5.1 is out of range'):
+        names.raw_from_user(raw, -51)

@@ -1,0 +1,57 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Frames, routes, units and errors: the small parts."""
+
+import math
+
+import pytest
+
+from drive_can_bridge.core.errors import (
+    BusUnavailable, ConfigurationError, DriveCanError, LocalProtocolError, RemoteProtocolError,
+)
+from drive_can_bridge.core.frame import Frame, Route
+from drive_can_bridge.core.units import convertible_units, Quantity, si_factor
+
+
+def test_frames_read_as_candump_writes_them() -> None:
+    assert str(Frame(0x3FFFF0, b'\x05\xDC', True)) == '003FFFF0#05DC'
+    assert str(Frame(0x3F1, b'', False)) == '3F1#'
+    assert Frame(0x3F1, b'', False) != Frame(0x3F1, b'', True)
+
+
+def test_routes_look_at_the_format() -> None:
+    route = Route(0x3F1, 0x7FF, False)
+    assert route.matches(Frame(0x3F1, b'', False))
+    assert not route.matches(Frame(0x3F1, b'', True))
+    assert not route.matches(Frame(0x3F2, b'', False))
+    assert Route(0x10200000, 0x1FE00000, True).matches(Frame(0x103FFFF0, b'', True))
+
+
+@pytest.mark.parametrize('quantity, unit, options, factor', [
+    (Quantity.VELOCITY, 'rpm', {}, 2 * math.pi / 60), (Quantity.VELOCITY, 'rad/s', {}, 1.0),
+    (Quantity.VELOCITY, 'deg/s', {}, math.pi / 180), (Quantity.VELOCITY, 'Hz', {}, 2 * math.pi),
+    (Quantity.VELOCITY, 'Hz', {'pole_pairs': 2}, math.pi),
+    (Quantity.VELOCITY, 'rpm', {'pole_pairs': 2}, 2 * math.pi / 60),
+    (Quantity.VELOCITY, 'rpm', {'gear_ratio': -2.0}, -math.pi / 60),
+    (Quantity.POSITION, 'rev', {'gear_ratio': 2.0}, math.pi), (Quantity.POSITION, 'rad', {}, 1.0),
+    (Quantity.POSITION, 'deg', {}, math.pi / 180), (Quantity.POSITION, 'rpm', {}, None),
+    (Quantity.VELOCITY, 'furlong', {}, None), (Quantity.EFFORT, 'anything', {}, 1.0),
+    (Quantity.EFFORT, 'A', {'gear_ratio': 5.0}, 1.0),
+])
+def test_factors(quantity: Quantity, unit: str, options: dict[str, float],
+                 factor: float | None) -> None:
+    found = si_factor(quantity, unit, **options)
+    assert found == (factor if factor is None else pytest.approx(factor))
+
+
+def test_units_that_convert() -> None:
+    assert convertible_units(Quantity.POSITION) == ('rad', 'deg', 'rev')
+    assert convertible_units(Quantity.EFFORT) == ()
+
+
+def test_errors() -> None:
+    error = ConfigurationError(['one', 'two'])
+    assert error.problems == ['one', 'two']
+    assert str(error) == 'one\ntwo'
+    assert issubclass(LocalProtocolError, ValueError)
+    assert issubclass(BusUnavailable, OSError)
+    assert issubclass(RemoteProtocolError, DriveCanError)

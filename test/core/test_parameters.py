@@ -1,0 +1,136 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Raw integers, words and values of a parameter."""
+
+import math
+
+from builders import (
+    ACTUAL, BOOL, FLAG, GAIN, INT16, INT32, ORDER, parameter, RAMP, RO, SPEED, STATUS, UINT16,
+)
+from hypothesis import given, strategies as st
+import pytest
+
+from drive_can_bridge.core.errors import DriveCanError, ValueRefused
+from drive_can_bridge.core.parameters import Parameter, ParameterType, ValueKind
+
+
+@pytest.mark.parametrize('entry, word, raw, value', [
+    (SPEED, 0xFA24, -1500, -150.0), (SPEED, 0x7FFF, 32767, 3276.7), (SPEED, 0x8000, -32768, -3276.8),
+    (GAIN, 0xFFFF, 65535, 65535), (GAIN, 0, 0, 0), (FLAG, 1, 1, True), (FLAG, 0, 0, False),
+    (FLAG, 2, 2, True),
+    (parameter('wide', 1, type=INT32), 0xFFFFFFFF, -1, -1),
+    (parameter('wide', 1, type=ParameterType.UINT32), 0xFFFFFFFF, 0xFFFFFFFF, 0xFFFFFFFF),
+    (parameter('warm', 1, type=INT16, scale=0.5, offset=-40.0), 100, 100, 10.0),
+])
+def test_word_raw_value(entry: Parameter, word: int, raw: int, value: object) -> None:
+    assert entry.raw_from_word(word) == raw
+    assert entry.word_from_raw(raw) == word
+    made = entry.value_from_raw(raw)
+    assert made == pytest.approx(value)
+    assert type(made) is type(value)
+
+
+@given(st.sampled_from([SPEED, RAMP, GAIN, parameter('o', 1, type=INT16, scale=-0.3, offset=7.0)]),
+       st.integers(0, 0xFFFF))
+def test_every_word_survives(entry: Parameter, word: int) -> None:
+    raw = entry.raw_from_word(word)
+    assert entry.word_from_raw(raw) == word
+    try:
+        assert entry.raw_from_value(entry.value_from_raw(raw)) == raw
+    except ValueRefused as error:
+        assert 'out of range' in str(error)
+
+
+@pytest.mark.parametrize('entry, kind', [
+    (SPEED, ValueKind.DOUBLE), (STATUS, ValueKind.INTEGER), (FLAG, ValueKind.BOOL),
+    (parameter('bare', 1, unit='V'), ValueKind.DOUBLE),
+    (parameter('odd', 1, type=BOOL, scale=1.0), ValueKind.DOUBLE),
+])
+def test_one_rule_for_types(entry: Parameter, kind: ValueKind) -> None:
+    assert entry.kind is kind
+
+
+@pytest.mark.parametrize('value, text', [
+    (math.nan, 'nan is not a finite number'), (math.inf, 'inf is not a finite number'),
+    (True, 'True is a bool, not a number'),
+    (3000.2, '3000.2 is out of range: -3000 to 3000 rpm'),
+    (-4000, '-4000 is out of range: -3000 to 3000 rpm'),
+])
+def test_refusals_say_why(value: float, text: str) -> None:
+    with pytest.raises(ValueRefused, match=text):
+        SPEED.raw_from_value(value)
+
+
+@pytest.mark.parametrize('entry, value, text', [
+    (GAIN, 70000, '70000 is not representable: uint16 carries 0 to 65535'),
+    (GAIN, 0.5, '0.5 is not an integer'),
+    (parameter('free', 1, scale=0.1, unit='V'), -1.0,
+     '-1 is not representable: uint16 carries 0 to 6553.5 V'),
+    (parameter('turned', 1, scale=-0.1), 1.0, 'uint16 carries -6553.5 to 0'),
+    (FLAG, 1, '1 is not a bool'), (FLAG, 1.0, '1.0 is not a bool'),
+    (parameter('low', 1, minimum=5.0), 4, '4 is out of range: at least 5'),
+    (parameter('high', 1, maximum=5.0), 6, '6 is out of range: at most 5'),
+])
+def test_more_refusals(entry: Parameter, value: float, text: str) -> None:
+    with pytest.raises(ValueRefused, match=text):
+        entry.raw_from_value(value)
+
+
+def test_limits_forgive_rounding_errors_only() -> None:
+    assert SPEED.raw_from_value(30000 * 0.1) == 30000
+    assert SPEED.raw_from_value(3000.00000001) == 30000
+    with pytest.raises(ValueRefused):
+        SPEED.raw_from_value(3000.01)
+
+
+@given(st.one_of(st.floats(), st.integers(-2**63, 2**63 - 1), st.booleans()),
+       st.sampled_from([SPEED, RAMP, GAIN, FLAG, ACTUAL,
+                        parameter('fine', 1, type=INT16, scale=0.001),
+                        parameter('moved', 1, type=INT32, scale=1e-6, offset=1e9)]))
+def test_any_value_is_converted_or_refused(value: float, entry: Parameter) -> None:
+    try:
+        raw = entry.raw_from_value(value)
+    except ValueRefused as error:
+        assert str(error)
+        return
+    low, high = entry.type.raw_range
+    assert low <= raw <= high
+
+
+@pytest.mark.parametrize('entry, text', [
+    (SPEED, '-3000 to 3000 rpm'), (GAIN, '0 to 65535'), (parameter('n', 1, type=INT16, scale=0.1,
+                                                                   unit='A'),
+                                                         '-3276.8 to 3276.7 A'),
+    (parameter('n', 1, minimum=1.0, unit='s'), 'at least 1 s'),
+    (parameter('n', 1, maximum=9.0), 'at most 9'),
+])
+def test_range_in_words(entry: Parameter, text: str) -> None:
+    assert entry.range_text == text
+
+
+def test_addresses() -> None:
+    assert RAMP.address == 'P30'
+    assert parameter('n', 613, subindex=5).address == 'P613.5'
+    assert parameter('n', None, index=0x2004, subindex=6).address == '2004h.06h'
+    assert parameter('n', None, index=0x2004).address == '2004h.00h'
+    assert parameter('n', None).address == 'process data'
+
+
+def test_access() -> None:
+    assert (SPEED.readable, SPEED.writable) == (True, True)
+    assert (ACTUAL.readable, ACTUAL.writable) == (True, False)
+    assert (ORDER.readable, ORDER.writable) == (False, True)
+    assert ACTUAL.access is RO
+
+
+def test_neutral() -> None:
+    assert SPEED.neutral_raw == 0
+    assert GAIN.neutral_raw == 0
+    assert parameter('n', 1, scale=0.5, offset=10.0, neutral=12.0).neutral_raw == 4
+    assert parameter('n', 1, scale=0.5, offset=10.0).neutral_raw == 0
+
+
+def test_widths() -> None:
+    assert (UINT16.bits, UINT16.signed, UINT16.raw_range) == (16, False, (0, 65535))
+    assert INT32.raw_range == (-2**31, 2**31 - 1)
+    assert BOOL.raw_range == (0, 1)
+    assert issubclass(ValueRefused, (DriveCanError, ValueError))

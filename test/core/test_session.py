@@ -1,0 +1,157 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""What all sessions share, shown with a session that does nothing of its own."""
+
+import math
+
+from builders import CONTROL, drive, GAIN, parameter, read, SPEED, STATUS, WORD
+import pytest
+
+from drive_can_bridge.core.control import ProfileControl
+from drive_can_bridge.core.errors import ValueRefused
+from drive_can_bridge.core.events import RequestCompleted
+from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.requests import Failure, Request, Written
+from drive_can_bridge.core.session import DriveState, Session, successes
+
+
+class Idle(Session):
+    """Implements what has to be, and keeps what it is given."""
+
+    waiting = 0
+    offline_advice = ''
+    stopped = True
+
+    def activate(self, now: float) -> None:
+        self.active = True
+
+    def deactivate(self, now: float) -> None:
+        self.active = False
+
+    def bus_up(self, now: float) -> None:
+        self.bus_available = True
+
+    def bus_down(self, now: float, reason: str) -> None:
+        self.bus_available = False
+
+    def time_lost(self, now: float) -> None:
+        raise NotImplementedError
+
+    def receive_frame(self, frame: Frame, now: float, age: float = 0.0) -> None:
+        self._frames.append(frame)
+
+    def handle_timer(self, now: float) -> None:
+        raise NotImplementedError
+
+    def next_timer(self) -> float:
+        return math.inf
+
+    def _enqueue(self, request: Request, now: float) -> None:
+        self.waiting += 1
+
+    def _waiting_requests(self) -> int:
+        return self.waiting
+
+
+def session(**options: object) -> Idle:
+    configuration = drive(**options)
+    table = configuration.profile.control
+    control = ProfileControl(table, timeout=2.0) if table is not None else None
+    return Idle(configuration, control)
+
+
+def test_refusals_in_order() -> None:
+    made = session()
+    reasons = []
+    for change in (lambda: None, lambda: made.activate(1.0), lambda: made.bus_up(2.0)):
+        change()
+        made.submit(read(GAIN), 3.0)
+        reasons += [event.outcomes for event in made.take_events()]
+    assert reasons == [(Failure('bridge inactive'),), (Failure('bus down'),)]
+    assert made.waiting == 1
+    made.waiting = 63
+    made.submit(read(GAIN), 4.0)
+    made.submit(read(GAIN, SPEED), 4.0)
+    assert [event.outcomes for event in made.take_events()] == [(Failure('busy'),) * 2]
+    assert made.statistics.requests_failed == 4
+
+
+def test_empty_request_is_answered_at_once() -> None:
+    made = session()
+    made.activate(1.0)
+    made.bus_up(1.0)
+    empty = read()
+    made.submit(empty, 2.0)
+    assert made.take_events() == [RequestCompleted(empty, ())]
+    assert made.waiting == 0
+
+
+def test_outboxes_are_emptied() -> None:
+    made = session()
+    made.receive_frame(Frame(1, b'', True), 1.0)
+    assert made.take_frames() == [Frame(1, b'', True)]
+    assert made.take_frames() == []
+    assert made.take_events() == []
+
+
+def test_states() -> None:
+    made = session(control=CONTROL, request=(WORD, SPEED), rearm_immediate=True)
+    assert made.state is DriveState.OFFLINE
+    made.online = True
+    assert made.state is DriveState.NOT_ARMED
+    made.setpoints.enabled = True
+    made.command(0, 1.0, 1.0)
+    assert made.state is DriveState.ONLINE
+    assert made.control is not None
+    made.control.status_received(8, 1.0)
+    assert made.state is DriveState.FAULT
+    made.online = False
+    assert made.state is DriveState.OFFLINE
+
+
+def test_control_word_that_no_control_uses_is_a_setpoint() -> None:
+    plain = session(request=(WORD, SPEED))
+    assert [item.parameter for item in plain.setpoints.items] == [WORD, SPEED]
+    assert plain.write_refusal(WORD) == 'sent cyclically: publish ~/command/control_word'
+    controlled = session(request=(WORD, SPEED), control=CONTROL)
+    assert controlled.write_refusal(WORD) == 'use ~/enable'
+    assert session(control=CONTROL).write_refusal(WORD) == 'use ~/enable'
+    assert controlled.write_refusal(STATUS) == ''
+
+
+def test_refused_commands_are_counted() -> None:
+    made = session()
+    for value in (math.nan, 1e9, True):
+        with pytest.raises(ValueRefused):
+            made.command(0, value, 1.0)
+    made.command(0, 5.0, 1.0)
+    assert made.statistics.commands_refused == 3
+
+
+def test_a_command_of_any_size_is_refused_not_a_defect() -> None:
+    made = session(request=(parameter('free', 60, scale=0.01),))
+    for value in (1.7e308, -1.7e308):
+        with pytest.raises(ValueRefused):
+            made.command(0, value, 1.0)
+    assert made.statistics.commands_refused == 2
+
+
+def test_reconfigure_changes_what_is_named() -> None:
+    made = session()
+    made.reconfigure()
+    assert (made.drive.command_timeout, made.drive.rearm_immediate) == (0.5, False)
+    made.reconfigure(command_timeout=0.0, rearm_immediate=True, parameter_timeout=0.3)
+    assert (made.setpoints.timeout, made.setpoints.rearm_immediate) == (0.0, True)
+    assert made.drive.parameter_timeout == 0.3
+
+
+def test_control_requests_need_a_drive() -> None:
+    from drive_can_bridge.core.control import ControlAction, ControlTicket
+    made = session(control=CONTROL)
+    made.active = made.bus_available = made.online = True
+    assert isinstance(made.request_control(ControlAction.DISABLE, 1.0), ControlTicket)
+    assert made.take_control_outcomes() == []
+    assert session().take_control_outcomes() == []
+
+
+def test_successes() -> None:
+    assert successes(2, 'note') == (Written('note'), Written('note'))

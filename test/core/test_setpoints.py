@@ -1,0 +1,98 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Arming and ageing of setpoints, without a session around them."""
+
+import math
+
+from builders import LIMIT, parameter, SPEED
+from hypothesis import given, strategies as st
+import pytest
+
+from drive_can_bridge.core.errors import ValueRefused
+from drive_can_bridge.core.setpoints import CommandOutcome, Setpoints
+
+
+def setpoints(*, timeout: float = 0.5, immediate: bool = False, enabled: bool = True) -> Setpoints:
+    made = Setpoints((SPEED, LIMIT), timeout=timeout, rearm_immediate=immediate)
+    made.enabled = enabled
+    made.changed = False
+    return made
+
+
+def test_starts_neutral_unarmed_and_closed() -> None:
+    made = Setpoints((SPEED, parameter('n', 1, neutral=7.0)), timeout=0.5, rearm_immediate=True)
+    assert [item.raw for item in made.items] == [0, 7]
+    assert made.waiting == list(made.items)
+    assert made.changed
+    assert made.command(0, 0.0, 1.0) is CommandOutcome.NOT_ARMED
+
+
+def test_changed_says_whether_something_else_is_to_be_sent() -> None:
+    made = setpoints(immediate=True)
+    made.command(0, 0.0, 1.0)
+    assert not made.changed
+    made.command(0, 5.0, 1.0)
+    assert made.changed
+    made.changed = False
+    made.command(0, 5.0, 1.1)
+    assert not made.changed
+    assert len(made.expire(2.0)) == 1
+    assert made.changed
+
+
+def test_refused_values_are_refused_even_while_closed() -> None:
+    made = setpoints(enabled=False)
+    with pytest.raises(ValueRefused):
+        made.command(0, math.nan, 1.0)
+
+
+def test_age_is_that_of_the_oldest_command() -> None:
+    made = setpoints(immediate=True)
+    assert math.isnan(made.age(1.0))
+    made.command(0, 5.0, 1.0)
+    made.command(1, 5.0, 1.2)
+    assert made.age(1.3) == pytest.approx(0.3)
+    made.disarm()
+    assert math.isnan(made.age(1.3))
+
+
+def test_disarm_forgets_what_expired_unnoticed() -> None:
+    made = setpoints(immediate=True)
+    made.command(0, 5.0, 1.0)
+    made.command(0, 5.0, 3.0)
+    made.disarm()
+    assert made.expire(3.1) == []
+
+
+def test_time_out_is_inclusive() -> None:
+    made = setpoints(immediate=True)
+    made.command(0, 5.0, 1.0)
+    assert made.expire(1.5) == []
+    assert made.expire(1.5 + 1e-9) == [made.items[0]]
+    assert made.expire(9.0) == []
+
+
+@given(st.lists(st.tuples(st.integers(0, 1), st.sampled_from([0.0, 0.1, 5.0, 10.0]),
+                          st.sampled_from([0.0, 0.1, 0.2, 0.3, 0.6])), max_size=40),
+       st.booleans(), st.sampled_from([0.0, 0.5]))
+def test_agrees_with_a_simple_model(steps: list[tuple[int, float, float]], immediate: bool,
+                                    timeout: float) -> None:
+    made = setpoints(timeout=timeout, immediate=immediate)
+    model: dict[int, tuple[int, float]] = {}
+    now = 1.0
+    for index, value, pause in steps:
+        now += pause
+        raw = round(value * 10)
+        for key, (_, since) in list(model.items()):
+            if 0 < timeout < now - since:
+                del model[key]
+        outcome = made.command(index, value, now)
+        if index in model or immediate or raw <= 1:
+            assert outcome is (CommandOutcome.ACCEPTED if index in model
+                               else CommandOutcome.ARMED)
+            model[index] = raw, now
+        else:
+            assert outcome is CommandOutcome.NOT_ARMED
+        made.expire(now)
+        assert [item.raw for item in made.items] == [
+            model.get(key, (0, 0.0))[0] for key in range(2)]
+        assert [item.armed for item in made.items] == [key in model for key in range(2)]
