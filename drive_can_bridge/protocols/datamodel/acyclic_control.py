@@ -1,0 +1,131 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The control word of a drive that does not get it cyclically, or does not answer cyclically.
+
+The control word is written when it changes, before everything else that waits. The status word is
+read twice a second, and twenty times while a request is under way. What has its slot in the cyclic
+telegrams is none of this module's business.
+"""
+
+from collections.abc import Callable
+import math
+
+from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.control import ControlMachine
+from drive_can_bridge.core.parameters import Parameter, Storage
+from drive_can_bridge.protocols.datamodel.channel import AcyclicChannel, Procedure, Read, Write
+
+#: s between two looks at the status word, while a request is under way and otherwise
+STATUS_PERIOD_PENDING = 0.05
+STATUS_PERIOD = 0.5
+
+
+class AcyclicControl:
+    """
+    Control by acyclic frames.
+
+    :param word: parameter of the control word; None: it is sent cyclically.
+    :param status: parameter of the status word; None: it comes cyclically, or there is none.
+    :param offset: added to parameter numbers on the wire.
+    :param changed: called after anything that may have changed the control word.
+    :ivar look_at: when the status word is to be read; infinity: not planned.
+    """
+
+    def __init__(self, channel: AcyclicChannel, control: ControlMachine, *,
+                 word: Parameter | None, status: Parameter | None, offset: int,
+                 changed: Callable[[float], None]) -> None:
+        self.look_at = math.inf
+        self._channel = channel
+        self._control = control
+        self._word = word
+        self._status = status
+        self._offset = offset
+        self._changed = changed
+        self._written: int | None = None
+        self._reading = False
+        self._watching = False
+
+    def begin(self, now: float) -> None:
+        """Handle a drive that was found: it gets its word, and its status is looked at."""
+        self._written = None
+        self._watching = True
+        if self._status is not None:
+            self.look_at = now
+
+    def end(self) -> None:
+        """Leave the status of a lost drive alone."""
+        self._watching = False
+        self.look_at = math.inf
+
+    def stop(self) -> None:
+        """Plan nothing any more. The channel was cleared."""
+        self.end()
+        self._reading = False
+
+    def update(self, now: float) -> None:
+        """Write the control word if it changed."""
+        word = self._control.word
+        if self._word is None or word == self._written:
+            return
+        self._written = word
+        self._channel.write_first(self._write(self._word, word), self._sent, now)
+        if self._watching and self._status is not None:
+            self.look_at = now
+
+    def write_at_once(self, now: float) -> bool:
+        """
+        Write the control word along with a cycle of a stop.
+
+        :return: False when the EEPROM wants more time.
+        """
+        return self._word is None or self._channel.write_at_once(
+            self._write(self._word, self._control.word), now)
+
+    def look(self, now: float) -> None:
+        """Read the status word, unless that is under way."""
+        self.look_at = math.inf
+        if self._status is not None and not self._reading:
+            self._reading = True
+            self._channel.run(self._read(self._status), self._received, now)
+
+    # -- inside ---------------------------------------------------------------------------------
+
+    def _write(self, parameter: Parameter, word: int) -> Write:
+        return Write((parameter.number or 0) + self._offset, (word,),
+                     parameter.storage is not Storage.RAM)
+
+    def _sent(self) -> None:
+        self._control.word_sent(self._channel.now)
+        self._changed(self._channel.now)
+
+    def _read(self, status: Parameter) -> Procedure:
+        words = yield Read((status.number or 0) + self._offset)
+        return None if words is None else status.raw_from_word(words[0])
+
+    def _received(self, raw: int | None) -> None:
+        now = self._channel.now
+        self._reading = False
+        if not self._watching:
+            return
+        if raw is not None:
+            self._control.status_received(raw, now)
+            self._changed(now)
+        self.look_at = min(self.look_at, now + (
+            STATUS_PERIOD_PENDING if self._control.pending else STATUS_PERIOD))
+
+
+def control_by_hand(drive: DriveConfiguration, channel: AcyclicChannel,
+                    control: ControlMachine | None, changed: Callable[[float], None], *,
+                    word: str, status: str) -> AcyclicControl | None:
+    """
+    Return what looks after the words that have no slot; None where there are none.
+
+    :param word: name of the control word's parameter; '' where it has its slot.
+    :param status: name of the status word's parameter; '' likewise, or where there is none.
+    """
+    parameters = drive.profile.parameters
+    if control is None or not word and not status:
+        return None
+    return AcyclicControl(channel, control, word=parameters.get(word),
+                          status=parameters.get(status), changed=changed,
+                          offset=drive.family_options['parameter_offset'])

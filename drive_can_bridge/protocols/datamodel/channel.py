@@ -1,0 +1,329 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The acyclic channel to one station: one frame at a time, paced, timed out, repeated.
+
+Anything that takes several frames (a mapping check, a verified write) is a *procedure*: a
+generator that yields steps and is sent their results, so that it reads like the sequence it is.
+
+=================== ==================================================================
+step                result sent back
+=================== ==================================================================
+``Read(n, count)``  the words, or None when nobody answered after all attempts
+``Write(n, words)`` None, as soon as the frame is handed out (nobody acknowledges it)
+=================== ==================================================================
+
+Order: every lane runs its procedures one after the other. Urgent ones come first; our own and
+those of users take turns after every step, so that neither a flood of users nor a silent parameter
+keeps the other waiting for more than one read. A control word goes before all of them, and takes
+the place of one that has not left yet (:meth:`~AcyclicChannel.write_first`).
+
+Pace: at least 20 ms lie between two EEPROM writes to a station and between such a write and the
+next read (manual, "Scrittura di un parametro": "almeno 20msec"); a frame leaves only while no
+cyclic request is under way, because nothing is known about how many requests a drive can hold.
+"""
+
+from collections import deque
+from collections.abc import Callable, Generator
+from dataclasses import dataclass
+from enum import Enum
+import math
+from typing import Any, Union
+
+from drive_can_bridge.core.frame import Frame
+
+#: s between an unacknowledged write and the next acyclic frame, so that a drive with a single
+#: receive buffer has fetched the first
+WRITE_SPACING = 0.001
+
+
+@dataclass(frozen=True)
+class Read:
+    """Read ``count`` consecutive parameters; ``attempts`` None: as configured."""
+
+    number: int
+    count: int = 1
+    attempts: int | None = None
+
+
+@dataclass(frozen=True)
+class Write:
+    """Write consecutive parameters."""
+
+    number: int
+    words: tuple[int, ...]
+    eeprom: bool
+
+
+Step = Union[Read, Write]
+Words = tuple[int, ...]
+Procedure = Generator[Step, Union[Words, None], Any]
+Done = Callable[[Any], None]
+Sent = Callable[[], None]
+
+
+class Lane(Enum):
+    """Who a procedure works for."""
+
+    URGENT = 'setpoints and control words: before everything else'
+    OWN = 'map checks and polling'
+    USERS = 'parameter services'
+
+
+class _Queue:
+    """The procedures of one lane, and the step that the first of them wants done."""
+
+    __slots__ = ('_running', 'attempts_left', 'step', 'waiting')
+
+    def __init__(self) -> None:
+        self.waiting: deque[tuple[Procedure, Done]] = deque()
+        self.attempts_left = 0
+        self.step: Step | None = None
+        self._running: tuple[Procedure, Done] | None = None
+
+    def fetch(self, attempts: int) -> Step | None:
+        """Return the step to be done next, beginning procedures as needed."""
+        while self.step is None and self.waiting:
+            self._running = self.waiting.popleft()
+            self.resume(None, attempts)
+        return self.step
+
+    def resume(self, result: Words | None, attempts: int) -> None:
+        """Tell the running procedure what became of its step."""
+        if self._running is None:
+            raise RuntimeError('no procedure to resume')
+        procedure, done = self._running
+        try:
+            step = self.step = procedure.send(result)
+        except StopIteration as stop:
+            self._running = self.step = None
+            done(stop.value)
+        else:
+            if isinstance(step, Read):
+                self.attempts_left = step.attempts or attempts
+
+    def clear(self) -> None:
+        """Forget everything."""
+        if self._running is not None:
+            self._running[0].close()
+        for procedure, _ in self.waiting:
+            procedure.close()
+        self.waiting.clear()
+        self._running = self.step = None
+
+
+class AcyclicChannel:
+    """
+    Runs procedures, one frame at a time.
+
+    :param encode_read: (number, count) -> frame.
+    :param encode_write: (number, words) -> frame.
+    :param timeout: s to wait for an answer.
+    :param attempts: how often a read is sent before it counts as unanswered.
+    :param eeprom_gap: s after an EEPROM write.
+    :ivar now: ``now`` of the call being served, for whoever is called back.
+    """
+
+    def __init__(self, *, encode_read: Callable[[int, int], Frame],
+                 encode_write: Callable[[int, Words], Frame],
+                 timeout: float, attempts: int, eeprom_gap: float) -> None:
+        self._encode_read = encode_read
+        self._encode_write = encode_write
+        self.timeout = timeout
+        self.attempts = attempts
+        self.now = -math.inf
+        self._eeprom_gap = eeprom_gap
+        self._queues = {lane: _Queue() for lane in Lane}
+        urgent, own, users = self._queues.values()
+        self._orders = (urgent, own, users), (urgent, users, own)
+        self._own, self._users = own, users
+        self._users_next = False
+        self._serving = own  # whose step is under way, or was last
+        self._first: tuple[Write, Sent] | None = None
+        self._busy = False  # something may be waiting or under way
+        self._advancing = False
+        self._outstanding = False
+        self._deadline = math.inf
+        self._not_before = -math.inf
+        self._eeprom_free_at = -math.inf
+        self._held_until = -math.inf
+        self._frames: list[Frame] = []
+
+    # -- queueing -------------------------------------------------------------------------------
+
+    def run(self, procedure: Procedure, done: Done, now: float, lane: Lane = Lane.OWN) -> None:
+        """Queue a procedure; ``done`` gets its return value."""
+        self._queues[lane].waiting.append((procedure, done))
+        self._busy = True
+        self.advance(now)
+
+    def write_first(self, write: Write, sent: Sent, now: float) -> None:
+        """
+        Write something before everything that waits.
+
+        It takes the place of such a write that has not left yet: what is outdated is not sent.
+
+        :param sent: called when the frame was handed out.
+        """
+        self._first = (write, sent)
+        self._busy = True
+        self.advance(now)
+
+    def write_at_once(self, write: Write, now: float) -> bool:
+        """
+        Write something without waiting for anything but the EEPROM.
+
+        :return: False when it is too early, and nothing was written.
+        """
+        if write.eeprom and now < self._eeprom_free_at:
+            return False
+        self._send_write(write, now)
+        return True
+
+    def clear(self) -> None:
+        """Forget everything under way. Nobody is told: that is the caller's business."""
+        for queue in self._queues.values():
+            queue.clear()
+        self._first = None
+        self._busy = False
+        self._outstanding = False
+        self._deadline = math.inf
+        self._held_until = -math.inf
+        self._frames.clear()
+
+    @property
+    def waiting_users(self) -> int:
+        """User procedures that have not begun."""
+        return len(self._users.waiting)
+
+    @property
+    def outstanding(self) -> Read | None:
+        """The read that waits for its answer, if any."""
+        step = self._serving.step
+        return step if self._outstanding and isinstance(step, Read) else None
+
+    @property
+    def eeprom_free_at(self) -> float:
+        """When the next EEPROM write, or read, may follow."""
+        return self._eeprom_free_at
+
+    def hold(self, until: float) -> None:
+        """Send nothing before ``until``: a cyclic request is under way."""
+        self._held_until = until
+
+    def release(self, now: float) -> None:
+        """Go on: the cyclic request was answered."""
+        self._held_until = -math.inf
+        if self._busy:
+            self.advance(now)
+
+    # -- input ----------------------------------------------------------------------------------
+
+    def receive(self, words: Words, now: float) -> None:
+        """Take the answer of the outstanding read (the caller has matched it)."""
+        self.now = now
+        self._finish(words)
+        self.advance(now)
+
+    def advance(self, now: float) -> None:
+        """Do all that is possible now."""
+        self.now = now
+        if self._advancing:  # called back from below: whatever was added is seen there
+            return
+        self._advancing = True
+        try:
+            while self._busy and self._advance_once(now):
+                pass
+        finally:
+            self._advancing = False
+
+    def _advance_once(self, now: float) -> bool:
+        """Do the next thing; False when it cannot be done yet."""
+        if self._outstanding:
+            if now < self._deadline:
+                return False
+            if self._serving.attempts_left <= 0:
+                self._finish(None)
+                return True
+            self._outstanding = False
+        if self._first is not None:
+            write, sent = self._first
+            if now < self._ready_at(write):
+                return False
+            self._first = None
+            self._send_write(write, now)
+            sent()
+            return True
+        step = self._choose()
+        if step is None:
+            self._busy = self._first is not None
+            return True
+        if now < self._ready_at(step):
+            return False
+        self._send(step, now)
+        return True
+
+    def next_timer(self) -> float:
+        """Return when ``advance`` wants to be called."""
+        if not self._busy:
+            return math.inf
+        if self._outstanding:
+            return self._deadline
+        if self._first is not None:
+            return self._ready_at(self._first[0])
+        for queue in self._order():
+            if queue.step is not None:
+                return self._ready_at(queue.step)
+        return math.inf
+
+    def take_frames(self) -> list[Frame]:
+        """Return the frames to be sent."""
+        frames = self._frames
+        if frames:
+            self._frames = []
+        return frames
+
+    # -- inside ---------------------------------------------------------------------------------
+
+    def _order(self) -> tuple[_Queue, _Queue, _Queue]:
+        """Return the queues in the order in which they are served now."""
+        return self._orders[self._users_next]
+
+    def _choose(self) -> Step | None:
+        """Return the step to be done next; None when there is nothing to do."""
+        for queue in self._order():
+            step = queue.fetch(self.attempts)
+            if step is not None:
+                self._serving = queue
+                return step
+        return None
+
+    def _finish(self, result: Words | None) -> None:
+        """End the step under way; then it is another lane's turn."""
+        queue = self._serving
+        self._outstanding = False
+        self._deadline = math.inf
+        if queue is self._own or queue is self._users:
+            self._users_next = queue is self._own
+        queue.resume(result, self.attempts)
+
+    def _ready_at(self, step: Step) -> float:
+        ready = max(self._held_until, self._not_before)
+        if isinstance(step, Read) or step.eeprom:
+            ready = max(ready, self._eeprom_free_at)
+        return ready
+
+    def _send(self, step: Step, now: float) -> None:
+        if isinstance(step, Read):
+            self._frames.append(self._encode_read(step.number, step.count))
+            self._outstanding = True
+            self._serving.attempts_left -= 1
+            self._deadline = now + self.timeout
+        else:
+            self._send_write(step, now)
+            self._finish(None)
+
+    def _send_write(self, write: Write, now: float) -> None:
+        self._frames.append(self._encode_write(write.number, write.words))
+        self._not_before = now + WRITE_SPACING
+        if write.eeprom:
+            self._eeprom_free_at = now + self._eeprom_gap

@@ -1,0 +1,431 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The conversation with one DataModel drive that uses 29-bit identifiers.
+
+.. code-block:: text
+
+    IDLE ──activate, bus up──► CHECKING ──maps agree──► CYCLIC ──missed_limit──► LEAVING
+      ▲                         ▲  │ ▲                    │                        │
+      │                         │  └─┼──maps differ──► DIFFERS (looks again in 1 s) │
+      └──deactivate / bus down──┘    └─────────3 neutral cycles, then silence──────┘
+
+A drive reads cyclic words by *its own* maps. So the maps are read before the first cyclic frame,
+every second while cycling, and again after each loss; a drive that does not answer gets no cyclic
+frames beyond three with neutral setpoints, in case it only lost its voice. With
+``mapping: assume`` there is neither CHECKING nor LEAVING: cycling never stops.
+"""
+
+from enum import Enum
+import math
+
+from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.errors import RemoteProtocolError
+from drive_can_bridge.core.events import (
+    Event, ForeignMasterSeen, MappingDiffered, Noted, ProcessDataReceived, SetpointsExpired,
+    StationFound,
+)
+from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.requests import BRIDGE_INACTIVE, BUS_DOWN
+from drive_can_bridge.core.session import DriveState, STOP_CYCLES
+from drive_can_bridge.protocols.datamodel import extended
+from drive_can_bridge.protocols.datamodel.acyclic_control import control_by_hand
+from drive_can_bridge.protocols.datamodel.base_session import DataModelSession
+from drive_can_bridge.protocols.datamodel.map_supervision import MapSupervision, Verdict
+from drive_can_bridge.protocols.datamodel.process_words import (
+    slot_of, unpack_available, wire_numbers, words_struct,
+)
+
+#: longest pause between the neutral cycles of a stop, however long the period is
+STOP_SPACING_MAX = 0.1
+LOOKING = 'being looked for'
+
+
+class Phase(Enum):
+    """What the session is doing."""
+
+    IDLE = 'idle'
+    CHECKING = 'checking the maps'
+    DIFFERS = 'maps differ'
+    CYCLIC = 'cycling'
+    LEAVING = 'last neutral cycles'
+
+
+class ExtendedSession(DataModelSession):
+    """Mapping check, cyclic exchange, and the acyclic frames between its cycles."""
+
+    def __init__(self, drive: DriveConfiguration) -> None:
+        station = drive.station
+        super().__init__(
+            drive,
+            encode_read=lambda number, count: extended.encode_read_request(
+                station, number, count),
+            encode_write=lambda number, words: extended.encode_write(station, number, words))
+        options = drive.family_options
+        self._verify: bool = options['mapping'] != 'assume'
+        self._strict: bool = options['length_policy'] == 'strict'
+        self._request_identifier = extended.cyclic_request_identifier(station)
+        self._response_identifier = self._request_identifier | extended.DIR
+        self._control_slot = slot_of(drive.cyclic_request, self._control_name)
+        table = drive.profile.control
+        status_name = table.status_parameter or '' if table is not None else ''
+        self._status_slot = slot_of(drive.cyclic_response, status_name)
+        self._pack = words_struct(drive.cyclic_request, unsigned=self._control_slot).pack
+        self._padding = extended.PADDING[len(drive.cyclic_request)]
+        self._unpack = words_struct(drive.cyclic_response).unpack_from
+        self._needed = 2 * len(drive.cyclic_response)
+        self._maps = MapSupervision(
+            self._channel, request_base=self._request_base, response_base=self._response_base,
+            request=wire_numbers(drive.cyclic_request, self._offset),
+            response=wire_numbers(drive.cyclic_response, self._offset),
+            rewrite=options['mapping'] == 'configure',
+            emit=self._maps_reported, judged=self._maps_judged)
+        self._by_hand = control_by_hand(
+            drive, self._channel, self.control, self._control_changed,
+            word=self._control_name if self._control_slot is None else '',
+            status=status_name if self._status_slot is None else '')
+        self._phase = Phase.IDLE
+        self._cycles_left = -1  # cycles still to be sent in LEAVING or before a stop; -1: no end
+        self._stopping = False
+        self._frame: Frame | None = None
+        self._sent_word: int | None = None
+        self._awaiting = False
+        self._forgiven = False
+        self._sent_at = -math.inf
+        self._in_pace = False  # the last cycle was a period ago: its distance says something
+        self._next_cycle = math.inf
+        self._missed_in_row = 0
+
+    # -- life cycle -----------------------------------------------------------------------------
+
+    def activate(self, now: float) -> None:
+        self.active = True
+        self.ever_online = False
+        if self.bus_available:
+            self._advice = LOOKING
+            self._begin(now)
+
+    def deactivate(self, now: float) -> None:
+        self.active = False
+        self._fail_requests(BRIDGE_INACTIVE)
+        if self._phase not in (Phase.CYCLIC, Phase.LEAVING):
+            self._withdraw(BRIDGE_INACTIVE, now)
+            self._go_idle('deactivated')
+            return
+        self._stopping = True  # from here on the control word goes along with the cycles
+        self._withdraw(BRIDGE_INACTIVE, now)
+        self._in_pace = False
+        self._cycles_left = STOP_CYCLES
+        spacing = min(self.drive.period, STOP_SPACING_MAX)
+        self._next_cycle = min(self._next_cycle, max(now, self._sent_at + spacing))
+
+    @property
+    def stopped(self) -> bool:
+        return self._phase is Phase.IDLE
+
+    def bus_up(self, now: float) -> None:
+        self.bus_available = True
+        if self.active:
+            self._advice = LOOKING
+            self._begin(now)
+
+    def bus_down(self, now: float, reason: str) -> None:
+        self.bus_available = False
+        self._fail_requests(BUS_DOWN)
+        self._lose(f'bus down: {reason}', now)
+        self._go_idle(f'bus down: {reason}')
+        self._frames.clear()
+
+    def time_lost(self, now: float) -> None:
+        if self._phase is Phase.IDLE or self._stopping:
+            return
+        self._lose('the bridge stood still', now)
+        self._begin(now)
+
+    def _begin(self, now: float) -> None:
+        """Start over: nothing is known of the drive."""
+        if self.online:
+            self._lose('the drive is being reconnected', now)
+        else:
+            self._withdraw('the drive is being reconnected', now)
+        self._stopping = False
+        self._stop_awaiting()
+        self._missed_in_row = 0
+        if self._verify:
+            self._phase = Phase.CHECKING
+            self._next_cycle = math.inf
+            self._maps.look_afresh(now)
+        else:
+            self._start_cycling(now)
+
+    def _go_idle(self, advice: str) -> None:
+        self._phase = Phase.IDLE
+        self._stopping = False
+        self._cycles_left = -1
+        self.setpoints.enabled = False
+        self._clear_channel()
+        self._next_cycle = math.inf
+        self._stop_awaiting()
+        self._advice = advice
+        self._be_offline(advice)
+
+    def _clear_channel(self) -> None:
+        super()._clear_channel()
+        self._maps.stop()
+        if self._by_hand is not None:
+            self._by_hand.stop()
+
+    # -- maps -----------------------------------------------------------------------------------
+
+    def _maps_judged(self, verdict: Verdict, text: str, now: float) -> None:
+        if verdict is Verdict.AGREE:
+            if self._phase is not Phase.CYCLIC:
+                self._start_cycling(now)
+        elif verdict is Verdict.DIFFER:
+            self._lose(f'mapping differs: {text}', now)
+            self._phase = Phase.DIFFERS
+            self._next_cycle = math.inf
+            self._stop_awaiting()
+        elif self._phase is Phase.LEAVING:
+            self._maps.look_at = math.inf  # that comes after the last neutral cycle
+        elif self._phase is not Phase.CYCLIC:  # there, the cyclic answers tell who is there
+            self._phase = Phase.CHECKING
+            self._advice = ('no answer to mapping read: drive silent, wrong station, bit rate '
+                            'or identifier mode')
+            self._maps.look_at = now  # paced by the time-out of the read
+
+    def _maps_reported(self, event: Event) -> None:
+        if isinstance(event, MappingDiffered):
+            self._advice = f'mapping differs: {event.text}'
+        self._events.append(event)
+
+    # -- cyclic exchange ------------------------------------------------------------------------
+
+    def _start_cycling(self, now: float) -> None:
+        self._phase = Phase.CYCLIC
+        self._cycles_left = -1
+        self._forgiven = False
+        self._in_pace = False
+        self._missed_in_row = 0
+        self._next_cycle = max(now, self._sent_at + self.drive.period)
+        self._advice = 'no cyclic response: drive silent or response identifier taken'
+
+    def _cycle(self, now: float) -> None:
+        """Send one cyclic request. The fast path of the timer."""
+        if self._awaiting:
+            self._miss(now)
+            if self._next_cycle == math.inf:
+                return
+        setpoints = self.setpoints
+        expired = setpoints.expire(now)
+        if expired:
+            self._events.append(SetpointsExpired(
+                tuple(setpoint.parameter.name for setpoint in expired)))
+        control = self.control
+        if (setpoints.changed or self._frame is None
+                or control is not None and control.word != self._sent_word):
+            self._frame = self._encode()
+        self._frames.append(self._frame)
+        if self._control_slot is not None and control is not None:
+            control.word_sent(now)
+        period = self.drive.period
+        if self._in_pace:
+            self.statistics.period_error.add(abs(now - self._sent_at - period))
+        self._in_pace = not self._stopping
+        self._awaiting = True
+        self._sent_at = now
+        soonest = now + 0.5 * period
+        self._channel.hold(soonest)
+        if self._cycles_left > 0:
+            self._count_down(now)
+            return
+        self._next_cycle += period
+        if self._next_cycle < soonest:
+            self._skip_cycles(soonest)
+
+    def _skip_cycles(self, soonest: float) -> None:
+        """Leave out cycles that are overdue, and keep to the beat: never catch up in a burst."""
+        period = self.drive.period
+        self._next_cycle += math.ceil((soonest - self._next_cycle) / period) * period
+
+    def _count_down(self, now: float) -> None:
+        """Handle the last cycles before silence."""
+        self._next_cycle = now + min(self.drive.period, STOP_SPACING_MAX)
+        if self._stopping and self._by_hand is not None:
+            written = self._by_hand.write_at_once(now)
+            self._frames += self._channel.take_frames()
+            if not written and self._channel.eeprom_free_at <= now + STOP_SPACING_MAX:
+                return  # an EEPROM is busy: the word goes with a later cycle
+        self._cycles_left -= 1
+        if self._cycles_left == 0 and self._stopping:
+            self._go_idle('deactivated')
+
+    def _encode(self) -> Frame:
+        raws = [setpoint.raw for setpoint in self.setpoints.items]
+        if self.control is not None:
+            self._sent_word = self.control.word
+            if self._control_slot is not None:
+                raws.insert(self._control_slot, self._sent_word)
+        self.setpoints.changed = False
+        return Frame(self._request_identifier, self._pack(*raws) + self._padding, True)
+
+    def _miss(self, now: float) -> None:
+        self._awaiting = False
+        self.statistics.missed += 1
+        self._missed_in_row += 1
+        if self._stopping:
+            return
+        if self._phase is Phase.LEAVING:
+            if self._cycles_left == 0:
+                self._begin(now)
+            return
+        if self._missed_in_row < self.drive.missed_limit:
+            return
+        self._missed_in_row = 0
+        reason = f'no cyclic response for {self.drive.missed_limit} cycles'
+        if not self._verify:
+            self._lose(reason, now)
+        elif self.online:
+            # it may still be listening: tell it to stand still before it is left alone
+            self._lose(reason, now)
+            self._phase = Phase.LEAVING
+            self._cycles_left = STOP_CYCLES
+        else:
+            self._begin(now)
+
+    def _stop_awaiting(self) -> None:
+        """Expect no answer any more; one that is on its way is no surprise, though."""
+        self._forgiven = self._awaiting
+        self._awaiting = False
+
+    def _withdraw(self, reason: str, now: float) -> None:
+        super()._withdraw(reason, now)
+        if self._by_hand is not None:
+            self._by_hand.end()
+
+    # -- frames from the drive ------------------------------------------------------------------
+
+    def receive_frame(self, frame: Frame, now: float, age: float = 0.0) -> None:
+        if frame[0] == self._response_identifier:
+            self._receive_cyclic(frame[1], now, now - age)
+            return
+        if not frame.extended or (frame.identifier ^ self._request_identifier
+                                  ) & extended.STATION_MASK:
+            self._reject(f'{frame}: not from this station')
+            return
+        if not frame.identifier & extended.DIR:
+            self._events.append(ForeignMasterSeen(
+                f'another master sends requests to station {self.drive.station}: {frame}'))
+            return
+        try:
+            telegram = extended.decode(frame, strict=self._strict)
+        except RemoteProtocolError as error:
+            self._reject(str(error))
+            return
+        step = self._channel.outstanding
+        if not isinstance(telegram, extended.ReadResponse) or step is None or (
+                telegram.number, len(telegram.words)) != (step.number, step.count):
+            self._reject(f'{frame}: nobody asked for it')
+            return
+        if len(frame.data) != extended.PAYLOAD:
+            self.statistics.short += 1
+        self._channel.receive(telegram.words, now)
+
+    def _receive_cyclic(self, data: bytes, now: float, received_at: float) -> None:
+        """Take a cyclic response. The fast path of the reader."""
+        statistics = self.statistics
+        if not self._awaiting:
+            if self._forgiven:
+                self._forgiven = False
+            else:
+                self._reject('cyclic response that nobody asked for')
+            return
+        if len(data) == extended.PAYLOAD:
+            raws: tuple[int, ...] = self._unpack(data)
+        else:
+            usable = self._unpack_short(data)
+            if usable is None:
+                return
+            raws = usable
+        self._awaiting = False
+        self._missed_in_row = 0
+        statistics.exchanges += 1
+        latency = received_at - self._sent_at
+        statistics.latency.add(latency if latency > 0.0 else 0.0)
+        if not self.online and not self._stopping:
+            if self._phase is Phase.LEAVING:  # it is back: look at its maps before anything else
+                self._begin(now)
+                return
+            self._found(now)
+        if self.control is not None and self._status_slot is not None:
+            slot = self._status_slot
+            self.control.status_received(raws[slot] if slot < len(raws) else None, now)
+            self._control_changed(now)
+        self._events.append(ProcessDataReceived(raws, received_at))
+        self._channel.release(now)
+
+    def _unpack_short(self, data: bytes) -> tuple[int, ...] | None:
+        """Unpack a response of unusual length; None when it is of no use."""
+        if self._strict:
+            self._reject(f'cyclic response with {len(data)} data bytes instead of 8')
+            return None
+        if len(data) >= self._needed:
+            self.statistics.short += 1
+            return self._unpack(data)
+        self._reject(f'cyclic response with {len(data)} data bytes, {self._needed} needed')
+        return unpack_available(self.drive.cyclic_response, data) or None
+
+    def _found(self, now: float) -> None:
+        self.online = True
+        self.ever_online = True
+        self._advice = ''
+        self.setpoints.disarm()
+        self.setpoints.enabled = True
+        self._events.append(StationFound())
+        if self._by_hand is not None:
+            self._by_hand.begin(now)
+        self._control_changed(now)
+
+    # -- timer ----------------------------------------------------------------------------------
+
+    def handle_timer(self, now: float) -> None:
+        if now >= self._next_cycle:
+            self._cycle(now)
+        if now >= self._maps.look_at:
+            self._maps.look(now)
+        if self.control is not None:
+            if self._by_hand is not None and now >= self._by_hand.look_at:
+                self._by_hand.look(now)
+            if now >= self.control.next_timer():
+                self.control.handle_timer(now)
+                self._control_changed(now)
+        if now >= self._channel.next_timer():
+            self._channel.advance(now)
+
+    def next_timer(self) -> float:
+        soonest = min(self._next_cycle, self._channel.next_timer(), self._maps.look_at)
+        if self.control is None:
+            return soonest
+        if self._by_hand is not None:
+            soonest = min(soonest, self._by_hand.look_at)
+        return min(soonest, self.control.next_timer())
+
+    # -- control --------------------------------------------------------------------------------
+
+    def _control_changed(self, now: float) -> None:
+        """Tell what the machine noted; write a control word that has no slot, on change."""
+        control = self.control
+        if control is None:
+            return
+        for note in control.take_notes():
+            self._events.append(Noted(note))
+        if self._by_hand is not None and not self._stopping and (
+                self.online or self._phase is Phase.CYCLIC):
+            self._by_hand.update(now)
+
+    # -- state ----------------------------------------------------------------------------------
+
+    @property
+    def state(self) -> DriveState:
+        if self._phase is Phase.DIFFERS:
+            return DriveState.MAPPING_DIFFERS
+        return super().state

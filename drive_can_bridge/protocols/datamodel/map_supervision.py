@@ -1,0 +1,143 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+Watch over the two maps of a drive: read them, compare them, rewrite them where that is wanted.
+
+The maps are read before the first cyclic frame, once a second from then on, and afresh whenever
+the session starts over. What a look finds is told to the session, which decides whether to cycle.
+
+With ``mapping: configure`` a difference is followed by a rewrite, and the rewrite by another look:
+nothing is believed that was not read. Map entries are kept in EEPROM, whose cells wear. So the
+pause before the next rewrite doubles from one to the next, whether it failed or was undone by
+somebody else, until the maps have been right for a minute.
+"""
+
+from collections.abc import Callable
+from enum import Enum
+import math
+
+from drive_can_bridge.core.events import Event, MappingDiffered, MappingWritten
+from drive_can_bridge.protocols.datamodel import procedures
+from drive_can_bridge.protocols.datamodel.channel import AcyclicChannel
+from drive_can_bridge.protocols.datamodel.mapping import differences
+
+#: s between two looks at the maps
+MAPPING_PERIOD = 1.0
+#: longest pause between map rewrites
+REWRITE_PAUSE_MAX = 60.0
+
+
+class Verdict(Enum):
+    """What a look at the maps found."""
+
+    AGREE = 'agree'
+    DIFFER = 'differ'
+    SILENT = 'no answer'
+
+
+class MapSupervision:
+    """
+    Looks at the maps of one drive.
+
+    :param emit: takes events for the user.
+    :param judged: takes each verdict, with the difference in words and the time; it may move
+        :attr:`look_at`.
+    :ivar look_at: when the next look is due; infinity: none is planned.
+    """
+
+    def __init__(self, channel: AcyclicChannel, *, request_base: int, response_base: int,
+                 request: tuple[int, ...], response: tuple[int, ...], rewrite: bool,
+                 emit: Callable[[Event], None],
+                 judged: Callable[[Verdict, str, float], None]) -> None:
+        self.look_at = math.inf
+        self._channel = channel
+        self._bases = request_base, response_base
+        self._request = request
+        self._response = response
+        self._rewrite = rewrite
+        self._emit = emit
+        self._judged = judged
+        self._running = False
+        self._outdated = False  # what is being read counts no more
+        self._agreed = False  # the drive is being cycled, unless it is lost meanwhile
+        self._told = ''
+        self._pause = MAPPING_PERIOD
+        self._rewritten_at = -math.inf
+
+    def look(self, now: float) -> None:
+        """Read the maps, unless that is under way."""
+        self.look_at = math.inf
+        if not self._running:
+            self._running = True
+            self._outdated = False
+            needed = self._request if self._agreed else None
+            self._channel.run(
+                procedures.read_maps(*self._bases, needed=needed), self._read, now)
+
+    def look_afresh(self, now: float) -> None:
+        """Read the maps; an answer that may be on its way already does not count."""
+        self._outdated = self._running
+        self._agreed = False
+        self.look(now)
+
+    def stop(self) -> None:
+        """Plan nothing any more. The channel was cleared."""
+        self.look_at = math.inf
+        self._running = self._agreed = False
+
+    # -- inside ---------------------------------------------------------------------------------
+
+    def _read(self, maps: procedures.Maps | None) -> None:
+        now = self._channel.now
+        self._running = False
+        if self._outdated:
+            self.look(now)
+            return
+        self.look_at = now + MAPPING_PERIOD
+        found = '' if maps is None else '; '.join(differences(
+            maps.request, maps.response,
+            wanted_request=self._request, wanted_response=self._response))
+        if not found and (maps is None or maps.response is None):
+            self._judged(Verdict.SILENT, '', now)
+            return
+        self._agreed = not found
+        if not found:
+            self._told = ''
+            if now - self._rewritten_at > REWRITE_PAUSE_MAX:
+                self._pause = MAPPING_PERIOD
+            self._judged(Verdict.AGREE, '', now)
+            return
+        self._judged(Verdict.DIFFER, found, now)
+        if not self._rewrite:
+            self._tell(found)
+        elif now >= self._rewritten_at + self._pause:
+            self._begin_rewrite(now)
+        else:
+            self.look_at = self._rewritten_at + self._pause
+            self._tell(f'{found}; rewritten before, not again within {self._pause:g} s')
+
+    def _begin_rewrite(self, now: float) -> None:
+        if self._rewritten_at > -math.inf:
+            self._pause = min(2 * self._pause, REWRITE_PAUSE_MAX)
+        self.look_at = math.inf
+        self._running = True
+        self._channel.run(
+            procedures.write_maps(*self._bases, request=self._request, response=self._response),
+            self._rewritten, now)
+
+    def _rewritten(self, failure: str) -> None:
+        now = self._rewritten_at = self._channel.now
+        self._running = False
+        if failure:
+            self._tell(f'could not be rewritten: {failure}')
+            self.look_at = now + self._pause
+            return
+        self._emit(MappingWritten(
+            f'request map {list(self._request)}, response map {list(self._response)}'))
+        self._told = ''
+        self.look(now)
+
+    def _tell(self, text: str) -> None:
+        """Report a difference, once."""
+        if text != self._told:
+            self._emit(MappingDiffered(text))
+        self._told = text

@@ -1,0 +1,84 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+What the rest of the program asks of a protocol family.
+
+Configuration checks, the exchange and the ROS side know families only through this interface and
+through the row in :mod:`drive_can_bridge.protocols.families`.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.frame import Route
+from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.session import Session
+
+
+class Complaint(NamedTuple):
+    """
+    A problem that a family finds in a drive's configuration.
+
+    :param key: key below the drive (``station``, ``cyclic_request``), or '' for the drive itself.
+    :param message: what is wrong and what is allowed.
+    """
+
+    key: str
+    message: str
+
+
+class Claim(NamedTuple):
+    """
+    Identifiers that a drive uses on its bus, and what for.
+
+    Two claims collide when some identifier matches both, unless both carry the same non-empty
+    ``shared`` mark (a broadcast identifier is shared on purpose).
+    """
+
+    route: Route
+    purpose: str
+    shared: str = ''
+
+    def overlaps(self, other: 'Claim') -> bool:
+        """Tell whether an identifier exists that both claim."""
+        common = self.route.mask & other.route.mask
+        return (self.route.extended == other.route.extended
+                and (self.route.identifier ^ other.route.identifier) & common == 0
+                and not (self.shared and self.shared == other.shared))
+
+
+class Family(ABC):
+    """One protocol family."""
+
+    #: value of the drive key ``protocol``
+    name: str
+    #: has a cyclic service of its own (False: the exchange is emulated by polling)
+    cyclic: bool
+    #: JSON Schema properties of the keys that only this family has; each has a ``default``
+    options_schema: dict[str, Any]
+
+    @abstractmethod
+    def check(self, drive: DriveConfiguration) -> Iterator[Complaint]:
+        """Yield everything that this family cannot do with the drive as configured."""
+
+    @abstractmethod
+    def claims(self, drive: DriveConfiguration) -> list[Claim]:
+        """Return all identifiers of the drive on its bus, both directions."""
+
+    @abstractmethod
+    def bits_per_second(self, drive: DriveConfiguration) -> float:
+        """Return the worst-case bus load of the drive's exchange (maximal bit stuffing)."""
+
+    @abstractmethod
+    def raw_parameter(self, drive: DriveConfiguration, name: str) -> Parameter | None:
+        """
+        Resolve a raw parameter name (``p30``, ``p613.5``, ``x2004.10``).
+
+        :return: an unlisted parameter that reads as an unsigned integer, or None where the name
+            is not a raw name of this family.
+        """
+
+    @abstractmethod
+    def make_session(self, drive: DriveConfiguration) -> Session:
+        """Make the drive's session. Nothing is sent before ``activate``."""

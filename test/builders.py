@@ -1,0 +1,199 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Configurations, frames and conversations for the tests of sessions."""
+
+from collections.abc import Iterable
+from typing import Any
+
+from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.events import Event, ProcessDataReceived, RequestCompleted
+from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.parameters import Access, Parameter, ParameterType, Storage, Value
+from drive_can_bridge.core.profile import ControlTable, Profile, StatusPattern
+from drive_can_bridge.core.requests import (
+    Failure, Outcome, ReadRequest, ReadValue, Request, WriteRequest, Written,
+)
+from drive_can_bridge.core.session import Session
+from drive_can_bridge.core.setpoints import CommandOutcome
+from drive_can_bridge.protocols.families import FAMILIES
+
+RO, RW, WO = Access.READ_ONLY, Access.READ_WRITE, Access.WRITE_ONLY
+RAM, EEPROM = Storage.RAM, Storage.EEPROM
+BOOL, INT16, UINT16 = ParameterType.BOOL, ParameterType.INT16, ParameterType.UINT16
+INT32 = ParameterType.INT32
+
+
+def parameter(name: str, number: int | None, **options: Any) -> Parameter:
+    """Make a parameter; a scale, offset or unit makes it a double, as in a profile."""
+    options.setdefault('scaled', bool({'scale', 'offset', 'unit'} & set(options)))
+    return Parameter(name=name, number=number, **options)
+
+
+SPEED = parameter('speed_setpoint', 50, type=INT16, scale=0.1, unit='rpm', minimum=-3000.0,
+                  maximum=3000.0, neutral=0.0, storage=RAM)
+LIMIT = parameter('torque_limit', 51, scale=0.1, unit='%', minimum=0.0, maximum=300.0,
+                  storage=RAM)
+WORD = parameter('control_word', 52, storage=RAM)
+ACTUAL = parameter('actual_speed', 209, type=INT16, scale=0.1, unit='rpm', access=RO)
+CURRENT = parameter('motor_current', 210, type=INT16, scale=0.01, unit='A', access=RO)
+STATUS = parameter('status_word', 211, access=RO,
+                   bits=(('ready', 0), ('enabled', 1), ('fault', 3)))
+RAMP = parameter('ramp_time', 30, scale=0.01, unit='s', storage=EEPROM, minimum=0.01,
+                 maximum=60.0)
+MAXIMUM = parameter('maximum_speed', 31, scale=0.1, unit='rpm', storage=EEPROM)
+GAIN = parameter('gain', 40, storage=RAM)
+DAMPING = parameter('damping', 41, storage=RAM)
+FLAG = parameter('flag', 42, type=BOOL, storage=RAM)
+ORDER = parameter('order', 43, access=WO, storage=RAM)
+KEY = parameter('key', 44, access=WO)
+TABLE = (SPEED, LIMIT, WORD, ACTUAL, CURRENT, STATUS, RAMP, MAXIMUM, GAIN, DAMPING, FLAG, ORDER,
+         KEY)
+
+CONTROL = ControlTable(
+    parameter='control_word', disable=0x0000, enable=0x0001, quick_stop=0x0002,
+    reset_fault=0x0080, status_parameter='status_word', ready=StatusPattern(1, 1),
+    enabled=StatusPattern(2, 2), fault=StatusPattern(8, 8))
+#: the same for a drive that reports nothing
+SILENT_CONTROL = ControlTable(
+    parameter='control_word', disable=0x0000, enable=0x0001, quick_stop=0x0002,
+    reset_fault=0x0080)
+
+#: drive keys that are not fields of a family
+_DRIVE_KEYS = set(DriveConfiguration.__dataclass_fields__)
+
+
+def drive(protocol: str = 'datamodel_extended', *, name: str = 'conveyor', station: int = 1,
+          table: Iterable[Parameter] = TABLE, control: ControlTable | None = None,
+          request: Iterable[Parameter] = (SPEED, LIMIT),
+          response: Iterable[Parameter] = (ACTUAL, CURRENT, STATUS), **options: Any,
+          ) -> DriveConfiguration:
+    """Make a drive; further keywords are its keys, those of the family included."""
+    keys = {key: value for key, value in options.items() if key in _DRIVE_KEYS}
+    family = {key: entry['default']
+              for key, entry in FAMILIES[protocol].options_schema.items()}
+    unknown = set(options) - set(keys) - set(family)
+    if unknown:
+        raise ValueError(f'no such keys: {unknown}')
+    family.update({key: value for key, value in options.items() if key in family})
+    profile = Profile('table', '/table.yaml', '', (protocol,), {p.name: p for p in table}, control)
+    return DriveConfiguration(
+        name=name, bus='main', protocol=protocol, station=station, profile=profile,
+        cyclic_request=tuple(request), cyclic_response=tuple(response), family_options=family,
+        **keys)
+
+
+def frame(text: str) -> Frame:
+    """Read a frame as candump writes it: eight digits are a 29-bit identifier."""
+    identifier, _, data = text.partition('#')
+    return Frame(int(identifier, 16), bytes.fromhex(data), len(identifier) == 8)
+
+
+def read(*parameters: Parameter) -> ReadRequest:
+    """Make a request to read parameters."""
+    return ReadRequest(parameters)
+
+
+def write(*items: tuple[Parameter, int], atomic: bool = False) -> WriteRequest:
+    """Make a request to write raw integers."""
+    return WriteRequest(items, atomic)
+
+
+def text_of(outcome: Outcome) -> object:
+    """Return what an outcome says: a raw integer, 'written', or the reason."""
+    if isinstance(outcome, ReadValue):
+        return outcome.raw
+    if isinstance(outcome, Written):
+        return outcome.note or 'written'
+    return outcome.reason if isinstance(outcome, Failure) else outcome
+
+
+class Conversation:
+    """
+    A session, spoken to in hex and literal times.
+
+    Every method that may cause frames returns them as candump writes them.
+    """
+
+    def __init__(self, configuration: DriveConfiguration) -> None:
+        self.session: Session = FAMILIES[configuration.protocol].make_session(configuration)
+        self.log: list[Event] = []
+
+    def sent(self) -> list[str]:
+        """Return the frames since the last look, and keep the events."""
+        self.log += self.session.take_events()
+        return [str(entry) for entry in self.session.take_frames()]
+
+    def at(self, now: float) -> list[str]:
+        """Let the timer run once."""
+        self.session.handle_timer(now)
+        return self.sent()
+
+    def until(self, end: float) -> list[tuple[float, str]]:
+        """Serve every timer up to and including ``end``, each at its own time."""
+        found = []
+        for _ in range(10000):
+            due = self.session.next_timer()
+            if due > end:
+                return found
+            found += [(round(due, 6), text) for text in self.at(due)]
+        raise AssertionError(f'the timer spins at {due}')
+
+    def hears(self, text: str, now: float) -> list[str]:
+        """Receive a frame."""
+        self.session.receive_frame(frame(text), now)
+        return self.sent()
+
+    def bus_up(self, now: float) -> list[str]:
+        self.session.bus_up(now)
+        return self.sent()
+
+    def bus_down(self, now: float, reason: str = 'unplugged') -> list[str]:
+        self.session.bus_down(now, reason)
+        return self.sent()
+
+    def activate(self, now: float) -> list[str]:
+        self.session.activate(now)
+        return self.sent()
+
+    def deactivate(self, now: float) -> list[str]:
+        self.session.deactivate(now)
+        return self.sent()
+
+    def time_lost(self, now: float) -> list[str]:
+        self.session.time_lost(now)
+        return self.sent()
+
+    def submits(self, request: Request, now: float) -> list[str]:
+        self.session.submit(request, now)
+        return self.sent()
+
+    def asks(self, action: ControlAction, now: float) -> list[str]:
+        """Ask for a control action, which has to be taken."""
+        ticket = self.session.request_control(action, now)
+        if isinstance(ticket, str):
+            raise AssertionError(ticket)
+        return self.sent()
+
+    def commands(self, index: int, value: Value, now: float) -> CommandOutcome:
+        return self.session.command(index, value, now)
+
+    def events(self, *kinds: type) -> list[Event]:
+        """Return the events since the last call, or only those of some kinds."""
+        self.log += self.session.take_events()
+        found, self.log = self.log, []
+        return [event for event in found if not kinds or isinstance(event, kinds)]
+
+    def samples(self) -> list[tuple[int, ...]]:
+        """Return the process data received since the last look at events."""
+        return [event.raws for event in self.events()
+                if isinstance(event, ProcessDataReceived)]
+
+    def outcomes(self) -> list[list[object]]:
+        """Return the outcomes of the requests that ended since the last look at events."""
+        return [[text_of(outcome) for outcome in event.outcomes] for event in self.events()
+                if isinstance(event, RequestCompleted)]
+
+    def control_outcomes(self) -> list[tuple[str, bool, str]]:
+        """Return the control requests that ended since the last call."""
+        return [(done.ticket.action.value, done.success, done.message)
+                for done in self.session.take_control_outcomes()]

@@ -1,0 +1,56 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""The frames of station 1 with the maps 50, 51 and 209, 210, 211, and the way to the first cycle."""
+
+from typing import Any
+
+from builders import Conversation, drive
+
+ZEROS = '0000000000000000'
+ASK_REQUEST_MAP = f'002007A4#{ZEROS}'
+ASK_RESPONSE_MAP = f'002007E4#{ZEROS}'
+REQUEST_MAP = '102007A4#0032003300000000'
+RESPONSE_MAP = '102007E4#00D100D200D30000'
+NEUTRAL = f'003FFFF0#{ZEROS}'
+#: 100.0 rpm, 2.50 A, ready
+ANSWER = '103FFFF0#03E800FA00010000'
+
+#: more than what sums of periods are wrong by
+TICK = 1e-6
+
+
+def checked(conversation: Conversation, now: float) -> None:
+    """Answer a look at the maps that began at ``now``."""
+    assert conversation.hears(REQUEST_MAP, now + 0.001) == [ASK_RESPONSE_MAP]
+    assert conversation.hears(RESPONSE_MAP, now + 0.002) == []
+
+
+def cycling(**options: Any) -> Conversation:
+    """Return a conversation whose maps were verified at 9.997 s; the first cycle is due at 10 s."""
+    talk = Conversation(drive(**options))
+    assert talk.bus_up(9.0) == []
+    if options.get('mapping') == 'assume':
+        assert talk.activate(10.0) == []
+    else:
+        assert talk.activate(9.998) == [ASK_REQUEST_MAP]
+        checked(talk, 9.998)
+    assert talk.session.next_timer() == 10.0
+    return talk
+
+
+def online(**options: Any) -> Conversation:
+    """Return a conversation with a drive that answered its first cycle at 10.002 s."""
+    talk = cycling(**options)
+    sent = talk.at(10.0)
+    assert len(sent) == 1
+    assert sent[0].startswith('003FFFF0#')
+    talk.hears(ANSWER, 10.002)
+    assert talk.session.online
+    talk.events()
+    return talk
+
+
+def exchange(talk: Conversation, now: float, answer: str = ANSWER) -> str:
+    """Let one cycle pass at ``now``; return its request. Nothing else may be sent."""
+    (_, request), = talk.until(now + TICK)
+    assert talk.hears(answer, now + 0.002) == []
+    return request

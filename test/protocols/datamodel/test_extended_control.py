@@ -1,0 +1,358 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Conversations about control: the word and the status, each with a slot and without."""
+
+from dataclasses import replace
+
+from builders import (
+    ACTUAL, CONTROL, Conversation, CURRENT, DAMPING, drive, GAIN, INT16, LIMIT, parameter, RAMP,
+    read, SILENT_CONTROL, SPEED, TABLE, WORD, write,
+)
+from extended_builders import (
+    ANSWER, ASK_REQUEST_MAP, checked, exchange, NEUTRAL, online, TICK, ZEROS,
+)
+import pytest
+
+from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.events import FrameRejected, Noted, StationLost
+from drive_can_bridge.core.session import DriveState
+
+READY, ENABLED, FAULT = (
+    ANSWER, '103FFFF0#03E800FA00030000', '103FFFF0#03E800FA00080000')
+DISABLE = '00300341#0000000000000000'
+ENABLE = '00300341#0001000000000000'
+QUICK_STOP = '00300341#0002000000000000'
+RESET = '00300341#0080000000000000'
+ASK_STATUS = f'00200D31#{ZEROS}'
+
+
+def inside(**options: object) -> Conversation:
+    """Return an online drive whose control word and status word have slots."""
+    return online(control=CONTROL, request=(WORD, SPEED), mapping='assume', **options)
+
+
+def beside(**options: object) -> Conversation:
+    """Return an online drive whose control word is written; disable was, at 10.002 s."""
+    options.setdefault('control', CONTROL)
+    return online(mapping='assume', **options)
+
+
+def at_once(talk: Conversation, now: float, answer: str) -> list[str]:
+    """Let one cycle pass; return its request and what followed the answer."""
+    request = [text for _, text in talk.until(now + TICK)]
+    return request + talk.hears(answer, now + 0.002)
+
+
+# -- in the cyclic request --------------------------------------------------------------------------
+
+
+def test_word_starts_as_disable_and_takes_its_slot() -> None:
+    talk = inside(rearm_immediate=True)
+    talk.commands(0, 100.0, 10.003)
+    assert exchange(talk, 10.02) == '003FFFF0#000003E800000000'
+
+
+def test_enable_in_the_cycle() -> None:
+    talk = inside()
+    assert talk.asks(ControlAction.ENABLE, 10.003) == []
+    assert exchange(talk, 10.02, READY) == '003FFFF0#0001000000000000'
+    assert exchange(talk, 10.04, ENABLED) == '003FFFF0#0001000000000000'
+    assert talk.control_outcomes() == [('enable', True, 'enabled')]
+    assert exchange(talk, 10.06, ENABLED) == '003FFFF0#0001000000000000'
+    talk.asks(ControlAction.DISABLE, 10.07)
+    assert exchange(talk, 10.08, READY) == NEUTRAL
+    assert talk.control_outcomes() == [('disable', True, 'ready')]
+
+
+def test_slot_in_the_middle() -> None:
+    talk = online(control=CONTROL, request=(SPEED, WORD, LIMIT), mapping='assume',
+                  rearm_immediate=True)
+    talk.commands(0, 100.0, 10.003)
+    talk.commands(1, 50.0, 10.003)
+    talk.asks(ControlAction.ENABLE, 10.003)
+    assert exchange(talk, 10.02, READY) == '003FFFF0#03E8000101F40000'
+
+
+def test_word_with_its_top_bit_set_in_a_signed_parameter() -> None:
+    signed = parameter('control_word', 52, type=INT16, storage=WORD.storage)
+    table = (*(entry for entry in TABLE if entry is not WORD), signed)
+    talk = online(control=replace(CONTROL, enable=0x8001), request=(signed,), mapping='assume',
+                  table=table)
+    talk.asks(ControlAction.ENABLE, 10.003)
+    assert exchange(talk, 10.02, READY) == '003FFFF0#8001000000000000'
+
+
+def test_fault_ends_it() -> None:
+    talk = inside()
+    talk.asks(ControlAction.ENABLE, 10.003)
+    exchange(talk, 10.02, READY)
+    exchange(talk, 10.04, ENABLED)
+    exchange(talk, 10.06, FAULT)
+    assert talk.session.state is DriveState.FAULT
+    assert [note.text for note in talk.events(Noted)] == [
+        'fault (status word 0008h); only ~/enable starts the drive again']
+    assert exchange(talk, 10.08, READY) == NEUTRAL
+    assert exchange(talk, 10.1, READY) == NEUTRAL
+
+
+def test_response_without_its_status_confirms_nothing() -> None:
+    talk = inside()
+    talk.asks(ControlAction.ENABLE, 10.003)
+    exchange(talk, 10.02, READY)
+    talk.until(10.04 + TICK)
+    talk.hears('103FFFF0#03E800FA', 10.041)       # too short for the status word
+    assert len(talk.events(FrameRejected)) == 1
+    assert talk.session.control is not None
+    assert talk.session.control.state == 'unknown'
+    assert talk.control_outcomes() == []
+    exchange(talk, 10.06, ENABLED)
+    assert talk.control_outcomes() == [('enable', True, 'enabled')]
+
+
+def test_loss_puts_the_word_back() -> None:
+    talk = inside()
+    talk.asks(ControlAction.ENABLE, 10.003)
+    exchange(talk, 10.02, READY)
+    exchange(talk, 10.04, ENABLED)
+    running = '003FFFF0#0001000000000000'
+    assert [text for _, text in talk.until(10.12 + TICK)] == [
+        running, running, running, NEUTRAL]
+    talk.hears(ENABLED, 10.121)
+    assert exchange(talk, 10.14, ENABLED) == NEUTRAL
+    assert any('enable withdrawn: no cyclic response' in note.text
+               for note in talk.events(Noted))
+
+
+def test_time_out_of_a_request() -> None:
+    talk = inside(control_timeout=0.05)
+    talk.asks(ControlAction.ENABLE, 10.003)
+    exchange(talk, 10.02, READY)
+    exchange(talk, 10.04, READY)
+    assert talk.session.next_timer() == pytest.approx(10.053)
+    assert talk.until(10.054) == []
+    (action, success, text), = talk.control_outcomes()
+    assert (action, success) == ('enable', False)
+    assert text.startswith('no confirmation in 0.05 s: stuck in state ready')
+    assert exchange(talk, 10.06, READY) == NEUTRAL
+
+
+def test_refusals() -> None:
+    plain = online()
+    assert plain.session.request_control(ControlAction.ENABLE, 10.003) == (
+        'the profile has no control section')
+    assert plain.session.take_control_outcomes() == []
+    talk = Conversation(drive(control=CONTROL))
+    assert talk.session.request_control(ControlAction.ENABLE, 1.0) == 'bridge inactive'
+    talk.activate(2.0)
+    assert talk.session.request_control(ControlAction.ENABLE, 2.0) == 'bus down'
+    talk.bus_up(3.0)
+    assert talk.session.request_control(ControlAction.ENABLE, 3.0) == 'drive offline'
+
+
+# -- written ----------------------------------------------------------------------------------------
+
+
+def test_disable_is_written_as_soon_as_the_drive_is_found() -> None:
+    talk = Conversation(drive(control=CONTROL))
+    talk.bus_up(9.0)
+    talk.activate(9.998)
+    checked(talk, 9.998)
+    assert talk.at(10.0) == [NEUTRAL]
+    assert talk.hears(READY, 10.002) == [DISABLE]
+    assert exchange(talk, 10.02) == NEUTRAL       # on change only
+
+
+def test_enable_is_written_on_change() -> None:
+    talk = beside()
+    exchange(talk, 10.02)
+    assert talk.asks(ControlAction.ENABLE, 10.025) == [ENABLE]
+    assert at_once(talk, 10.04, READY) == [NEUTRAL]
+    assert at_once(talk, 10.06, ENABLED) == [NEUTRAL]
+    assert talk.control_outcomes() == [('enable', True, 'enabled')]
+    assert talk.asks(ControlAction.QUICK_STOP, 10.07) == [QUICK_STOP]
+    # the drive stands: disable follows at once, a millisecond after
+    assert at_once(talk, 10.08, READY) == [NEUTRAL, DISABLE]
+    assert talk.control_outcomes() == [('quick_stop', True, 'ready')]
+
+
+def test_written_word_waits_for_the_cyclic_response() -> None:
+    talk = beside()
+    exchange(talk, 10.02)
+    talk.until(10.04 + TICK)
+    assert talk.asks(ControlAction.ENABLE, 10.041) == []
+    assert talk.hears(READY, 10.042) == [ENABLE]
+    assert talk.control_outcomes() == []          # that status was older than the word
+    assert at_once(talk, 10.06, ENABLED) == [NEUTRAL]
+    assert talk.control_outcomes() == [('enable', True, 'enabled')]
+
+
+def test_word_that_is_outdated_is_not_sent() -> None:
+    talk = beside()
+    exchange(talk, 10.02)
+    talk.until(10.04 + TICK)
+    assert talk.asks(ControlAction.ENABLE, 10.041) == []
+    assert talk.asks(ControlAction.DISABLE, 10.0415) == []
+    assert ENABLE not in talk.hears(READY, 10.042)
+    assert all(text != ENABLE for _, text in talk.until(10.2))
+
+
+def test_stop_goes_before_everything_that_waits() -> None:
+    talk = beside(period=10.0)
+    for _ in range(20):
+        talk.submits(read(GAIN), 10.1)
+    talk.submits(write((RAMP, 5), (DAMPING, 6)), 10.1)
+    assert talk.asks(ControlAction.QUICK_STOP, 10.101) == []
+    assert talk.hears('10200281#0001000000000000', 10.102) == [QUICK_STOP]
+    # neither does an answer that does not come hold it up for longer than one attempt
+    talk.until(10.11)
+    talk.asks(ControlAction.DISABLE, 10.12)
+    found = talk.until(10.25)
+    assert found[0][1] == DISABLE
+    assert found[0][0] <= 10.203 + TICK
+
+
+def test_stop_of_a_drive_whose_user_request_is_unanswered_and_long() -> None:
+    talk = beside(period=10.0, parameter_retries=9)
+    exchanged = [parameter(f'r{number}', number) for number in range(300, 320, 2)]
+    talk.submits(read(*exchanged), 10.1)
+    talk.asks(ControlAction.QUICK_STOP, 10.11)
+    found = talk.until(10.21)
+    assert QUICK_STOP in [text for _, text in found]
+
+
+def test_word_does_not_wait_for_the_eeprom() -> None:
+    talk = beside(period=10.0)
+    talk.submits(write((RAMP, 5)), 10.1)
+    talk.hears('102001E1#0004000000000000', 10.101)
+    assert talk.asks(ControlAction.QUICK_STOP, 10.103) == [QUICK_STOP]
+
+
+def test_word_in_an_eeprom_does() -> None:
+    slow = parameter('control_word', 52)
+    talk = beside(period=10.0, table=(*(entry for entry in TABLE if entry is not WORD), slow))
+    talk.submits(write((RAMP, 5)), 10.1)
+    talk.hears('102001E1#0004000000000000', 10.101)
+    assert talk.asks(ControlAction.QUICK_STOP, 10.103) == []
+    assert talk.until(10.122)[0] == (10.121, QUICK_STOP)
+
+
+def test_loss_writes_disable() -> None:
+    talk = beside()
+    talk.asks(ControlAction.ENABLE, 10.01)
+    for cycle, answer in ((1, READY), (2, ENABLED), (3, ENABLED)):
+        talk.until(10.0 + 0.02 * cycle + TICK)
+        talk.hears(answer, 10.002 + 0.02 * cycle)
+    found = talk.until(10.16)
+    assert [text for _, text in found] == [NEUTRAL] * 3 + [NEUTRAL, DISABLE] + [NEUTRAL]
+    assert talk.events(StationLost) == [StationLost('no cyclic response for 3 cycles')]
+
+
+def test_differing_map_writes_disable() -> None:
+    talk = online(control=CONTROL, period=0.1)
+    talk.asks(ControlAction.ENABLE, 10.01)
+    for cycle in range(1, 10):
+        talk.until(10.0 + 0.1 * cycle + TICK)
+        talk.hears(ENABLED if cycle > 1 else READY, 10.002 + 0.1 * cycle)
+    assert talk.control_outcomes() == [('enable', True, 'enabled')]
+    talk.until(11.0 + TICK)
+    assert ASK_REQUEST_MAP in talk.hears(ENABLED, 11.002)
+    assert talk.hears('102007A4#0000000000000000', 11.003) == [DISABLE]
+
+
+def test_drive_that_reports_nothing() -> None:
+    talk = beside(control=SILENT_CONTROL, period=10.0)
+    talk.asks(ControlAction.ENABLE, 10.01)
+    talk.until(10.02)
+    (action, success, text), = talk.control_outcomes()
+    assert (action, success) == ('enable', True)
+    assert 'does not report' in text
+
+
+def test_reset_pulse_of_a_drive_that_reports_nothing() -> None:
+    talk = beside(control=SILENT_CONTROL, period=10.0)
+    sent = talk.asks(ControlAction.RESET_FAULT, 10.1)
+    sent += [text for _, text in talk.until(10.2)]
+    assert sent == [RESET, DISABLE]
+    assert [done[:2] for done in talk.control_outcomes()] == [('reset_fault', True)]
+
+
+# -- a status word without a slot -------------------------------------------------------------------
+
+
+def apart(**options: object) -> Conversation:
+    """Return an online drive whose control and status words both have no slot."""
+    return beside(response=(ACTUAL, CURRENT), **options)
+
+
+def test_status_is_read_when_the_drive_is_found() -> None:
+    talk = Conversation(drive(control=CONTROL, response=(ACTUAL, CURRENT), mapping='assume'))
+    talk.bus_up(9.0)
+    talk.activate(10.0)
+    talk.at(10.0)
+    assert talk.hears(ANSWER, 10.002) == [DISABLE]
+    assert talk.until(10.01) == [(10.003, ASK_STATUS)]
+    talk.hears('10200D31#0001000000000000', 10.011)
+    assert talk.session.control is not None
+    assert talk.session.control.state == 'ready'
+
+
+def looks(talk: Conversation, end: float, status: str, cycles: float = 0.02) -> list[float]:
+    """Answer everything until ``end``; return when the status was read."""
+    times = []
+    while True:
+        now = talk.session.next_timer()
+        if now > end:
+            return times
+        sent = talk.at(now)
+        while sent:
+            text = sent.pop(0)
+            if text == NEUTRAL:
+                sent += talk.hears(ANSWER, now)
+            elif text == ASK_STATUS:
+                times.append(round(now, 3))
+                sent += talk.hears(f'10200D31#{status}000000000000', now)
+
+
+def test_status_is_read_twice_a_second_and_often_while_something_is_pending() -> None:
+    talk = apart()
+    calm = looks(talk, 13.0, '0001')
+    assert len(calm) in (6, 7)
+    talk.asks(ControlAction.ENABLE, 13.001)
+    busy = looks(talk, 13.4, '0001')
+    assert len(busy) in (7, 8, 9)
+    looks(talk, 13.6, '0003')
+    assert talk.control_outcomes() == [('enable', True, 'enabled')]
+    assert len(looks(talk, 15.6, '0003')) in (4, 5)
+
+
+def test_status_that_does_not_come_is_asked_for_again() -> None:
+    talk = apart(parameter_retries=0)
+    talk.until(10.01)
+    asked = [now for now, text in talk.until(11.9) if text == ASK_STATUS]
+    assert talk.session.ever_online
+    assert len(asked) <= 3
+
+
+def test_fault_is_seen_in_a_read_status() -> None:
+    talk = apart()
+    looks(talk, 10.6, '0008')
+    assert talk.session.state is DriveState.FAULT
+
+
+def test_no_status_is_read_of_a_lost_drive() -> None:
+    talk = apart()
+    looks(talk, 10.6, '0001')
+    talk.bus_down(10.61)
+    assert talk.until(20.0) == []
+    talk = apart()
+    talk.until(10.5)                              # no answers: offline, but cycled on
+    assert not talk.session.online
+    assert ASK_STATUS not in [text for _, text in talk.until(12.0)]
+
+
+def test_status_that_arrives_after_the_loss_is_not_believed() -> None:
+    talk = apart(period=0.1, parameter_timeout=2.0)
+    assert (10.003, ASK_STATUS) in talk.until(10.45)
+    assert not talk.session.online
+    talk.hears('10200D31#0008000000000000', 10.46)
+    assert talk.session.control is not None
+    assert not talk.session.control.fault

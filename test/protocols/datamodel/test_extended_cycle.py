@@ -1,0 +1,463 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Conversations in cycles: pace, responses of every kind, offline and online."""
+
+import math
+
+from builders import (
+    ACTUAL, Conversation, CURRENT, drive, FLAG, frame, parameter, read, SPEED, UINT16,
+)
+from extended_builders import (
+    ANSWER, ASK_REQUEST_MAP, ASK_RESPONSE_MAP, checked, cycling, exchange, NEUTRAL, online,
+    REQUEST_MAP, RESPONSE_MAP, TICK, ZEROS,
+)
+import pytest
+
+from drive_can_bridge.core.events import (
+    ForeignMasterSeen, FrameRejected, ProcessDataReceived, StationFound, StationLost,
+)
+from drive_can_bridge.core.session import DriveState
+
+# -- pace -------------------------------------------------------------------------------------------
+
+
+def test_cycles_keep_their_beat() -> None:
+    talk = online()
+    for cycle in range(1, 40):
+        assert exchange(talk, 10.0 + 0.02 * cycle) == NEUTRAL
+    statistics = talk.session.statistics
+    assert statistics.exchanges == 40
+    assert statistics.missed == 0
+    assert statistics.latency.count == 40
+    assert statistics.latency.mean == pytest.approx(0.002)
+    assert statistics.period_error.count == 39
+    assert statistics.period_error.maximum == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize('late, following', [
+    (0.0, 10.04), (0.004, 10.04), (0.0099, 10.04),
+    # later than half a period: the next one is left out, the beat stays
+    (0.0101, 10.06), (0.019, 10.06), (0.0201, 10.06), (0.0299, 10.06), (0.031, 10.08),
+    (0.9, 10.94),
+])
+def test_late_cycle(late: float, following: float) -> None:
+    talk = online()
+    talk.hears(ANSWER, 10.003)
+    assert talk.at(10.02 + late) == [NEUTRAL]
+    talk.hears(ANSWER, 10.021 + late)
+    assert talk.session.next_timer() == pytest.approx(following)
+    assert talk.at(10.02 + late + 0.005) == []
+    assert talk.session.statistics.missed == 0
+    assert talk.session.statistics.period_error.maximum == pytest.approx(late, abs=1e-9)
+
+
+def test_timer_that_is_called_all_the_time_sends_no_more() -> None:
+    talk = online()
+    sent = []
+    for step in range(2001):
+        now = 10.002 + step * 0.0001
+        for text in talk.at(now):
+            sent.append(now)
+            assert talk.hears(ANSWER, now) == []
+    assert len(sent) == 10
+
+
+# -- responses --------------------------------------------------------------------------------------
+
+
+def test_response_is_published_as_raw_integers_in_slot_order() -> None:
+    talk = online()
+    talk.at(10.02)
+    talk.hears('103FFFF0#FFFF8000FFFF1234', 10.021)
+    assert talk.events() == [ProcessDataReceived((-1, -32768, 0xFFFF), 10.021)]
+
+
+def test_age_of_a_frame_counts_for_stamp_and_latency_only() -> None:
+    talk = online()
+    talk.at(10.02)
+    talk.session.receive_frame(frame(ANSWER), 10.025, 0.003)
+    assert talk.events() == [ProcessDataReceived((1000, 250, 1), pytest.approx(10.022))]
+    assert talk.session.statistics.latency.count == 2
+    assert talk.session.statistics.latency.maximum == pytest.approx(0.002)
+    # a stamp from before the request: adapters' clocks drift
+    talk.at(10.04)
+    talk.session.receive_frame(frame(ANSWER), 10.041, 0.05)
+    assert talk.session.statistics.latency.maximum == pytest.approx(0.002)
+    assert talk.session.statistics.latency.total == pytest.approx(0.004)
+
+
+def test_second_answer_in_a_cycle_is_rejected() -> None:
+    talk = online()
+    talk.at(10.02)
+    talk.hears(ANSWER, 10.021)
+    talk.hears('103FFFF0#0BAD0BAD0BAD0000', 10.022)
+    assert talk.events() == [ProcessDataReceived((1000, 250, 1), 10.021),
+                             FrameRejected('cyclic response that nobody asked for')]
+    assert talk.session.statistics.rejected == 1
+    assert talk.session.statistics.exchanges == 2
+
+
+def test_late_answer_counts_for_the_next_cycle_which_then_is_not_missed() -> None:
+    talk = online()
+    talk.at(10.02)
+    talk.at(10.04)
+    assert talk.session.statistics.missed == 1
+    talk.hears(ANSWER, 10.041)
+    talk.at(10.06)
+    assert talk.session.statistics.missed == 1
+    assert talk.session.statistics.exchanges == 2
+
+
+def test_unasked_answer_before_the_first_cycle() -> None:
+    talk = Conversation(drive())
+    talk.bus_up(9.0)
+    talk.activate(10.0)
+    talk.hears(ANSWER, 10.0005)
+    assert talk.events() == [FrameRejected('cyclic response that nobody asked for')]
+    assert not talk.session.online
+
+
+@pytest.mark.parametrize('data, raws', [
+    ('03E800FA0001', (1000, 250, 1)),
+    ('03E800FA00017F', (1000, 250, 1)),
+])
+def test_short_response_that_holds_everything(data: str, raws: tuple[int, ...]) -> None:
+    talk = online()
+    talk.at(10.02)
+    talk.hears(f'103FFFF0#{data}', 10.021)
+    assert talk.events() == [ProcessDataReceived(raws, 10.021)]
+    assert talk.session.statistics.short == 1
+    assert talk.session.statistics.rejected == 0
+
+
+@pytest.mark.parametrize('data, raws', [
+    ('03E800FA00', (1000, 250)), ('03E800FA', (1000, 250)), ('03E800', (1000,)),
+    ('03E8', (1000,)),
+])
+def test_response_too_short_publishes_only_what_arrived(data: str, raws: tuple[int, ...]) -> None:
+    talk = online()
+    talk.at(10.02)
+    talk.hears(f'103FFFF0#{data}', 10.021)
+    assert talk.events() == [
+        FrameRejected(f'cyclic response with {len(data) // 2} data bytes, 6 needed'),
+        ProcessDataReceived(raws, 10.021)]
+    assert talk.session.statistics.rejected == 1
+    assert talk.session.statistics.short == 0
+    talk.at(10.04)
+    assert talk.session.statistics.missed == 0
+
+
+@pytest.mark.parametrize('data', ['', 'FF'])
+def test_response_without_a_whole_word_is_none(data: str) -> None:
+    talk = online()
+    talk.at(10.02)
+    talk.hears(f'103FFFF0#{data}', 10.021)
+    assert talk.events() == [
+        FrameRejected(f'cyclic response with {len(data) // 2} data bytes, 6 needed')]
+    talk.hears(ANSWER, 10.022)  # the real one may still come
+    assert talk.samples() == [(1000, 250, 1)]
+    talk.at(10.04)
+    talk.hears(f'103FFFF0#{data}', 10.041)
+    talk.at(10.06)
+    assert talk.session.statistics.missed == 1
+
+
+@pytest.mark.parametrize('data', ['03E800FA00017F', '03E8', ''])
+def test_strict_policy_takes_eight_bytes_only(data: str) -> None:
+    talk = online(length_policy='strict')
+    talk.at(10.02)
+    talk.hears(f'103FFFF0#{data}', 10.021)
+    assert talk.events() == [
+        FrameRejected(f'cyclic response with {len(data) // 2} data bytes instead of 8')]
+    talk.at(10.04)
+    assert talk.session.statistics.missed == 1
+    assert talk.session.statistics.short == 0
+
+
+def test_strict_policy_holds_for_acyclic_answers_too() -> None:
+    talk = Conversation(drive(length_policy='strict'))
+    talk.bus_up(9.0)
+    talk.activate(10.0)
+    assert talk.hears('102007A4#00320033000000', 10.001) == []
+    assert len(talk.events(FrameRejected)) == 1
+    assert talk.hears(REQUEST_MAP, 10.002) == [ASK_RESPONSE_MAP]
+
+    lenient = online()
+    lenient.submits(read(FLAG), 10.003)
+    lenient.hears('102002A1#0001', 10.004)
+    assert lenient.outcomes() == [[1]]
+    assert lenient.session.statistics.short == 1
+    lenient.submits(read(FLAG), 10.005)
+    lenient.hears('102002A1#00', 10.006)
+    assert lenient.outcomes() == []
+    assert lenient.session.statistics.rejected == 1
+
+
+def test_drive_without_mapped_response_is_online_when_it_answers() -> None:
+    talk = Conversation(drive(response=()))
+    talk.bus_up(9.0)
+    talk.activate(9.998)
+    checked(talk, 9.998)
+    talk.at(10.0)
+    talk.hears('103FFFF0#', 10.001)
+    assert talk.session.online
+    assert talk.samples() == [()]
+
+
+def test_drive_without_setpoints_is_polled_and_never_unarmed() -> None:
+    talk = Conversation(drive(request=()))
+    talk.bus_up(9.0)
+    talk.activate(9.998)
+    talk.hears(f'102007A4#{ZEROS}', 9.999)
+    talk.hears(RESPONSE_MAP, 10.0)
+    assert talk.at(10.0) == [NEUTRAL]
+    talk.hears(ANSWER, 10.001)
+    assert talk.session.state is DriveState.ONLINE
+
+
+def test_slots_are_signed_or_not_as_their_types_say() -> None:
+    talk = online(mapping='assume', rearm_immediate=True,
+                  request=(SPEED, parameter('level', 60, type=UINT16), FLAG))
+    talk.commands(0, -150.0, 10.003)
+    talk.commands(1, 65535, 10.003)
+    talk.commands(2, True, 10.003)
+    assert exchange(talk, 10.02) == '003FFFF0#FA24FFFF00010000'
+
+
+# -- frames of others -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('text', [
+    '002001E2#0000000000000000', '003001E2#03E807D000000000', '003FFFF0#0000000000000000',
+    '002001E0#0000000000000000',
+])
+def test_second_master_is_noticed(text: str) -> None:
+    talk = online()
+    assert talk.hears(text, 10.003) == []
+    assert talk.events() == [ForeignMasterSeen(
+        f'another master sends requests to station 1: {text}')]
+    assert talk.session.online
+
+
+@pytest.mark.parametrize('text', [
+    '103001E2#03E807D000000000',     # an acknowledged write: there is no such thing
+    '102001E0#0000000000000000', '102001EF#0000000000000000',
+    '103FFFF1#0000000000000000',     # almost cyclic
+    '102FFFF0#0000000000000000',
+    '102001E2#03E807D000000000',     # an answer to a read of nobody
+    '102001E2#03E807',
+    '105FFFF0#03E800FA00010000',     # station 2
+    '005FFFF0#03E800FA00010000',
+    '7F1#2211000000000000', '3F1#0000000000000000',
+])
+def test_what_nobody_asked_for_is_counted_and_leaves_no_trace(text: str) -> None:
+    talk = online()
+    talk.at(10.02)
+    assert talk.hears(text, 10.0205) == []
+    assert len(talk.events(FrameRejected)) == 1
+    assert talk.session.statistics.rejected == 1
+    talk.hears(ANSWER, 10.021)
+    assert talk.samples() == [(1000, 250, 1)]
+
+
+@pytest.mark.parametrize('text', [
+    '104007A4#0032003300000000',     # of another station
+    '102007A3#0032003300000000',     # another count
+    '102007E4#0032003300000000',     # another number
+    '102007A4#00320033000000',       # too short
+])
+def test_answer_that_does_not_match_the_question(text: str) -> None:
+    talk = Conversation(drive())
+    talk.bus_up(9.0)
+    talk.activate(10.0)
+    assert talk.hears(text, 10.001) == []
+    assert talk.session.statistics.rejected == 1
+    assert talk.hears(REQUEST_MAP, 10.002) == [ASK_RESPONSE_MAP]
+
+
+# -- offline and online -----------------------------------------------------------------------------
+
+
+def test_offline_at_the_limit_three_neutral_cycles_then_silence() -> None:
+    talk = online(rearm_immediate=True)
+    talk.commands(0, 20.0, 10.003)
+    moving = '003FFFF0#00C8000000000000'
+    assert talk.until(10.06 + TICK) == [(10.02, moving), (10.04, moving), (10.06, moving)]
+    assert talk.session.online
+    assert talk.session.statistics.missed == 2
+
+    assert talk.until(10.08 + TICK) == [(10.08, NEUTRAL)]
+    assert talk.events() == [StationLost('no cyclic response for 3 cycles')]
+    assert not talk.session.online
+    assert talk.session.offline_advice == 'no cyclic response for 3 cycles'
+
+    assert talk.until(10.14 + TICK) == [
+        (10.1, NEUTRAL), (10.12, NEUTRAL), (10.14, ASK_REQUEST_MAP)]
+    assert {text for _, text in talk.until(11.0)} == {ASK_REQUEST_MAP}
+
+
+def test_drive_that_answers_again_while_it_is_left_is_checked_first() -> None:
+    talk = online()
+    talk.until(10.08 + TICK)
+    talk.events()
+    assert talk.hears(ANSWER, 10.081) == []         # the look waits: a cyclic request was sent
+    assert talk.until(10.09 + TICK) == [(10.09, ASK_REQUEST_MAP)]
+    checked(talk, 10.091)
+    assert talk.until(10.1 + TICK) == [(10.1, NEUTRAL)]
+    talk.hears(ANSWER, 10.102)
+    assert talk.events(StationFound, StationLost, FrameRejected) == [StationFound()]
+
+
+def test_drive_that_answers_the_last_neutral_cycle() -> None:
+    talk = online()
+    talk.until(10.12 + TICK)
+    talk.events()
+    talk.hears(ANSWER, 10.122)
+    assert talk.until(10.13 + TICK) == [(10.13, ASK_REQUEST_MAP)]
+    assert talk.events(FrameRejected) == []
+
+
+def test_recovery_after_silence() -> None:
+    talk = online()
+    talk.until(10.15)
+    talk.events()
+    assert talk.hears(REQUEST_MAP, 10.16) == [ASK_RESPONSE_MAP]
+    assert talk.hears(RESPONSE_MAP, 10.17) == []
+    assert talk.at(10.17) == [NEUTRAL]
+    talk.hears(ANSWER, 10.172)
+    assert talk.events() == [StationFound(), ProcessDataReceived((1000, 250, 1), 10.172)]
+    # the pause is no error of the period
+    assert talk.session.statistics.period_error.maximum < 0.001
+    assert exchange(talk, 10.19) == NEUTRAL
+
+
+@pytest.mark.parametrize('limit', [1, 2, 5])
+def test_limit(limit: int) -> None:
+    talk = online(missed_limit=limit)
+    talk.until(10.0 + 0.02 * limit + TICK)
+    assert talk.session.online
+    talk.until(10.02 + 0.02 * limit + TICK)
+    assert not talk.session.online
+    assert talk.events(StationLost) == [
+        StationLost(f'no cyclic response for {limit} cycles')]
+
+
+def test_misses_have_to_be_consecutive() -> None:
+    talk = online()
+    for cycle in range(1, 40):
+        talk.until(10.0 + 0.02 * cycle + TICK)
+        if cycle % 3 == 0:
+            talk.hears(ANSWER, 10.0 + 0.02 * cycle + 0.002)
+    assert talk.session.online
+    assert talk.session.statistics.missed == 26
+
+
+def test_drive_that_answers_reads_but_no_cycles() -> None:
+    talk = cycling()
+    assert talk.until(10.06 + TICK) == [
+        (10.0, NEUTRAL), (10.02, NEUTRAL), (10.04, NEUTRAL), (10.06, ASK_REQUEST_MAP)]
+    checked(talk, 10.061)
+    # never closer together than a period, here and elsewhere
+    assert talk.until(10.07) == [(10.063, NEUTRAL)]
+    assert talk.session.offline_advice == (
+        'no cyclic response: drive silent or response identifier taken')
+    assert talk.events(StationFound, StationLost) == []
+
+
+def test_first_cycle_keeps_its_distance_to_the_last_one() -> None:
+    talk = online(period=0.1)
+    talk.until(10.4)
+    assert talk.hears(ANSWER, 10.401) == []
+    assert talk.until(10.45 + TICK) == [(10.45, ASK_REQUEST_MAP)]
+    checked(talk, 10.451)
+    assert talk.session.next_timer() == pytest.approx(10.5)
+
+
+# -- bus and time -----------------------------------------------------------------------------------
+
+
+def test_bus_down_is_silence_and_offline() -> None:
+    talk = online()
+    assert talk.bus_down(10.01) == []
+    assert talk.events() == [StationLost('bus down: unplugged')]
+    assert talk.session.offline_advice == 'bus down: unplugged'
+    assert talk.session.next_timer() == math.inf
+    assert talk.at(20.0) == []
+    assert talk.session.stopped
+    assert talk.bus_up(21.0) == [ASK_REQUEST_MAP]
+    checked(talk, 21.0)
+    assert talk.at(21.002) == [NEUTRAL]
+
+
+def test_frames_that_were_not_fetched_die_with_the_bus() -> None:
+    talk = online()
+    talk.session.handle_timer(10.02)
+    assert talk.bus_down(10.021) == []
+
+
+def test_bus_that_comes_up_twice_makes_the_drive_offline_once() -> None:
+    talk = online()
+    assert talk.bus_up(10.01) == [ASK_REQUEST_MAP]
+    assert talk.events() == [StationLost('the drive is being reconnected')]
+    assert not talk.session.online
+
+
+def test_lost_time_starts_over() -> None:
+    talk = online(rearm_immediate=True)
+    talk.commands(0, 20.0, 10.003)
+    assert exchange(talk, 10.02) == '003FFFF0#00C8000000000000'
+    talk.events()
+    assert talk.time_lost(15.0) == [ASK_REQUEST_MAP]
+    assert talk.events() == [StationLost('the bridge stood still')]
+    assert talk.at(15.0) == []
+    checked(talk, 15.0)
+    assert talk.at(15.002) == [NEUTRAL]
+    talk.hears(ANSWER, 15.004)
+    assert talk.session.state is DriveState.NOT_ARMED
+
+
+def test_lost_time_with_an_answer_in_the_queue() -> None:
+    talk = online()
+    talk.at(10.02)
+    talk.time_lost(15.0)
+    talk.hears(ANSWER, 15.0)
+    assert talk.events(FrameRejected, ProcessDataReceived, StationFound) == []
+    talk.hears(ANSWER, 15.001)
+    assert len(talk.events(FrameRejected)) == 1
+
+
+def test_lost_time_with_assumed_maps() -> None:
+    talk = online(mapping='assume', rearm_immediate=True)
+    talk.commands(0, 20.0, 10.003)
+    assert talk.time_lost(15.0) == []
+    assert talk.at(15.0) == [NEUTRAL]
+
+
+def test_lost_time_without_a_bus_is_nothing() -> None:
+    talk = Conversation(drive())
+    assert talk.time_lost(15.0) == []
+    talk.activate(16.0)
+    assert talk.time_lost(17.0) == []
+    assert talk.events() == []
+
+
+def test_activated_again_while_stopping() -> None:
+    talk = online()
+    talk.deactivate(10.01)
+    assert talk.until(10.02 + TICK) == [(10.02, NEUTRAL)]
+    talk.hears(ANSWER, 10.021)
+    assert talk.session.online
+    assert talk.activate(10.035) == [ASK_REQUEST_MAP]
+    assert not talk.session.online
+    checked(talk, 10.035)
+    assert talk.until(10.04 + TICK) == [(10.04, NEUTRAL)]
+    talk.hears(ANSWER, 10.041)
+    assert talk.session.online
+    assert talk.commands(0, 0.0, 10.042).value == 'armed'
+    assert exchange(talk, 10.06) == NEUTRAL
+
+
+def test_short_exchange_of_another_width() -> None:
+    talk = online(response=(ACTUAL, CURRENT), mapping='assume')
+    talk.at(10.02)
+    talk.hears('103FFFF0#03E800FA', 10.021)
+    assert talk.samples() == [(1000, 250)]

@@ -1,0 +1,474 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Conversations about the maps: nothing is cycled to a drive that would misunderstand it."""
+
+import math
+
+from builders import ACTUAL, Conversation, drive, GAIN, RAMP, read, SPEED, write
+from extended_builders import (
+    ANSWER, ASK_REQUEST_MAP, ASK_RESPONSE_MAP, checked, exchange, NEUTRAL, online, REQUEST_MAP,
+    RESPONSE_MAP, TICK, ZEROS,
+)
+import pytest
+
+from drive_can_bridge.core.events import (
+    FrameRejected, MappingDiffered, MappingWritten, ProcessDataReceived, StationFound,
+    StationLost,
+)
+from drive_can_bridge.core.session import DriveState
+
+OTHER_REQUEST_MAP = '102007A4#0033003200000000'
+
+
+def asked(**options: object) -> Conversation:
+    """Return a conversation that asked for the request map at 10 s."""
+    talk = Conversation(drive(**options))
+    talk.bus_up(9.0)
+    assert talk.activate(10.0) == [ASK_REQUEST_MAP]
+    return talk
+
+
+# -- verify -----------------------------------------------------------------------------------------
+
+
+def test_maps_agree() -> None:
+    talk = asked()
+    assert talk.at(10.0005) == []
+    assert talk.hears(REQUEST_MAP, 10.001) == [ASK_RESPONSE_MAP]
+    assert talk.hears(RESPONSE_MAP, 10.002) == []
+    assert talk.session.next_timer() == 10.002
+    assert talk.session.state is DriveState.OFFLINE
+    assert talk.at(10.002) == [NEUTRAL]
+    assert not talk.session.online
+
+    assert talk.hears(ANSWER, 10.004) == []
+
+    assert talk.events() == [StationFound(), ProcessDataReceived((1000, 250, 1), 10.004)]
+    assert talk.session.online
+    assert talk.session.ever_online
+    assert talk.session.offline_advice == ''
+    assert talk.session.state is DriveState.NOT_ARMED
+
+
+def test_bus_comes_after_activation() -> None:
+    talk = Conversation(drive())
+    assert talk.activate(10.0) == []
+    assert talk.until(11.0) == []
+    assert talk.session.stopped
+    assert talk.bus_up(11.0) == [ASK_REQUEST_MAP]
+    assert not talk.session.stopped
+
+
+def test_entries_after_the_first_zero_do_not_count() -> None:
+    talk = asked(request=(SPEED,), response=(ACTUAL,))
+    talk.hears('102007A4#0032000000330034', 10.001)
+    talk.hears('102007E4#00D1000000D200D3', 10.002)
+    assert talk.at(10.002) == [NEUTRAL]
+
+
+def test_longer_response_map_is_accepted() -> None:
+    talk = asked(response=(ACTUAL,))
+    talk.hears(REQUEST_MAP, 10.001)
+    talk.hears(RESPONSE_MAP, 10.002)
+    assert talk.at(10.002) == [NEUTRAL]
+    talk.hears(ANSWER, 10.004)
+    assert talk.samples() == [(1000,)]
+
+
+@pytest.mark.parametrize('request_map, response_map, text', [
+    ('102007A4#0032003300340000', RESPONSE_MAP,
+     'request map is 50, 51, 52, configured 50, 51'),
+    ('102007A4#0033003200000000', RESPONSE_MAP, 'request map is 51, 50, configured 50, 51'),
+    ('102007A4#0032000000330000', RESPONSE_MAP, 'request map is 50, configured 50, 51'),
+    ('102007A4#0000003200330000', RESPONSE_MAP, 'request map is empty, configured 50, 51'),
+    (REQUEST_MAP, '102007E4#00D100D200000000',
+     'response map is 209, 210, configured 209, 210, 211'),
+    ('102007A4#0000000000000000', '102007E4#0000000000000000',
+     'request map is empty, configured 50, 51; '
+     'response map is empty, configured 209, 210, 211'),
+])
+def test_maps_differ(request_map: str, response_map: str, text: str) -> None:
+    talk = asked()
+    talk.hears(request_map, 10.001)
+    assert talk.hears(response_map, 10.002) == []
+
+    assert talk.events() == [MappingDiffered(text)]
+    assert talk.session.state is DriveState.MAPPING_DIFFERS
+    assert talk.session.offline_advice == f'mapping differs: {text}'
+    assert talk.until(11.001) == []
+
+
+def test_corrected_maps_are_seen_after_a_second() -> None:
+    talk = asked()
+    talk.hears(OTHER_REQUEST_MAP, 10.001)
+    talk.hears(RESPONSE_MAP, 10.002)
+    assert len(talk.events(MappingDiffered)) == 1
+
+    # still wrong: not reported again
+    assert talk.until(11.002) == [(11.002, ASK_REQUEST_MAP)]
+    talk.hears(OTHER_REQUEST_MAP, 11.003)
+    talk.hears(RESPONSE_MAP, 11.004)
+    assert talk.events() == []
+
+    assert talk.until(12.004) == [(12.004, ASK_REQUEST_MAP)]
+    checked(talk, 12.004)
+    assert talk.at(12.006) == [NEUTRAL]
+
+
+def test_parameter_services_work_while_maps_differ() -> None:
+    talk = asked()
+    talk.hears(OTHER_REQUEST_MAP, 10.001)
+    talk.hears(RESPONSE_MAP, 10.002)
+    assert talk.submits(read(GAIN), 10.1) == [f'00200281#{ZEROS}']
+    talk.hears('10200281#0007000000000000', 10.101)
+    assert talk.outcomes() == [[7]]
+    # nobody answers: the drive is there, so it is not called offline
+    talk.submits(read(GAIN), 10.2)
+    talk.until(10.6)
+    assert talk.outcomes() == [['no answer in 0.1 s, 3 attempts']]
+
+
+def test_silent_drive_is_looked_for_again_and_again() -> None:
+    talk = asked()
+    assert talk.session.offline_advice == 'being looked for'
+    assert talk.until(10.35) == [(10.1, ASK_REQUEST_MAP), (10.2, ASK_REQUEST_MAP),
+                                 (10.3, ASK_REQUEST_MAP)]
+    assert talk.session.offline_advice.startswith('no answer to mapping read')
+    assert talk.hears(REQUEST_MAP, 10.36) == [ASK_RESPONSE_MAP]
+    # the second answer never comes: from the start
+    assert talk.until(10.46) == [(10.46, ASK_REQUEST_MAP)]
+    assert talk.events() == []
+
+
+def test_maps_are_looked_at_every_second_while_cycling() -> None:
+    talk = online()
+    looks = []
+    for cycle in range(1, 151):
+        start = 10.0 + 0.02 * cycle
+        for now, text in [*talk.until(start + TICK),
+                          *((start + 0.002, text) for text in talk.hears(ANSWER, start + 0.002))]:
+            if text == ASK_REQUEST_MAP:
+                looks.append(round(now, 3))
+                assert talk.hears(REQUEST_MAP, now + 0.001) == [ASK_RESPONSE_MAP]
+                assert talk.hears(RESPONSE_MAP, now + 0.002) == []
+            else:
+                assert text == NEUTRAL
+    # each a second after the last one ended; the first had to wait for the answer of its cycle
+    assert looks == [11.002, 12.004]
+    assert talk.session.online
+
+
+def test_lost_map_while_cycling() -> None:
+    talk = online()
+    assert talk.commands(0, 0.0, 10.003)
+    for cycle in range(1, 50):
+        exchange(talk, 10.0 + 0.02 * cycle)
+    talk.events()
+
+    # the look that is due at 11.0 s waits for the answer to the cycle at 11.0 s
+    assert talk.until(11.0) == [(11.0, NEUTRAL)]
+    assert talk.hears(ANSWER, 11.002) == [ASK_REQUEST_MAP]
+    # that is enough: not one more setpoint goes to a parameter that it is not for
+    assert talk.hears('102007A4#0000000000000000', 11.003) == []
+
+    text = 'request map is empty, configured 50, 51'
+    assert talk.events(StationLost, MappingDiffered) == [
+        StationLost(f'mapping differs: {text}'), MappingDiffered(text)]
+    assert not talk.session.online
+    assert talk.until(12.002) == []
+    assert talk.until(12.003) == [(12.003, ASK_REQUEST_MAP)]
+    checked(talk, 12.003)
+    assert talk.at(12.005) == [NEUTRAL]
+    talk.hears(ANSWER, 12.008)
+    assert talk.events(StationFound) == [StationFound()]
+    assert talk.session.state is DriveState.NOT_ARMED  # it wants arming again
+
+
+def test_response_map_that_changes_while_cycling() -> None:
+    talk = online()
+    for cycle in range(1, 50):
+        exchange(talk, 10.0 + 0.02 * cycle)
+    talk.at(11.0)
+    talk.hears(ANSWER, 11.002)
+    assert talk.hears(REQUEST_MAP, 11.003) == [ASK_RESPONSE_MAP]
+    assert talk.hears('102007E4#00D100D300D20000', 11.004) == []
+    assert talk.events(MappingDiffered) == [
+        MappingDiffered('response map is 209, 211, 210, configured 209, 210, 211')]
+    assert talk.until(12.0) == []
+
+
+def test_difference_is_believed_although_the_rest_is_not_answered() -> None:
+    talk = asked()
+    assert talk.hears(OTHER_REQUEST_MAP, 10.001) == [ASK_RESPONSE_MAP]
+    assert talk.until(10.5) == []
+    assert talk.session.state is DriveState.MAPPING_DIFFERS
+
+
+def test_answer_to_the_cycle_before_a_lost_map_is_no_surprise() -> None:
+    talk = online(period=1.0)
+    assert talk.until(11.0)[0] == (11.0, NEUTRAL)
+    assert talk.until(11.5) == [(11.5, ASK_REQUEST_MAP)]  # half a period without an answer
+    talk.hears(OTHER_REQUEST_MAP, 11.6)
+    assert talk.session.state is DriveState.MAPPING_DIFFERS
+    talk.events()
+
+    talk.hears(ANSWER, 11.7)
+    assert talk.events() == []
+    talk.hears(ANSWER, 11.8)
+    assert talk.events() == [FrameRejected('cyclic response that nobody asked for')]
+    assert talk.session.statistics.rejected == 1
+
+
+def test_unanswered_look_while_cycling_does_not_matter() -> None:
+    talk = online()
+    for cycle in range(1, 50):
+        exchange(talk, 10.0 + 0.02 * cycle)
+    talk.at(11.0)
+    assert talk.hears(ANSWER, 11.002) == [ASK_REQUEST_MAP]
+    for cycle in range(51, 100):
+        exchange(talk, 10.0 + 0.02 * cycle)
+    assert talk.session.online
+    # one attempt only, and the next look a second after the first one failed
+    assert talk.events(StationLost) == []
+    times = []
+    for cycle in range(100, 120):
+        times += [now for now, text in talk.until(10.0 + 0.02 * cycle + TICK)
+                  if text == ASK_REQUEST_MAP]
+        for _ in talk.hears(ANSWER, 10.002 + 0.02 * cycle):
+            times.append(round(10.002 + 0.02 * cycle, 3))
+    assert times == [12.102]
+
+
+# -- other numbers ----------------------------------------------------------------------------------
+
+
+def test_bases_and_offset() -> None:
+    talk = Conversation(drive(request_map_base=300, response_map_base=500, parameter_offset=-1,
+                              request=(SPEED,), response=(ACTUAL,)))
+    talk.bus_up(9.0)
+    assert talk.activate(10.0) == [f'002012B4#{ZEROS}']                     # 299
+    assert talk.hears('102012B4#0031000000000000', 10.001) == [f'00201F34#{ZEROS}']   # 49; 499
+    talk.hears('10201F34#00D0000000000000', 10.002)                         # 208
+    assert talk.at(10.002) == [NEUTRAL]
+
+
+def test_offset_moves_parameters() -> None:
+    talk = online(parameter_offset=1000, mapping='assume')
+    assert talk.submits(read(GAIN), 10.003) == [f'00204101#{ZEROS}']        # 1040
+    talk.hears('10204101#0007000000000000', 10.004)
+    assert talk.submits(write((RAMP, 5)), 10.005) == [f'00204061#{ZEROS}']  # 1030
+    assert talk.hears('10204061#0004000000000000', 10.006) == ['00304061#0005000000000000']
+    talk.until(10.0265)
+    assert talk.hears(ANSWER, 10.027) == [f'00204061#{ZEROS}']
+    talk.hears('10204061#0005000000000000', 10.031)
+    assert talk.outcomes() == [[7], ['written']]
+
+
+# -- assume -----------------------------------------------------------------------------------------
+
+
+def test_assume_never_looks() -> None:
+    talk = Conversation(drive(mapping='assume'))
+    talk.bus_up(9.0)
+    assert talk.activate(10.0) == []
+    sent = talk.until(14.0)
+    assert {text for _, text in sent} == {NEUTRAL}
+    assert [now for now, _ in sent] == [round(10 + 0.02 * step, 6) for step in range(201)]
+    assert talk.events() == []
+    assert not talk.session.online
+    talk.hears(ANSWER, 14.002)
+    assert talk.session.online
+
+
+def test_assume_goes_on_cycling_after_a_loss() -> None:
+    talk = online(mapping='assume')
+    assert talk.commands(0, 0.0, 10.003)
+    talk.commands(0, 20.0, 10.004)
+    assert talk.until(10.06) == [(10.02, '003FFFF0#00C8000000000000'),
+                                 (10.04, '003FFFF0#00C8000000000000'),
+                                 (10.06, '003FFFF0#00C8000000000000')]
+    assert talk.session.online
+    assert talk.until(10.1) == [(10.08, NEUTRAL), (10.1, NEUTRAL)]
+    assert talk.events() == [StationLost('no cyclic response for 3 cycles')]
+    assert talk.session.offline_advice == 'no cyclic response for 3 cycles'
+    talk.hears(ANSWER, 10.102)
+    assert talk.session.online
+    assert exchange(talk, 10.12) == NEUTRAL
+
+
+# -- configure --------------------------------------------------------------------------------------
+
+
+def number_of(text: str) -> int:
+    return int(text[:8], 16) >> 4 & 0xFFFF
+
+
+class MapKeeper:
+    """A drive that has eight map registers and answers at once."""
+
+    def __init__(self, *entries: int) -> None:
+        self.registers = dict(zip(range(122, 130), entries))
+        self.read_only: set[int] = set()
+        self.silent_after = math.inf
+        self.trace: list[str] = []
+
+    def serve(self, talk: Conversation, sent: list[str], now: float) -> None:
+        """Answer frames, and the frames that the answers cause."""
+        for text in sent:
+            number, count = number_of(text), int(text[7], 16)
+            if text[2] == '3' and count:
+                word = int(text[9:13], 16)
+                self.trace.append(f'{now:.3f} {number} := {word}')
+                if number not in self.read_only:
+                    self.registers[number] = word
+            elif count and self.silent_after > 0:
+                self.silent_after -= 1
+                if count == 1:
+                    self.trace.append(f'{now:.3f} {number}?')
+                words = ''.join(f'{self.registers[number + step]:04X}' for step in range(count))
+                self.serve(talk, talk.hears(f'1{text[1:9]}{words:0<16}', now), now)
+
+    def live(self, talk: Conversation, end: float) -> list[float]:
+        """Serve until ``end``; return the times of cyclic frames, which get no answer."""
+        cycles = []
+        while talk.session.next_timer() <= end:
+            now = talk.session.next_timer()
+            sent = talk.at(now)
+            cycles += [now for text in sent if text.startswith('003FFFF0')]
+            self.serve(talk, sent, now)
+        return cycles
+
+
+def configured(keeper: MapKeeper) -> Conversation:
+    talk = Conversation(drive(mapping='configure', response=(ACTUAL,)))
+    talk.bus_up(9.0)
+    keeper.serve(talk, talk.activate(10.0), 10.0)
+    return talk
+
+
+def test_configure_in_the_safe_order() -> None:
+    keeper = MapKeeper(99, 98, 97, 0, 209, 210, 0, 0)
+    talk = configured(keeper)
+    assert keeper.live(talk, 10.15) == [pytest.approx(time) for time in (10.1, 10.12, 10.14)]
+    assert keeper.trace == [
+        '10.000 122?', '10.000 122 := 0', '10.020 122?',          # off first
+        '10.020 123?', '10.020 123 := 51', '10.040 123?',
+        '10.040 124?', '10.040 124 := 0', '10.060 124?',
+        '10.060 125?', '10.060 126?',                             # right: not written
+        '10.060 127?', '10.060 127 := 0', '10.080 127?',
+        '10.080 128?', '10.080 129?',
+        '10.080 122?', '10.080 122 := 50', '10.100 122?',         # on last
+    ]
+    for place, entry in enumerate(keeper.trace):
+        if ':=' in entry:  # a read before, because of the wear, and one after, to believe it
+            number = entry.split()[1]
+            assert keeper.trace[place - 1].endswith(f' {number}?')
+            assert keeper.trace[place + 1].endswith(f' {number}?')
+    assert keeper.registers == dict(zip(range(122, 130), (50, 51, 0, 0, 209, 0, 0, 0)))
+    assert talk.events(MappingWritten, MappingDiffered) == [
+        MappingWritten('request map [50, 51], response map [209]')]
+
+
+def test_configure_leaves_right_maps_alone() -> None:
+    keeper = MapKeeper(50, 51, 0, 0, 209, 0, 0, 0)
+    talk = configured(keeper)
+    assert keeper.trace == []
+    assert talk.at(10.0) == [NEUTRAL]
+
+
+def test_configure_without_setpoints_switches_the_request_map_off() -> None:
+    keeper = MapKeeper(50, 51, 0, 0, 209, 0, 0, 0)
+    talk = Conversation(drive(mapping='configure', request=(), response=(ACTUAL,)))
+    talk.bus_up(9.0)
+    keeper.serve(talk, talk.activate(10.0), 10.0)
+    keeper.live(talk, 10.2)
+    assert [keeper.registers[number] for number in range(122, 130)] == [0, 0, 0, 0, 209, 0, 0, 0]
+
+
+def test_failing_rewrite_backs_off() -> None:
+    keeper = MapKeeper(99, 51, 0, 0, 209, 0, 0, 0)
+    keeper.read_only = {122}
+    talk = configured(keeper)
+    assert keeper.live(talk, 20.0) == []
+    # 122 := 0 fails, is read back, and tried again 1, 2, 4 s later
+    text = 'could not be rewritten: map parameter 122: read back 99 instead of 0'
+    assert talk.events(MappingDiffered, MappingWritten) == [MappingDiffered(text)]
+    assert talk.session.offline_advice.startswith('mapping differs: ')
+    assert [entry for entry in keeper.trace if ':=' in entry] == [
+        '10.000 122 := 0', '11.020 122 := 0', '13.040 122 := 0', '17.060 122 := 0']
+
+
+def test_pause_between_rewrites_is_a_minute_at_most() -> None:
+    keeper = MapKeeper(99, 51, 0, 0, 209, 0, 0, 0)
+    keeper.read_only = {122}
+    talk = configured(keeper)
+    keeper.live(talk, 400.0)
+    times = [float(entry.split()[0]) for entry in keeper.trace if ':=' in entry]
+    pauses = [round(b - a) for a, b in zip(times, times[1:])]
+    assert pauses == [1, 2, 4, 8, 16, 32, 60, 60, 60, 60, 60]
+
+
+def test_rewrite_that_somebody_undoes_is_not_repeated_at_once() -> None:
+    keeper = MapKeeper(99, 51, 0, 0, 209, 0, 0, 0)
+    talk = configured(keeper)
+    end = 10.2
+    for _ in range(40):
+        keeper.live(talk, end)
+        keeper.registers[122] = 99
+        end += 1.0
+    # EEPROM cells wear: 1, 2, 4, 8, 16 s instead of one rewrite a second
+    starts = [float(entry.split()[0]) for entry in keeper.trace if entry.endswith('122 := 0')]
+    assert len(starts) <= 6
+    assert keeper.registers[122] in (50, 99)
+    told = talk.events(MappingDiffered)
+    assert told
+    assert 'rewritten before, not again within' in told[0].text
+
+
+def test_rewrites_after_a_quiet_minute_are_prompt_again() -> None:
+    keeper = MapKeeper(99, 51, 0, 0, 209, 0, 0, 0)
+    talk = configured(keeper)
+    keeper.live(talk, 10.2)
+    for now in (80.0, 150.0, 220.0):
+        keeper.live(talk, now)
+        keeper.registers[122] = 99
+        keeper.live(talk, now + 3.0)
+        assert keeper.registers[122] == 50
+
+
+def test_drive_that_falls_silent_in_a_rewrite() -> None:
+    keeper = MapKeeper(99, 51, 0, 0, 209, 0, 0, 0)
+    keeper.silent_after = 3  # both maps, and 122 before it is written
+    talk = configured(keeper)
+    assert keeper.live(talk, 10.5) == []
+    assert keeper.registers[122] == 0  # every request word is ignored: that is safe
+    assert talk.events(MappingDiffered) == [
+        MappingDiffered('could not be rewritten: no answer for map parameter 122')]
+
+
+def test_maps_that_cannot_be_read_are_not_written() -> None:
+    keeper = MapKeeper(99, 51, 0, 0, 209, 0, 0, 0)
+    keeper.silent_after = 2
+    talk = configured(keeper)
+    keeper.live(talk, 10.5)
+    assert keeper.trace == []
+    assert talk.session.state is DriveState.MAPPING_DIFFERS
+
+
+# -- what is not believed ---------------------------------------------------------------------------
+
+
+def test_look_that_began_before_time_was_lost_does_not_count() -> None:
+    talk = asked()
+    talk.hears(REQUEST_MAP, 10.001)
+    assert talk.time_lost(15.0) == []
+    # the answer lay in a queue for five seconds; the drive may have been replaced meanwhile
+    assert talk.hears(RESPONSE_MAP, 15.0) == [ASK_REQUEST_MAP]
+    checked(talk, 15.0)
+    assert talk.at(15.002) == [NEUTRAL]
+
+
+def test_only_one_look_at_a_time() -> None:
+    talk = asked()
+    assert talk.bus_up(10.0005) == []
+    assert talk.hears(REQUEST_MAP, 10.001) == [ASK_RESPONSE_MAP]
+    assert talk.hears(RESPONSE_MAP, 10.002) == [ASK_REQUEST_MAP]

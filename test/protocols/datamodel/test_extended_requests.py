@@ -1,0 +1,469 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Conversations about parameter requests: acyclic frames, their pace, and what became of them."""
+
+from builders import (
+    ACTUAL, BOOL, CONTROL, Conversation, DAMPING, drive, FLAG, GAIN, KEY, LIMIT, MAXIMUM, ORDER,
+    parameter, RAM, RAMP, read, SPEED, WORD, write,
+)
+from extended_builders import ANSWER, ASK_REQUEST_MAP, NEUTRAL, online, TICK, ZEROS
+import pytest
+
+from drive_can_bridge.core.events import FrameRejected, RequestCompleted
+
+ASK_GAIN = f'00200281#{ZEROS}'
+ASK_DAMPING = f'00200291#{ZEROS}'
+ASK_BOTH = f'00200282#{ZEROS}'
+ASK_RAMP = f'002001E1#{ZEROS}'
+
+
+def quiet(**options: object) -> Conversation:
+    """Return a conversation with an online drive that is cycled once in ten seconds."""
+    options.setdefault('mapping', 'assume')
+    return online(period=10.0, **options)
+
+
+# -- reading ----------------------------------------------------------------------------------------
+
+
+def test_read() -> None:
+    talk = quiet()
+    assert talk.submits(read(GAIN), 10.1) == [ASK_GAIN]
+    assert talk.hears('10200281#1234FFFFFFFFFFFF', 10.101) == []
+    assert talk.outcomes() == [[0x1234]]
+    assert talk.session.statistics.requests_ok == 1
+
+
+def test_read_signed() -> None:
+    talk = quiet()
+    talk.submits(read(ACTUAL), 10.1)
+    talk.hears('10200D11#FF38000000000000', 10.101)
+    assert talk.outcomes() == [[-200]]
+
+
+def test_consecutive_numbers_share_frames() -> None:
+    many = [parameter(f'r{number}', number) for number in (43, 300, 40, 42, 44, 41, 40)]
+    talk = quiet()
+    assert talk.submits(read(*many), 10.1) == [f'00200284#{ZEROS}']
+    assert talk.hears('10200284#00280029002A002B', 10.101) == [f'002002C1#{ZEROS}']
+    assert talk.hears('102002C1#002C000000000000', 10.102) == [f'002012C1#{ZEROS}']
+    talk.hears('102012C1#012C000000000000', 10.103)
+    assert talk.outcomes() == [[43, 300, 40, 42, 44, 41, 40]]
+
+
+def test_shared_frame_falls_apart_when_nobody_answers() -> None:
+    talk = quiet()
+    assert talk.submits(read(GAIN, DAMPING), 10.1) == [ASK_BOTH]
+    assert talk.until(10.4 + TICK) == [(10.2, ASK_BOTH), (10.3, ASK_BOTH), (10.4, ASK_GAIN)]
+    assert talk.hears('10200281#0007000000000000', 10.41) == [ASK_DAMPING]
+    assert talk.until(10.8) == [(10.51, ASK_DAMPING), (10.61, ASK_DAMPING)]
+    assert talk.outcomes() == [[7, 'no answer in 0.1 s, 3 attempts']]
+    assert talk.session.statistics.requests_ok == 1
+    assert talk.session.statistics.requests_failed == 1
+
+
+def test_answer_to_a_repeated_question() -> None:
+    talk = quiet()
+    talk.submits(read(GAIN), 10.1)
+    assert talk.until(10.2 + TICK) == [(10.2, ASK_GAIN)]
+    talk.hears('10200281#0007000000000000', 10.25)
+    assert talk.outcomes() == [[7]]
+    # and the answer to the first question, late
+    talk.hears('10200281#0007000000000000', 10.26)
+    assert len(talk.events(FrameRejected)) == 1
+
+
+@pytest.mark.parametrize('retries, timeout, text', [
+    (2, 0.1, 'no answer in 0.1 s, 3 attempts'), (0, 0.25, 'no answer in 0.25 s, 1 attempt'),
+    (1, 1.0, 'no answer in 1 s, 2 attempts'),
+])
+def test_time_out(retries: int, timeout: float, text: str) -> None:
+    talk = quiet(parameter_retries=retries, parameter_timeout=timeout)
+    talk.submits(read(GAIN), 10.1)
+    end = 10.1 + (retries + 1) * timeout
+    sent = talk.until(end - TICK)
+    assert len(sent) == retries
+    assert talk.outcomes() == []
+    talk.until(end + TICK)
+    assert talk.outcomes() == [[text]]
+
+
+def test_timeout_that_is_changed_while_running() -> None:
+    talk = quiet(parameter_retries=0)
+    talk.session.reconfigure(parameter_timeout=0.3)
+    talk.submits(read(GAIN), 10.1)
+    talk.until(10.4 + TICK)
+    assert talk.outcomes() == [['no answer in 0.3 s, 1 attempt']]
+
+
+def test_offline_drive_is_asked_once_and_the_rest_fails_at_once() -> None:
+    talk = Conversation(drive(parameter_retries=0, mapping='assume', period=10.0))
+    talk.bus_up(9.0)
+    talk.activate(10.0)
+    talk.at(10.0)
+    assert talk.submits(read(GAIN, RAMP, ACTUAL), 16.0) == [ASK_RAMP]
+    assert talk.until(16.2) == []
+    assert talk.outcomes() == [['no answer; drive offline'] * 3]
+
+
+def test_offline_drive_that_answers_anyway() -> None:
+    talk = Conversation(drive(parameter_retries=0, mapping='assume', period=10.0))
+    talk.bus_up(9.0)
+    talk.activate(10.0)
+    talk.at(10.0)
+    talk.submits(read(GAIN, RAMP), 16.0)
+    assert talk.hears('102001E1#0005000000000000', 16.001) == [ASK_GAIN]
+    talk.until(16.2)
+    assert talk.outcomes() == [['no answer; drive offline', 5]]
+
+
+def test_requests_in_a_row() -> None:
+    talk = quiet()
+    assert talk.submits(read(GAIN), 10.1) == [ASK_GAIN]
+    assert talk.submits(read(DAMPING), 10.1) == []
+    assert talk.submits(read(), 10.1) == []
+    assert talk.outcomes() == [[]]
+    assert talk.hears('10200281#0001000000000000', 10.101) == [ASK_DAMPING]
+    assert talk.hears('10200291#0002000000000000', 10.102) == []
+    assert talk.outcomes() == [[1], [2]]
+
+
+def test_look_at_the_maps_goes_between_two_reads_of_a_long_request() -> None:
+    talk = online()
+    single = [parameter(f'r{number}', number) for number in range(300, 340, 2)]
+    for cycle in range(1, 50):
+        now = 10.0 + 0.02 * cycle
+        talk.until(now + TICK)
+        talk.hears(ANSWER, now + 0.002)
+    talk.submits(read(*single), 10.99)
+    answered, now = 0, 10.991
+    looks = []
+    while now < 11.03:
+        for due, text in talk.until(now):
+            if text == ASK_REQUEST_MAP:
+                looks.append(answered)
+        outstanding = talk.session._channel.outstanding
+        if outstanding is not None and outstanding.number >= 300:
+            sent = talk.hears(f'10{0x200001 | outstanding.number << 4:06X}#0001', now)
+            answered += 1
+            looks += [answered for text in sent if text == ASK_REQUEST_MAP]
+        now += 0.001
+    assert len(looks) == 1
+    assert 0 < looks[0] < 20
+
+
+# -- writing ----------------------------------------------------------------------------------------
+
+
+def test_write_to_ram_is_read_back() -> None:
+    talk = quiet()
+    assert talk.submits(write((GAIN, 7)), 10.1) == ['00300281#0007000000000000']
+    assert talk.at(10.1009) == []
+    assert talk.at(10.1011) == [ASK_GAIN]           # a millisecond for its receive buffer
+    talk.hears('10200281#0007000000000000', 10.102)
+    assert talk.outcomes() == [['written']]
+
+
+def test_read_back_of_something_else() -> None:
+    talk = quiet()
+    talk.submits(write((GAIN, 7), (SPEED, -150)), 10.1)
+    talk.until(10.11)
+    assert talk.hears('10200281#0006000000000000', 10.12) == ['00300321#FF6A000000000000']
+    talk.until(10.13)
+    talk.hears('10200321#FF6B000000000000', 10.14)
+    assert talk.outcomes() == [
+        ['read back 6 instead of 7', 'read back -14.9 instead of -15']]
+
+
+def test_bool_is_read_back_as_a_bool() -> None:
+    assert FLAG.type is BOOL
+    for word, outcome in (('0001', 'written'), ('FFFF', 'written'),
+                          ('0000', 'read back False instead of True')):
+        talk = quiet()
+        assert talk.submits(write((FLAG, 1)), 10.1) == ['003002A1#0001000000000000']
+        talk.until(10.11)
+        talk.hears(f'102002A1#{word}000000000000', 10.12)
+        assert talk.outcomes() == [[outcome]]
+
+
+def test_write_that_is_not_read_back() -> None:
+    talk = quiet()
+    talk.submits(write((GAIN, 7)), 10.1)
+    assert [text for _, text in talk.until(10.5)] == [ASK_GAIN] * 3      # written once
+    assert talk.outcomes() == [['no answer in 0.1 s, 3 attempts']]
+
+
+def test_write_to_an_offline_drive() -> None:
+    talk = Conversation(drive(parameter_retries=0, mapping='assume', period=10.0))
+    talk.bus_up(9.0)
+    talk.activate(10.0)
+    talk.at(10.0)
+    assert talk.submits(write((GAIN, 7), (DAMPING, 8)), 16.0) == ['00300281#0007000000000000']
+    assert [text for _, text in talk.until(16.2)] == [ASK_GAIN]
+    assert talk.outcomes() == [['no answer; drive offline'] * 2]
+
+
+def test_writes_without_verification() -> None:
+    talk = quiet(verify_writes=False)
+    note = 'sent; this protocol does not acknowledge writes'
+    assert talk.submits(write((GAIN, 7), (DAMPING, 8)), 10.1) == ['00300281#0007000000000000']
+    assert talk.until(10.11) == [(10.101, '00300291#0008000000000000')]
+    assert talk.outcomes() == [[note, note]]
+    # an EEPROM cell is looked at all the same
+    assert talk.submits(write((RAMP, 5)), 10.2) == [ASK_RAMP]
+    assert talk.hears('102001E1#0004000000000000', 10.201) == ['003001E1#0005000000000000']
+    assert talk.outcomes() == [[note]]
+
+
+def test_write_only_parameters_are_never_read() -> None:
+    talk = quiet()
+    note = 'sent; this protocol does not acknowledge writes'
+    assert talk.submits(write((ORDER, 1)), 10.1) == ['003002B1#0001000000000000']
+    assert talk.submits(write((KEY, 1)), 10.2) == ['003002C1#0001000000000000']
+    assert talk.until(10.5) == []
+    assert talk.outcomes() == [[note], [note]]
+
+
+def test_parameter_65535_is_refused() -> None:
+    talk = quiet()
+    last = parameter('p65535', 65535, listed=False)
+    assert talk.submits(write((last, 1), (GAIN, 7)), 10.1) == ['00300281#0007000000000000']
+    talk.until(10.11)
+    talk.hears('10200281#0007000000000000', 10.12)
+    assert talk.outcomes() == [[
+        'parameter 65535 is never written: its number marks cyclic frames', 'written']]
+    assert talk.submits(read(last), 10.2) == [f'002FFFF1#{ZEROS}']
+    talk.hears('102FFFF1#0009000000000000', 10.201)
+    assert talk.outcomes() == [[9]]
+
+
+# -- EEPROM -----------------------------------------------------------------------------------------
+
+
+def test_equal_value_is_not_written_to_eeprom() -> None:
+    talk = quiet()
+    assert talk.submits(write((RAMP, 5)), 10.1) == [ASK_RAMP]
+    assert talk.hears('102001E1#0005000000000000', 10.101) == []
+    assert talk.outcomes() == [['written']]
+
+
+def test_eeprom_that_does_not_answer_is_not_written() -> None:
+    talk = quiet()
+    talk.submits(write((RAMP, 5)), 10.1)
+    assert [text for _, text in talk.until(10.5)] == [ASK_RAMP, ASK_RAMP]
+    assert talk.outcomes() == [['no answer in 0.1 s, 3 attempts']]
+
+
+@pytest.mark.parametrize('gap', [0.02, 0.05])
+def test_eeprom_writes_are_paced_and_reads_wait(gap: float) -> None:
+    talk = quiet(eeprom_write_gap=gap)
+    assert talk.submits(write((RAMP, 5), (MAXIMUM, 6)), 10.1) == [ASK_RAMP]
+    assert talk.hears('102001E1#0004000000000000', 10.11) == ['003001E1#0005000000000000']
+    assert talk.submits(read(GAIN), 10.111) == []
+    assert talk.until(10.11 + gap - TICK) == []
+    assert [text for _, text in talk.until(10.11 + gap + TICK)] == [ASK_RAMP]
+    now = 10.11 + gap + 0.001
+    assert talk.hears('102001E1#0005000000000000', now) == [f'002001F1#{ZEROS}']
+    assert talk.hears('102001F1#0005000000000000', now) == ['003001F1#0006000000000000']
+    assert talk.until(now + gap - TICK) == []
+    assert [text for _, text in talk.until(now + gap + TICK)] == [f'002001F1#{ZEROS}']
+    assert talk.hears('102001F1#0006000000000000', now + gap + 0.001) == [ASK_GAIN]
+    assert talk.outcomes() == [['written', 'written']]
+
+
+def test_ram_does_not_wait_for_the_eeprom_but_a_millisecond() -> None:
+    talk = quiet(verify_writes=False)
+    talk.submits(write((RAMP, 5), (GAIN, 7)), 10.1)
+    assert talk.hears('102001E1#0004000000000000', 10.11) == ['003001E1#0005000000000000']
+    assert talk.until(10.12) == [(10.111, '00300281#0007000000000000')]
+
+
+def test_what_the_profile_does_not_say_is_eeprom() -> None:
+    talk = quiet()
+    raw = parameter('p600', 600, listed=False)
+    assert talk.submits(write((raw, 5)), 10.1) == [f'00202581#{ZEROS}']
+    assert talk.hears('10202581#0004000000000000', 10.11) == ['00302581#0005000000000000']
+    assert talk.until(10.13 - TICK) == []
+    assert talk.until(10.13 + TICK) == [(10.13, f'00202581#{ZEROS}')]
+
+
+def test_eeprom_pace_outlives_a_deactivation_and_a_lost_bus() -> None:
+    talk = quiet(verify_writes=False)
+    talk.submits(write((RAMP, 5)), 10.1)
+    talk.hears('102001E1#0004000000000000', 10.11)
+    talk.bus_down(10.112)
+    talk.bus_up(10.113)
+    talk.at(10.113)
+    assert talk.submits(read(GAIN), 10.114) == []
+    assert talk.until(10.1299) == []
+
+
+# -- together ---------------------------------------------------------------------------------------
+
+
+def test_together_in_one_frame() -> None:
+    talk = quiet()
+    assert talk.submits(write((DAMPING, 8), (GAIN, 7), atomic=True), 10.1) == [
+        '00300282#0007000800000000']
+    assert talk.until(10.11) == [(10.101, ASK_BOTH)]
+    talk.hears('10200282#0007000900000000', 10.12)
+    assert talk.outcomes() == [['read back 9 instead of 8', 'written']]
+
+
+def test_together_without_an_answer() -> None:
+    talk = quiet(parameter_retries=0)
+    talk.submits(write((GAIN, 7), (DAMPING, 8), atomic=True), 10.1)
+    talk.until(10.3)
+    assert talk.outcomes() == [['no answer in 0.1 s, 1 attempt'] * 2]
+
+
+def test_together_unverified() -> None:
+    note = 'sent; this protocol does not acknowledge writes'
+    talk = quiet(verify_writes=False)
+    assert len(talk.submits(write((GAIN, 7), (DAMPING, 8), atomic=True), 10.1)) == 1
+    assert talk.outcomes() == [[note, note]]
+    # 43 cannot be read: nothing is
+    talk = quiet()
+    talk.submits(write((FLAG, 1), (ORDER, 2), atomic=True), 10.1)
+    assert talk.until(10.5) == []
+    assert talk.outcomes() == [[note, note]]
+
+
+@pytest.mark.parametrize('items', [
+    ((GAIN, 1), (FLAG, 1)),                                                 # a gap
+    ((GAIN, 1), (GAIN, 2)),
+    ((RAMP, 1), (MAXIMUM, 1)),                                              # EEPROM
+    ((ORDER, 1), (KEY, 1)),                                                 # nobody knows
+    tuple((parameter(f'r{number}', number, storage=RAM), 1) for number in range(300, 305)),
+])
+def test_what_does_not_fit_one_frame_is_not_written(items: tuple[tuple[object, int], ...]) -> None:
+    talk = quiet()
+    assert talk.submits(write(*items, atomic=True), 10.1) == []
+    (outcome, *rest), = talk.outcomes()
+    assert rest == [outcome] * (len(items) - 1)
+    assert 'nothing was written' in str(outcome)
+    assert talk.until(10.5) == []
+
+
+def test_four_at_most() -> None:
+    talk = quiet(verify_writes=False)
+    items = [(parameter(f'r{number}', number, storage=RAM), number) for number in range(300, 304)]
+    assert talk.submits(write(*items, atomic=True), 10.1) == ['003012C4#012C012D012E012F']
+
+
+def test_one_alone_is_written_like_any_other() -> None:
+    talk = quiet()
+    assert talk.submits(write((RAMP, 5), atomic=True), 10.1) == [ASK_RAMP]
+    talk.hears('102001E1#0005000000000000', 10.101)
+    assert talk.outcomes() == [['written']]
+
+
+# -- refusals ---------------------------------------------------------------------------------------
+
+
+def test_inactive_and_bus_down() -> None:
+    talk = Conversation(drive())
+    talk.submits(read(GAIN, DAMPING), 1.0)
+    talk.activate(2.0)
+    talk.submits(read(GAIN), 3.0)
+    assert talk.outcomes() == [['bridge inactive', 'bridge inactive'], ['bus down']]
+    assert talk.session.statistics.requests_failed == 3
+
+
+def test_open_requests_end_with_the_bus_and_with_activity() -> None:
+    talk = quiet()
+    talk.submits(read(GAIN, RAMP), 10.1)
+    talk.submits(write((GAIN, 7)), 10.1)
+    talk.bus_down(10.11)
+    assert talk.outcomes() == [['bus down', 'bus down'], ['bus down']]
+    talk.bus_up(11.0)
+    talk.submits(read(GAIN), 11.1)
+    talk.deactivate(11.11)
+    assert talk.outcomes() == [['bridge inactive']]
+    talk.submits(read(GAIN), 11.12)
+    assert talk.outcomes() == [['bridge inactive']]
+
+
+def test_queue_is_bounded() -> None:
+    talk = quiet()
+    for _ in range(66):
+        talk.submits(read(GAIN), 10.1)
+    assert talk.outcomes() == [['busy']]            # one is served, 64 wait
+    talk.hears('10200281#0001000000000000', 10.11)
+    talk.submits(read(GAIN), 10.12)
+    talk.submits(read(GAIN), 10.12)
+    assert talk.outcomes() == [[1], ['busy']]
+    served = 0
+    now = 10.13
+    while talk.hears('10200281#0001000000000000', now):
+        served += 1
+        now += 0.001
+    assert served == 64
+    assert talk.outcomes() == [[1]] * 65
+
+
+def test_every_request_is_answered_by_itself() -> None:
+    talk = quiet()
+    first, second = read(GAIN), read(GAIN)
+    talk.submits(first, 10.1)
+    talk.submits(second, 10.1)
+    talk.hears('10200281#0001000000000000', 10.11)
+    talk.hears('10200281#0002000000000000', 10.12)
+    done = talk.events(RequestCompleted)
+    assert [event.request for event in done] == [first, second]
+    assert [event.request is wanted for event, wanted in zip(done, (first, second))] == [True] * 2
+
+
+def test_what_may_not_be_written() -> None:
+    talk = online(control=CONTROL)
+    refusal = talk.session.write_refusal
+    assert refusal(SPEED) == 'sent cyclically: publish ~/command/speed_setpoint'
+    assert refusal(LIMIT) == 'sent cyclically: publish ~/command/torque_limit'
+    assert refusal(WORD) == 'use ~/enable'
+    assert refusal(GAIN) == ''
+    for number, refused in ((121, False), (122, True), (125, True), (126, True), (129, True),
+                            (130, False)):
+        text = refusal(parameter(f'p{number}', number, listed=False))
+        assert text == ('mapping parameter: not written while the bridge is active' if refused
+                        else '')
+    talk.deactivate(10.01)
+    talk.until(10.2)
+    assert refusal(parameter('p122', 122, listed=False)) == ''
+
+
+def test_moved_maps_are_guarded_too() -> None:
+    talk = Conversation(drive(request_map_base=300, response_map_base=310, parameter_offset=-1))
+    talk.bus_up(9.0)
+    talk.activate(10.0)
+    refused = [number for number in range(100, 400)
+               if talk.session.write_refusal(parameter(f'p{number}', number, listed=False))]
+    assert refused == [300, 301, 302, 303, 310, 311, 312, 313]
+
+
+# -- beside the cycle -------------------------------------------------------------------------------
+
+
+def test_acyclic_frames_wait_for_the_cyclic_response() -> None:
+    talk = online(mapping='assume')
+    assert talk.at(10.02) == [NEUTRAL]
+    assert talk.submits(read(GAIN), 10.021) == []
+    assert talk.hears(ANSWER, 10.023) == [ASK_GAIN]
+
+
+def test_or_for_half_a_period() -> None:
+    talk = online(mapping='assume')
+    talk.at(10.02)
+    talk.submits(read(GAIN), 10.021)
+    assert talk.at(10.0299) == []
+    assert talk.until(10.03 + TICK) == [(10.03, ASK_GAIN)]
+
+
+def test_cycles_do_not_wait_for_acyclic_answers() -> None:
+    talk = online(mapping='assume')
+    talk.submits(read(GAIN), 10.003)
+    times = []
+    for cycle in range(1, 30):
+        now = 10.0 + 0.02 * cycle
+        times += [when for when, text in talk.until(now + TICK) if text == NEUTRAL]
+        talk.hears(ANSWER, now + 0.002)
+    assert times == pytest.approx([10.0 + 0.02 * cycle for cycle in range(1, 30)])
+    assert talk.outcomes() == [['no answer in 0.1 s, 3 attempts']]

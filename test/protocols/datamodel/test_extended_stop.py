@@ -1,0 +1,263 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Conversations that end: neutral cycles, the word for disable, then silence."""
+
+import math
+
+from builders import (
+    CONTROL, Conversation, CURRENT, drive, GAIN, parameter, RAMP, read, SPEED, STATUS, TABLE, WORD,
+    write,
+)
+from extended_builders import (
+    ANSWER, ASK_REQUEST_MAP, checked, cycling, exchange, NEUTRAL, online, TICK,
+)
+import pytest
+
+from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.events import FrameRejected, MappingDiffered, StationLost
+
+DISABLE = '00300341#0000000000000000'
+ENABLE = '00300341#0001000000000000'
+#: an EEPROM cell is the default where the profile does not say
+SLOW_WORD = parameter('control_word', 52)
+SLOW_TABLE = (*(entry for entry in TABLE if entry.name != 'control_word'), SLOW_WORD)
+
+
+def silent(talk: Conversation, now: float) -> None:
+    """Assert that the session has come to its end."""
+    assert talk.session.stopped
+    assert talk.session.next_timer() == math.inf
+    assert talk.at(now) == []
+    assert talk.at(now + 100.0) == []
+    assert not talk.session.online
+
+
+def test_three_neutral_cycles_then_silence() -> None:
+    talk = online(rearm_immediate=True)
+    talk.commands(0, 100.0, 10.003)
+    assert exchange(talk, 10.02) != NEUTRAL
+    talk.events()
+
+    assert talk.deactivate(10.025) == []
+    assert not talk.session.stopped
+    assert not talk.session.active
+    assert exchange(talk, 10.04) == NEUTRAL
+    assert exchange(talk, 10.06) == NEUTRAL
+    assert talk.until(10.08 + TICK) == [(10.08, NEUTRAL)]
+
+    silent(talk, 10.09)
+    assert talk.events(StationLost) == [StationLost('deactivated')]
+    assert talk.session.offline_advice == 'deactivated'
+
+
+def test_answer_to_the_last_cycle_is_no_surprise() -> None:
+    talk = online()
+    talk.deactivate(10.01)
+    talk.until(10.06 + TICK)
+    talk.hears(ANSWER, 10.062)
+    assert talk.events(FrameRejected) == []
+    talk.hears(ANSWER, 10.063)
+    assert len(talk.events(FrameRejected)) == 1
+
+
+def test_stop_does_not_depend_on_answers() -> None:
+    talk = online()
+    talk.deactivate(10.01)
+    assert talk.until(11.0) == [(10.02, NEUTRAL), (10.04, NEUTRAL), (10.06, NEUTRAL)]
+    silent(talk, 11.0)
+
+
+def test_commands_are_not_taken_while_stopping() -> None:
+    talk = online(rearm_immediate=True)
+    talk.deactivate(10.01)
+    assert talk.commands(0, 100.0, 10.011).value == 'not armed'
+    assert exchange(talk, 10.02) == NEUTRAL
+    assert talk.commands(0, 100.0, 10.023).value == 'not armed'
+    assert exchange(talk, 10.04) == NEUTRAL
+
+
+def test_long_periods_do_not_make_the_stop_long() -> None:
+    talk = online(period=5.0)
+    talk.deactivate(11.0)
+    assert talk.until(12.0) == [(11.0, NEUTRAL), (11.1, NEUTRAL), (11.2, NEUTRAL)]
+    silent(talk, 12.0)
+
+
+def test_first_neutral_cycle_keeps_its_distance() -> None:
+    talk = online(period=5.0)
+    talk.deactivate(10.01)
+    assert talk.until(12.0) == [(10.1, NEUTRAL), (10.2, NEUTRAL), (10.3, NEUTRAL)]
+
+
+def test_drive_that_never_answered_is_stopped_too() -> None:
+    talk = cycling()
+    talk.deactivate(10.0)
+    assert talk.until(11.0) == [(10.0, NEUTRAL), (10.02, NEUTRAL), (10.04, NEUTRAL)]
+
+
+def test_nothing_is_sent_to_a_drive_whose_maps_are_not_known() -> None:
+    talk = Conversation(drive())
+    talk.bus_up(9.0)
+    assert talk.activate(10.0) == [ASK_REQUEST_MAP]
+    assert talk.deactivate(10.05) == []
+    silent(talk, 10.06)
+    # the answer comes late
+    assert talk.hears('102007A4#0032003300000000', 10.07) == []
+    silent(talk, 10.08)
+
+
+def test_stop_while_the_drive_is_being_left() -> None:
+    talk = online()
+    talk.until(10.08 + TICK)
+    assert not talk.session.online
+    talk.deactivate(10.09)
+    assert talk.until(11.0) == [(10.1, NEUTRAL), (10.12, NEUTRAL), (10.14, NEUTRAL)]
+    silent(talk, 11.0)
+
+
+def test_deactivated_twice() -> None:
+    talk = online()
+    talk.deactivate(10.01)
+    talk.until(10.02 + TICK)
+    talk.deactivate(10.03)
+    assert talk.until(11.0) == [(10.04, NEUTRAL), (10.06, NEUTRAL), (10.08, NEUTRAL)]
+    assert talk.deactivate(12.0) == []
+    silent(talk, 12.0)
+
+
+def test_bus_that_goes_while_stopping() -> None:
+    talk = online()
+    talk.deactivate(10.01)
+    talk.until(10.02 + TICK)
+    talk.bus_down(10.03)
+    silent(talk, 10.04)
+    assert talk.bus_up(10.05) == []
+    silent(talk, 10.06)
+
+
+def test_no_look_at_the_maps_while_stopping() -> None:
+    talk = online(period=0.1)
+    for cycle in range(1, 10):
+        exchange(talk, 10.0 + 0.1 * cycle)
+    talk.deactivate(10.95)
+    # a look was due at 11.0; what it might find must not keep the session from its end
+    assert talk.until(12.0) == [(11.0, NEUTRAL), (11.1, NEUTRAL), (11.2, NEUTRAL)]
+    silent(talk, 12.0)
+
+
+def test_look_that_is_under_way_when_the_stop_begins() -> None:
+    talk = online(period=0.1)
+    for cycle in range(1, 10):
+        exchange(talk, 10.0 + 0.1 * cycle)
+    talk.at(11.0)
+    assert talk.hears(ANSWER, 11.001) == [ASK_REQUEST_MAP]
+    talk.deactivate(11.002)
+    assert talk.hears('102007A4#0000000000000000', 11.003) == []
+    assert talk.until(12.0) == [(11.1, NEUTRAL), (11.2, NEUTRAL), (11.3, NEUTRAL)]
+    assert talk.events(MappingDiffered) == []
+    silent(talk, 12.0)
+
+
+def test_acyclic_frames_end_with_the_stop() -> None:
+    talk = online(verify_writes=False)
+    talk.submits(write((RAMP, 5), (GAIN, 7)), 10.003)
+    talk.submits(read(GAIN), 10.003)
+    talk.deactivate(10.004)
+    assert {text for _, text in talk.until(11.0)} == {NEUTRAL}
+
+
+def test_time_lost_while_stopping_goes_on_stopping() -> None:
+    talk = online()
+    talk.deactivate(10.01)
+    assert talk.time_lost(15.0) == []
+    assert [text for _, text in talk.until(16.0)] == [NEUTRAL] * 3
+    silent(talk, 16.0)
+
+
+# -- with a control word ----------------------------------------------------------------------------
+
+
+def enabled(**options: object) -> Conversation:
+    """Return a conversation with a drive that is enabled at 10.1 s, cycled every 0.1 s."""
+    talk = online(control=CONTROL, period=0.1, **options)
+    talk.asks(ControlAction.ENABLE, 10.01)
+    for step in range(10):
+        now = 10.1 + 0.1 * step
+        talk.until(now + TICK)
+        talk.hears('103FFFF0#03E800FA00030000' if step > 1 else ANSWER, now + 0.002)
+        talk.until(now + 0.06)
+        if talk.control_outcomes():
+            return talk
+    raise AssertionError('not enabled')
+
+
+def test_disable_goes_with_the_cycles() -> None:
+    talk = enabled(request=(WORD, SPEED), mapping='assume')
+    beat = talk.session.next_timer()
+    (_, request), = talk.until(beat)
+    assert request == '003FFFF0#0001000000000000'
+    talk.hears('103FFFF0#03E800FA00030000', beat + 0.002)
+    talk.deactivate(beat + 0.05)
+    assert [text for _, text in talk.until(beat + 5.0)] == [NEUTRAL] * 3
+    silent(talk, beat + 6.0)
+
+
+def test_disable_is_written_with_each_of_the_last_cycles() -> None:
+    talk = enabled(mapping='assume')
+    beat = talk.session.next_timer()
+    talk.until(beat)
+    talk.hears('103FFFF0#03E800FA00030000', beat + 0.002)
+    talk.deactivate(beat + 0.05)
+    found = talk.until(beat + 5.0)
+    assert [text for _, text in found] == [NEUTRAL, DISABLE] * 3
+    assert [now for now, _ in found] == pytest.approx(
+        [beat + 0.1, beat + 0.1, beat + 0.2, beat + 0.2, beat + 0.3, beat + 0.3])
+    silent(talk, beat + 6.0)
+
+
+@pytest.mark.parametrize('period, gap', [(0.02, 0.02), (0.005, 0.02), (0.02, 0.1)])
+def test_control_word_in_an_eeprom_keeps_the_pace(period: float, gap: float) -> None:
+    talk = online(control=CONTROL, table=SLOW_TABLE, mapping='assume', period=period,
+                  eeprom_write_gap=gap)
+    # at the start disable was written; now the stop comes at once
+    first = [text for _, text in talk.until(10.0 + period - TICK)]
+    assert first.count(DISABLE) <= 1
+    talk.deactivate(10.0 + period - TICK)
+    found = talk.until(12.0)
+    times = [now for now, text in found if text == DISABLE]
+    assert len(times) == 3
+    assert all(b - a >= gap - TICK for a, b in zip(times, times[1:]))
+    cycles = [now for now, text in found if text == NEUTRAL]
+    assert len(cycles) >= 3
+    assert all(b - a >= period - TICK for a, b in zip(cycles, cycles[1:]))
+    assert found[-1][0] < 10.5
+    silent(talk, 13.0)
+
+
+def test_stop_does_not_wait_for_an_eeprom_that_takes_minutes() -> None:
+    talk = online(control=CONTROL, table=SLOW_TABLE, mapping='assume', eeprom_write_gap=60.0)
+    assert talk.until(10.019) == []
+    talk.deactivate(10.019)
+    assert [text for _, text in talk.until(12.0)] == [NEUTRAL] * 3
+    silent(talk, 13.0)
+
+
+def test_only_the_status_is_acyclic() -> None:
+    talk = online(control=CONTROL, request=(WORD, SPEED), response=(CURRENT,), mapping='assume',
+                  table=TABLE)
+    assert STATUS not in talk.session.drive.cyclic_response
+    talk.deactivate(10.01)
+    assert [text for _, text in talk.until(12.0)] == [NEUTRAL] * 3
+    silent(talk, 13.0)
+
+
+def test_nothing_is_left_of_an_enabled_drive_after_a_restart() -> None:
+    talk = enabled()
+    talk.deactivate(12.0)
+    talk.until(13.0)
+    talk.activate(14.0)
+    checked(talk, 14.0)
+    talk.until(14.002)
+    assert talk.hears(ANSWER, 14.004) == [DISABLE]
+    assert talk.control_outcomes() == []
+    assert talk.session.control is not None
+    assert talk.session.control.word == 0

@@ -1,0 +1,448 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The promises that every protocol family keeps, whatever its frames look like.
+
+A new family adds a :class:`Partner`: how its drive is configured and what the drive answers. The
+tests stay as they are.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+import math
+from typing import Any
+
+from builders import (
+    ACTUAL, Conversation, CURRENT, DAMPING, drive, GAIN, LIMIT, ORDER, RAMP, read, SPEED, STATUS,
+    text_of, write,
+)
+import pytest
+
+from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.errors import ValueRefused
+from drive_can_bridge.core.events import (
+    FrameRejected, ProcessDataReceived, RequestCompleted, SetpointsExpired, StationFound,
+    StationLost,
+)
+from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.session import DriveState
+from drive_can_bridge.core.setpoints import CommandOutcome
+from drive_can_bridge.protocols.families import FAMILIES
+
+#: s between a request and its answer
+DELAY = 0.0005
+
+
+class Partner(ABC):
+    """The drive at the other end of the bus: registers, and the family's telegrams."""
+
+    def __init__(self, **options: Any) -> None:
+        self.configuration = self.configure(**options)
+        self.talk = Conversation(self.configuration)
+        self.now = 10.0
+        self.mute = False
+        self.registers = {
+            parameter.number: 0 for parameter in self.configuration.profile.parameters.values()}
+        self.registers.update({209: 1000, 210: 250, 211: 1})
+        self.frames: list[tuple[float, str]] = []
+
+    @abstractmethod
+    def configure(self, **options: Any) -> DriveConfiguration:
+        """Make a configuration with ``speed_setpoint`` as its only setpoint."""
+
+    @abstractmethod
+    def answers(self, sent: str) -> list[str]:
+        """Do what the drive does with a frame; return what it answers."""
+
+    @abstractmethod
+    def setpoints(self, sent: str) -> list[int]:
+        """Return the raw setpoints that a frame carries; none if it carries none."""
+
+    # -- the bus --------------------------------------------------------------------------------
+
+    def deliver(self, sent: list[str]) -> None:
+        for text in sent:
+            self.frames.append((self.now, text))
+            answers = [] if self.mute else self.answers(text)
+            for answer in answers:
+                self.now += DELAY
+                self.deliver(self.talk.hears(answer, self.now))
+
+    def live(self, duration: float) -> None:
+        """Let time pass, every timer in time."""
+        end = self.now + duration
+        for _ in range(100_000):
+            due = self.talk.session.next_timer()
+            if due > end:
+                self.now = max(self.now, end)
+                return
+            self.now = max(self.now, due)
+            self.deliver(self.talk.at(self.now))
+        raise AssertionError('the timer spins')
+
+    def start(self) -> None:
+        self.deliver(self.talk.bus_up(self.now))
+        self.deliver(self.talk.activate(self.now))
+        self.live(0.2)
+
+    def take(self) -> list[tuple[float, str]]:
+        """Return the frames sent since the last call."""
+        frames, self.frames = self.frames, []
+        return frames
+
+    def commanded(self) -> Iterator[int]:
+        """Return the raw speed setpoints sent since the last call."""
+        for _, text in self.take():
+            yield from self.setpoints(text)
+
+
+class ExtendedPartner(Partner):
+    """DataModel with 29-bit identifiers."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
+        self.registers.update(zip(range(122, 130), (50, 0, 0, 0, 209, 210, 211, 0)))
+
+    def configure(self, **options: Any) -> DriveConfiguration:
+        options.setdefault('request', (SPEED,))
+        return drive('datamodel_extended', response=(ACTUAL, CURRENT, STATUS), **options)
+
+    def answers(self, sent: str) -> list[str]:
+        identifier, data = int(sent[:8], 16), bytes.fromhex(sent[9:])
+        number, count = identifier >> 4 & 0xFFFF, identifier & 0xF
+        if sent.startswith('003FFFF0'):
+            self.registers[50] = int.from_bytes(data[:2], 'big')
+            words = [self.registers[209], self.registers[210], self.registers[211]]
+        elif identifier & 0x100000:
+            for place in range(count):
+                self.registers[number + place] = int.from_bytes(
+                    data[2 * place:2 * place + 2], 'big')
+            return []
+        elif any(number + place not in self.registers for place in range(count)):
+            return []
+        else:
+            words = [self.registers[number + place] for place in range(count)]
+        text = ''.join(f'{word:04X}' for word in words)
+        return [f'{identifier | 0x10000000:08X}#{text:0<16}']
+
+    def setpoints(self, sent: str) -> list[int]:
+        return [int(sent[9:13], 16)] if sent.startswith('003FFFF0') else []
+
+
+PARTNERS: dict[str, type[Partner]] = {
+    'datamodel_extended': ExtendedPartner,
+}
+
+
+def test_every_family_has_a_partner() -> None:
+    assert set(PARTNERS) == set(FAMILIES)
+
+
+@pytest.fixture(params=sorted(PARTNERS), name='make')
+def _make(request: pytest.FixtureRequest) -> type[Partner]:
+    return PARTNERS[request.param]
+
+
+@pytest.fixture(name='partner')
+def _partner(make: type[Partner]) -> Partner:
+    partner = make()
+    partner.start()
+    assert partner.talk.session.online
+    partner.take()
+    partner.talk.events()
+    return partner
+
+
+# -- life cycle -------------------------------------------------------------------------------------
+
+
+def test_nothing_before_activation(make: type[Partner]) -> None:
+    partner = make()
+    partner.deliver(partner.talk.bus_up(9.0))
+    partner.live(5.0)
+    assert partner.take() == []
+    assert partner.talk.session.next_timer() == math.inf
+    assert partner.talk.session.stopped
+    assert not partner.talk.session.active
+
+
+def test_nothing_before_the_bus_is_there(make: type[Partner]) -> None:
+    partner = make()
+    partner.deliver(partner.talk.activate(9.0))
+    partner.live(5.0)
+    assert partner.take() == []
+    partner.deliver(partner.talk.bus_up(partner.now))
+    partner.live(0.2)
+    assert partner.talk.session.online
+
+
+def test_online_is_told_before_the_first_sample(make: type[Partner]) -> None:
+    partner = make()
+    partner.start()
+    events = partner.talk.events(StationFound, StationLost, ProcessDataReceived)
+    assert events[0] == StationFound()
+    assert {event.raws for event in events[1:]} == {(1000, 250, 1)}
+    assert partner.talk.session.ever_online
+    assert partner.talk.session.offline_advice == ''
+
+
+def test_silent_drive_is_not_online(make: type[Partner]) -> None:
+    partner = make()
+    partner.mute = True
+    partner.start()
+    partner.live(3.0)
+    session = partner.talk.session
+    assert not session.online
+    assert not session.ever_online
+    assert session.state is DriveState.OFFLINE
+    assert session.offline_advice
+    assert partner.take()
+    assert partner.talk.events(StationFound, StationLost, ProcessDataReceived) == []
+
+
+def test_loss_and_recovery(partner: Partner) -> None:
+    partner.mute = True
+    partner.live(1.0)
+    lost, = partner.talk.events(StationLost)
+    assert lost.reason
+    assert not partner.talk.session.online
+    assert partner.talk.session.statistics.missed >= 3
+    partner.mute = False
+    partner.live(2.0)
+    assert partner.talk.session.online
+    assert len(partner.talk.events(StationFound)) == 1
+
+
+def test_deactivation_ends_neutral_and_then_silent(partner: Partner) -> None:
+    partner.talk.commands(0, 0.0, partner.now)
+    partner.talk.commands(0, 100.0, partner.now)
+    partner.live(0.1)
+    assert list(partner.commanded())[-1] == 1000
+    partner.deliver(partner.talk.deactivate(partner.now))
+    partner.live(1.0)
+    assert set(partner.commanded()) == {0}
+    session = partner.talk.session
+    assert session.stopped
+    assert not session.online
+    assert session.next_timer() == math.inf
+    assert partner.talk.events(StationLost) == [StationLost('deactivated')]
+    partner.live(5.0)
+    assert partner.take() == []
+
+
+def test_deactivation_of_a_drive_that_stopped_answering(partner: Partner) -> None:
+    partner.mute = True
+    partner.deliver(partner.talk.deactivate(partner.now))
+    partner.live(1.0)
+    assert partner.talk.session.stopped
+    assert set(partner.commanded()) <= {0}
+
+
+def test_bus_down_is_silence_at_once(partner: Partner) -> None:
+    assert partner.talk.bus_down(partner.now) == []
+    partner.live(3.0)
+    assert partner.take() == []
+    assert partner.talk.session.offline_advice == 'bus down: unplugged'
+    assert partner.talk.session.stopped
+
+
+def test_life_can_be_repeated(partner: Partner) -> None:
+    for _ in range(3):
+        partner.deliver(partner.talk.deactivate(partner.now))
+        partner.live(1.0)
+        assert partner.talk.session.stopped
+        partner.deliver(partner.talk.activate(partner.now))
+        partner.live(1.0)
+        assert partner.talk.session.online
+        partner.talk.bus_down(partner.now)
+        partner.deliver(partner.talk.bus_up(partner.now))
+        partner.live(1.0)
+        assert partner.talk.session.online
+
+
+# -- setpoints --------------------------------------------------------------------------------------
+
+
+def test_only_neutral_until_armed(partner: Partner) -> None:
+    assert partner.talk.session.state is DriveState.NOT_ARMED
+    assert partner.talk.commands(0, 100.0, partner.now) is CommandOutcome.NOT_ARMED
+    partner.live(0.5)
+    assert set(partner.commanded()) <= {0}
+    assert partner.talk.commands(0, 0.0, partner.now) is CommandOutcome.ARMED
+    assert partner.talk.session.state is DriveState.ONLINE
+    assert partner.talk.commands(0, 100.0, partner.now) is CommandOutcome.ACCEPTED
+    partner.live(0.1)
+    assert list(partner.commanded())[-1] == 1000
+
+
+def test_immediate(make: type[Partner]) -> None:
+    partner = make(rearm_immediate=True)
+    partner.start()
+    assert partner.talk.commands(0, -100.0, partner.now) is CommandOutcome.ARMED
+    partner.live(0.1)
+    assert list(partner.commanded())[-1] == 0xFC18
+
+
+def test_silence_of_the_commander_is_neutral(partner: Partner) -> None:
+    partner.talk.commands(0, 0.0, partner.now)
+    partner.talk.commands(0, 100.0, partner.now)
+    partner.live(1.0)
+    assert list(partner.commanded())[-1] == 0
+    assert partner.talk.events(SetpointsExpired) == [SetpointsExpired(('speed_setpoint',))]
+    assert partner.talk.commands(0, 100.0, partner.now) is CommandOutcome.NOT_ARMED
+    assert math.isnan(partner.talk.session.setpoints.age(partner.now))
+
+
+@pytest.mark.parametrize('upset', ['loss', 'bus', 'time'])
+def test_after_an_upset_it_wants_arming_again(partner: Partner, upset: str) -> None:
+    talk = partner.talk
+    talk.commands(0, 0.0, partner.now)
+    talk.commands(0, 100.0, partner.now)
+    partner.live(0.1)
+    partner.take()
+    if upset == 'loss':
+        partner.mute = True
+        partner.live(0.2)
+        partner.take()  # until the loss was noticed, the command was still in force
+        partner.mute = False
+    elif upset == 'bus':
+        talk.bus_down(partner.now)
+        partner.deliver(talk.bus_up(partner.now))
+    else:
+        partner.now += 5.0
+        partner.deliver(talk.time_lost(partner.now))
+    partner.live(1.0)
+    assert talk.session.online
+    assert set(partner.commanded()) <= {0}
+    assert talk.session.state is DriveState.NOT_ARMED
+    assert talk.commands(0, 100.0, partner.now) is CommandOutcome.NOT_ARMED
+
+
+@pytest.mark.parametrize('value', [math.nan, math.inf, 3000.1, 1e300, True])
+def test_bad_commands_are_refused(partner: Partner, value: float) -> None:
+    partner.talk.commands(0, 0.0, partner.now)
+    partner.talk.commands(0, 100.0, partner.now)
+    with pytest.raises(ValueRefused):
+        partner.talk.commands(0, value, partner.now)
+    partner.live(0.1)
+    assert list(partner.commanded())[-1] == 1000
+    assert partner.talk.session.statistics.commands_refused == 1
+
+
+# -- parameters -------------------------------------------------------------------------------------
+
+
+def outcomes(partner: Partner) -> list[list[object]]:
+    return [[text_of(outcome) for outcome in event.outcomes]
+            for event in partner.talk.events(RequestCompleted)]
+
+
+def test_parameters_are_read_and_written(partner: Partner) -> None:
+    partner.registers[40] = 7
+    partner.deliver(partner.talk.submits(read(GAIN, ACTUAL, DAMPING), partner.now))
+    partner.live(0.1)
+    partner.deliver(partner.talk.submits(write((GAIN, 8), (RAMP, 9)), partner.now))
+    partner.live(0.3)
+    assert outcomes(partner) == [[7, 1000, 0], ['written', 'written']]
+    assert (partner.registers[40], partner.registers[30]) == (8, 9)
+
+
+def test_missing_parameter_takes_no_other_along(partner: Partner) -> None:
+    del partner.registers[41]
+    partner.deliver(partner.talk.submits(read(GAIN, DAMPING, RAMP), partner.now))
+    partner.live(3.0)
+    (gain, damping, ramp), = outcomes(partner)
+    assert (gain, ramp) == (0, 0)
+    assert 'no answer' in str(damping)
+    assert partner.talk.session.online
+
+
+def test_requests_never_hold_up_the_exchange(partner: Partner) -> None:
+    for _ in range(30):
+        partner.deliver(partner.talk.submits(read(GAIN, RAMP), partner.now))
+    partner.live(1.0)
+    assert partner.talk.session.statistics.missed == 0
+    assert partner.talk.session.statistics.exchanges > 40
+    assert outcomes(partner) == [[0, 0]] * 30
+
+
+def test_requests_without_a_drive_end(make: type[Partner]) -> None:
+    partner = make()
+    partner.mute = True
+    partner.start()
+    for _ in range(3):
+        partner.deliver(partner.talk.submits(read(GAIN, RAMP, DAMPING), partner.now))
+        partner.deliver(partner.talk.submits(write((GAIN, 1)), partner.now))
+    partner.live(10.0)
+    done = outcomes(partner)
+    assert [len(entry) for entry in done] == [3, 1, 3, 1, 3, 1]
+    assert {reason for entry in done for reason in entry} == {'no answer; drive offline'}
+
+
+def test_requests_are_refused_while_nothing_can_be_sent(make: type[Partner]) -> None:
+    partner = make()
+    partner.talk.submits(read(GAIN, RAMP), 1.0)
+    partner.talk.activate(2.0)
+    partner.talk.submits(write((GAIN, 1)), 2.0)
+    assert outcomes(partner) == [['bridge inactive'] * 2, ['bus down']]
+
+
+def test_64_requests_wait(partner: Partner) -> None:
+    partner.mute = True
+    for _ in range(70):
+        partner.deliver(partner.talk.submits(read(GAIN), partner.now))
+    refused = outcomes(partner)
+    assert refused == [['busy']] * len(refused)
+    assert len(refused) in (5, 6)
+    partner.mute = False
+    partner.live(10.0)
+    assert len(outcomes(partner)) == 70 - len(refused)
+
+
+def test_requests_end_with_the_bus_or_with_activity(partner: Partner) -> None:
+    partner.mute = True
+    for reason in ('bus down', 'bridge inactive'):
+        partner.deliver(partner.talk.submits(read(GAIN, RAMP), partner.now))
+        partner.deliver(partner.talk.submits(read(GAIN), partner.now))
+        if reason == 'bus down':
+            partner.talk.bus_down(partner.now)
+            partner.deliver(partner.talk.bus_up(partner.now))
+        else:
+            partner.deliver(partner.talk.deactivate(partner.now))
+        assert outcomes(partner) == [[reason, reason], [reason]]
+
+
+def test_what_users_may_not_write(partner: Partner) -> None:
+    refusal = partner.talk.session.write_refusal
+    assert refusal(SPEED) == 'sent cyclically: publish ~/command/speed_setpoint'
+    assert [refusal(parameter) for parameter in (GAIN, RAMP, ORDER, LIMIT)] == [''] * 4
+
+
+# -- anything -----------------------------------------------------------------------------------------
+
+
+def test_frames_of_strangers_do_no_harm(partner: Partner) -> None:
+    samples = len(partner.talk.samples())
+    for identifier in (*range(0, 0x800, 7), *range(0, 0x20000000, 0x1234567)):
+        for data in (b'', b'\xFF', bytes(8), bytes([0xFF] * 8)):
+            for is_extended in (False, True):
+                if identifier > 0x7FF and not is_extended:
+                    continue
+                partner.talk.session.receive_frame(
+                    Frame(identifier, data, is_extended), partner.now)
+    assert len(partner.talk.samples()) == samples == 0
+    assert partner.talk.session.online
+    partner.live(1.0)
+    assert partner.talk.session.statistics.missed == 0
+
+
+def test_unasked_frames_are_counted(partner: Partner) -> None:
+    seen = [text for _, text in partner.frames]
+    partner.live(0.1)
+    answered = [answer for _, text in partner.take() for answer in partner.answers(text)]
+    assert answered
+    assert not seen
+    before = partner.talk.session.statistics.rejected
+    partner.talk.events()
+    partner.talk.hears(answered[-1], partner.now + DELAY)
+    assert partner.talk.session.statistics.rejected == before + 1
+    assert len(partner.talk.events(FrameRejected)) == 1
