@@ -1,0 +1,89 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The command ``drive_can``: everything that a person runs by hand.
+
+Every subcommand is a module with ``add_parser(subparsers)`` and ``run(args) -> exit code``. Only
+the one that was asked for is imported, so that ``validate`` needs neither python-can nor ROS.
+
+Exit codes: 0 success, 1 the request failed, 2 wrong usage.
+"""
+
+import argparse
+from collections.abc import Sequence
+import importlib
+import os
+import sys
+from typing import Any
+
+from drive_can_bridge import __version__
+from drive_can_bridge.core.errors import DriveCanError
+
+PROGRAM = 'drive_can'
+
+#: subcommand -> module and one line of help
+SUBCOMMANDS: dict[str, tuple[str, str]] = {
+    'validate': ('drive_can_bridge.cli.validate',
+                 'check a parameter file without touching a bus'),
+    'simulate': ('drive_can_bridge.cli.simulate',
+                 'play every drive of a parameter file on its bus'),
+    'demo': ('drive_can_bridge.cli.demo',
+             'run a bridge and simulated drives in one process'),
+}
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """
+    Run the command.
+
+    :param argv: arguments without the program's name; None: those of the process.
+    :return: exit code.
+    """
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    try:
+        code = _run(arguments)
+        sys.stdout.flush()
+        return code
+    except BrokenPipeError:
+        # Whoever read our output has gone. Python flushes once more on its way out: into nothing.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    except KeyboardInterrupt:
+        return _fail('interrupted')
+    except DriveCanError as error:
+        print(error, file=sys.stderr)
+        return 1
+    except OSError as error:
+        place = f'{error.filename}: ' if error.filename else ''
+        return _fail(f'{place}{error.strerror or error}')
+    except ImportError as error:
+        return _fail(f'this needs a Python module that is not installed: {error.name or error}')
+    except Exception as error:  # noqa: BLE001  no traceback ever reaches a user
+        return _fail(f'internal error, please report it: {type(error).__name__}: {error}')
+
+
+def _run(arguments: list[str]) -> int:
+    wanted = next((word for word in arguments if not word.startswith('-')), None)
+    parser = argparse.ArgumentParser(
+        prog=PROGRAM, description='Tools of drive_can_bridge, the bridge from motor drives on '
+                                  'CAN buses to ROS 2.')
+    parser.add_argument('--version', action='version', version=f'{PROGRAM} {__version__}')
+    subparsers = parser.add_subparsers(dest='subcommand', metavar='SUBCOMMAND', required=True)
+    module: Any = None
+    for name, (path, help_line) in SUBCOMMANDS.items():
+        if name == wanted:
+            module = importlib.import_module(path)
+            module.add_parser(subparsers)
+        else:
+            subparsers.add_parser(name, help=help_line)
+    args = parser.parse_args(arguments)
+    code: int = module.run(args)
+    return code
+
+
+def _fail(message: str) -> int:
+    print(f'{PROGRAM}: {message}', file=sys.stderr)
+    return 1
+
+
+if __name__ == '__main__':
+    sys.exit(main())

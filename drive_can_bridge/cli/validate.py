@@ -1,0 +1,62 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""The subcommand ``drive_can validate``: check a parameter file without touching a bus."""
+
+from argparse import Namespace
+import sys
+from typing import Any
+
+from drive_can_bridge.configuration.bus_check import Adapters
+from drive_can_bridge.configuration.load import configuration_from_file
+from drive_can_bridge.configuration.model import BusConfiguration, DriveConfiguration
+from drive_can_bridge.configuration.traffic_check import bus_share
+from drive_can_bridge.core.parameters import Parameter
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add the subcommand to the command's parser."""
+    parser = subparsers.add_parser(
+        'validate', help='check a parameter file without touching a bus',
+        description='Check a parameter file and the profiles it names. Prints one line per '
+                    'drive, or on standard error one line per problem '
+                    '(FILE:LINE: key.path: what is wrong, what is allowed).',
+        epilog='Exit code 0: everything is all right. 1: it is not. 2: wrong usage.')
+    parser.add_argument('file', metavar='FILE', help='ROS 2 parameter file of the bridge')
+
+
+def run(args: Namespace) -> int:
+    """
+    Check the file.
+
+    :raises ConfigurationError: the file has problems.
+    :raises OSError: the file cannot be read.
+    """
+    configuration = configuration_from_file(args.file, adapters=_adapters())
+    for warning in configuration.warnings:
+        print(f'warning: {warning}', file=sys.stderr)
+    for drive in configuration.drives.values():
+        print(summary(drive, configuration.buses[drive.bus]))
+    return 0
+
+
+def summary(drive: DriveConfiguration, bus: BusConfiguration) -> str:
+    """Write everything that matters about a drive in one line."""
+    return (f'{drive.name}: bus {drive.bus} ({bus.interface} {bus.channel}), {drive.protocol}, '
+            f'station {drive.station}, profile {drive.profile.name}, '
+            f'period {1000 * drive.period:g} ms, '
+            f'request {_names(drive.cyclic_request)}, response {_names(drive.cyclic_response)}, '
+            f'load {100 * bus_share(drive, bus):.1f} %')
+
+
+def _names(parameters: tuple[Parameter, ...]) -> str:
+    return f'[{", ".join(parameter.name for parameter in parameters)}]'
+
+
+def _adapters() -> Adapters | None:
+    """Return what is known about CAN adapters, if python-can is installed."""
+    try:
+        from drive_can_bridge.transport import adapters
+    except ImportError:
+        print('warning: python-can is not installed: interfaces and adapter keys are unchecked',
+              file=sys.stderr)
+        return None
+    return adapters

@@ -1,0 +1,126 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Find and read profiles: ``profile:`` is an absolute path, or a name looked up as NAME.yaml."""
+
+from collections.abc import Sequence
+from pathlib import Path as FilePath
+
+from drive_can_bridge.configuration.problems import Problem, show, suggestion, Tree
+from drive_can_bridge.configuration.profile_check import LoadedProfile, profile_from_tree
+from drive_can_bridge.configuration.reader import BrokenYaml, Events, Rules, TreeReader
+from drive_can_bridge.resources import profiles_directory
+
+SUFFIX = '.yaml'
+
+
+class ProfileStore:
+    """
+    The profiles of one configuration; each file is read once.
+
+    :param directories: searched in order, before the directory shipped with the package; empty
+        entries are ignored.
+    """
+
+    def __init__(self, directories: Sequence[str]) -> None:
+        self._directories = [FilePath(entry) for entry in directories if entry]
+        try:
+            self._directories.append(profiles_directory())
+        except FileNotFoundError:
+            # An incomplete installation; profiles given by path still work.
+            pass
+        self._loaded: dict[FilePath, LoadedProfile] = {}
+
+    @property
+    def problems(self) -> list[Problem]:
+        """What is wrong in the profiles read so far."""
+        return [problem for loaded in self._loaded.values() for problem in loaded.problems]
+
+    def load(self, name: str) -> LoadedProfile | str:
+        """
+        Return a profile, or why there is none.
+
+        A profile that was found is returned even when it has problems: see ``problems``.
+        """
+        path = self._find(name)
+        if isinstance(path, str):
+            return path
+        if path not in self._loaded:
+            try:
+                self._loaded[path] = read_profile(path)
+            except OSError as error:
+                return f'{path} cannot be read ({error.strerror}), allowed is a readable file'
+        return self._loaded[path]
+
+    def _find(self, name: str) -> FilePath | str:
+        if '/' in name:
+            path = FilePath(name)
+            if not path.is_absolute():
+                return f'{show(name)} is neither a name nor an absolute path, allowed is one of ' \
+                       'them'
+            return path if _is_file(path) else f'no file {name}, allowed is an existing one'
+        for directory in self._directories:
+            path = directory / f'{name}{SUFFIX}'
+            if _is_file(path):
+                return path
+        if name.endswith(SUFFIX):
+            return f'{show(name)} is unknown, allowed is a name without {SUFFIX}'
+        known = sorted({path.stem for directory in self._directories
+                        for path in directory.glob(f'*{SUFFIX}')})
+        places = ', '.join(map(str, self._directories)) or 'no directory'
+        hint = suggestion(name, known) if known else 'there is no profile at all'
+        return f'{show(name)} is unknown, {hint} (searched: {places})'
+
+
+def _is_file(path: FilePath) -> bool:
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
+
+
+def read_profile(path: FilePath) -> LoadedProfile:
+    """
+    Read a profile file.
+
+    :raises OSError: the file cannot be read.
+    """
+    data = path.read_bytes()
+    file = str(path)
+    problems: list[Problem] = []
+    tree = Tree({}, file)
+    broken = True
+    try:
+        events = Events(data)
+        while events.head is not None and not events.at('MappingStart'):
+            if events.at('Scalar') or events.at('SequenceStart') or events.at('Alias'):
+                break
+            events.take()
+        if events.head is not None and events.at('MappingStart'):
+            reader = TreeReader(events, file, Rules.PROFILE)
+            tree = reader.tree
+            try:
+                reader.read()
+            finally:
+                problems += reader.problems + reader.garbled
+            broken = False
+            _expect_end(events, file, problems)
+        else:
+            problems.append(Problem(file, 1, 'yaml', 'no mapping, allowed are protocols, '
+                                                     'parameters, control, description'))
+    except BrokenYaml as error:
+        problems.append(Problem(file, error.line, 'yaml', str(error)))
+        broken = True
+    if broken:
+        tree.damaged.add(())
+    loaded = profile_from_tree(tree)
+    # What follows from a file that could not be read to its end is not worth mentioning.
+    loaded.problems[:] = problems if broken else problems + loaded.problems
+    return loaded
+
+
+def _expect_end(events: Events, file: str, problems: list[Problem]) -> None:
+    while events.head is not None:
+        if events.at('DocumentStart'):
+            problems.append(Problem(file, events.line, 'yaml', 'a second document, allowed is '
+                                                               'one'))
+            return
+        events.take()

@@ -1,0 +1,170 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+Check a tree against a JSON Schema, and say what is wrong in sentences of our own.
+
+What is wrong is also cut out of the tree and marked as damaged, so that the checks that follow
+find either good values or none.
+"""
+
+from collections.abc import Callable, Iterator
+from copy import deepcopy
+from dataclasses import replace
+import math
+from typing import Any
+
+from jsonschema import Draft202012Validator
+from jsonschema.exceptions import ValidationError
+from jsonschema.validators import extend
+
+from drive_can_bridge.configuration.problems import (
+    describe_type, hint, Path, Problem, show, suggestion, Tree,
+)
+from drive_can_bridge.configuration.schema import Schema
+
+#: gives another sentence for an error, or None to keep the usual one; '' hides it
+Override = Callable[[Path, Any, str], 'str | None']
+
+_TYPE_WORDS = {
+    'boolean': 'true or false', 'integer': 'an integer', 'number': 'a number',
+    'string': 'a string', 'array': 'a list', 'object': 'a mapping',
+}
+
+
+def _is_integer(_: Any, value: Any) -> bool:
+    # JSON Schema calls 1.0 an integer; a ROS parameter is one type or the other.
+    return isinstance(value, int) and not isinstance(value, bool)
+
+
+def _is_number(_: Any, value: Any) -> bool:
+    return _is_integer(_, value) or (isinstance(value, float) and math.isfinite(value))
+
+
+_Validator = extend(
+    Draft202012Validator,
+    type_checker=Draft202012Validator.TYPE_CHECKER.redefine_many(
+        {'integer': _is_integer, 'number': _is_number}))
+
+
+def check_schema(tree: Tree, schema: Schema, start: str = '', *,
+                 override: Override | None = None) -> tuple[Tree, list[Problem]]:
+    """
+    Check a tree.
+
+    :param schema: a whole schema document.
+    :param start: name of the definition that describes the tree; '' for the document itself.
+    :param override: see :data:`Override`; called with path, value and the violated keyword.
+    :return: the tree without what is wrong, and the problems.
+    """
+    root: Schema = {'$ref': f'#/$defs/{start}', '$defs': schema['$defs']} if start else schema
+    sound = replace(tree, data=deepcopy(tree.data), damaged=set(tree.damaged))
+    problems: list[Problem] = []
+    for error in _Validator(root).iter_errors(tree.data):
+        for path, message, at in _sentences(error, tree):
+            if override is not None:
+                changed = override(path, error.instance, str(error.validator))
+                message = message if changed is None else changed
+            _cut(sound, path)
+            if message:
+                problems.append(tree.problem(path, message, at=at))
+    return sound, problems
+
+
+def check_value(value: Any, schema: Schema) -> str | None:
+    """Say what is wrong with a single value; None: nothing."""
+    for error in _Validator(schema).iter_errors(value):
+        return _message(error)
+    return None
+
+
+def _cut(tree: Tree, path: Path) -> None:
+    """Remove a value that is not to be used."""
+    tree.damaged.add(path)
+    parent: Any = tree.data
+    for part in path[:-1]:
+        parent = parent.get(part) if isinstance(parent, dict) else None
+    if isinstance(parent, dict) and path:
+        parent.pop(path[-1], None)
+
+
+def _sentences(error: ValidationError, tree: Tree) -> Iterator[tuple[Path, str, Path]]:
+    """Yield path of the culprit, sentence, and path of the line for every part of an error."""
+    path: Path = tuple(error.absolute_path)
+    if error.validator == 'required':
+        for key in error.validator_value:
+            here = (*path, key)
+            if key in error.instance or here in tree.damaged or path in tree.incomplete:
+                continue
+            # Called once per missing key, with all keys each time: name only this one.
+            if f"'{key}'" in error.message:
+                option = error.schema.get('properties', {}).get(key)
+                yield here, f'missing, allowed is {allowed(option)}', here
+    elif error.validator == 'additionalProperties':
+        known = error.schema.get('properties', {})
+        for key in error.instance:
+            if key not in known:
+                yield (*path, key), f'unknown key, {suggestion(str(key), known)}', (*path, key)
+    elif 'propertyNames' in error.relative_schema_path:
+        here = (*path, error.instance)
+        yield here, _message(error), here
+    elif path and isinstance(path[-1], int):
+        yield path[:-1], _message(error), path
+    else:
+        yield path, _message(error), path
+
+
+def _message(error: ValidationError) -> str:
+    value, schema = error.instance, error.schema
+    if error.validator == 'type':
+        if isinstance(value, float) and not math.isfinite(value):
+            return f'{show(value)} is not a finite number, allowed is {allowed(schema)}'
+        shown = describe_type(value)
+        if isinstance(value, (bool, int, float, str)):
+            shown = f'{show(value)} is {shown}'
+        return f'{shown}, allowed is {allowed(schema)}'
+    if error.validator == 'enum':
+        remark = hint(value, schema['enum']) if isinstance(value, str) else ''
+        return f'{show(value)} is unknown{remark}, allowed is {allowed(schema)}'
+    if error.validator in ('minimum', 'maximum'):
+        return f'{show(value)} is out of range, allowed is {allowed(schema)}'
+    if error.validator == 'not' and not error.validator_value:
+        return 'not allowed here, allowed is to leave it out'
+    if error.validator == 'not':
+        return f'{show(value)} is useless, allowed is any other number'
+    if error.validator == 'minLength':
+        return 'an empty string, allowed is text'
+    if error.validator in ('minItems', 'maxItems'):
+        least, most = schema.get('minItems', 0), schema.get('maxItems')
+        count = str(least) if least == most else f'at least {least}'
+        return f'a list of {len(value)} values, allowed are {count}'
+    if error.validator == 'minProperties':
+        return 'an empty mapping, allowed is at least one entry'
+    return f'{show(value)} is wrong, allowed is {allowed(schema)}'
+
+
+def allowed(schema: Any) -> str:
+    """Say in words what a schema accepts."""
+    if not isinstance(schema, dict):
+        return 'a value'
+    if 'patternErrorMessage' in schema:
+        return str(schema['patternErrorMessage'])
+    if 'enum' in schema:
+        words = [str(word) for word in schema['enum']]
+        return words[0] if len(words) == 1 else f'{", ".join(words[:-1])} or {words[-1]}'
+    types = schema.get('type', 'object')
+    types = [types] if isinstance(types, str) else types
+    text = ' or '.join(_TYPE_WORDS[name] for name in types)
+    if types == ['array']:
+        items = allowed(schema.get('items'))
+        if 'enum' in schema.get('items', {}):
+            return f'a list of {items}'
+        items = items.removeprefix('an ').removeprefix('a ')
+        count = f'{schema["minItems"]} ' if 'maxItems' in schema else ''
+        # "an integer of 0 to 7" is one; a list holds several.
+        noun, _, limits = items.partition(' of ')
+        return f'a list of {count}{noun}s' + (f' of {limits}' if limits else '')
+    low, high = schema.get('minimum'), schema.get('maximum')
+    if low is not None and high is not None:
+        return f'{text} of {low:.12g} to {high:.12g}'
+    if low is not None:
+        return f'{text} of at least {low:.12g}'
+    return text

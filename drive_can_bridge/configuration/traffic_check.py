@@ -1,0 +1,55 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""What drives do to each other on a bus: colliding identifiers, and the load they add up to."""
+
+from collections.abc import Iterable, Iterator
+
+from drive_can_bridge.configuration.model import BusConfiguration, DriveConfiguration
+from drive_can_bridge.configuration.problems import Problem, Tree
+from drive_can_bridge.protocols.families import FAMILIES
+from drive_can_bridge.protocols.family import Claim
+
+#: share of the bus above which a configuration is refused, and warned about
+LOAD_MAX = 1.0
+LOAD_WARNING = 0.7
+
+
+def bus_share(drive: DriveConfiguration, bus: BusConfiguration) -> float:
+    """Return the worst-case share of the bus that the exchange of a drive takes."""
+    return FAMILIES[drive.protocol].bits_per_second(drive) / bus.bitrate
+
+
+def collisions(tree: Tree, drives: Iterable[DriveConfiguration]) -> Iterator[Problem]:
+    """Yield a problem for every drive that uses identifiers of an earlier one on its bus."""
+    claimed: dict[str, list[tuple[Claim, DriveConfiguration]]] = {}
+    for drive in drives:
+        on_bus = claimed.setdefault(drive.bus, [])
+        own = FAMILIES[drive.protocol].claims(drive)
+        hit = next(((claim, other) for mine in own for claim, other in on_bus
+                    if mine.overlaps(claim)), None)
+        if hit is not None:
+            claim, other = hit
+            yield tree.problem(
+                ('drives', drive.name, 'station'),
+                f'{drive.station} collides with drive {other.name} (station {other.station}) on '
+                f'bus {drive.bus}: both use {claim.purpose}; allowed is a station of its own')
+        on_bus.extend((claim, drive) for claim in own)
+
+
+def overloads(tree: Tree, bus: BusConfiguration, drives: Iterable[DriveConfiguration],
+              ) -> tuple[list[Problem], list[Problem]]:
+    """
+    Check the worst-case load of a bus.
+
+    :return: problems and warnings.
+    """
+    shares = {drive.name: bus_share(drive, bus) for drive in drives}
+    total = sum(shares.values())
+    if total <= LOAD_WARNING:
+        return [], []
+    parts = ', '.join(f'{name} {100 * share:.1f} %' for name, share in shares.items())
+    figure = f'worst-case load {100 * total:.1f} % at {bus.bitrate} bit/s ({parts})'
+    path = ('buses', bus.name)
+    if total > LOAD_MAX:
+        return [tree.problem(path, f'{figure}, allowed is {100 * LOAD_MAX:.0f} %: use longer '
+                                   'periods, fewer drives or a higher bit rate')], []
+    return [], [tree.problem(path, f'{figure}, recommended is at most {100 * LOAD_WARNING:.0f} %')]

@@ -1,0 +1,104 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+What python-can knows about its adapters, without opening one.
+
+Used by the configuration check: an interface that does not exist or lacks its driver never will
+work, and a key that the adapter's class does not name is probably misspelt. Most classes swallow
+unknown keywords silently.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+import difflib
+import importlib
+import inspect
+import logging
+from typing import Any
+
+import can
+import can.interfaces
+
+
+def adapter_keywords(interface: str) -> set[str] | None:
+    """
+    Return the keyword arguments that an adapter's class, or one it inherits from, names.
+
+    :return: None where the class cannot be imported: nothing can be said then.
+    """
+    try:
+        adapter = _adapter_class(interface)
+    except _Unusable:
+        return None
+    names: set[str] = set()
+    for ancestor in inspect.getmro(adapter):
+        if '__init__' not in vars(ancestor) or ancestor is object:
+            continue
+        try:
+            parameters = inspect.signature(vars(ancestor)['__init__']).parameters
+        except (TypeError, ValueError):
+            return None
+        names.update(name for name, parameter in parameters.items() if parameter.kind in (
+            inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY))
+    return names - {'self'}
+
+
+def check_interface(interface: str) -> str | None:
+    """Say why an interface can never be used on this machine; None: it may."""
+    known = sorted(can.interfaces.BACKENDS)
+    if interface not in can.interfaces.BACKENDS:
+        match = difflib.get_close_matches(interface, known, n=1)
+        hint = f"did you mean '{match[0]}'?" if match else f'allowed: {", ".join(known)}'
+        return f"'{interface}' is no interface of python-can, {hint}"
+    try:
+        adapter = _adapter_class(interface)
+    except _Unusable as error:
+        return f"the driver of interface '{interface}' is missing ({error}), allowed is one " \
+               'that is installed'
+    # python-can's serial adapters import without pyserial, and fail only when they are opened.
+    if getattr(inspect.getmodule(adapter), 'serial', adapter) is None:
+        return f"the driver of interface '{interface}' is missing (Python module pyserial), " \
+               'allowed is one that is installed'
+    return None
+
+
+def check_bitrate(interface: str, bitrate: int) -> str | None:
+    """
+    Say why an adapter cannot be set to a bit rate; None: it may be possible.
+
+    Known for adapters whose class has a closed table of bit rates (slcan). The others tell when
+    they are opened.
+    """
+    try:
+        rates = getattr(_adapter_class(interface), '_BITRATES', None)
+    except _Unusable:
+        return None
+    if not isinstance(rates, dict) or not rates or bitrate in rates:
+        return None
+    return f'{bitrate} is impossible with {interface}, ' \
+           f'allowed is one of {", ".join(str(rate) for rate in sorted(rates))}'
+
+
+class _Unusable(Exception):
+    """The class of an adapter cannot be had."""
+
+
+def _adapter_class(interface: str) -> type[Any]:
+    try:
+        module, name = can.interfaces.BACKENDS[interface]
+        with _quiet():
+            adapter: type[Any] = getattr(importlib.import_module(module), name)
+    except Exception as error:  # adapters, plugins among them, raise anything here
+        raise _Unusable(error) from error
+    return adapter
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep adapters from logging about optional libraries while they are only looked at."""
+    logger = logging.getLogger('can')
+    level = logger.level
+    logger.setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        logger.setLevel(level)

@@ -1,0 +1,69 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""What python-can's adapters know, found without opening one."""
+
+import can.interfaces
+import pytest
+
+from drive_can_bridge.transport.adapters import adapter_keywords, check_bitrate, check_interface
+
+
+def test_keywords_of_an_adapter() -> None:
+    found = adapter_keywords('slcan')
+    assert found is not None
+    # named by the class, by what it inherits from
+    assert {'sleep_after_open', 'bitrate', 'can_filters', 'channel'} <= found
+    assert not {'self', 'kwargs', 'bitrat'} & found
+
+
+def test_interfaces_that_every_linux_has() -> None:
+    for interface in ('virtual', 'socketcan', 'slcan'):
+        assert check_interface(interface) is None
+        assert adapter_keywords(interface) is not None
+
+
+def test_unknown_interface() -> None:
+    assert check_interface('slcam') == (
+        "'slcam' is no interface of python-can, did you mean 'slcan'?")
+    found = check_interface('zzzzzz')
+    assert found is not None
+    assert found.startswith("'zzzzzz' is no interface of python-can, allowed: canalystii, ")
+    assert adapter_keywords('zzzzzz') is None
+    assert check_bitrate('zzzzzz', 5) is None
+
+
+def test_driver_that_cannot_be_imported(monkeypatch: pytest.MonkeyPatch,
+                                        capfd: pytest.CaptureFixture[str]) -> None:
+    backends = {**can.interfaces.BACKENDS, 'own': ('no_such_module', 'Bus'),
+                'odd': ('math', 'Bus')}
+    monkeypatch.setattr(can.interfaces, 'BACKENDS', backends)
+    assert check_interface('own') == (
+        "the driver of interface 'own' is missing (No module named 'no_such_module'), allowed is "
+        'one that is installed')
+    assert check_interface('odd') == (
+        "the driver of interface 'odd' is missing (module 'math' has no attribute 'Bus'), allowed "
+        'is one that is installed')
+    assert adapter_keywords('own') is None
+    assert capfd.readouterr() == ('', '')
+
+
+def test_serial_adapter_without_pyserial(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr('can.interfaces.slcan.serial', None)
+    assert check_interface('slcan') == (
+        "the driver of interface 'slcan' is missing (Python module pyserial), allowed is one that "
+        'is installed')
+
+
+def test_bit_rates() -> None:
+    assert check_bitrate('slcan', 125000) is None
+    assert check_bitrate('virtual', 123456) is None
+    found = check_bitrate('slcan', 123456)
+    assert found is not None
+    assert found.startswith('123456 is impossible with slcan, allowed is one of 10000, 20000, ')
+
+
+def test_every_adapter_can_be_looked_at() -> None:
+    for interface in can.interfaces.BACKENDS:
+        missing = check_interface(interface)
+        assert missing is None or interface in missing
+        assert adapter_keywords(interface) is None or 'channel' in (
+            adapter_keywords(interface) or ()) or missing is None

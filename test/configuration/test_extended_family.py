@@ -1,0 +1,94 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""The family table's row of the DataModel protocol with 29-bit identifiers."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from configuration_builders import load
+import pytest
+
+from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.parameters import Access, ParameterType, ValueKind
+from drive_can_bridge.protocols.datamodel.extended import (
+    encode_cyclic_request, encode_read_request, encode_write,
+)
+from drive_can_bridge.protocols.datamodel.extended_family import DataModelExtended
+
+FAMILY = DataModelExtended()
+
+
+@pytest.fixture
+def drive(tmp_path: Path) -> DriveConfiguration:
+    return load(tmp_path).drives['conveyor']
+
+
+def with_options(drive: DriveConfiguration, **options: object) -> DriveConfiguration:
+    return replace(drive, family_options={**drive.family_options, **options})
+
+
+def test_claims_are_all_frames_of_the_station(drive: DriveConfiguration) -> None:
+    (claim,) = FAMILY.claims(drive)
+    assert claim.route == (0x00200000, 0x0FE00000, True)
+    frames = [encode_cyclic_request(1, [5]), encode_read_request(1, 122, 4),
+              encode_write(1, 0x1234, [5])]
+    for frame in frames:
+        assert claim.route.matches(frame)
+        assert claim.route.matches(Frame(frame.identifier | 0x10000000, frame.data, True))
+    assert not claim.route.matches(encode_cyclic_request(2, [5]))
+    assert not claim.route.matches(Frame(0x200, b'', False))
+
+
+def test_claims_collide_with_the_same_station_only(drive: DriveConfiguration) -> None:
+    (own,) = FAMILY.claims(drive)
+    for station in range(1, 128):
+        (other,) = FAMILY.claims(replace(drive, station=station))
+        assert own.overlaps(other) == (station == 1)
+
+
+@pytest.mark.parametrize(('period', 'mapping', 'bits'), [
+    (0.02, 'assume', 16000.0), (0.02, 'verify', 16640.0), (0.02, 'configure', 16640.0),
+    (0.005, 'assume', 64000.0), (1.0, 'verify', 960.0)])
+def test_load(drive: DriveConfiguration, period: float, mapping: str, bits: float) -> None:
+    drive = with_options(replace(drive, period=period), mapping=mapping)
+    assert FAMILY.bits_per_second(drive) == pytest.approx(bits)
+
+
+@pytest.mark.parametrize(('name', 'number'), [
+    ('p0', 0), ('p30', 30), ('p030', 30), ('p65535', 65535)])
+def test_raw_names(drive: DriveConfiguration, name: str, number: int) -> None:
+    parameter = FAMILY.raw_parameter(drive, name)
+    assert parameter is not None
+    assert (parameter.name, parameter.number, parameter.type) == (
+        name, number, ParameterType.UINT16)
+    assert (parameter.scaled, parameter.storage, parameter.listed) == (False, None, False)
+    assert (parameter.access, parameter.kind) == (Access.READ_WRITE, ValueKind.INTEGER)
+
+
+@pytest.mark.parametrize('name', [
+    '', 'p', 'p65536', 'p123456', 'p-1', 'P30', 'p30.1', 'x1000.1', 'speed', 'p1 ', 'p٣', 'pp1'])
+def test_names_that_are_not_raw(drive: DriveConfiguration, name: str) -> None:
+    assert FAMILY.raw_parameter(drive, name) is None
+
+
+def test_raw_names_with_an_offset(drive: DriveConfiguration) -> None:
+    moved = with_options(drive, parameter_offset=-1)
+    assert FAMILY.raw_parameter(moved, 'p0') is None
+    assert FAMILY.raw_parameter(moved, 'p65536') is None
+    parameter = FAMILY.raw_parameter(moved, 'p1')
+    assert parameter is not None
+    assert parameter.number == 1
+    moved = with_options(drive, parameter_offset=1)
+    assert FAMILY.raw_parameter(moved, 'p65535') is None
+    assert FAMILY.raw_parameter(moved, 'p65534') is not None
+
+
+def test_nothing_to_complain_about(drive: DriveConfiguration) -> None:
+    assert list(FAMILY.check(drive)) == []
+
+
+@pytest.mark.parametrize('offset', [-123, 65532])
+def test_maps_moved_out_of_range(drive: DriveConfiguration, offset: int) -> None:
+    keys = {complaint.key for complaint in FAMILY.check(
+        with_options(drive, parameter_offset=offset))}
+    assert 'request_map_base' in keys

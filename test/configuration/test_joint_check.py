@@ -1,0 +1,153 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""The joint section: what is wrong with it, and the factors that it gives."""
+
+import math
+from pathlib import Path
+
+from configuration_builders import changed, FILE, load, problems, warnings
+import pytest
+
+from drive_can_bridge.core.units import convertible_units, Quantity, si_factor
+
+CASES = [
+    ('rearm: neutral', 'joint: {velocity: actual}',
+     ['f.yaml:18: drives.conveyor.joint.name: missing, allowed is a string']),
+    ('rearm: neutral', 'joint: {name: a}',
+     ['f.yaml:18: drives.conveyor.joint: names no quantity, allowed is at least one of '
+      'position, velocity, effort, position_command, velocity_command, effort_command']),
+    ('rearm: neutral', 'joint: {name: a, velocity: actul}',
+     ["f.yaml:18: drives.conveyor.joint.velocity: 'actul' is not in cyclic_response, did you "
+      "mean 'actual'?"]),
+    ('rearm: neutral', 'joint: {name: a, velocity: speed}',
+     ["f.yaml:18: drives.conveyor.joint.velocity: 'speed' is not in cyclic_response, allowed: "
+      'actual, current, status']),
+    ('rearm: neutral', 'joint: {name: a, velocity: current}',
+     ["f.yaml:18: drives.conveyor.joint.velocity: 'current' has the unit 'A', which does not "
+      'convert; allowed is one of rad/s, deg/s, rpm, Hz']),
+    ('rearm: neutral', 'joint: {name: a, position: actual}',
+     ["f.yaml:18: drives.conveyor.joint.position: 'actual' has the unit 'rpm', which does not "
+      'convert; allowed is one of rad, deg, rev']),
+    ('rearm: neutral', 'joint: {name: a, velocity_command: limit}',
+     ["f.yaml:18: drives.conveyor.joint.velocity_command: 'limit' has no unit, which does not "
+      'convert; allowed is one of rad/s, deg/s, rpm, Hz']),
+    ('rearm: neutral', 'joint: {name: a, velocity: actual, gear_ratio: 0}',
+     ['f.yaml:18: drives.conveyor.joint.gear_ratio: 0 is useless, allowed is any other number']),
+    ('rearm: neutral', 'joint: {name: a, velocity: actual, gear_ratio: .inf}',
+     ['f.yaml:18: drives.conveyor.joint.gear_ratio: inf is not a finite number, allowed is a '
+      'number']),
+    ('rearm: neutral', 'joint: {name: a, velocity: actual, pole_pairs: 0}',
+     ['f.yaml:18: drives.conveyor.joint.pole_pairs: 0 is out of range, allowed is an integer '
+      'of 1 to 1000']),
+    ('rearm: neutral', 'joint: {name: a, velocity: actual, velocty: actual}',
+     ["f.yaml:18: drives.conveyor.joint.velocty: unknown key, did you mean 'velocity'?"]),
+    ('rearm: neutral', 'joint: {name: a, velocity: actual, effort: actual}',
+     ["f.yaml:18: drives.conveyor.joint.effort: 'actual' is the velocity already, allowed is "
+      'another parameter']),
+    ('rearm: neutral', 'joint: {name: 5, velocity: actual}',
+     ['f.yaml:18: drives.conveyor.joint.name: 5 is an integer, allowed is a string']),
+    ('rearm: neutral', 'joint: {name: "", velocity: actual}',
+     ['f.yaml:18: drives.conveyor.joint.name: an empty string, allowed is text']),
+    ('rearm: neutral', 'joint: x',
+     ["f.yaml:18: drives.conveyor.joint: 'x' is a string, allowed is a mapping"]),
+    ('rearm: neutral', 'joint: {}',
+     ['f.yaml:18: drives.conveyor.joint: an empty mapping (rcl garbles what follows), allowed '
+      'is to leave the key out']),
+]
+
+
+@pytest.mark.parametrize(('old', 'new', 'expected'), CASES)
+def test_problem_of_a_joint(tmp_path: Path, old: str, new: str, expected: list[str]) -> None:
+    assert problems(tmp_path, changed(FILE, old, new)) == expected
+
+
+@pytest.mark.parametrize(('new', 'line'), [
+    ('{name: a, effort_command: word}', "effort_command: 'word' is the control word, allowed is a "
+                                        'setpoint'),
+    ('{name: a, effort_command: flag}', "effort_command: 'flag' is a bool, allowed is a number"),
+    ('{name: a, effort_command: actual}', "effort_command: 'actual' is not in cyclic_request, "
+                                          'allowed: word, flag'),
+])
+def test_command_that_is_no_setpoint(tmp_path: Path, new: str, line: str) -> None:
+    text = changed(FILE, '[speed, limit]', '[word, flag]')
+    assert problems(tmp_path, changed(text, 'rearm: neutral', f'joint: {new}')) == [
+        f'f.yaml:18: drives.conveyor.joint.{line}']
+
+
+def test_empty_list(tmp_path: Path) -> None:
+    text = changed(FILE, '[speed, limit]', '[]')
+    text = changed(text, 'rearm: neutral', 'joint: {name: a, effort_command: limit}')
+    assert problems(tmp_path, text) == [
+        "f.yaml:18: drives.conveyor.joint.effort_command: 'limit' is not in cyclic_request, "
+        'cyclic_request is empty']
+
+
+def test_no_complaint_about_what_follows_from_another(tmp_path: Path) -> None:
+    text = changed(FILE, '[speed, limit]', '[1]')
+    text = changed(text, 'rearm: neutral', 'joint: {name: a, velocity_command: speed}')
+    assert problems(tmp_path, text) == [
+        'f.yaml:16: drives.conveyor.cyclic_request: 1 is an integer, allowed is a string']
+
+
+def test_no_complaint_about_a_name_that_is_misspelt_in_the_list(tmp_path: Path) -> None:
+    text = changed(FILE, '[speed, limit]', '[sped]')
+    text = changed(text, 'rearm: neutral', 'joint: {name: a, velocity_command: speed}')
+    assert problems(tmp_path, text) == [
+        "f.yaml:16: drives.conveyor.cyclic_request: 'sped' is not in the profile, did you mean "
+        "'speed'?"]
+
+
+def test_factors(tmp_path: Path) -> None:
+    text = changed(FILE, '[actual, current, status]', '[position, frequency, current, status]')
+    text = changed(text, '[speed, limit]', '[speed, angle, limit]')
+    text = changed(text, 'rearm: neutral', (
+        'joint: {name: arm, position: position, velocity: frequency, effort: current, '
+        'position_command: angle, velocity_command: speed, effort_command: limit, '
+        'gear_ratio: -4, pole_pairs: 3}'))
+    configuration = load(tmp_path, text)
+    joint = configuration.drives['conveyor'].joint
+    assert configuration.warnings == ()
+    assert joint is not None
+    assert (joint.name, joint.gear_ratio, joint.pole_pairs) == ('arm', -4.0, 3)
+    assert (joint.position, joint.velocity_command) == ('position', 'speed')
+    assert joint.factors == pytest.approx({
+        'position': -2 * math.pi / 4,
+        'frequency': -2 * math.pi / 3 / 4,
+        'current': 1.0,
+        'angle': -math.pi / 180 / 4,
+        'speed': -2 * math.pi / 60 / 4,
+        'limit': 1.0,
+    })
+
+
+def test_pole_pairs_without_a_frequency(tmp_path: Path) -> None:
+    text = changed(FILE, 'rearm: neutral', 'joint: {name: a, velocity: actual, pole_pairs: 2}')
+    assert warnings(tmp_path, text) == [
+        'f.yaml:18: drives.conveyor.joint.pole_pairs: has no effect: no parameter of the joint '
+        'has the unit Hz']
+
+
+def test_no_joint(tmp_path: Path) -> None:
+    assert load(tmp_path).drives['conveyor'].joint is None
+
+
+@pytest.mark.parametrize(('quantity', 'unit', 'factor'), [
+    (Quantity.POSITION, 'rad', 1.0),
+    (Quantity.POSITION, 'deg', 0.0174532925199),
+    (Quantity.POSITION, 'rev', 6.28318530718),
+    (Quantity.VELOCITY, 'rad/s', 1.0),
+    (Quantity.VELOCITY, 'deg/s', 0.0174532925199),
+    (Quantity.VELOCITY, 'rpm', 0.10471975512),
+    (Quantity.VELOCITY, 'Hz', 6.28318530718),
+    (Quantity.EFFORT, 'A', 1.0),
+])
+def test_units(quantity: Quantity, unit: str, factor: float) -> None:
+    assert si_factor(quantity, unit) == pytest.approx(factor)
+
+
+def test_units_that_do_not_convert() -> None:
+    assert si_factor(Quantity.POSITION, 'rpm') is None
+    assert si_factor(Quantity.VELOCITY, '') is None
+    assert si_factor(Quantity.EFFORT, 'A', gear_ratio=3.0, pole_pairs=2) == 1.0
+    assert si_factor(Quantity.VELOCITY, 'rpm', gear_ratio=1.0, pole_pairs=2) == pytest.approx(
+        0.10471975512)
+    assert convertible_units(Quantity.EFFORT) == ()

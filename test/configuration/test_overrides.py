@@ -1,0 +1,111 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""The node's way: flat overrides with dotted names instead of a file."""
+
+from array import array
+from pathlib import Path
+from typing import Any
+
+from configuration_builders import changed, PROFILE
+import pytest
+
+from drive_can_bridge.configuration.load import configuration_from_overrides
+from drive_can_bridge.configuration.overrides import tree_from_overrides
+from drive_can_bridge.core.errors import ConfigurationError
+
+
+@pytest.fixture
+def good(tmp_path: Path) -> dict[str, Any]:
+    """Return overrides without a fault, for a profile in ``tmp_path``."""
+    (tmp_path / 'table.yaml').write_text(PROFILE)
+    return {
+        'profile_directories': [str(tmp_path)],
+        'buses.main.interface': 'virtual',
+        'buses.main.channel': 'demo',
+        'drives.conveyor.bus': 'main',
+        'drives.conveyor.protocol': 'datamodel_extended',
+        'drives.conveyor.station': 1,
+        'drives.conveyor.profile': 'table',
+        'drives.conveyor.cyclic_request': ['speed'],
+        'drives.conveyor.cyclic_response': ['actual', 'status'],
+        'drives.conveyor.joint.name': 'belt',
+        'drives.conveyor.joint.velocity': 'actual',
+        'use_sim_time': True,
+        'qos_overrides./parameter_events.publisher.depth': 10,
+    }
+
+
+def problems(overrides: dict[str, Any]) -> list[str]:
+    with pytest.raises(ConfigurationError) as caught:
+        configuration_from_overrides(overrides)
+    return caught.value.problems
+
+
+def test_good(good: dict[str, Any]) -> None:
+    configuration = configuration_from_overrides(good)
+    drive = configuration.drives['conveyor']
+    assert [parameter.name for parameter in drive.cyclic_response] == ['actual', 'status']
+    assert drive.joint is not None
+    assert drive.joint.name == 'belt'
+    assert configuration.warnings == ()
+
+
+@pytest.mark.parametrize(('name', 'value', 'expected'), [
+    ('drives.conveyor.statoin', 1,
+     ["drives.conveyor.statoin: unknown key, did you mean 'station'?"]),
+    ('drives.conveyor.station', 200,
+     ['drives.conveyor.station: 200 is out of range, allowed is 1 to 127 (datamodel_extended)']),
+    ('drives.conveyor.station', True,
+     ['drives.conveyor.station: true is a bool, allowed is an integer']),
+    ('drives.conveyor.station', None,
+     ['drives.conveyor.station: an empty list, allowed is an integer']),
+    ('drives.conveyor.station', b'\x01',
+     ['drives.conveyor.station: a bytes, allowed is an integer']),
+    ('drives.conveyor.period', float('nan'),
+     ['drives.conveyor.period: nan is not a finite number, allowed is a number of 0.001 to 60']),
+    ('drives.conveyor.cyclic_request', ['sped'],
+     ["drives.conveyor.cyclic_request: 'sped' is not in the profile, did you mean 'speed'?"]),
+    ('drives.conveyor.bus', 'mian',
+     ["drives.conveyor.bus: 'mian' is unknown, did you mean 'main'?"]),
+    ('drives.conveyor', 5,
+     ["drives.conveyor: has a value, and 'bus' below it; allowed is one of them",
+      'drives.conveyor: 5 is an integer, allowed is a mapping']),
+    ('drives', None,
+     ["drives: has a value, and 'conveyor' below it; allowed is one of them",
+      'drives: an empty list, allowed is a mapping']),
+    ('unknown.key', 5,
+     ['unknown: unknown key, allowed: autostart, diagnostics_period, profile_directories, buses, '
+      'drives, use_sim_time, start_type_description_service']),
+])
+def test_problem(good: dict[str, Any], name: str, value: object, expected: list[str]) -> None:
+    assert problems({**good, name: value}) == expected
+
+
+def test_nothing_at_all() -> None:
+    assert problems({}) == ['buses: missing, allowed is a mapping']
+
+
+def test_problem_inside_a_profile(good: dict[str, Any], tmp_path: Path) -> None:
+    (tmp_path / 'table.yaml').write_text(changed(PROFILE, 'access: wo', 'access: w'))
+    assert problems(good) == [
+        f"{tmp_path}/table.yaml:9: parameters.order.access: 'w' is unknown (did you mean 'wo'?), "
+        'allowed is ro, rw or wo']
+
+
+@pytest.mark.parametrize('empty', [None, [], (), array('q')])
+def test_empty_lists(good: dict[str, Any], empty: object) -> None:
+    good['drives.conveyor.cyclic_request'] = empty
+    good['profile_directories'] = [*good['profile_directories'], '']
+    configuration = configuration_from_overrides(good)
+    assert configuration.drives['conveyor'].cyclic_request == ()
+
+
+def test_numbers(good: dict[str, Any]) -> None:
+    configuration = configuration_from_overrides({**good, 'diagnostics_period': 2,
+                                                  'drives.conveyor.period': 1})
+    assert repr(configuration.diagnostics_period) == '2.0'
+    assert repr(configuration.drives['conveyor'].period) == '1.0'
+
+
+def test_topic_names_keep_their_dots() -> None:
+    tree, _ = tree_from_overrides({'qos_overrides./a.b.c': 1, 'x.y': 2})
+    assert tree.data == {'qos_overrides./a.b.c': 1, 'x': {'y': 2}}

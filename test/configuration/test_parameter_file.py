@@ -1,0 +1,231 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Reading parameter files: structure, sections, lines; everything that rcl refuses or garbles."""
+
+from pathlib import Path
+
+from configuration_builders import FILE
+import pytest
+
+from drive_can_bridge.configuration.load import configuration_from_file
+from drive_can_bridge.configuration.parameter_file import read_parameter_file
+from drive_can_bridge.core.errors import ConfigurationError
+
+HEAD = '/**/drive_can_bridge:\n  ros__parameters:\n'
+BUSES = '    buses: {m: {interface: virtual}}\n'
+
+
+def read(folder: Path, text: str | bytes) -> tuple[object, list[str]]:
+    path = folder / 'f.yaml'
+    path.write_bytes(text.encode() if isinstance(text, str) else text)
+    tree, problems = read_parameter_file(path)
+    return (None if tree is None else tree.data,
+            [str(problem).replace(f'{folder}/', '') for problem in problems])
+
+
+@pytest.mark.parametrize('top', [
+    '/**/drive_can_bridge', 'drive_can_bridge', '/drive_can_bridge', '/ns/drive_can_bridge',
+    '/**', '"**"', '"*"', '/*', '/*/drive_can_bridge', '/a/b_2/other_name'])
+def test_section_names(tmp_path: Path, top: str) -> None:
+    text = f'{top}:\n  ros__parameters:\n' + BUSES
+    assert read(tmp_path, text) == ({'buses': {'m': {'interface': 'virtual'}}}, [])
+
+
+def test_nested_names(tmp_path: Path) -> None:
+    text = '/ns:\n  a:\n    ros__parameters: {x: 1}\n  b:\n    ros__parameters:\n' + \
+        BUSES.replace('    ', '      ', 1)
+    assert read(tmp_path, text) == ({'buses': {'m': {'interface': 'virtual'}}}, [])
+
+
+def test_values(tmp_path: Path) -> None:
+    text = HEAD + BUSES + """\
+    a: [1, 0x2, 010]
+    b: [x, 'yes', "1"]
+    c: []
+    d: &anchor 5
+    e: !!str 5
+    f: |-
+      7
+    g: >-
+      yes
+    "h": {i: {j: -0.5}}
+    k:
+      - on
+      - off
+    l: !!map {m: ''}
+"""
+    data, problems = read(tmp_path, text)
+    assert problems == []
+    assert data == {
+        'buses': {'m': {'interface': 'virtual'}}, 'a': [1, 2, 8], 'b': ['x', 'yes', '1'], 'c': [],
+        'd': 5, 'e': '5', 'f': 7, 'g': True, 'h': {'i': {'j': -0.5}}, 'k': [True, False],
+        'l': {'m': ''}}
+
+
+@pytest.mark.parametrize('text', [
+    '\ufeff' + HEAD + BUSES, (HEAD + BUSES).replace('\n', '\r\n'), '---\n' + HEAD + BUSES + '...',
+    '%YAML 1.1\n---\n' + HEAD + BUSES, 'x:\n  ros__parameters: {a: 1}\n---\n' + HEAD + BUSES,
+    HEAD + BUSES + 'x:\n  ros__parameters: {a.b: 1, a.b: 2}\n', (HEAD + BUSES).encode('utf-16'),
+])
+def test_what_else_is_fine(tmp_path: Path, text: str | bytes) -> None:
+    assert read(tmp_path, text) == ({'buses': {'m': {'interface': 'virtual'}}}, [])
+
+
+CASES = [
+    # what rcl refuses
+    ('    a: *x\n',
+     ['f.yaml:4: a: an alias (rcl refuses the file), allowed is the value itself']),
+    ('    a: {b: &x 1, <<: *x}\n',
+     ['f.yaml:4: a.<<: an alias (rcl refuses the file), allowed is the value itself']),
+    ('    a:\n    b: 1\n',
+     ['f.yaml:4: a: no value (rcl refuses the file), allowed is a value, or [] for an empty '
+      'list']),
+    ('    a: !!str\n    b: 1\n',
+     ['f.yaml:4: a: no value (rcl refuses the file), allowed is a value, or [] for an empty '
+      'list']),
+    ('    a: {b}\n',
+     ['f.yaml:4: a.b: no value (rcl refuses the file), allowed is a value, or [] for an empty '
+      'list']),
+    ('    a: [1, 2.0]\n',
+     ['f.yaml:4: a: 2.0 is a number in a list that began with an integer (rcl refuses the file), '
+      'allowed are values of one type']),
+    ('    a:\n      - x\n      - y\n      - 5\n',
+     ['f.yaml:6: a: true is a bool in a list that began with a string (rcl refuses the file), '
+      'allowed are values of one type',
+      'f.yaml:7: a: 5 is an integer in a list that began with a string (rcl refuses the file), '
+      'allowed are values of one type']),
+    ('    a: [1, *x]\n',
+     ['f.yaml:4: a: an alias (rcl refuses the file), allowed is the value itself']),
+    ('    a: [x, {b: 2}]\n',
+     ['f.yaml:4: a: a list or mapping in a list, allowed are plain values']),
+    ('    "": 1\n',
+     ['f.yaml:4: an empty key, allowed is a name']),
+    ('    ? [a]\n    : 1\n',
+     ['f.yaml:4: a list or mapping as a key, allowed is a name']),
+    ('    a:\n      ? {b: 1}\n      : {c: 2}\n',
+     ['f.yaml:5: a: a list or mapping as a key, allowed is a name']),
+    ('    a:\n      *x : 1\n',
+     ['f.yaml:5: a: an alias as a key, allowed is a name']),
+    ('x:\n  a: 1\n',
+     ['f.yaml:5: x/a: no mapping (rcl refuses the file), allowed: ros__parameters']),
+    ('x:\n  ros_parameters: [1]\n',
+     ['f.yaml:5: x/ros_parameters: no mapping (rcl refuses the file), did you mean '
+      "'ros__parameters'?"]),
+    ('x:\n',
+     ['f.yaml:4: x: no mapping (rcl refuses the file), allowed is ros__parameters below it']),
+    ('x y:\n  ros__parameters: {a: 1}\n',
+     ["f.yaml:5: x y: 'x y' is no node name (rcl refuses the file), allowed is for example "
+      '/**/drive_can_bridge']),
+    ('//x:\n  ros__parameters: {a: 1}\n',
+     ["f.yaml:5: //x: '//x' is no node name (rcl refuses the file), allowed is for example "
+      '/**/drive_can_bridge']),
+    ('x:\n  ros__parameters: {a: [1, x]}\n',
+     ["f.yaml:5: a: 'x' is a string in a list that began with an integer (rcl refuses the file), "
+      'allowed are values of one type']),
+    ('ros__parameters: {a: 1}\n',
+     ['f.yaml:4: ros__parameters: no node name above it, allowed is NODE_NAME: '
+      '{ros__parameters: …}']),
+    ('[a, b]: {}\n',
+     ['f.yaml:4: yaml: a key that is no name, allowed are node names']),
+    # what rcl garbles
+    ('    a: {b: {}, c: 1}\n',
+     ['f.yaml:4: a.b: an empty mapping (rcl garbles what follows), allowed is to leave the key '
+      'out']),
+    ('    a.b: 1\n',
+     ['f.yaml:4: a.b: a key with dots, allowed are nested keys']),
+    ('    a:\n      b.c: {d: 1}\n',
+     ['f.yaml:5: a.b.c: a key with dots, allowed are nested keys']),
+    ('    a: 1\n    b: 2\n    a: 3\n',
+     ['f.yaml:6: a: duplicate key, allowed is one (the first is in line 4)']),
+    ('    a: {b: 1}\n    a: {c: 1}\n',
+     ['f.yaml:5: a: duplicate key, allowed is one (the first is in line 4)']),
+    ('    a: "x\\0y"\n',
+     ['f.yaml:4: a: a NUL character, allowed is text without']),
+    ('    "a\\0": 1\n',
+     ['f.yaml:4: a key with a NUL character, allowed is a name']),
+    ('/**/drive_can_bridge:\n  ros__parameters: {a: 1}\n',
+     ['f.yaml:4: /**/drive_can_bridge: duplicate key, allowed is one (the first is in line 1)']),
+    ('  a: 1\n',
+     ['f.yaml:4: /**/drive_can_bridge/a: stands beside ros__parameters (rcl refuses or garbles '
+      'the file), allowed is a section of its own',
+      'f.yaml:4: /**/drive_can_bridge/a: no mapping (rcl refuses the file), allowed: '
+      'ros__parameters']),
+    ('x:\n  ros__parameterss: {a: 1}\n',
+     ['f.yaml:5: x/ros__parameterss: misspelt, allowed is ros__parameters']),
+    ('x:\n  ros__parameters: []\n',
+     ['f.yaml:5: x/ros__parameters: no mapping, allowed are parameters']),
+    ('---\ntext\n',
+     ['f.yaml:5: yaml: no mapping, allowed is NODE_NAME: {ros__parameters: …}']),
+]
+
+
+@pytest.mark.parametrize(('tail', 'expected'), CASES)
+def test_problem(tmp_path: Path, tail: str, expected: list[str]) -> None:
+    data, problems = read(tmp_path, HEAD + BUSES + tail)
+    assert problems == expected
+    assert isinstance(data, dict)
+    assert data['buses'] == {'m': {'interface': 'virtual'}}
+
+
+@pytest.mark.parametrize(('tail', 'line', 'what'), [
+    ('    a: b: c\n', 4, 'mapping values are not allowed in this context'),
+    ('    a: "open\n    b: 1\n', 4, 'found unexpected end of stream'),
+    ('  \ta: 1\n', 4, 'found character that cannot start any token'),
+    ('    a: [1\n    b: 1\n', 4, "did not find expected ',' or ']'"),
+    ('    a: @x\n', 4, 'found character that cannot start any token'),
+])
+def test_broken_yaml(tmp_path: Path, tail: str, line: int, what: str) -> None:
+    pytest.importorskip('yaml._yaml', reason='the wording is that of libyaml')
+    assert read(tmp_path, HEAD + BUSES + tail) == (
+        None, [f'f.yaml:{line}: yaml: not valid YAML: {what}'])
+
+
+def test_bytes_that_are_no_text(tmp_path: Path) -> None:
+    data, problems = read(tmp_path, HEAD.encode() + b'    a: \xff\xfe\n')
+    assert data is None
+    assert len(problems) == 1
+    assert problems[0].startswith('f.yaml:')
+    assert 'not valid YAML' in problems[0]
+
+
+@pytest.mark.parametrize(('text', 'found'), [
+    ('', ''), ('# nothing\n', ''), ('{}\n', ''),
+    ('x:\n  ros__parameters: {a: 1}\n', '; the file has: x'),
+    ('x: {ros__parameters: {}}\n/y/z: {ros__parameters: {a: 1}}\n', '; the file has: x, /y/z'),
+])
+def test_no_section_of_a_bridge(tmp_path: Path, text: str, found: str) -> None:
+    assert read(tmp_path, text) == (None, [
+        'f.yaml:1: buses: no section of the file holds it, allowed is one '
+        '/**/drive_can_bridge: {ros__parameters: {buses: …}}' + found])
+
+
+def test_several_sections_of_bridges(tmp_path: Path) -> None:
+    text = HEAD + BUSES + '/b/drive_can_bridge:\n  ros__parameters:\n' + BUSES
+    assert read(tmp_path, text) == (None, [
+        'f.yaml:6: buses: in a second section, /b/drive_can_bridge; allowed is one section that '
+        'holds it (the first is /**/drive_can_bridge)'])
+
+
+def test_dotted_buses_still_mark_the_section(tmp_path: Path) -> None:
+    assert read(tmp_path, HEAD + '    buses.main.interface: virtual\n')[1] == [
+        'f.yaml:3: buses.main.interface: a key with dots, allowed are nested keys']
+
+
+def test_nested_too_deep(tmp_path: Path) -> None:
+    _, problems = read(tmp_path, HEAD + BUSES + '    a: ' + '{a: ' * 5000 + '1' + '}' * 5000)
+    assert [problem.split(': ', 2)[2] for problem in problems] == [
+        'nested too deep, allowed are 32 levels']
+    _, problems = read(tmp_path, '{a: ' * 5000 + '1' + '}' * 5000)
+    assert problems
+
+
+def test_missing_file(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError):
+        configuration_from_file(tmp_path / 'nothing.yaml')
+
+
+def test_lines_are_those_of_the_file(tmp_path: Path) -> None:
+    path = tmp_path / 'f.yaml'
+    path.write_text('# one\n\n' + FILE.replace('rearm: neutral', 'rearm: x'))
+    with pytest.raises(ConfigurationError) as caught:
+        configuration_from_file(path)
+    assert f'{path}:20: drives.conveyor.rearm: ' in str(caught.value)

@@ -1,0 +1,127 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""``drive_can validate`` as a user runs it, and the front end around it."""
+
+import os
+from pathlib import Path
+import subprocess
+import sys
+
+from configuration_builders import changed, FILE, write
+import pytest
+
+import drive_can_bridge
+from drive_can_bridge.cli import main as front_end
+
+ROOT = Path(drive_can_bridge.__file__).resolve().parents[1]
+ENVIRONMENT = {**os.environ, 'PYTHONPATH': os.pathsep.join(
+    filter(None, (str(ROOT), os.environ.get('PYTHONPATH'))))}
+
+
+def run(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([sys.executable, '-m', 'drive_can_bridge.cli.main', *arguments],
+                          capture_output=True, text=True, env=ENVIRONMENT, timeout=60, check=False)
+
+
+def test_good_file(tmp_path: Path) -> None:
+    done = run('validate', str(write(tmp_path)))
+    assert done.stdout == (
+        'conveyor: bus main (virtual demo), datamodel_extended, station 1, profile table, '
+        'period 20 ms, request [speed, limit], response [actual, current, status], load 13.3 %\n'
+        'lift: bus main (virtual demo), datamodel_extended, station 2, profile table, '
+        'period 20 ms, request [speed], response [actual, status], load 13.3 %\n')
+    assert (done.returncode, done.stderr) == (0, '')
+
+
+def test_warnings(tmp_path: Path) -> None:
+    path = write(tmp_path, changed(FILE, 'bitrate: 125000', 'rx_queue: 5'))
+    done = run('validate', str(path))
+    assert done.stderr == (
+        f'warning: {path}:8: buses.main.rx_queue: the adapter for virtual does not name this key '
+        "(did you mean 'rx_queue_size'?); it is handed over all the same\n")
+    assert done.returncode == 0
+    assert len(done.stdout.splitlines()) == 2
+
+
+def test_problems(tmp_path: Path) -> None:
+    text = changed(FILE, 'interface: virtual', 'interface: virtul')
+    path = write(tmp_path, changed(text, 'station: 1', 'statoin: 1'))
+    done = run('validate', str(path))
+    assert done.stderr.splitlines() == [
+        f"{path}:6: buses.main.interface: 'virtul' is no interface of python-can, did you mean "
+        "'virtual'?",
+        f'{path}:10: drives.conveyor.station: missing, allowed is an integer',
+        f"{path}:13: drives.conveyor.statoin: unknown key, did you mean 'station'?"]
+    assert (done.returncode, done.stdout) == (1, '')
+
+
+@pytest.mark.parametrize(('name', 'line'), [
+    ('nothing.yaml', 'drive_can: nothing.yaml: No such file or directory\n'),
+    ('/', 'drive_can: /: Is a directory\n')])
+def test_no_file(name: str, line: str) -> None:
+    done = run('validate', name)
+    assert (done.returncode, done.stdout, done.stderr) == (1, '', line)
+
+
+@pytest.mark.parametrize('arguments', [
+    [], ['validate'], ['validate', 'a', 'b'], ['validat', 'a'], ['validate', '--nothing', 'a'],
+    ['--nothing']])
+def test_wrong_usage(arguments: list[str]) -> None:
+    done = run(*arguments)
+    assert done.returncode == 2
+    assert done.stdout == ''
+    assert done.stderr.startswith('usage: drive_can')
+    assert 'Traceback' not in done.stderr
+
+
+def test_version_and_help() -> None:
+    assert run('--version').stdout == f'drive_can {drive_can_bridge.__version__}\n'
+    done = run('--help')
+    assert done.returncode == 0
+    for name in ('validate', 'simulate', 'demo'):
+        assert f'    {name} ' in done.stdout
+
+
+def test_needs_neither_ros_nor_a_bus_library(tmp_path: Path) -> None:
+    code = ('import sys\n'
+            'class Block:\n'
+            '    def find_spec(self, name, path=None, target=None):\n'
+            '        if name.split(".")[0] in ("can", "rclpy", "rich", "serial"):\n'
+            '            raise ModuleNotFoundError(name, name=name)\n'
+            'sys.meta_path.insert(0, Block())\n'
+            'from drive_can_bridge.cli.main import main\n'
+            f'sys.exit(main(["validate", {str(write(tmp_path))!r}]))\n')
+    done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True,
+                          env=ENVIRONMENT, timeout=60, check=False)
+    assert done.returncode == 0
+    assert len(done.stdout.splitlines()) == 2
+    assert done.stderr == ('warning: python-can is not installed: interfaces and adapter keys are '
+                           'unchecked\n')
+
+
+def test_reader_that_went_away(tmp_path: Path) -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    with os.fdopen(writing, 'w') as gone:
+        done = subprocess.run(
+            [sys.executable, '-m', 'drive_can_bridge.cli.main', 'validate', str(write(tmp_path))],
+            stdout=gone, stderr=subprocess.PIPE, text=True, env=ENVIRONMENT, timeout=60,
+            check=False)
+    assert (done.returncode, done.stderr) == (1, '')
+
+
+@pytest.mark.parametrize(('error', 'line'), [
+    (ValueError('odd'), 'drive_can: internal error, please report it: ValueError: odd\n'),
+    (KeyboardInterrupt(), 'drive_can: interrupted\n'),
+    (ModuleNotFoundError('no', name='rclpy'),
+     'drive_can: this needs a Python module that is not installed: rclpy\n'),
+    (OSError(28, 'No space left on device'), 'drive_can: No space left on device\n'),
+    (OSError('odd'), 'drive_can: odd\n'),
+])
+def test_never_a_traceback(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+                           error: BaseException, line: str) -> None:
+    def fail(_: object) -> int:
+        raise error
+
+    monkeypatch.setattr(front_end, '_run', fail)
+    assert front_end.main([]) == 1
+    assert capsys.readouterr() == ('', line)
