@@ -1,0 +1,229 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+``drive_can simulate``: play every drive of a bridge parameter file on its buses.
+
+Standard output has first the end points, one line per bus, then what the drives do. Standard input
+takes faults while the drives run, see :mod:`drive_can_bridge.simulation.console`.
+"""
+
+import argparse
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, ExitStack
+from dataclasses import replace
+import os
+from pathlib import Path
+import select
+import signal
+import sys
+import threading
+import time
+from typing import Any, TextIO
+
+from drive_can_bridge.configuration.model import BridgeConfiguration, BusConfiguration
+from drive_can_bridge.core.errors import ConfigurationError, TransportError, ValueRefused
+from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.simulation.console import Console, describe, help_lines, LineReader
+from drive_can_bridge.simulation.faults import Fault, parse_fault
+from drive_can_bridge.simulation.simulation import Simulation
+from drive_can_bridge.simulation.terminal import SlcanTerminal
+
+FAILED = 1
+WRONG_USAGE = 2
+#: s between two looks at the threads
+_LOOK_PERIOD = 0.5
+
+
+class _WrongUsage(Exception):
+    """The command line cannot be obeyed."""
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add the subcommand to the parser of ``drive_can``."""
+    parser = subparsers.add_parser(
+        'simulate', help='play the drives of a parameter file',
+        description='Play every drive of a bridge parameter file on its buses, until SIGINT or '
+                    'SIGTERM.',
+        epilog='Lines on standard input: ' + '\n'.join(help_lines()),
+        formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--params-file', metavar='FILE', type=Path, required=True,
+                        help='parameter file of the bridge')
+    parser.add_argument('--interface', help='python-can interface for all buses, instead of the '
+                                            "file's")
+    parser.add_argument('--channel', help="channel for all buses, instead of the file's")
+    parser.add_argument('--pty', action='store_true',
+                        help='a pseudo-terminal per bus, which behaves like an SLCAN adapter')
+    parser.add_argument('--pty-link', metavar='DIR', type=Path,
+                        help='keep DIR/BUS pointing at the pseudo-terminal of each bus (implies '
+                             '--pty)')
+    parser.add_argument('--fault', metavar='DRIVE:FAULT', action='append', default=[],
+                        help='begin with a fault, for example conveyor:late=0.15; repeatable')
+    parser.add_argument('--log-frames', action='store_true',
+                        help='print every frame: (seconds) BUS ID#DATA R|T')
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """
+    Simulate until a signal.
+
+    :return: 0 after SIGINT or SIGTERM, 1 failure, 2 wrong usage; one line on standard error each.
+    """
+    try:
+        pty = args.pty or args.pty_link is not None
+        if pty and (args.interface or args.channel):
+            raise _WrongUsage('--pty and --interface/--channel exclude each other')
+        configuration = _on_buses(_load(args.params_file), args.interface, args.channel)
+        faults = [_fault(text, configuration) for text in args.fault]
+        with ExitStack() as stack:
+            return _simulate(stack, configuration, faults, pty=pty, link=args.pty_link,
+                             log_frames=args.log_frames)
+    except _WrongUsage as error:
+        _complain(str(error))
+        return WRONG_USAGE
+    except ConfigurationError as error:
+        print(error, file=sys.stderr)
+    except (TransportError, OSError) as error:
+        _complain(str(error))
+    return FAILED
+
+
+def _simulate(stack: ExitStack, configuration: BridgeConfiguration,
+              faults: list[tuple[str, Fault]], *, pty: bool, link: Path | None,
+              log_frames: bool) -> int:
+    # before anything is announced: whoever reads the first line may send the signal at once
+    wake = stack.enter_context(_signals_as_descriptor())
+    output = _Output(sys.stdout)
+    terminals: dict[str, SlcanTerminal] = {}
+
+    def show_frame(bus: str, frame: Frame, sent: bool) -> None:
+        output.say(f'({time.time():.6f}) {bus} {frame} {"T" if sent else "R"}')
+
+    def open_terminal(bus: BusConfiguration) -> SlcanTerminal:
+        return terminals[bus.name]
+
+    simulation = Simulation(
+        configuration, open_bus=open_terminal if pty else None, say=output.say,
+        complain=_complain, show_frame=show_frame if log_frames else None)
+    for name, fault in faults:
+        try:
+            simulation.drives[name].fault(fault)
+        except ValueRefused as error:
+            raise _WrongUsage(f'--fault {name}:{fault}: {error}') from None
+    for bus in configuration.buses.values():
+        if pty:
+            terminals[bus.name] = terminal = SlcanTerminal()
+            stack.callback(terminal.close)
+            if link is not None:
+                terminal.link(link / bus.name)
+            output.say(f'bus {bus.name}: slcan {terminal.path}')
+        else:
+            output.say(f'bus {bus.name}: {bus.interface} {bus.channel}')
+    stack.enter_context(simulation)
+    for drive in simulation.drives.values():
+        output.say(f'drive {describe(drive)}')
+    status = _wait(simulation, wake, Console(simulation, say=output.say, complain=_complain))
+    simulation.stop()
+    for drive in simulation.drives.values():
+        output.say(describe(drive))
+        for rule, count in drive.violations.items():
+            output.say(f'{drive.name}: violation: {rule}: {count} times')
+    return status
+
+
+def _wait(simulation: Simulation, wake: int, console: Console) -> int:
+    """Obey standard input until a signal comes, or a thread has ended by itself."""
+    reader = LineReader()
+    while not simulation.failure:
+        wanted = [wake]
+        if reader.fileno is not None and reader.usable:
+            wanted.append(reader.fileno)
+        readable, _, _ = select.select(wanted, [], [], _LOOK_PERIOD)
+        if wake in readable:
+            return 0
+        if readable:
+            for line in reader.read_lines():
+                console.obey(line)
+    return FAILED
+
+
+def _load(path: Path) -> BridgeConfiguration:
+    # imported late: it reads schemas, and --help needs none
+    from drive_can_bridge.configuration.load import configuration_from_file
+    return configuration_from_file(path)
+
+
+def _on_buses(configuration: BridgeConfiguration, interface: str | None,
+              channel: str | None) -> BridgeConfiguration:
+    """Replace the end points of all buses."""
+    buses = {}
+    for bus in configuration.buses.values():
+        changed = replace(bus, interface=interface or bus.interface,
+                          channel=bus.channel if channel is None else channel)
+        if changed.interface != bus.interface:
+            # options of one adapter mean nothing to another
+            changed = replace(changed, options={})
+        buses[bus.name] = changed
+    return replace(configuration, buses=buses)
+
+
+def _fault(text: str, configuration: BridgeConfiguration) -> tuple[str, Fault]:
+    """Read an argument of ``--fault``."""
+    name, colon, fault = text.partition(':')
+    if not colon:
+        raise _WrongUsage(f'--fault {text}: write DRIVE:FAULT, for example conveyor:late=0.15')
+    if name not in configuration.drives:
+        raise _WrongUsage(f"--fault {text}: no drive '{name}'; drives: "
+                          f"{', '.join(configuration.drives) or 'none'}")
+    try:
+        return name, parse_fault(fault)
+    except ValueRefused as error:
+        raise _WrongUsage(f'--fault {text}: {error}') from None
+
+
+class _Output:
+    """Standard output for several threads; a reader who left is no reason to end."""
+
+    def __init__(self, stream: TextIO | None) -> None:
+        self._stream = stream
+        self._lock = threading.Lock()
+
+    def say(self, line: str) -> None:
+        with self._lock:
+            if self._stream is None:
+                return
+            try:
+                print(line, file=self._stream, flush=True)
+            except OSError:
+                self._stream = None
+                # Python flushes once more at exit, and would complain
+                os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _complain(line: str) -> None:
+    try:
+        print(f'drive_can simulate: {line}', file=sys.stderr, flush=True)
+    except OSError:
+        pass
+
+
+@contextmanager
+def _signals_as_descriptor() -> Iterator[int]:
+    """Turn SIGINT and SIGTERM into something that can be waited for."""
+    reading, writing = os.pipe()
+    os.set_blocking(writing, False)
+
+    def wake(signum: int, _: Any) -> None:
+        try:
+            os.write(writing, b'\0')
+        except BlockingIOError:
+            pass
+
+    previous: list[tuple[int, Callable[[int, Any], Any] | int | None]] = [
+        (signum, signal.signal(signum, wake)) for signum in (signal.SIGINT, signal.SIGTERM)]
+    try:
+        yield reading
+    finally:
+        for signum, handler in previous:
+            signal.signal(signum, handler)
+        os.close(reading)
+        os.close(writing)

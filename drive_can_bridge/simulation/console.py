@@ -1,0 +1,123 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+Lines typed by a person, or sent by a script, while drives are simulated.
+
+.. code-block:: text
+
+    conveyor silent          a fault begins; several may follow each other on one line
+    conveyor ok              all faults of the drive end
+    conveyor                 what the drive is doing
+    list                     the same for all drives
+    help                     the faults
+"""
+
+import os
+import sys
+
+from drive_can_bridge.core.errors import ValueRefused
+from drive_can_bridge.simulation.faults import parse_fault, USAGE
+from drive_can_bridge.simulation.player import Say
+from drive_can_bridge.simulation.simulation import PlayedDrive, Simulation
+
+_CHUNK = 4096
+_LINE_MAX = 1000
+
+
+class Console:
+    """
+    Obeys lines.
+
+    :param say: takes what was asked for.
+    :param complain: takes one line per line that makes no sense.
+    """
+
+    def __init__(self, simulation: Simulation, *, say: Say, complain: Say) -> None:
+        self._drives = simulation.drives
+        self._say = say
+        self._complain = complain
+
+    def obey(self, line: str) -> None:
+        """Obey one line. An empty one does nothing."""
+        words = line.split()
+        if not words:
+            return
+        if words == ['help']:
+            for text in help_lines():
+                self._say(text)
+        elif words == ['list']:
+            for drive in self._drives.values():
+                self._say(describe(drive))
+        elif words[0] not in self._drives:
+            self._complain(f"no drive '{words[0]}'; drives: {', '.join(self._drives)}; "
+                           f"also: list, help")
+        elif len(words) == 1:
+            self._say(describe(self._drives[words[0]]))
+        else:
+            self._play(self._drives[words[0]], words[1:])
+
+    def _play(self, drive: PlayedDrive, texts: list[str]) -> None:
+        try:
+            # all are read before the first is played: a line counts as a whole or not at all
+            for fault in [parse_fault(text) for text in texts]:
+                drive.fault(fault)
+        except ValueRefused as error:
+            self._complain(str(error))
+
+
+class LineReader:
+    """
+    Standard input, without ever blocking or stopping a process in the background.
+
+    :ivar fileno: to wait for, or None: nothing (more) comes.
+    """
+
+    def __init__(self) -> None:
+        self.fileno: int | None = None
+        self._rest = b''
+        try:
+            # the descriptor may be closed (None), or replaced by something that has none
+            self.fileno = None if sys.stdin is None else sys.stdin.fileno()
+        except (OSError, ValueError):
+            pass
+
+    @property
+    def usable(self) -> bool:
+        """May be read now: a terminal stops whoever reads from it in the background."""
+        if self.fileno is None:
+            return False
+        try:
+            return not os.isatty(self.fileno) or os.tcgetpgrp(self.fileno) == os.getpgrp()
+        except OSError:
+            return False
+
+    def read_lines(self) -> list[str]:
+        """Return the lines that have come. Call it when the descriptor is readable."""
+        if self.fileno is None:
+            return []
+        try:
+            data = os.read(self.fileno, _CHUNK)
+        except BlockingIOError:
+            return []
+        except OSError:
+            data = b''
+        if not data:
+            self.fileno = None
+            data = b'\n'
+        *lines, self._rest = (self._rest + data).split(b'\n')
+        self._rest = self._rest[:_LINE_MAX]
+        return [line.decode('utf-8', 'replace') for line in lines]
+
+
+def describe(drive: PlayedDrive) -> str:
+    """Return one line about a drive."""
+    configuration = drive.drive.configuration
+    return (f'{drive.name}: {configuration.protocol} station {configuration.station} '
+            f'on bus {configuration.bus}, {drive.requests} requests, {drive.answers} answers, '
+            f'{drive.eeprom_writes} EEPROM writes, faults: {drive.faults_text}')
+
+
+def help_lines() -> list[str]:
+    """Return what can be typed."""
+    width = max(len(usage) for usage, _ in USAGE)
+    return ['DRIVE FAULT …  DRIVE  list  help; faults:'] + [
+        f'  {usage:{width}}  {meaning}' for usage, meaning in USAGE]

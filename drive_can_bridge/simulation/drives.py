@@ -1,0 +1,37 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""The table of simulated drives. A new protocol family adds one row."""
+
+from collections.abc import Mapping
+
+from drive_can_bridge.configuration.model import BridgeConfiguration
+from drive_can_bridge.core.errors import ConfigurationError
+from drive_can_bridge.simulation.datamodel_extended import SimulatedDataModelDrive
+from drive_can_bridge.simulation.drive import EEPROM_TIME, SimulatedDrive
+
+SIMULATED_DRIVES: Mapping[str, type[SimulatedDrive]] = {
+    'datamodel_extended': SimulatedDataModelDrive,
+}
+
+
+def make_drives(configuration: BridgeConfiguration, *, eeprom_time: float = EEPROM_TIME,
+                ) -> dict[str, SimulatedDrive]:
+    """
+    Make every drive of a configuration.
+
+    :raises ConfigurationError: a protocol that is not simulated.
+    """
+    problems = [
+        f"drives.{drive.name}.protocol: '{drive.protocol}' is not simulated, "
+        f"simulated are: {', '.join(SIMULATED_DRIVES)}"
+        for drive in configuration.drives.values() if drive.protocol not in SIMULATED_DRIVES]
+    if problems:
+        raise ConfigurationError(problems)
+    drives = {}
+    for drive in configuration.drives.values():
+        neighbours = [
+            route for other in configuration.drives.values()
+            if other is not drive and other.bus == drive.bus
+            for route in SIMULATED_DRIVES[other.protocol].routes(other)]
+        drives[drive.name] = SIMULATED_DRIVES[drive.protocol](
+            drive, neighbours=neighbours, eeprom_time=eeprom_time)
+    return drives

@@ -1,0 +1,134 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+A motor that moves: speed follows its setpoint with a ramp, and what follows from that.
+
+Not a model of any real machine. It is there so that values look alive, have the right signs, and
+react to what is commanded. Time is an argument; all formulas are closed, so that it does not
+matter how often :meth:`Motor.advance` is called.
+"""
+
+from dataclasses import dataclass
+import math
+
+#: shares of the rated torque: at rated speed, at any speed, at one rated speed per second
+LOAD_TORQUE = 0.30
+FRICTION_TORQUE = 0.05
+INERTIA_TORQUE = 0.35
+TORQUE_MAX = 2.0
+#: share of the rated current that an energised motor takes without any torque
+MAGNETISING_CURRENT = 0.2
+
+AMBIENT_TEMPERATURE = 25.0
+#: °C above ambient that rated current leads to in the end
+TEMPERATURE_RISE = 50.0
+TEMPERATURE_TIME_CONSTANT = 120.0
+
+
+@dataclass(frozen=True)
+class Rates:
+    """How fast a value may move away from zero and towards it, per second."""
+
+    rising: float
+    falling: float
+
+
+@dataclass
+class Ramp:
+    """
+    A value that follows its target at a limited rate.
+
+    :ivar slope: rate of change at the end of the last step.
+    """
+
+    value: float = 0.0
+    slope: float = 0.0
+
+    def advance(self, duration: float, target: float, rates: Rates) -> float:
+        """
+        Go towards the target for some time.
+
+        :return: integral of the value over the duration.
+        """
+        integral = 0.0
+        self.slope = 0.0
+        while duration > 0.0 and self.value != target:
+            if self.value * target < 0.0:
+                goal, rate = 0.0, rates.falling
+            elif abs(target) > abs(self.value):
+                goal, rate = target, rates.rising
+            else:
+                goal, rate = target, rates.falling
+            needed = abs(goal - self.value) / rate
+            if needed <= duration:
+                integral += (self.value + goal) / 2.0 * needed
+                self.value = goal
+                duration -= needed
+            else:
+                self.slope = math.copysign(rate, goal - self.value)
+                before = self.value
+                self.value += self.slope * duration
+                integral += (before + self.value) / 2.0 * duration
+                duration = 0.0
+        return integral + self.value * max(duration, 0.0)
+
+
+class Motor:
+    """
+    Speed, position, torque, current and temperature of a motor.
+
+    :param rated_speed: in whatever unit speed setpoints have.
+    :param revolutions: revolutions per second at a speed of one unit.
+    :ivar position: revolutions since power was applied first.
+    :ivar torque: share of the rated torque, with sign.
+    :ivar current: share of the rated current, a magnitude.
+    :ivar temperature: °C.
+    """
+
+    def __init__(self, rated_speed: float, revolutions: float) -> None:
+        self.rated_speed = rated_speed
+        self.revolutions = revolutions
+        self.ramp = Ramp()
+        self.position = 0.0
+        self.torque = 0.0
+        self.current = 0.0
+        self.temperature = AMBIENT_TEMPERATURE
+
+    @property
+    def speed(self) -> float:
+        """Speed in the unit of the setpoint."""
+        return self.ramp.value
+
+    @property
+    def share_of_rated_speed(self) -> float:
+        """Speed as a share of the rated one, with sign."""
+        return self.ramp.value / self.rated_speed
+
+    @property
+    def revolutions_per_second(self) -> float:
+        """Speed of the shaft."""
+        return self.ramp.value * self.revolutions
+
+    def advance(self, duration: float, target: float, rates: Rates, *, energised: bool) -> None:
+        """
+        Let time pass.
+
+        :param target: speed to go to; a motor that is not energised coasts towards 0.
+        """
+        if duration > 0.0:
+            travelled = self.ramp.advance(duration, target if energised else 0.0, rates)
+            self.position += travelled * self.revolutions
+            goal = AMBIENT_TEMPERATURE + TEMPERATURE_RISE * self.current ** 2
+            self.temperature += (goal - self.temperature) * -math.expm1(
+                -duration / TEMPERATURE_TIME_CONSTANT)
+        self._load(energised)
+
+    def _load(self, energised: bool) -> None:
+        if not energised:
+            self.torque = self.current = 0.0
+            return
+        speed = self.share_of_rated_speed
+        friction = math.copysign(FRICTION_TORQUE, speed) if speed else 0.0
+        torque = (LOAD_TORQUE * speed + friction
+                  + INERTIA_TORQUE * self.ramp.slope / self.rated_speed)
+        self.torque = min(max(torque, -TORQUE_MAX), TORQUE_MAX)
+        self.current = math.hypot(MAGNETISING_CURRENT, self.torque)

@@ -1,0 +1,157 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+What a parameter means, found by its name.
+
+A profile does not say which of its parameters is a speed. The simulated drive guesses from names,
+by the few rules of this module (docs/simulation.md has them as a table). A parameter that no rule
+takes is a plain register: it keeps what is written.
+"""
+
+from collections.abc import Mapping
+from enum import Enum
+import re
+from typing import NamedTuple
+
+from drive_can_bridge.core.parameters import Parameter
+
+
+class Quantity(Enum):
+    """What a parameter measures."""
+
+    SPEED = 'speed'
+    POSITION = 'position'
+    TORQUE = 'torque'
+    TEMPERATURE = 'temperature'
+    VOLTAGE = 'voltage'
+    POWER = 'power'
+    LOAD = 'load'
+    CURRENT = 'current'
+    FAULT_CODE = 'fault code'
+
+
+# In this order: a "current_position" is a position, a "torque_current" follows the torque.
+_QUANTITY_WORDS: tuple[tuple[Quantity, frozenset[str]], ...] = (
+    (Quantity.SPEED, frozenset(('speed', 'velocity', 'frequency', 'rpm'))),
+    (Quantity.POSITION, frozenset(('position', 'angle'))),
+    (Quantity.TORQUE, frozenset(('torque', 'force'))),
+    (Quantity.TEMPERATURE, frozenset(('temperature',))),
+    (Quantity.VOLTAGE, frozenset(('voltage',))),
+    (Quantity.POWER, frozenset(('power',))),
+    (Quantity.LOAD, frozenset(('load', 'utilisation', 'utilization'))),
+    (Quantity.CURRENT, frozenset(('current',))),
+)
+# A "nominal_current" or "speed_limit" is a setting, even where it is read-only.
+_SETTING_WORDS = frozenset(('limit', 'maximum', 'minimum', 'max', 'min', 'nominal', 'rated',
+                            'reference', 'threshold', 'setpoint', 'target', 'command'))
+_FAULT_WORDS = frozenset(('fault', 'error', 'alarm'))
+_CODE_WORDS = frozenset(('code', 'number'))
+
+_SETPOINT = re.compile(
+    r'(?:setpoint|target|reference)_(?P<after>.+)|(?P<before>.+)_(?:setpoint|reference|command)')
+
+
+class Pair(NamedTuple):
+    """A setpoint and the actual value that follows it."""
+
+    setpoint: Parameter
+    actual: Parameter
+
+
+class RampKind(Enum):
+    """What a ramp parameter says: seconds from 0 to the rated speed, or a rate."""
+
+    TIME = 'time'
+    RATE = 'rate'
+
+
+class RampUse(Enum):
+    """Which changes of speed a ramp parameter is for."""
+
+    BOTH = 'both'
+    RISING = 'rising'
+    FALLING = 'falling'
+    QUICK_STOP = 'quick stop'
+
+
+class RampParameter(NamedTuple):
+    """A parameter that sets a ramp."""
+
+    parameter: Parameter
+    kind: RampKind
+    use: RampUse
+
+
+def quantity_of(parameter: Parameter) -> Quantity | None:
+    """Tell what a parameter measures, or None."""
+    words = _words(parameter)
+    if words & _FAULT_WORDS and words & _CODE_WORDS:
+        return Quantity.FAULT_CODE
+    for quantity, names in _QUANTITY_WORDS:
+        if words & names:
+            return quantity
+    return None
+
+
+def measured(parameter: Parameter) -> Quantity | None:
+    """Tell what a read-only parameter shows of the motor; None for settings and the rest."""
+    if parameter.writable or _words(parameter) & _SETTING_WORDS:
+        return None
+    return quantity_of(parameter)
+
+
+def pairs(parameters: Mapping[str, Parameter], *, without: str | None = None) -> list[Pair]:
+    """
+    Find setpoints and the actual values that follow them.
+
+    ``speed_setpoint`` (also ``setpoint_speed``, ``target_speed``, ``speed_reference``,
+    ``speed_command``, or a writable ``speed``) goes with a read-only ``actual_speed`` (also
+    ``speed_actual``, ``actual_value_…``, ``motor_…``, ``…_feedback``).
+
+    :param without: name of the control parameter, which is no setpoint.
+    """
+    found = []
+    for parameter in parameters.values():
+        if not parameter.writable or parameter.name == without:
+            continue
+        match = _SETPOINT.fullmatch(parameter.name)
+        subject = parameter.name if match is None else match['after'] or match['before']
+        for pattern in ('actual_{}', '{}_actual', 'actual_value_{}', 'motor_{}', '{}_feedback'):
+            actual = parameters.get(pattern.format(subject))
+            if actual is not None and not actual.writable:
+                found.append(Pair(parameter, actual))
+                break
+    return found
+
+
+def setpoints(parameters: Mapping[str, Parameter], *, without: str | None = None,
+              ) -> list[Parameter]:
+    """Return the writable parameters whose names are those of setpoints."""
+    return [parameter for parameter in parameters.values()
+            if parameter.writable and parameter.name != without
+            and _SETPOINT.fullmatch(parameter.name)]
+
+
+def ramp_parameters(parameters: Mapping[str, Parameter]) -> list[RampParameter]:
+    """Find ``ramp_time``, ``acceleration_time``, ``ramp_down_time``, ``deceleration`` …."""
+    found = []
+    for parameter in parameters.values():
+        words = _words(parameter)
+        ramp = 'ramp' in words
+        rising = bool(words & {'acceleration', 'up', 'rising', 'start'})
+        falling = bool(words & {'deceleration', 'down', 'falling', 'stop', 'braking', 'brake'})
+        rate = bool(words & {'acceleration', 'deceleration'})
+        if not parameter.writable or words & _SETTING_WORDS or not (ramp or rate):
+            continue
+        use = RampUse.BOTH
+        if 'quick' in words:
+            use = RampUse.QUICK_STOP
+        elif rising is not falling:
+            use = RampUse.RISING if rising else RampUse.FALLING
+        seconds = 'time' in words or parameter.unit in ('s', 'ms')
+        found.append(RampParameter(parameter,
+                                   RampKind.TIME if seconds or not rate else RampKind.RATE, use))
+    return found
+
+
+def _words(parameter: Parameter) -> frozenset[str]:
+    return frozenset(parameter.name.split('_'))

@@ -1,0 +1,131 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+How large the quantities of a simulated drive are in the units of its profile.
+
+The motor computes shares of its rating. A rating of 100 % of a quantity is the figure of this
+module for its unit, made smaller where the parameter cannot carry it.
+"""
+
+import math
+
+from drive_can_bridge.core.parameters import Parameter, ParameterType
+from drive_can_bridge.simulation.names import Quantity
+
+#: revolutions per second at a speed of 1 in the unit; one pole pair
+_REVOLUTIONS = {
+    'rpm': 1.0 / 60.0, '1/min': 1.0 / 60.0, 'min-1': 1.0 / 60.0,
+    'Hz': 1.0, 'rev/s': 1.0, '1/s': 1.0,
+    'rad/s': 0.5 / math.pi, 'deg/s': 1.0 / 360.0,
+}
+#: revolutions per second at rated speed, for a unit that says nothing about revolutions
+_RATED_REVOLUTIONS = 25.0
+#: value after one revolution
+_PER_REVOLUTION = {'rev': 1.0, 'rad': 2.0 * math.pi, 'deg': 360.0}
+_INCREMENTS_PER_REVOLUTION = 4096.0
+
+_RATINGS = {
+    Quantity.TORQUE: {'Nm': 20.0, 'N': 2000.0, 'A': 8.0},
+    Quantity.CURRENT: {'A': 10.0, 'mA': 10_000.0},
+    Quantity.VOLTAGE: {'V': 560.0, 'mV': 560_000.0, 'kV': 0.56},
+    Quantity.POWER: {'W': 3000.0, 'kW': 3.0},
+}
+_DEFAULT_RATING = 100.0
+
+
+def highest(parameter: Parameter) -> float:
+    """Return the largest magnitude a parameter may have: by its limits, else by its type."""
+    limits = [limit for limit in (parameter.minimum, parameter.maximum) if limit is not None]
+    if parameter.maximum is None:
+        limits += [raw * parameter.scale + parameter.offset for raw in parameter.type.raw_range]
+    return max(map(abs, limits)) or 1.0
+
+
+def rated_speed(setpoint: Parameter) -> float:
+    """Return the speed that a ramp time refers to: the limit of the setpoint, or 100 %."""
+    if setpoint.maximum is None and setpoint.unit == '%':
+        return _DEFAULT_RATING
+    return highest(setpoint)
+
+
+def revolutions_per_unit(speed: Parameter, rated: float) -> float:
+    """Return revolutions per second at a speed of one unit."""
+    return _REVOLUTIONS.get(speed.unit, _RATED_REVOLUTIONS / rated)
+
+
+def speed_value(parameter: Parameter, revolutions: float, share: float) -> float:
+    """Express a speed, given in revolutions per second and as share of the rated one."""
+    factor = _REVOLUTIONS.get(parameter.unit)
+    if factor is not None:
+        return revolutions / factor
+    return share * (_DEFAULT_RATING if parameter.unit == '%' else highest(parameter) / 2.0)
+
+
+def position_value(parameter: Parameter, revolutions: float) -> float:
+    """Express a position; it wraps where the parameter ends, as counters do."""
+    value = revolutions * _per_revolution(parameter)
+    low, high = sorted(raw * parameter.scale + parameter.offset
+                       for raw in parameter.type.raw_range)
+    if parameter.minimum is not None and parameter.maximum is not None:
+        low, high = parameter.minimum, parameter.maximum
+    span = high - low + abs(parameter.scale)
+    return low + math.fmod(math.fmod(value - low, span) + span, span)
+
+
+def revolutions_per_position(parameter: Parameter) -> float:
+    """Return the revolutions that a change of position by one unit stands for."""
+    return 1.0 / _per_revolution(parameter)
+
+
+def temperature_value(parameter: Parameter, celsius: float) -> float:
+    """Express a temperature."""
+    if parameter.unit == 'K':
+        return celsius + 273.15
+    if parameter.unit in ('°F', 'degF', 'F'):
+        return celsius * 1.8 + 32.0
+    return celsius
+
+
+def rating(parameter: Parameter, quantity: Quantity) -> float:
+    """Return what a parameter shows at 100 % of a quantity."""
+    wanted = _RATINGS.get(quantity, {}).get(parameter.unit, _DEFAULT_RATING)
+    # a voltage hardly exceeds its rating, everything else may double
+    headroom = 1.2 if quantity is Quantity.VOLTAGE else 2.0
+    return min(wanted, highest(parameter) / headroom)
+
+
+def _per_revolution(parameter: Parameter) -> float:
+    return _PER_REVOLUTION.get(
+        parameter.unit, 1.0 if parameter.scaled else _INCREMENTS_PER_REVOLUTION)
+
+
+class RawRange:
+    """
+    The raw integers that a parameter may have, and the nearest one to a value.
+
+    :param limits: respect the profile's ``minimum`` and ``maximum``, not only the type.
+    """
+
+    def __init__(self, parameter: Parameter, *, limits: bool) -> None:
+        self._scale, self._offset = parameter.scale, parameter.offset
+        self.low, self.high = parameter.type.raw_range
+        if not limits or parameter.type is ParameterType.BOOL:
+            return
+        ends = [(limit - parameter.offset) / parameter.scale
+                for limit in (parameter.minimum, parameter.maximum) if limit is not None]
+        lower, upper = parameter.minimum, parameter.maximum
+        if parameter.scale < 0.0:
+            lower, upper = upper, lower
+            ends.reverse()
+        # rounded to the inside, except where the limit is a raw step but for float noise
+        if upper is not None:
+            self.high = max(self.low, min(self.high, math.floor(ends[-1] + 1e-6)))
+        if lower is not None:
+            self.low = min(self.high, max(self.low, math.ceil(ends[0] - 1e-6)))
+
+    def clamp(self, raw: int) -> int:
+        """Return the allowed raw integer nearest to another one."""
+        return min(max(raw, self.low), self.high)
+
+    def nearest(self, value: float) -> int:
+        """Return the allowed raw integer nearest to a physical value."""
+        return self.clamp(math.floor((value - self._offset) / self._scale + 0.5))

@@ -1,0 +1,179 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+Every drive of a bridge configuration, played on its buses.
+
+.. code-block:: python
+
+    with Simulation(configuration) as simulation:
+        simulation.drives['conveyor'].fault('late=0.15')
+        simulation.drives['conveyor'].value('actual_speed')
+
+The end points are python-can interfaces unless ``open_bus`` says otherwise. Neither ``can`` nor
+``rclpy`` is imported here.
+"""
+
+from collections import Counter
+import sys
+import threading
+import time
+from typing import Any
+
+from drive_can_bridge.configuration.model import BridgeConfiguration, BusConfiguration
+from drive_can_bridge.core.parameters import Value
+from drive_can_bridge.simulation.drive import EEPROM_TIME, SimulatedDrive
+from drive_can_bridge.simulation.drives import make_drives
+from drive_can_bridge.simulation.faults import Fault
+from drive_can_bridge.simulation.player import BusPlayer, OpenBus, Port, Say, ShowFrame
+
+#: s that the arrival of a frame may be noticed late. Two writes 20 ms apart on the wire must not
+#: seem closer because the thread that plays the bus slept over the first.
+ARRIVAL_JITTER = 0.002
+
+
+class PlayedDrive:
+    """A simulated drive on a running bus, for use from any thread."""
+
+    def __init__(self, drive: SimulatedDrive, lock: threading.Lock) -> None:
+        self.drive = drive
+        self.name = drive.name
+        self._lock = lock
+
+    def fault(self, fault: str | Fault) -> None:
+        """
+        Play a fault, ``late=0.15``; ``ok`` ends all.
+
+        :raises ValueRefused: there is no such fault, or it does not suit this drive.
+        """
+        with self._lock:
+            self.drive.fault(fault, time.monotonic())
+
+    def value(self, name: str) -> Value:
+        """
+        Return a register as a physical value.
+
+        :raises ValueRefused: there is no such register.
+        """
+        with self._lock:
+            return self.drive.value(name, time.monotonic())
+
+    def set_value(self, name: str, value: Value) -> None:
+        """
+        Set a register, read-only ones included; an actual value is held there.
+
+        :raises ValueRefused: there is no such register, or the value does not fit.
+        """
+        with self._lock:
+            self.drive.set_value(name, value, time.monotonic())
+
+    def release(self, name: str) -> None:
+        """Let an actual value that was set follow the motor again."""
+        with self._lock:
+            self.drive.release(name)
+
+    @property
+    def faults_text(self) -> str:
+        """The faults in force, in words; 'ok' without any."""
+        with self._lock:
+            return self.drive.faults_text
+
+    @property
+    def violations(self) -> Counter[str]:
+        """How often the other side broke a rule of the protocol, by rule."""
+        with self._lock:
+            return Counter(self.drive.violations)
+
+    @property
+    def requests(self) -> int:
+        """Requests understood."""
+        return self.drive.requests
+
+    @property
+    def answers(self) -> int:
+        """Answers given, before faults took theirs."""
+        return self.drive.answers
+
+    @property
+    def eeprom_writes(self) -> int:
+        """EEPROM cells written."""
+        return self.drive.eeprom_writes
+
+
+class Simulation:
+    """
+    All drives of a configuration, and a thread per bus.
+
+    :param open_bus: opens the end point of a bus; None: python-can, by the configuration.
+    :param say: takes lines about the drives (faults, violations); None: they are dropped.
+    :param complain: takes lines about the buses; None: standard error.
+    :param show_frame: called for each frame.
+    :param eeprom_time: s that an EEPROM write takes.
+    :ivar drives: the drives by name.
+    :raises ConfigurationError: a protocol that is not simulated.
+    """
+
+    def __init__(self, configuration: BridgeConfiguration, *, open_bus: OpenBus | None = None,
+                 say: Say | None = None, complain: Say | None = None,
+                 show_frame: ShowFrame | None = None,
+                 eeprom_time: float = EEPROM_TIME - ARRIVAL_JITTER) -> None:
+        self.configuration = configuration
+        drives = make_drives(configuration, eeprom_time=eeprom_time)
+        self._players = {
+            bus.name: BusPlayer(
+                bus, [drive for drive in drives.values() if drive.configuration.bus == bus.name],
+                open_bus=open_bus or open_configured_bus, say=say or _drop,
+                complain=complain or _to_standard_error, show_frame=show_frame)
+            for bus in configuration.buses.values()}
+        self.drives = {
+            name: PlayedDrive(drive, self._players[drive.configuration.bus].lock)
+            for name, drive in drives.items()}
+
+    def start(self) -> None:
+        """
+        Open the buses and play.
+
+        :raises BusMisconfigured: no attempt to open a bus will ever succeed.
+        """
+        try:
+            for player in self._players.values():
+                player.start()
+        except BaseException:
+            self.stop()
+            raise
+
+    def stop(self) -> None:
+        """End the threads and close the buses."""
+        for player in self._players.values():
+            player.stop()
+
+    @property
+    def failure(self) -> str:
+        """Why a thread ended by itself, or ''."""
+        return '; '.join(player.failure for player in self._players.values() if player.failure)
+
+    def __enter__(self) -> 'Simulation':
+        """Start."""
+        self.start()
+        return self
+
+    def __exit__(self, *_: Any) -> None:
+        """Stop."""
+        self.stop()
+
+
+def open_configured_bus(bus: BusConfiguration) -> Port:
+    """
+    Open a bus by python-can.
+
+    :raises TransportError: see :func:`drive_can_bridge.transport.port.open_port`.
+    """
+    # imported late: pseudo-terminals work where python-can does not
+    from drive_can_bridge.transport.port import open_port
+    return open_port(bus)
+
+
+def _drop(line: str) -> None:
+    """Ignore a line."""
+
+
+def _to_standard_error(line: str) -> None:
+    print(line, file=sys.stderr, flush=True)

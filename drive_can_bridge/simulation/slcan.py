@@ -1,0 +1,165 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+r"""
+The serial protocol of SLCAN adapters, seen from the adapter: bytes in, frames and bytes out.
+
+Commands end with ``\r`` and are answered with ``\r`` (done) or ``\a`` (refused), as the adapters
+of Lawicel do and many after them:
+
+============== ===================================================================
+command        meaning
+============== ===================================================================
+S0 … S9, sXXXX bit rate, bus timing registers; only while closed
+O, L, C        open, open without sending, close
+tiiildd…       send an 11-bit frame: identifier, length, data, all hexadecimal
+Tiiiiiiiildd…  send a 29-bit frame
+riiil, R…l     send a remote frame; accepted and gone, no drive here answers any
+V, N, F        version, serial number, status flags
+Z0, Z1         received frames without, with a time stamp in ms
+============== ===================================================================
+
+A frame that was taken for sending is *not* answered. Adapters differ there, clients do not wait
+for it, and python-can's reader returns from ``recv(timeout=0)`` empty-handed once per such answer.
+"""
+
+from drive_can_bridge.core.frame import (
+    EXTENDED_IDENTIFIER_MAX, Frame, STANDARD_IDENTIFIER_MAX,
+)
+
+DONE = b'\r'
+REFUSED = b'\a'
+VERSION = b'V1013\r'
+SERIAL_NUMBER = b'NSIM1\r'
+NO_FLAGS = b'F00\r'
+# Z1 stamps wrap once a minute
+_STAMP_WRAP = 60_000
+# the longest command is a 29-bit frame with eight bytes: 26 characters
+_COMMAND_MAX = 64
+
+
+class SlcanAdapter:
+    """
+    The state of an adapter.
+
+    :ivar is_open: frames pass.
+    :ivar opened: how often a client opened the channel.
+    :ivar refused: commands refused.
+    """
+
+    def __init__(self) -> None:
+        self.is_open = False
+        self.opened = 0
+        self.refused = 0
+        self._listen_only = False
+        self._stamps = False
+        self._command = bytearray()
+        self._skipping = False
+        self._replies = bytearray()
+
+    def receive_bytes(self, data: bytes) -> list[Frame]:
+        """Take what the client wrote; return the frames it sends. Any bytes will do."""
+        frames = []
+        for command in self._commands(data):
+            frame = self._obey(command)
+            if frame is not None:
+                frames.append(frame)
+        return frames
+
+    def take_replies(self) -> bytes:
+        """Return the answers to commands."""
+        replies, self._replies = bytes(self._replies), bytearray()
+        return replies
+
+    def encode(self, frame: Frame, now: float) -> bytes:
+        """Return what the adapter writes when it receives a frame from the bus."""
+        head = (f'T{frame.identifier:08X}' if frame.extended else f't{frame.identifier:03X}')
+        stamp = f'{int(now * 1000.0) % _STAMP_WRAP:04X}' if self._stamps else ''
+        return f'{head}{len(frame.data)}{frame.data.hex().upper()}{stamp}\r'.encode()
+
+    # -- inside ---------------------------------------------------------------------------------
+
+    def _commands(self, data: bytes) -> list[str]:
+        """Cut the stream into commands; what is too long to be one is skipped."""
+        commands = []
+        parts = data.split(DONE)
+        for index, part in enumerate(parts):
+            if len(self._command) + len(part) > _COMMAND_MAX:
+                self._skipping = True
+                self._command.clear()
+            if not self._skipping:
+                self._command += part
+            if index == len(parts) - 1:
+                break
+            if self._skipping:
+                self._skipping = False
+                self._reply(REFUSED)
+            elif self._command:
+                commands.append(self._command.decode('latin-1'))
+            self._command.clear()
+        return commands
+
+    def _obey(self, command: str) -> Frame | None:
+        kind = command[0]
+        if kind in 'tTrR':
+            return self._transmit(command)
+        if kind == 'O' or kind == 'L':
+            # real adapters refuse this while open; a client that crashed never closed
+            self.is_open = True
+            self._listen_only = kind == 'L'
+            self.opened += 1
+            self._reply(DONE)
+        elif kind == 'C':
+            self.is_open = False
+            self._reply(DONE)
+        elif kind in 'Ss':
+            wanted = command in _BIT_RATES or kind == 's' and _hexadecimal(command[1:], 4)
+            self._reply(DONE if wanted and not self.is_open else REFUSED)
+        elif command == 'V':
+            self._reply(VERSION)
+        elif command == 'N':
+            self._reply(SERIAL_NUMBER)
+        elif command == 'F':
+            self._reply(NO_FLAGS if self.is_open else REFUSED)
+        elif command in ('Z0', 'Z1'):
+            self._stamps = command == 'Z1'
+            self._reply(DONE)
+        elif kind in 'MmWXU':
+            # filters, polling and serial speed make no difference here
+            self._reply(DONE)
+        else:
+            self._reply(REFUSED)
+        return None
+
+    def _transmit(self, command: str) -> Frame | None:
+        """Take a frame from the client."""
+        frame = _frame(command)
+        if frame is None or not self.is_open or self._listen_only:
+            self._reply(REFUSED)
+            return None
+        return frame if command[0] in 'tT' else None
+
+    def _reply(self, reply: bytes) -> None:
+        self.refused += reply == REFUSED
+        self._replies += reply
+
+
+_BIT_RATES = frozenset(f'S{digit}' for digit in range(10))
+
+
+def _frame(command: str) -> Frame | None:
+    """Read a transmit command; None if it is none. Remote frames come out without data."""
+    extended = command[0] in 'TR'
+    remote = command[0] in 'rR'
+    width = 8 if extended else 3
+    head, body = command[1:2 + width], command[2 + width:]
+    if not _hexadecimal(head, 1 + width) or head[-1] not in '012345678':
+        return None
+    identifier, length = int(head[:-1], 16), int(head[-1])
+    if identifier > (EXTENDED_IDENTIFIER_MAX if extended else STANDARD_IDENTIFIER_MAX):
+        return None
+    if not _hexadecimal(body, 0 if remote else 2 * length):
+        return None
+    return Frame(identifier, bytes.fromhex(body), extended)
+
+
+def _hexadecimal(text: str, length: int) -> bool:
+    return len(text) == length and all(c in '0123456789abcdefABCDEF' for c in text)

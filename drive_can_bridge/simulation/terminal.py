@@ -1,0 +1,183 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+A pseudo-terminal that behaves like the serial port of an SLCAN adapter.
+
+A bridge in another process opens it with ``interface: slcan``. There is no kernel CAN in it, and
+no root. It never blocks: while nobody reads, the oldest frames are dropped. The slave side is kept
+open here too, so that bridges may come and go.
+"""
+
+from array import array
+from collections import deque
+import fcntl
+import os
+from pathlib import Path
+import select
+import termios
+import time
+import tty
+
+from drive_can_bridge.core.errors import BusUnavailable
+from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.simulation.slcan import SlcanAdapter
+
+#: frames that wait while a client does not read, beside what the kernel holds
+BACKLOG = 256
+#: s after which such a frame is not worth reading any more
+BACKLOG_AGE = 1.0
+#: bytes that a client may leave unread in the kernel's buffer of 4096
+_UNREAD_MAX = 2048
+_CHUNK = 4096
+#: s between two looks at a client that does not read
+_BACKLOG_PERIOD = 0.005
+
+
+class SlcanTerminal:
+    """
+    A bus end point like :class:`drive_can_bridge.transport.port.Port`, on a pseudo-terminal.
+
+    Not for several threads at once.
+
+    :ivar path: the device that a client opens.
+    :ivar dropped: frames lost because nobody read them.
+    :raises BusUnavailable: the system has no pseudo-terminal left.
+    """
+
+    def __init__(self) -> None:
+        try:
+            self._master, self._slave = os.openpty()
+        except OSError as error:
+            raise BusUnavailable(f'pseudo-terminal: {error.strerror}') from error
+        # Raw before anybody may write: an echo would play every frame back into the bus.
+        tty.setraw(self._slave)
+        os.set_blocking(self._master, False)
+        self.path = os.ttyname(self._slave)
+        self.age = 0.0
+        self.dropped = 0
+        self._adapter = SlcanAdapter()
+        self._received: deque[Frame] = deque()
+        self._outgoing: deque[tuple[float, bytes]] = deque()
+        self._started = b''         # rest of what the kernel took a part of
+        self._links: list[Path] = []
+        self._closed = False
+
+    @property
+    def is_open(self) -> bool:
+        """A client has opened the channel."""
+        return self._adapter.is_open
+
+    def receive(self, timeout: float) -> Frame | None:
+        """
+        Wait for a frame from the client.
+
+        :raises BusUnavailable: closed.
+        """
+        deadline = time.monotonic() + timeout
+        while not self._received:
+            self._check_open()
+            left = max(deadline - time.monotonic(), 0.0)
+            waiting = bool(self._started or self._outgoing)
+            readable, _, _ = select.select(
+                [self._master], [], [], min(left, _BACKLOG_PERIOD) if waiting else left)
+            # in this order: a new client's first command ends the backlog of the one before
+            if readable:
+                self._read()
+            if waiting:
+                self._flush()
+            if not readable and left <= 0.0:
+                break
+        return self._received.popleft() if self._received else None
+
+    def send(self, frame: Frame, timeout: float = 0.0) -> None:
+        """
+        Hand a frame to the client. It is dropped while the channel is closed.
+
+        :raises BusUnavailable: closed.
+        """
+        self._check_open()
+        if not self._adapter.is_open:
+            return
+        if len(self._outgoing) >= BACKLOG:
+            self._outgoing.popleft()
+            self.dropped += 1
+        now = time.monotonic()
+        self._outgoing.append((now, self._adapter.encode(frame, now)))
+        self._flush()
+
+    def link(self, path: Path) -> None:
+        """
+        Let a symbolic link point here for as long as the terminal is open.
+
+        :raises OSError: it cannot be made, or something that is no link is in the way.
+        """
+        if path.exists() and not path.is_symlink():
+            raise FileExistsError(f'{path} exists and is not a symbolic link')
+        path.parent.mkdir(parents=True, exist_ok=True)
+        # a name of its own first: whoever looks finds the old link or the new one, never none
+        temporary = path.with_name(f'.{path.name}.{os.getpid()}')
+        temporary.unlink(missing_ok=True)
+        temporary.symlink_to(self.path)
+        temporary.replace(path)
+        self._links.append(path)
+
+    def close(self) -> None:
+        """Close the terminal and remove its links. Never raises."""
+        if self._closed:
+            return
+        self._closed = True
+        for path in self._links:
+            try:
+                # another simulation may have taken the name over
+                if os.readlink(path) == self.path:
+                    path.unlink()
+            except OSError:
+                pass
+        os.close(self._master)
+        os.close(self._slave)
+
+    # -- inside ---------------------------------------------------------------------------------
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise BusUnavailable('pseudo-terminal closed')
+
+    def _read(self) -> None:
+        try:
+            data = os.read(self._master, _CHUNK)
+        except BlockingIOError:
+            return
+        except OSError as error:
+            raise BusUnavailable(f'pseudo-terminal: {error.strerror}') from error
+        before = self._adapter.is_open, self._adapter.opened
+        self._received.extend(self._adapter.receive_bytes(data))
+        if before != (self._adapter.is_open, self._adapter.opened):
+            # what an earlier client has not read is nothing for the next one (the kernel's share
+            # is for the client to discard: doing that here would race with its first read)
+            self.dropped += len(self._outgoing)
+            self._outgoing.clear()
+        replies = self._adapter.take_replies()
+        if replies:
+            self._outgoing.append((time.monotonic(), replies))
+            self._flush()
+
+    def _flush(self) -> None:
+        """Write as much as a client may want, without waiting."""
+        oldest = time.monotonic() - BACKLOG_AGE
+        while self._outgoing and self._outgoing[0][0] < oldest:
+            self._outgoing.popleft()
+            self.dropped += 1
+        try:
+            while self._has_room() and (self._started or self._outgoing):
+                if not self._started:
+                    self._started = self._outgoing.popleft()[1]
+                self._started = self._started[os.write(self._master, self._started):]
+        except BlockingIOError:
+            pass
+        except OSError as error:
+            raise BusUnavailable(f'pseudo-terminal: {error.strerror}') from error
+
+    def _has_room(self) -> bool:
+        """Tell whether the client reads; far before the kernel would cut a line in two."""
+        unread = array('i', [0])
+        fcntl.ioctl(self._slave, termios.FIONREAD, unread)
+        return unread[0] < _UNREAD_MAX

@@ -1,0 +1,352 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Conversations with the simulated DataModel drive, in literal bytes and literal times."""
+
+from dataclasses import replace
+
+from hypothesis import given, strategies as st
+import pytest
+from simulation_builders import (
+    ACTUAL_SPEED, ask, CONTROL, CONTROL_WORD, drive, EEPROM, EXAMPLE, parameter, RAM, RO,
+    SPEED_SETPOINT, STATUS_WORD, WO,
+)
+
+from drive_can_bridge.core.errors import ValueRefused
+from drive_can_bridge.core.frame import EXTENDED_IDENTIFIER_MAX, Frame
+
+# station 1
+CYCLIC = '003FFFF0'
+ANSWER = '103FFFF0'
+READ_30 = '002001E1#0000000000000000'
+READ_50 = '00200321#0000000000000000'
+
+LOST = 'EEPROM write less than 20 ms after the one before (lost)'
+TOO_EARLY = 'read while an EEPROM write is under way (not answered)'
+
+
+class TestCyclicExchange:
+
+    def test_answers_at_once_with_junk_in_unused_bytes(self) -> None:
+        made = drive()
+        # 0.0 rpm; 2.00 A: an energised motor at rest; ready and enabled
+        assert ask(made, f'{CYCLIC}#0000000000000000', 0.0) == [f'{ANSWER}#000000C80003A5A5']
+
+    def test_words_are_applied_before_the_answer(self) -> None:
+        made = drive(request=(SPEED_SETPOINT,), response=(SPEED_SETPOINT,))
+        # 12.3 rpm; bytes 2 to 7 have no meaning
+        assert ask(made, f'{CYCLIC}#007BFFFFFFFFFFFF', 0.0) == [f'{ANSWER}#007BA5A5A5A5A5A5']
+
+    def test_speed_follows_with_a_ramp(self) -> None:
+        made = drive()
+        # 1500 rpm = 3A98h, at 3000 rpm per second
+        ask(made, f'{CYCLIC}#3A98000000000000', 10.0)
+        assert ask(made, f'{CYCLIC}#3A98000000000000', 10.25)[0][9:13] == '1D4C'    # 750.0
+        assert ask(made, f'{CYCLIC}#3A98000000000000', 10.75)[0][9:13] == '3A98'    # 1500.0
+        assert ask(made, f'{CYCLIC}#0000000000000000', 10.75)[0][9:13] == '3A98'
+        assert ask(made, f'{CYCLIC}#0000000000000000', 11.00)[0][9:13] == '1D4C'
+        assert ask(made, f'{CYCLIC}#0000000000000000', 11.50)[0][9:13] == '0000'
+
+    def test_setpoint_beyond_the_limits_is_clamped(self) -> None:
+        made = drive(response=(SPEED_SETPOINT,))
+        # 3276.7 rpm becomes 3000.0 = 7530h
+        assert ask(made, f'{CYCLIC}#7FFF000000000000', 0.0)[0][9:13] == '7530'
+        assert ask(made, f'{CYCLIC}#8000000000000000', 0.0)[0][9:13] == '8AD0'
+
+    def test_parameter_that_does_not_exist_reads_0(self) -> None:
+        made = drive()
+        made.set_value('p126', 999)
+        assert ask(made, f'{CYCLIC}#0000000000000000', 0.0)[0][9:13] == '0000'
+
+    def test_read_only_and_map_parameters_are_not_written(self) -> None:
+        made = drive()
+        made.set_value('p122', 211)
+        made.set_value('p123', 126)
+        assert ask(made, f'{CYCLIC}#FFFFFFFF00000000', 0.0) == [f'{ANSWER}#000000C80003A5A5']
+        assert made.value('p126') == 209
+        assert list(made.violations) == ['map parameter in the request map (ignored)']
+
+    def test_empty_maps(self) -> None:
+        made = drive(mapping='configure')
+        assert ask(made, f'{CYCLIC}#3A98000000000000', 0.0) == [f'{ANSWER}#A5A5A5A5A5A5A5A5']
+        assert made.value('speed_setpoint') == 0.0
+
+    def test_eeprom_parameter_in_the_request_map_wears_out(self) -> None:
+        made = drive()
+        made.set_value('p123', 30)
+        for now in (0.0, 0.005, 0.010):
+            ask(made, f'{CYCLIC}#0000006400000000', now)
+        assert made.eeprom_writes == 3
+        assert made.violations == {'EEPROM parameter ramp_time written cyclically': 3}
+
+    def test_offset_moves_everything_on_the_wire(self) -> None:
+        made = drive(parameter_offset=-1)
+        # maps at 121 and 125, with the numbers 49, 50 and 208, 209, 210
+        assert ask(made, '00200794#0000000000000000', 0.0) == ['10200794#0031003200000000']
+        assert ask(made, '002007D4#0000000000000000', 0.0) == ['102007D4#00D000D100D20000']
+        assert ask(made, '002001D1#0000000000000000', 0.0) == ['102001D1#0064A5A5A5A5A5A5']
+        assert made.value('p122') == 49
+        assert made.value('p30') == 1.0
+
+    def test_map_bases(self) -> None:
+        made = drive(request_map_base=300, response_map_base=310)
+        assert ask(made, '002012C4#0000000000000000', 0.0) == ['102012C4#0032003300000000']
+        assert ask(made, '00201364#0000000000000000', 0.0) == ['10201364#00D100D200D30000']
+        assert ask(made, '002007A4#0000000000000000', 0.0) == []
+
+
+class TestAcyclicAccess:
+
+    def test_read_of_a_window_with_an_unknown_register(self) -> None:
+        made = drive()
+        # 209 to 211 exist, 212 does not
+        assert ask(made, '00200D13#0000000000000000', 0.0) == ['10200D13#000000C80003A5A5']
+        assert ask(made, '00200D14#0000000000000000', 0.0) == []
+        assert not made.violations
+
+    def test_write_is_never_answered(self) -> None:
+        made = drive()
+        # ramp time 2.00 s
+        assert ask(made, '003001E1#00C8000000000000', 0.0) == []
+        assert made.value('ramp_time') == 2.0
+        assert ask(made, READ_30, 0.020) == ['102001E1#00C8A5A5A5A5A5A5']
+
+    def test_write_window_with_an_unknown_register_is_ignored(self) -> None:
+        made = drive()
+        ask(made, '003001D2#00C800C800000000', 0.0)     # 29 does not exist
+        assert made.value('ramp_time') == 1.0
+        assert made.eeprom_writes == 0
+
+    def test_read_only_register_keeps_its_value(self) -> None:
+        made = drive()
+        assert ask(made, '00300D11#1234000000000000', 0.0) == []
+        assert made.value('actual_speed') == 0.0
+        assert made.eeprom_writes == 0
+
+    def test_write_only_register_is_not_read(self) -> None:
+        made = drive([*EXAMPLE, parameter('user_command', 70, access=WO, storage=RAM)])
+        ask(made, '00300461#0001000000000000', 0.0)
+        assert made.value('user_command') == 1
+        assert ask(made, '00200461#0000000000000000', 0.0) == []
+
+    def test_ramp_time_takes_effect(self) -> None:
+        made = drive()
+        ask(made, '003001E1#00C8000000000000', 0.0)     # 2 s from 0 to 3000 rpm
+        ask(made, f'{CYCLIC}#7530000000000000', 1.0)
+        assert made.value('actual_speed', 2.0) == 1500.0
+
+    def test_what_is_not_for_this_drive(self) -> None:
+        made = drive()
+        for text in ('005FFFF0#0000000000000000', '3F1#03D1000100000000',
+                     '7F0#0000000000000000'):
+            assert ask(made, text, 0.0) == []
+        assert not made.violations
+        assert made.requests == 0
+
+    @pytest.mark.parametrize('text', [
+        f'{CYCLIC}#0000', f'{CYCLIC}#', '003001E1#00C8', '002001E1#', '002001E1#00000000',
+        f'{ANSWER}#0000000000000000',
+    ])
+    def test_wrong_length_or_direction(self, text: str) -> None:
+        made = drive()
+        assert ask(made, text, 0.0) == []
+        assert sum(made.violations.values()) == 1
+        assert made.value('ramp_time') == 1.0
+
+    def test_read_request_with_data_is_answered_and_noted(self) -> None:
+        made = drive()
+        assert len(ask(made, '002001E1#0000000000000001', 0.0)) == 1
+        assert made.violations == {'read request with data other than 00h': 1}
+        assert made.take_notices() == [
+            'conveyor: violation: read request with data other than 00h']
+
+
+class TestEeprom:
+
+    def test_second_write_too_early_is_lost(self) -> None:
+        made = drive()
+        ask(made, '003001E1#00C8000000000000', 5.000)
+        ask(made, '003001E1#012C000000000000', 5.019)
+        assert made.value('ramp_time') == 2.0
+        assert made.violations == {LOST: 1}
+        assert made.eeprom_writes == 1
+
+    def test_second_write_in_time(self) -> None:
+        made = drive()
+        ask(made, '003001E1#00C8000000000000', 5.000)
+        ask(made, '003001E1#012C000000000000', 5.020)
+        assert made.value('ramp_time') == 3.0
+        assert not made.violations
+        assert made.eeprom_writes == 2
+
+    def test_a_lost_write_does_not_prolong_the_wait(self) -> None:
+        made = drive()
+        for now, word in ((1.000, '00C8'), (1.010, '012C'), (1.020, '0190')):
+            ask(made, f'003001E1#{word}000000000000', now)
+        assert made.value('ramp_time') == 4.0
+
+    def test_reads_wait_too(self) -> None:
+        made = drive()
+        ask(made, '003001E1#00C8000000000000', 0.0)
+        assert ask(made, READ_50, 0.010) == []
+        assert len(ask(made, READ_50, 0.020)) == 1
+        assert made.violations == {TOO_EARLY: 1}
+
+    def test_cyclic_exchange_goes_on(self) -> None:
+        made = drive()
+        ask(made, '003001E1#00C8000000000000', 0.0)
+        assert len(ask(made, f'{CYCLIC}#0000000000000000', 0.001)) == 1
+
+    def test_map_parameters_are_eeprom(self) -> None:
+        made = drive()
+        ask(made, '003007A1#0000000000000000', 0.000)
+        ask(made, '003007B1#0000000000000000', 0.005)
+        assert (made.value('p122'), made.value('p123')) == (0, 51)
+        assert made.violations == {LOST: 1}
+
+    def test_one_frame_is_one_write(self) -> None:
+        made = drive()
+        ask(made, '003007A4#0033003200000000', 0.0)
+        assert [made.value(f'p{number}') for number in range(122, 126)] == [51, 50, 0, 0]
+        assert made.eeprom_writes == 4
+        assert not made.violations
+
+    @pytest.mark.parametrize(('storage', 'writes'), [(RAM, 0), (EEPROM, 2), (None, 2)])
+    def test_what_is_not_known_counts_as_eeprom(self, storage: object, writes: int) -> None:
+        made = drive([parameter('gain', 60, storage=storage)], request=(), response=())
+        ask(made, '003003C1#0001000000000000', 0.0)
+        ask(made, '003003C1#0002000000000000', 0.02)
+        assert made.eeprom_writes == writes
+        assert made.value('gain') == 2
+
+    def test_ram_is_written_while_eeprom_is_busy(self) -> None:
+        made = drive([*EXAMPLE, parameter('gain', 60, storage=RAM)])
+        ask(made, '003001E1#00C8000000000000', 0.0)
+        ask(made, '003003C1#0007000000000000', 0.001)
+        assert made.value('gain') == 7
+        assert not made.violations
+
+
+class TestControl:
+
+    request = (SPEED_SETPOINT, CONTROL_WORD)
+    response = (ACTUAL_SPEED, STATUS_WORD)
+
+    def exchange(self, made: object, word: int, now: float, speed: str = '7530') -> str:
+        answers = ask(made, f'{CYCLIC}#{speed}{word:04X}00000000', now)  # type: ignore[arg-type]
+        return answers[0][9:17]
+
+    def made(self) -> object:
+        return drive([*EXAMPLE, CONTROL_WORD], control=CONTROL, request=self.request,
+                     response=self.response)
+
+    def test_follows_only_while_enabled(self) -> None:
+        made = self.made()
+        assert self.exchange(made, 0x0000, 0.0) == '00000001'
+        assert self.exchange(made, 0x0000, 1.0) == '00000001'
+        assert self.exchange(made, 0x0001, 1.0) == '00000003'
+        assert self.exchange(made, 0x0001, 1.5) == '3A980003'
+        assert self.exchange(made, 0x0000, 1.5) == '3A980001'
+        # without torque it coasts: 3000 rpm in 4 s
+        assert self.exchange(made, 0x0000, 2.5) == '1D4C0001'
+
+    def test_quick_stop_is_faster_than_the_ramp(self) -> None:
+        made = self.made()
+        self.exchange(made, 0x0000, 0.0)
+        self.exchange(made, 0x0001, 0.0)
+        assert self.exchange(made, 0x0001, 1.0) == '75300003'
+        assert self.exchange(made, 0x0002, 1.0) == '75300003'
+        assert self.exchange(made, 0x0002, 1.1) == '3A980003'
+        assert self.exchange(made, 0x0002, 1.21) == '00000001'
+        # enable alone does not start it again
+        assert self.exchange(made, 0x0001, 1.3) == '00000001'
+        assert self.exchange(made, 0x0000, 1.3) == '00000001'
+        assert self.exchange(made, 0x0001, 1.3) == '00000003'
+
+    def test_trip_and_reset(self) -> None:
+        made = self.made()
+        self.exchange(made, 0x0000, 0.0)
+        self.exchange(made, 0x0001, 0.0)
+        made.fault('trip', 1.0)  # type: ignore[attr-defined]
+        assert self.exchange(made, 0x0001, 1.0)[4:] == '0008'
+        assert self.exchange(made, 0x0000, 1.1)[4:] == '0008'
+        assert self.exchange(made, 0x0001, 1.2)[4:] == '0008'
+        assert self.exchange(made, 0x0080, 1.3)[4:] == '0001'
+        assert self.exchange(made, 0x0001, 1.4)[4:] == '0003'
+
+    def test_fault_whose_cause_persists(self) -> None:
+        made = self.made()
+        made.fault('trip=2', 1.0)  # type: ignore[attr-defined]
+        assert self.exchange(made, 0x0080, 1.1)[4:] == '0008'
+        # the word has to change for another attempt
+        assert self.exchange(made, 0x0080, 3.0)[4:] == '0008'
+        assert self.exchange(made, 0x0000, 3.1)[4:] == '0008'
+        assert self.exchange(made, 0x0080, 3.2)[4:] == '0001'
+
+    def test_enable_held_during_the_fault_does_not_restart(self) -> None:
+        made = self.made()
+        self.exchange(made, 0x0001, 0.0)
+        made.fault('trip', 0.5)  # type: ignore[attr-defined]
+        made.fault('ok', 0.6)    # type: ignore[attr-defined]
+        assert self.exchange(made, 0x0001, 0.7)[4:] == '0001'
+
+    def test_status_without_named_bits(self) -> None:
+        bare = replace(STATUS_WORD, bits=())
+        made = drive([SPEED_SETPOINT, ACTUAL_SPEED, bare, CONTROL_WORD], control=CONTROL,
+                     request=self.request, response=(ACTUAL_SPEED, bare))
+        assert self.exchange(made, 0x0000, 0.0) == '00000001'
+        assert self.exchange(made, 0x0001, 0.0) == '00000003'
+
+
+class TestByHand:
+
+    def test_actual_value_is_held_until_released(self) -> None:
+        made = drive()
+        made.set_value('actual_speed', 12.3)
+        assert ask(made, f'{CYCLIC}#3A98000000000000', 0.0)[0][9:13] == '007B'
+        assert ask(made, f'{CYCLIC}#3A98000000000000', 1.0)[0][9:13] == '007B'
+        made.release('actual_speed')
+        assert made.value('actual_speed', 1.0) == 1500.0
+
+    @pytest.mark.parametrize('name', ['nonsense', 'p999', 'p', 'px', 'p-1'])
+    def test_unknown_register(self, name: str) -> None:
+        with pytest.raises(ValueRefused, match=f"no parameter '{name}'"):
+            drive().value(name)
+
+    @pytest.mark.parametrize('value', [-1, 0x10000, 1.5])
+    def test_map_entry_that_cannot_be(self, value: float) -> None:
+        made = drive()
+        with pytest.raises(ValueRefused, match='0 to 65535'):
+            made.set_value('p122', value)
+
+    def test_initial_values_are_plausible_and_the_same_each_time(self) -> None:
+        parameters = [*EXAMPLE, parameter('firmware_version', 1, access=RO),
+                      parameter('maximum_speed', 31, unit='rpm', minimum=0.0, maximum=3000.0)]
+        first, second = drive(parameters), drive(parameters)
+        for made in (first, second):
+            assert made.value('ramp_time') == 1.0
+            assert made.value('torque_limit') == 300.0
+            assert made.value('maximum_speed') == 3000.0
+            assert made.value('speed_setpoint') == 0.0
+        assert first.value('firmware_version') == second.value('firmware_version') != 0
+
+
+frames = st.builds(
+    Frame, st.integers(0, EXTENDED_IDENTIFIER_MAX), st.binary(max_size=8), st.booleans())
+own_frames = st.builds(
+    lambda low, direction, data: Frame(direction | 1 << 21 | low, data, True),
+    st.integers(0, 0x1FFFFF), st.sampled_from((0, 0x10000000)), st.binary(max_size=8))
+read_and_write = st.builds(
+    lambda write, number, count, data: Frame(1 << 21 | write | number << 4 | count, data, True),
+    st.sampled_from((0, 0x100000)), st.sampled_from((29, 30, 50, 122, 126, 209, 0xFFFF)),
+    st.integers(0, 15), st.binary(min_size=8, max_size=8))
+
+
+@given(st.lists(st.tuples(st.one_of(frames, own_frames, read_and_write),
+                          st.floats(-1.0, 100.0)), max_size=30))
+def test_no_frame_ever_raises(conversation: list[tuple[Frame, float]]) -> None:
+    made = drive([*EXAMPLE, CONTROL_WORD], control=CONTROL)
+    for received, now in conversation:
+        made.receive_frame(received, now)
+        made.handle_timer(now)
+        for answer in made.frames_to_send():
+            assert answer.identifier >> 21 == 0x81
+            assert len(answer.data) == 8

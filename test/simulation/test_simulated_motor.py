@@ -1,0 +1,302 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""The motor of the simulated drives, and how its quantities get into parameters by their names."""
+
+from dataclasses import replace
+from typing import Any
+
+from hypothesis import given, strategies as st
+import pytest
+from simulation_builders import (
+    ACTUAL_SPEED, CONTROL, CONTROL_WORD, EXAMPLE, INT16, parameter, profile, RAM, RO,
+    SPEED_SETPOINT, STATUS_WORD, WO,
+)
+
+from drive_can_bridge.core.parameters import Parameter, ParameterType
+from drive_can_bridge.core.profile import StatusPattern
+from drive_can_bridge.simulation import names, scales
+from drive_can_bridge.simulation.motor import AMBIENT_TEMPERATURE, Motor, Ramp, Rates
+from drive_can_bridge.simulation.names import Quantity, RampKind, RampUse
+from drive_can_bridge.simulation.plant import Plant
+
+RATES = Rates(rising=10.0, falling=20.0)
+
+
+class TestRamp:
+
+    def test_rises_and_falls_at_different_rates(self) -> None:
+        ramp = Ramp()
+        ramp.advance(0.5, 100.0, RATES)
+        assert (ramp.value, ramp.slope) == (5.0, 10.0)
+        ramp.advance(0.1, 0.0, RATES)
+        assert (ramp.value, ramp.slope) == (3.0, -20.0)
+
+    def test_reversal_falls_to_zero_and_rises_from_there(self) -> None:
+        ramp = Ramp(10.0)
+        ramp.advance(1.0, -50.0, RATES)
+        assert (ramp.value, ramp.slope) == (-5.0, -10.0)
+
+    def test_integral(self) -> None:
+        # 1 s up to 10, 1 s at 10
+        assert Ramp().advance(2.0, 10.0, RATES) == 15.0
+
+    def test_stays_at_its_target(self) -> None:
+        ramp = Ramp()
+        ramp.advance(100.0, 7.0, RATES)
+        assert (ramp.value, ramp.slope) == (7.0, 0.0)
+
+    @given(st.lists(st.tuples(st.floats(0.0, 5.0), st.floats(-100.0, 100.0)), max_size=20))
+    def test_it_does_not_matter_how_often_time_passes(
+            self, steps: list[tuple[float, float]]) -> None:
+        coarse, fine = Ramp(), Ramp()
+        for duration, target in steps:
+            whole = coarse.advance(duration, target, RATES)
+            parts = sum(fine.advance(duration / 4.0, target, RATES) for _ in range(4))
+            assert fine.value == pytest.approx(coarse.value, abs=1e-6)
+            assert parts == pytest.approx(whole, abs=1e-6)
+
+
+class TestMotor:
+
+    def test_current_follows_acceleration_and_load(self) -> None:
+        motor = Motor(3000.0, 1.0 / 60.0)
+        rates = Rates(3000.0, 3000.0)
+        motor.advance(0.0, 0.0, rates, energised=True)
+        at_rest = motor.current
+        motor.advance(0.5, 3000.0, rates, energised=True)
+        accelerating = motor.current
+        motor.advance(5.0, 3000.0, rates, energised=True)
+        running = motor.current
+        motor.advance(0.5, 0.0, rates, energised=True)
+        assert at_rest < running < accelerating
+        assert motor.torque < 0.0
+
+    def test_position_integrates(self) -> None:
+        motor = Motor(3000.0, 1.0 / 60.0)
+        motor.advance(2.0, 600.0, Rates(600.0, 600.0), energised=True)
+        assert motor.position == pytest.approx(15.0)
+
+    def test_temperature_creeps(self) -> None:
+        motor = Motor(3000.0, 1.0 / 60.0)
+        rates = Rates(3000.0, 3000.0)
+        motor.advance(10.0, 3000.0, rates, energised=True)
+        motor.advance(10.0, 3000.0, rates, energised=True)
+        warm = motor.temperature
+        motor.advance(600.0, 3000.0, rates, energised=True)
+        assert AMBIENT_TEMPERATURE < warm < motor.temperature < 60.0
+
+    def test_without_torque(self) -> None:
+        motor = Motor(3000.0, 1.0 / 60.0)
+        motor.advance(1.0, 3000.0, Rates(3000.0, 3000.0), energised=False)
+        assert (motor.speed, motor.torque, motor.current) == (0.0, 0.0, 0.0)
+
+
+class TestNames:
+
+    @pytest.mark.parametrize(('name', 'quantity'), [
+        ('actual_speed', Quantity.SPEED), ('output_frequency', Quantity.SPEED),
+        ('current_position', Quantity.POSITION), ('torque_current', Quantity.TORQUE),
+        ('motor_current', Quantity.CURRENT), ('heatsink_temperature', Quantity.TEMPERATURE),
+        ('dc_link_voltage', Quantity.VOLTAGE), ('output_power', Quantity.POWER),
+        ('motor_load', Quantity.LOAD), ('fault_code', Quantity.FAULT_CODE),
+        ('rated_current', None), ('speed_limit', None), ('firmware_version', None),
+    ])
+    def test_measured(self, name: str, quantity: Quantity | None) -> None:
+        assert names.measured(parameter(name, 1, access=RO)) is quantity
+        assert names.measured(parameter(name, 1)) is None
+
+    @pytest.mark.parametrize(('setpoint', 'actual'), [
+        ('speed_setpoint', 'actual_speed'), ('setpoint_speed', 'actual_speed'),
+        ('target_position', 'actual_position'), ('frequency_reference', 'frequency_actual'),
+        ('torque_command', 'torque_feedback'), ('setpoint_1', 'actual_value_1'),
+        ('speed', 'actual_speed'), ('speed_setpoint', 'motor_speed'),
+    ])
+    def test_pairs(self, setpoint: str, actual: str) -> None:
+        table = {p.name: p for p in (parameter(setpoint, 1), parameter(actual, 2, access=RO))}
+        pair, = names.pairs(table)
+        assert (pair.setpoint.name, pair.actual.name) == (setpoint, actual)
+        assert names.pairs(table, without=setpoint) == []
+
+    @pytest.mark.parametrize(('name', 'unit', 'kind', 'use'), [
+        ('ramp_time', 's', RampKind.TIME, RampUse.BOTH),
+        ('acceleration_time', 'ms', RampKind.TIME, RampUse.RISING),
+        ('ramp_down_time', 's', RampKind.TIME, RampUse.FALLING),
+        ('deceleration', 'rpm/s', RampKind.RATE, RampUse.FALLING),
+        ('acceleration', '', RampKind.RATE, RampUse.RISING),
+        ('quick_stop_ramp', 's', RampKind.TIME, RampUse.QUICK_STOP),
+    ])
+    def test_ramps(self, name: str, unit: str, kind: RampKind, use: RampUse) -> None:
+        made = parameter(name, 1, unit=unit)
+        assert names.ramp_parameters({name: made}) == [(made, kind, use)]
+
+    def test_what_is_no_ramp(self) -> None:
+        for made in (parameter('ramp_time', 1, access=RO), parameter('ramp_limit', 1),
+                     parameter('stop_mode', 1)):
+            assert names.ramp_parameters({made.name: made}) == []
+
+
+class TestPlant:
+
+    def test_speed_in_another_unit(self) -> None:
+        hertz = parameter('output_frequency', 3, scale=0.1, unit='Hz', access=RO)
+        percent = parameter('output_speed', 4, scale=0.1, unit='%', access=RO)
+        plant = running([*EXAMPLE, hertz, percent], 'speed_setpoint', 1500.0)
+        assert plant.value('output_frequency') == 25.0
+        assert plant.value('output_speed') == 50.0
+
+    def test_setpoint_without_actual_value_moves_the_motor(self) -> None:
+        position = parameter('position', 3, unit='rev', type=INT16, access=RO)
+        plant = running([SPEED_SETPOINT, position], 'speed_setpoint', 600.0)
+        assert plant.value('position') == pytest.approx(100.0, abs=2.0)
+
+    def test_position_is_that_of_the_shaft_where_a_speed_is_commanded(self) -> None:
+        plant = running(BOTH, 'speed_setpoint', 60.0, preferred=['speed_setpoint'])
+        assert plant.value('actual_speed') == 60.0
+        before = plant.value('actual_position')
+        plant.advance(10.5)
+        assert plant.value('actual_position') == pytest.approx(before + 180.0, abs=1.0)
+
+    def test_position_is_followed_where_a_position_is_commanded(self) -> None:
+        plant = running(BOTH, 'position_setpoint', 90.0, preferred=['position_setpoint'])
+        assert plant.value('actual_position') == 90.0
+        assert plant.value('actual_speed') == 0.0
+        plant.write('position_setpoint', 30000)
+        plant.advance(10.1)
+        # 3000 degrees per second are 500 rpm
+        assert plant.value('actual_position') == 390.0
+        assert plant.value('actual_speed') == 500.0
+
+    def test_position_wraps_where_the_parameter_ends(self) -> None:
+        wrapped = parameter('position', 1, type=INT16, access=RO)
+        assert scales.position_value(wrapped, 7.0) == 7 * 4096
+        assert scales.position_value(wrapped, 9.0) == 9 * 4096 - 65536
+        limited = parameter('position', 1, type=INT16, unit='deg', minimum=0.0, maximum=359.0)
+        assert scales.position_value(limited, 1.25) == 90.0
+        assert scales.position_value(limited, -0.25) == 270.0
+
+    def test_values_never_leave_their_type(self) -> None:
+        small = parameter('actual_torque', 3, scale=0.0001, unit='Nm', type=INT16, access=RO)
+        plant = running([*EXAMPLE, small], 'speed_setpoint', -3000.0)
+        assert -3.2768 <= plant.value('actual_torque') < 0.0
+
+    def test_limits_in_any_direction(self) -> None:
+        upside_down = parameter('x', 1, type=INT16, scale=-0.5, minimum=-10.0, maximum=20.0)
+        span = scales.RawRange(upside_down, limits=True)
+        assert (span.low, span.high) == (-40, 20)
+        one_sided = scales.RawRange(parameter('x', 1, maximum=15.0), limits=True)
+        assert (one_sided.low, one_sided.high) == (0, 15)
+        boolean = scales.RawRange(parameter('x', 1, type=ParameterType.BOOL), limits=True)
+        assert boolean.clamp(5) == 1
+
+    def test_rate_parameters(self) -> None:
+        rate = parameter('acceleration', 3, unit='rpm/s', storage=RAM)
+        plant = Plant(profile([*EXAMPLE[:-1], rate]))
+        assert plant.value('acceleration') == 3000.0
+        plant.write('acceleration', 600)
+        plant.write('speed_setpoint', 30000)
+        plant.advance(0.0)
+        plant.advance(1.0)
+        assert plant.value('actual_speed') == 600.0
+
+    def test_power_cycle_keeps_what_eeprom_keeps(self) -> None:
+        gain = parameter('gain', 60, storage=RAM)
+        unknown = parameter('offset_angle', 61)
+        plant = Plant(profile([*EXAMPLE, gain, unknown]))
+        initial = plant.raw('gain')
+        for name, raw in (('gain', 999), ('offset_angle', 999), ('ramp_time', 500),
+                          ('speed_setpoint', 5000)):
+            plant.write(name, raw)
+        plant.power_on()
+        assert plant.raw('gain') == initial
+        assert plant.raw('offset_angle') == 999
+        assert plant.raw('ramp_time') == 500
+        assert plant.raw('speed_setpoint') == 0
+
+    def test_every_kind_of_parameter_has_an_initial_value(self) -> None:
+        table: list[Parameter] = [
+            parameter('switch', 1, type=ParameterType.BOOL),
+            parameter('command_word', 2, access=WO),
+            parameter('lower_limit', 3, minimum=5.0), parameter('current_limit', 4, unit='%'),
+            parameter('minimum_speed', 5, minimum=10.0, maximum=90.0),
+            parameter('gain', 6, scale=0.01, minimum=0.0, maximum=3.0),
+            parameter('position_setpoint', 7, neutral=1e9),
+            parameter('ramp_ms', 8, unit='ms'), parameter('warm_up', 9, minimum=200.0),
+        ]
+        plant = Plant(profile(table))
+        assert [plant.value(p.name) for p in table] == [
+            False, 0, 100, 100.0, 10.0, 1.0, 0, 1000.0, 200]
+
+
+POSITION_SETPOINT = parameter('position_setpoint', 53, type=INT16, scale=0.1, unit='deg',
+                              minimum=-3000.0, maximum=3000.0)
+ACTUAL_POSITION = parameter('actual_position', 214, type=INT16, scale=0.1, unit='deg', access=RO)
+BOTH = [SPEED_SETPOINT, POSITION_SETPOINT, ACTUAL_SPEED, ACTUAL_POSITION]
+
+
+def running(table: list[Parameter], setpoint: str, value: float,
+            preferred: list[str] | None = None) -> Plant:
+    """Make a plant that has followed a setpoint for ten seconds."""
+    plant = Plant(profile(table), preferred=preferred or [])
+    plant.set_value(setpoint, value)
+    plant.advance(0.0)
+    plant.advance(10.0)
+    return plant
+
+
+@pytest.mark.parametrize(('name', 'options', 'value'), [
+    ('dc_link_voltage', {'scale': 0.1, 'unit': 'V'}, 560.0 * 0.993),
+    ('output_voltage', {'scale': 0.1, 'unit': 'V'}, 560.0 * 0.7 / 2),
+    ('actual_torque', {'scale': 0.1, 'unit': '%'}, 20.0),
+    ('output_power', {'unit': 'W'}, 300.0),
+    ('motor_load', {'unit': '%'}, 20.0),
+    ('motor_current', {'scale': 0.01, 'unit': 'A'}, 2.83),
+    ('motor_temperature', {'scale': 0.1, 'unit': 'degC'}, 25.3),
+    ('motor_temperature', {'scale': 0.1, 'unit': 'K'}, 298.5),
+    ('motor_temperature', {'scale': 0.1, 'unit': 'degF'}, 77.6),
+    ('fault_code', {}, 0),
+    ('firmware_torque_limit', {'maximum': 40.0}, 40),
+])
+def test_quantities_at_half_speed(name: str, options: dict[str, Any], value: float) -> None:
+    made = parameter(name, 3, access=RO, **options)
+    plant = running([*EXAMPLE[:3], made], 'speed_setpoint', 1500.0)
+    assert plant.value(name) == pytest.approx(value, abs=1.0 if name != 'fault_code' else 0.0)
+
+
+def test_torque_setpoint_is_followed_and_ends_with_a_fault() -> None:
+    setpoint = parameter('torque_setpoint', 3, unit='%', type=INT16)
+    actual = parameter('actual_torque', 4, unit='%', type=INT16, access=RO)
+    plant = running([*EXAMPLE, setpoint, actual], 'torque_setpoint', 50.0)
+    assert plant.value('actual_torque') == 50.0
+    plant.trip()
+    plant.advance(20.0)
+    assert plant.value('actual_torque') == 0.0
+
+
+def test_ramps_by_use() -> None:
+    table = [SPEED_SETPOINT, ACTUAL_SPEED, parameter('ramp_up_time', 1, unit='s'),
+             parameter('ramp_down_time', 2, unit='s'),
+             parameter('quick_stop_ramp', 3, scale=0.1, unit='s')]
+    plant = Plant(profile(table))
+    assert plant.value('quick_stop_ramp') == pytest.approx(0.2)
+    plant.write('ramp_up_time', 2)
+    plant.write('ramp_down_time', 4)
+    plant.set_value('speed_setpoint', 3000.0)
+    plant.advance(0.0)
+    plant.advance(1.0)
+    assert plant.value('actual_speed') == 1500.0
+    plant.set_value('speed_setpoint', 0.0)
+    plant.advance(2.0)
+    assert plant.value('actual_speed') == 750.0
+
+
+def test_overlapping_status_patterns() -> None:
+    # states as numbers in the low bits: 0 is ready, 3 enabled, 4 a fault
+    table = replace(CONTROL, ready=StatusPattern(7, 0), enabled=StatusPattern(7, 3),
+                    fault=StatusPattern(7, 4))
+    bare = replace(STATUS_WORD, bits=(('moving', 15),))
+    plant = Plant(profile([SPEED_SETPOINT, ACTUAL_SPEED, bare, CONTROL_WORD], table))
+    plant.advance(0.0)
+    assert plant.raw('status_word') == 0
+    plant.write('control_word', 1)
+    assert plant.raw('status_word') == 3
+    plant.trip()
+    assert plant.raw('status_word') == 4

@@ -1,0 +1,284 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Drives played by threads: on python-can's virtual bus, on lost buses, by the console."""
+
+from collections import deque
+from collections.abc import Iterator
+import os
+import threading
+import time
+from typing import Any
+
+import can
+import pytest
+from simulation_builders import bridge, configuration, frame, wait_for
+
+from drive_can_bridge.configuration.model import BusConfiguration
+from drive_can_bridge.core.errors import (
+    BusMisconfigured, BusUnavailable, TransportError, ValueRefused,
+)
+from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.simulation.console import Console, LineReader
+from drive_can_bridge.simulation.simulation import Simulation
+from drive_can_bridge.simulation.terminal import SlcanTerminal
+
+POLL = frame('003FFFF0#0000000000000000')
+ANSWER = frame('103FFFF0#000000C80003A5A5')
+
+
+class ScriptedPort:
+    """An end point whose frames and failures come from the test."""
+
+    def __init__(self) -> None:
+        self.age = 0.0
+        self.incoming: deque[Frame | Exception] = deque()
+        self.sent: list[Frame] = []
+        self.send_failure: Exception | None = None
+        self.closed = False
+        self._event = threading.Event()
+
+    def put(self, item: Frame | Exception) -> None:
+        self.incoming.append(item)
+        self._event.set()
+
+    def receive(self, timeout: float) -> Frame | None:
+        if not self.incoming:
+            self._event.clear()
+            self._event.wait(timeout)
+        if not self.incoming:
+            return None
+        item = self.incoming.popleft()
+        if isinstance(item, Exception):
+            raise item
+        return item
+
+    def send(self, frame: Frame, timeout: float) -> None:
+        if self.send_failure is not None:
+            failure, self.send_failure = self.send_failure, None
+            raise failure
+        self.sent.append(frame)
+
+    def close(self) -> None:
+        self.closed = True
+
+
+class Scripted:
+    """A simulation on scripted ports, with all that it says."""
+
+    def __init__(self, *drives: Any, failures: list[Exception] | None = None) -> None:
+        self.ports: list[ScriptedPort] = []
+        self.failures = failures or []
+        self.said: list[str] = []
+        self.complaints: list[str] = []
+        self.shown: list[str] = []
+        self.simulation = Simulation(
+            bridge(*drives), open_bus=self.open, say=self.said.append,
+            complain=self.complaints.append, show_frame=self.show)
+
+    def open(self, bus: BusConfiguration) -> ScriptedPort:
+        if self.failures:
+            raise self.failures.pop(0)
+        self.ports.append(ScriptedPort())
+        return self.ports[-1]
+
+    def show(self, bus: str, shown: Frame, sent: bool) -> None:
+        self.shown.append(f'{bus} {shown} {"T" if sent else "R"}')
+
+
+@pytest.fixture
+def scripted() -> Iterator[Scripted]:
+    made = Scripted(configuration(), configuration(name='lift', station=2))
+    with made.simulation:
+        yield made
+
+
+def test_request_and_answer(scripted: Scripted) -> None:
+    port = scripted.ports[0]
+    port.put(POLL)
+    port.put(frame('005FFFF0#0000000000000000'))
+    wait_for(lambda: len(port.sent) == 2, 'answers')
+    assert port.sent == [ANSWER, frame('105FFFF0#000000C80003A5A5')]
+    assert scripted.shown == [
+        'main 003FFFF0#0000000000000000 R', 'main 103FFFF0#000000C80003A5A5 T',
+        'main 005FFFF0#0000000000000000 R', 'main 105FFFF0#000000C80003A5A5 T']
+    assert scripted.simulation.drives['lift'].requests == 1
+
+
+def test_late_answers_come_by_themselves(scripted: Scripted) -> None:
+    port = scripted.ports[0]
+    scripted.simulation.drives['conveyor'].fault('late=0.2')
+    begin = time.monotonic()
+    port.put(POLL)
+    wait_for(lambda: port.sent, 'answer')
+    assert time.monotonic() - begin >= 0.2
+
+
+def test_values_by_name(scripted: Scripted) -> None:
+    conveyor = scripted.simulation.drives['conveyor']
+    conveyor.set_value('speed_setpoint', 30.0)
+    wait_for(lambda: conveyor.value('actual_speed') == 30.0, 'speed')
+    conveyor.set_value('actual_speed', 5.0)
+    assert conveyor.value('actual_speed') == 5.0
+    conveyor.release('actual_speed')
+    assert conveyor.value('actual_speed') == 30.0
+    with pytest.raises(ValueRefused):
+        conveyor.value('nonsense')
+
+
+def test_faults_and_violations_are_said_once(scripted: Scripted) -> None:
+    conveyor = scripted.simulation.drives['conveyor']
+    conveyor.fault('silent')
+    for _ in range(3):
+        scripted.ports[0].put(frame('003001E0#0000000000000000'))
+    rule = 'frame that the manual does not define (ignored)'
+    wait_for(lambda: conveyor.violations == {rule: 3}, 'violations')
+    wait_for(lambda: len(scripted.said) == 2, 'lines')
+    assert scripted.said == ['conveyor: fault silent', f'conveyor: violation: {rule}']
+    assert conveyor.faults_text == 'silent'
+
+
+def test_lost_bus_is_opened_again(scripted: Scripted) -> None:
+    scripted.failures += [BusUnavailable('no such device'), BusMisconfigured('no driver')]
+    scripted.ports[0].put(BusUnavailable('receive: unplugged'))
+    wait_for(lambda: len(scripted.ports) == 2, 'second port')
+    assert scripted.ports[0].closed
+    scripted.ports[1].put(POLL)
+    wait_for(lambda: scripted.ports[1].sent == [ANSWER], 'answer')
+    assert scripted.complaints == [
+        'bus main: lost: receive: unplugged; trying again every 0.05 s', 'bus main: open']
+    scripted.ports[1].send_failure = BusUnavailable('send: unplugged')
+    scripted.ports[1].put(POLL)
+    wait_for(lambda: len(scripted.ports) == 3, 'third port')
+    assert scripted.complaints[2:3] == [
+        'bus main: lost: send: unplugged; trying again every 0.05 s']
+
+
+def test_answer_that_cannot_be_sent_is_lost(scripted: Scripted) -> None:
+    port = scripted.ports[0]
+    port.send_failure = TransportError('send: transmit queue full')
+    port.put(POLL)
+    port.put(POLL)
+    wait_for(lambda: port.sent == [ANSWER], 'second answer')
+    assert scripted.complaints == ['bus main: send: transmit queue full']
+
+
+def test_bus_that_is_not_there_yet() -> None:
+    made = Scripted(failures=[BusUnavailable('virtual x: absent')] * 2)
+    with made.simulation:
+        wait_for(lambda: made.ports, 'port')
+        wait_for(lambda: len(made.complaints) == 2, 'lines')
+    assert made.complaints == [
+        'bus main: virtual x: absent; trying again every 0.05 s', 'bus main: open']
+    assert made.ports[0].closed
+
+
+def test_bus_that_will_never_open() -> None:
+    made = Scripted(failures=[BusMisconfigured('unknown interface')])
+    with pytest.raises(BusMisconfigured):
+        made.simulation.start()
+
+
+def test_thread_that_fails_says_so() -> None:
+    made = Scripted()
+    with made.simulation:
+        made.ports[0].put(RuntimeError('a mistake of ours'))
+        wait_for(lambda: made.simulation.failure, 'failure')
+    assert made.complaints == ['bus main: RuntimeError: a mistake of ours']
+    assert made.ports[0].closed
+
+
+def test_age_of_a_frame_counts() -> None:
+    made = Scripted()
+    with made.simulation:
+        port = made.ports[0]
+        # two writes to EEPROM, noticed at once but 30 ms apart on the wire
+        port.age = 0.03
+        port.put(frame('003001E1#00C8000000000000'))
+        wait_for(lambda: made.simulation.drives['conveyor'].eeprom_writes == 1, 'write')
+        port.age = 0.0
+        port.put(frame('003001E1#012C000000000000'))
+        wait_for(lambda: made.simulation.drives['conveyor'].eeprom_writes == 2, 'write')
+        assert not made.simulation.drives['conveyor'].violations
+
+
+def test_virtual_bus() -> None:
+    channel = 'test_simulation'
+    with Simulation(bridge(channel=channel)) as simulation, can.Bus(
+            interface='virtual', channel=channel, ignore_config=True) as bus:
+        bus.send(can.Message(arbitration_id=POLL.identifier, data=POLL.data))
+        message = bus.recv(10.0)
+        assert message is not None
+        assert Frame(message.arbitration_id, bytes(message.data), True) == ANSWER
+        simulation.drives['conveyor'].fault('off')
+        bus.send(can.Message(arbitration_id=POLL.identifier, data=POLL.data))
+        wait_for(lambda: simulation.drives['conveyor'].faults_text == 'off', 'fault')
+        assert bus.recv(0.1) is None
+
+
+class TestConsole:
+
+    @pytest.fixture
+    def lines(self, scripted: Scripted) -> Any:
+        said: list[str] = []
+        complaints: list[str] = []
+        console = Console(scripted.simulation, say=said.append, complain=complaints.append)
+
+        def obey(line: str) -> tuple[list[str], list[str]]:
+            said.clear()
+            complaints.clear()
+            console.obey(line)
+            return list(said), list(complaints)
+        return obey
+
+    def test_faults(self, lines: Any, scripted: Scripted) -> None:
+        assert lines('conveyor late=0.5 duplicate') == ([], [])
+        assert scripted.simulation.drives['conveyor'].faults_text == 'late=0.5, duplicate'
+        assert scripted.simulation.drives['lift'].faults_text == 'ok'
+        assert lines('  conveyor   ok \r') == ([], [])
+        assert scripted.simulation.drives['conveyor'].faults_text == 'ok'
+
+    def test_questions(self, lines: Any) -> None:
+        line = ('lift: datamodel_extended station 2 on bus main, 0 requests, 0 answers, '
+                '0 EEPROM writes, faults: ok')
+        assert lines('lift') == ([line], [])
+        assert lines('list')[0][1] == line
+        assert '  drop=N             every Nth answer is lost (1: all)' in lines('help')[0]
+        assert lines('') == ([], [])
+
+    @pytest.mark.parametrize(('line', 'complaint'), [
+        ('lft silent', "no drive 'lft'; drives: conveyor, lift; also: list, help"),
+        ('list all', "no drive 'list'; drives: conveyor, lift; also: list, help"),
+        ('lift late', "'late' is not a fault, write late=SECONDS"),
+        ('lift stuck=p999', "lift has no parameter 'p999'"),
+    ])
+    def test_lines_that_make_no_sense(self, lines: Any, line: str, complaint: str) -> None:
+        assert lines(line) == ([], [complaint])
+
+    def test_standard_input(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        reading, writing = os.pipe()
+        with os.fdopen(reading) as stream:
+            monkeypatch.setattr('sys.stdin', stream)
+            reader = LineReader()
+            assert (reader.fileno, reader.usable) == (reading, True)
+            os.write(writing, b'list\nhe')
+            assert reader.read_lines() == ['list']
+            os.write(writing, b'lp \xff')
+            assert reader.read_lines() == []
+            os.close(writing)
+            assert reader.read_lines() == ['help \N{REPLACEMENT CHARACTER}']
+            assert (reader.fileno, reader.usable, reader.read_lines()) == (None, False, [])
+
+    def test_terminal_of_others_is_left_alone(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        # reading from it would stop a process in the background
+        terminal = SlcanTerminal()
+        with open(terminal.path, encoding='ascii') as stream:
+            monkeypatch.setattr('sys.stdin', stream)
+            assert not LineReader().usable
+        terminal.close()
+
+    def test_no_standard_input(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr('sys.stdin', None)
+        assert not LineReader().usable
+
+    def test_a_line_counts_as_a_whole(self, lines: Any, scripted: Scripted) -> None:
+        assert len(lines('lift silent nonsense')[1]) == 1
+        assert scripted.simulation.drives['lift'].faults_text == 'ok'
