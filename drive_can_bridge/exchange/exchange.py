@@ -1,0 +1,334 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The exchange of one bus: owns the sessions of its drives under one lock.
+
+Two threads drive it: the link's reader (``frame_received``) and the timer thread started here.
+Whoever submits a request does so under the same lock and sends the frames at once, so that a
+service call never waits for a tick. Everything that a frame causes, publishing included, happens
+in the thread that received it: a hop through an executor costs 50 µs and a quarter of a core at
+1,000 frames/s.
+
+The timer is a plain thread that sleeps until the earliest of its sessions' deadlines, which are
+absolute: it needs no executor, no wait set, and follows each session's own rhythm (cycles, time-
+outs, EEPROM gaps) instead of one period.
+"""
+
+from collections.abc import Callable, Sequence
+import threading
+import time
+from typing import Any, Protocol
+
+from drive_can_bridge.configuration.model import BusConfiguration
+from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlTicket
+from drive_can_bridge.core.events import Event, ProcessDataReceived
+from drive_can_bridge.core.frame import Frame, Route
+from drive_can_bridge.core.requests import Request
+from drive_can_bridge.core.session import Session
+from drive_can_bridge.exchange.router import Router
+from drive_can_bridge.transport.link import Link, steady_now
+
+#: the timer thread passes at least this often (s), so that a longer gap means lost time
+PASS_PERIOD = 0.25
+#: s without a pass after which nothing is believed any more: the process stood still
+LOST_TIME = 1.0
+#: s that a stop may take beyond its neutral cycles
+STOP_MARGIN = 0.5
+
+
+class DriveListener(Protocol):
+    """
+    What an exchange tells the owner of a drive.
+
+    Every call comes with the bus lock held, from the reader or timer thread or from the thread
+    that called the exchange: it has to be short and must not call back into the exchange.
+    """
+
+    def take_commands(self, now: float) -> None:
+        """Hand the newest setpoint commands to the session: a cycle may be due."""
+
+    def discard_commands(self) -> None:
+        """Throw away commands that are waiting: the process stood still, they are stale."""
+
+    def process_data(self, event: ProcessDataReceived) -> None:
+        """Publish a sample. The fast path."""
+
+    def handle_event(self, event: Event) -> None:
+        """Publish or log anything else."""
+
+    def control_completed(self, outcome: ControlCompleted) -> None:
+        """Answer a control request."""
+
+
+class BusListener(Protocol):
+    """What an exchange tells about its bus; from the reader or timer thread, lock not held."""
+
+    def bus_opened(self, bus: str) -> None:
+        """The bus is there (again)."""
+
+    def bus_lost(self, bus: str, reason: str) -> None:
+        """The bus is gone, or could not be opened."""
+
+    def fatal(self, bus: str, reason: str, *, misconfigured: bool) -> None:
+        """The exchange cannot go on."""
+
+
+class Member:
+    """A drive on the bus: its session and whoever listens to it."""
+
+    __slots__ = ('listener', 'session')
+
+    def __init__(self, session: Session, listener: DriveListener) -> None:
+        self.session = session
+        self.listener = listener
+
+
+class BusExchange:
+    """
+    All drives of one bus.
+
+    :param routes: for each session, in the same order, the identifiers it wants to see.
+    """
+
+    def __init__(self, bus: BusConfiguration, sessions: Sequence[Session],
+                 routes: Sequence[Sequence[Route]], listener: BusListener, *,
+                 clock: Callable[[], float] = steady_now) -> None:
+        self.bus = bus
+        self.lock = threading.Lock()
+        self._clock = clock
+        self._listener = listener
+        self._members: list[Member] = []
+        self._sessions = list(sessions)
+        self._router: Router[Member] = Router()
+        self._routes = [list(entries) for entries in routes]
+        # a send may hold up every drive of the bus: never for more than half a cycle
+        shortest = min((session.drive.period for session in sessions), default=0.1)
+        self.link = Link(bus, [route for entries in routes for route in entries], self,
+                         send_timeout=min(0.5 * shortest, 0.05))
+        self._wake = threading.Event()
+        self._wake_at = 0.0
+        self._last_pass = 0.0
+        self._closing = False
+        self._thread = threading.Thread(target=self._run, name=f'exchange {bus.name}',
+                                        daemon=True)
+        self.active = False
+        self.bus_state = 'opening'
+        self.bus_reason = ''
+        self.frames_rejected = 0
+        self.received_bits = 0
+        self.sent_bits = 0
+
+    # -- life cycle -----------------------------------------------------------------------------
+
+    def attach(self, session: Session, listener: DriveListener) -> None:
+        """Say who listens to a session. Once for each, before ``open``."""
+        member = Member(session, listener)
+        self._members.append(member)
+        self._router.add(self._routes[self._sessions.index(session)], member)
+
+    def open(self) -> None:
+        """Start both threads; the bus opens in the background. Nothing is sent."""
+        self._last_pass = self._clock()
+        self.link.start()
+        self._thread.start()
+
+    def activate(self) -> None:
+        """Begin the exchange with every drive."""
+        with self.lock:
+            now = self._clock()
+            self._last_pass = now
+            self.active = True
+            for member in self._members:
+                member.listener.discard_commands()
+                member.session.activate(now)
+                self._pump(member, now)
+        self._wake.set()
+
+    def deactivate(self) -> bool:
+        """
+        Stop every drive safely and wait until it is done.
+
+        :return: False when it could not be completed in time (a bus that blocks).
+        """
+        with self.lock:
+            now = self._clock()
+            self.active = False
+            for member in self._members:
+                member.session.deactivate(now)
+                self._pump(member, now)
+        self._wake.set()
+        end = now + STOP_MARGIN + 3 * min(
+            max((session.drive.period for session in self._sessions), default=0.0), 0.1)
+        while not self._stopped():
+            if self._clock() > end:
+                return False
+            if not self._thread.is_alive():  # the neutral frames go out all the same
+                with self.lock:
+                    self._pass()
+            time.sleep(0.002)
+        return True
+
+    def close(self) -> None:
+        """End both threads and close the bus."""
+        self._closing = True
+        self._wake.set()
+        if self._thread.is_alive() and self._thread is not threading.current_thread():
+            self._thread.join(timeout=2.0)
+        self.link.stop()
+
+    def _stopped(self) -> bool:
+        with self.lock:
+            return all(session.stopped for session in self._sessions)
+
+    # -- users, any thread ------------------------------------------------------------------------
+
+    def submit(self, session: Session, request: Request) -> None:
+        """Hand a parameter request to a drive's session; the answer comes as an event."""
+        member = self._member(session)
+        with self.lock:
+            now = self._clock()
+            session.submit(request, now)
+            self._pump(member, now)
+            due = session.next_timer()
+        if due < self._wake_at:
+            self._wake.set()
+
+    def request_control(self, session: Session, action: ControlAction,
+                        register: Callable[[ControlTicket], None]) -> str:
+        """
+        Hand a control request to a drive's session.
+
+        :param register: is given the ticket before its outcome can be delivered.
+        :return: '' when it was taken, else why not.
+        """
+        member = self._member(session)
+        with self.lock:
+            now = self._clock()
+            ticket = session.request_control(action, now)
+            if isinstance(ticket, str):
+                return ticket
+            register(ticket)
+            self._pump(member, now)
+        self._wake.set()
+        return ''
+
+    def reconfigure(self, session: Session, **changes: Any) -> None:
+        """Change what may change while running (see :meth:`.Session.reconfigure`)."""
+        with self.lock:
+            session.reconfigure(**changes)
+
+    def _member(self, session: Session) -> Member:
+        return next(member for member in self._members if member.session is session)
+
+    # -- the timer thread -------------------------------------------------------------------------
+
+    def _run(self) -> None:
+        try:
+            while not self._closing:
+                with self.lock:
+                    self._wake_at = self._pass()
+                self._wake.wait(max(0.0, self._wake_at - self._clock()))
+                self._wake.clear()
+        except Exception as error:  # the outermost loop of a thread: no failure is silent
+            self._fail(f'{type(error).__name__}: {error}')
+
+    def _pass(self) -> float:
+        """Serve every session that is due; return when the next one is."""
+        now = self._clock()
+        self._notice_lost_time(now)
+        soonest = now + PASS_PERIOD
+        for member in self._members:
+            session = member.session
+            due = session.next_timer()
+            if due <= now:
+                member.listener.take_commands(now)
+                session.handle_timer(now)
+                self._pump(member, now)
+                due = session.next_timer()
+            if due < soonest:
+                soonest = due
+        return soonest
+
+    def _notice_lost_time(self, now: float) -> None:
+        gap = now - self._last_pass
+        self._last_pass = now
+        if gap < LOST_TIME or not self.active:
+            return
+        for member in self._members:
+            member.listener.discard_commands()
+            member.session.time_lost(now)
+            self._pump(member, now)
+
+    # -- the reader thread (LinkListener) ---------------------------------------------------------
+
+    def frame_received(self, frame: Frame, age: float) -> None:
+        """Take a frame from the link. The fast path of the reader."""
+        with self.lock:
+            now = self._clock()
+            if now - self._last_pass >= LOST_TIME:
+                self._notice_lost_time(now)
+            self.received_bits += _bits(frame)
+            member = self._router.find(frame)
+            if member is None:
+                self.frames_rejected += 1
+                return
+            member.session.receive_frame(frame, now - age)
+            self._pump(member, now)
+            due = member.session.next_timer()
+        if due < self._wake_at:
+            self._wake.set()
+
+    def bus_opened(self) -> None:
+        """Begin (again) with every drive."""
+        with self.lock:
+            now = self._clock()
+            self.bus_state, self.bus_reason = 'up', ''
+            for member in self._members:
+                member.session.bus_up(now)
+                self._pump(member, now)
+        self._wake.set()
+        self._listener.bus_opened(self.bus.name)
+
+    def bus_lost(self, reason: str) -> None:
+        """Tell every drive that its bus is gone."""
+        with self.lock:
+            now = self._clock()
+            self.bus_state, self.bus_reason = 'down', reason
+            for member in self._members:
+                member.session.bus_down(now, reason)
+                self._pump(member, now)
+        self._listener.bus_lost(self.bus.name, reason)
+
+    def bus_misconfigured(self, reason: str) -> None:
+        """Give up: the configuration of the bus is wrong."""
+        self.bus_state, self.bus_reason = 'misconfigured', reason
+        self._listener.fatal(self.bus.name, reason, misconfigured=True)
+
+    def link_failed(self, reason: str) -> None:
+        """Give up: the reader thread met a defect."""
+        self._fail(reason)
+
+    def _fail(self, reason: str) -> None:
+        self.bus_state, self.bus_reason = 'failed', reason
+        self._listener.fatal(self.bus.name, f'internal error: {reason}', misconfigured=False)
+
+    # -- from session to the outside ----------------------------------------------------------------
+
+    def _pump(self, member: Member, now: float) -> None:
+        """Send what a session wants sent, and tell its listener what happened."""
+        session = member.session
+        for frame in session.take_frames():
+            if self.link.send(frame):
+                self.sent_bits += _bits(frame)
+        for event in session.take_events():
+            if type(event) is ProcessDataReceived:
+                member.listener.process_data(event)
+            else:
+                member.listener.handle_event(event)
+        if session.control is not None:
+            for outcome in session.take_control_outcomes():
+                member.listener.control_completed(outcome)
+
+
+def _bits(frame: Frame) -> int:
+    """Return a frame's length on the bus without stuff bits, interframe space included."""
+    return (67 if frame[2] else 47) + 8 * len(frame[1])

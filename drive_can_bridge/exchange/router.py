@@ -1,0 +1,42 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Find the owner of a frame by identifier *and* frame format, in a dictionary look-up or two."""
+
+from collections.abc import Iterable
+from typing import Generic, TypeVar
+
+from drive_can_bridge.core.frame import Frame, Route
+
+Owner = TypeVar('Owner')
+
+
+class Router(Generic[Owner]):
+    """
+    Routes with masks, grouped by mask.
+
+    A bus has a handful of distinct masks at most, so that a frame costs one masked look-up per
+    mask however many drives there are.
+    """
+
+    def __init__(self) -> None:
+        self._tables: list[tuple[bool, int, dict[int, Owner]]] = []
+
+    def add(self, routes: Iterable[Route], owner: Owner) -> None:
+        """Send the frames of these routes to ``owner``."""
+        for route in routes:
+            for extended, mask, table in self._tables:
+                if extended == route.extended and mask == route.mask:
+                    break
+            else:
+                table = {}
+                self._tables.append((route.extended, route.mask, table))
+            table[route.identifier & route.mask] = owner
+
+    def find(self, frame: Frame) -> Owner | None:
+        """Return the owner of a frame, or None."""
+        identifier, _, frame_extended = frame
+        for extended, mask, table in self._tables:
+            if extended == frame_extended:
+                owner = table.get(identifier & mask)
+                if owner is not None:
+                    return owner
+        return None

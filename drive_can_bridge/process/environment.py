@@ -1,0 +1,47 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""The ROS environment of the demo: which domain, and how far its traffic gets."""
+
+import os
+import shlex
+
+DOMAIN_ID = 'ROS_DOMAIN_ID'
+DISCOVERY_RANGE = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
+_LOCALHOST_ONLY = 'ROS_LOCALHOST_ONLY'
+#: what another process has to have in common with the demo in order to see it
+_SHARED = (DOMAIN_ID, DISCOVERY_RANGE, _LOCALHOST_ONLY, 'ROS_STATIC_PEERS',
+           'RMW_IMPLEMENTATION')
+#: with a larger one the ports of DDS leave the range of UDP
+DOMAIN_ID_MAX = 232
+
+
+def prepare(domain_id: int | None) -> None:
+    """
+    Set up the environment of this process, before rclpy is initialised.
+
+    Simulated drives have no business on a network: unless the environment says how far discovery
+    reaches, it stays on this machine.
+    """
+    if domain_id is not None:
+        os.environ[DOMAIN_ID] = str(domain_id)
+    if not os.environ.get(DISCOVERY_RANGE) and os.environ.get(_LOCALHOST_ONLY) != '1':
+        os.environ[DISCOVERY_RANGE] = 'LOCALHOST'
+
+
+def in_words() -> str:
+    """Say where the demo can be seen, ``ROS domain 0, on this machine only``."""
+    domain = os.environ.get(DOMAIN_ID) or '0'
+    reach = os.environ.get(DISCOVERY_RANGE, '').upper()
+    if os.environ.get(_LOCALHOST_ONLY) == '1' or reach == 'LOCALHOST':
+        place = 'on this machine only'
+    elif reach == 'OFF':
+        place = 'without discovery'
+    else:
+        place = 'on the network'
+    return f'ROS domain {domain}, {place}'
+
+
+def export_command() -> str:
+    """Return the shell command that makes another terminal see the demo; '' if none is needed."""
+    settings = [f'{name}={shlex.quote(os.environ[name])}' for name in _SHARED
+                if os.environ.get(name)]
+    return f'export {" ".join(settings)}' if settings else ''

@@ -1,0 +1,103 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+SIGINT and SIGTERM: the first asks for a safe stop, a second ends the process at once.
+
+rclpy's own handlers shut the context down first, so that no neutral frame could follow. Python's
+handlers only run between two bytecodes of the main thread. So the signal is taken from the wake-up
+file descriptor, which the interpreter's C handler writes to, by a thread of its own: a second
+signal works even while the main thread hangs in a library.
+"""
+
+import os
+import queue
+import signal
+import socket
+import threading
+import time
+from types import TracebackType
+
+#: s after the first signal that the drives have to come to a stop, whatever follows. Who stops a
+#: process group, or a service with all its processes, reaches the bridge directly and once more
+#: through the launch that started it: without this grace the second signal would end the process
+#: before its first neutral frame.
+GRACE = 0.3
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+class SignalWatcher:
+    """
+    Collects what ends the process: signals and fatal errors.
+
+    Use as a context manager in the main thread, before other threads start.
+
+    :param keep: go on after the context: in the rest of the process's life, a first signal changes
+        nothing any more, and a second still ends it.
+    """
+
+    def __init__(self, *, keep: bool = False) -> None:
+        self._keep = keep
+        self._reasons: queue.SimpleQueue[str] = queue.SimpleQueue()
+        self._read, self._write = socket.socketpair()
+        self._write.setblocking(False)
+        self._signalled = False
+        self._second = 0
+
+    def __enter__(self) -> 'SignalWatcher':
+        self._old_fd = signal.set_wakeup_fd(self._write.fileno(), warn_on_full_buffer=False)
+        self._old = [signal.signal(number, _ignore) for number in SIGNALS]
+        threading.Thread(target=self._watch, name='signals', daemon=True).start()
+        return self
+
+    def __exit__(self, exception_type: type[BaseException] | None,
+                 exception: BaseException | None, traceback: TracebackType | None) -> None:
+        if self._keep:
+            return
+        signal.set_wakeup_fd(self._old_fd)
+        for number, handler in zip(SIGNALS, self._old):
+            signal.signal(number, handler)
+        self._write.close()
+
+    @property
+    def signalled(self) -> bool:
+        """A signal has come."""
+        return self._signalled
+
+    def exit_code(self, code: int) -> int:
+        """Return what the process ends with: ``code``, or 128 + n after a second signal."""
+        return 128 + self._second if self._second else code
+
+    def fatal(self, reason: str) -> None:
+        """End the process for a reason of its own. From any thread."""
+        self._reasons.put(reason)
+
+    def wait(self, timeout: float | None = None) -> str | None:
+        """
+        Wait for the end.
+
+        :return: '' after a signal, the reason after a fatal error, None after the time-out.
+        """
+        try:
+            return self._reasons.get(timeout=timeout)
+        except queue.Empty:
+            return None
+
+    def _watch(self) -> None:
+        first = 0.0
+        while True:
+            received = self._read.recv(1)
+            if not received:
+                return
+            number = received[0]
+            if number not in SIGNALS:
+                continue
+            if self._signalled:
+                self._second = number
+                time.sleep(max(0.0, first + GRACE - time.monotonic()))
+                os._exit(128 + number)
+            first = time.monotonic()
+            self._signalled = True
+            self._reasons.put('')
+
+
+def _ignore(*_: object) -> None:
+    """Take the place of a handler: the wake-up descriptor does the work."""

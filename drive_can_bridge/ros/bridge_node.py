@@ -1,0 +1,367 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The bridge: a managed node that turns its parameters into buses, exchanges and drive nodes.
+
+========== ====================================================================================
+transition what happens
+========== ====================================================================================
+configure  parameters are checked, buses opened, drive nodes made; nothing is sent
+activate   the exchange begins: mapping checks, then cyclic frames with neutral setpoints
+deactivate three cycles with neutral setpoints (and ``disable``), then silence
+cleanup    buses closed, drive nodes gone
+shutdown   deactivate and cleanup as far as needed
+========== ====================================================================================
+"""
+
+from collections.abc import Callable
+import threading
+from typing import Any
+
+from lifecycle_msgs.msg import State
+from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rclpy.clock import Clock, ClockType
+from rclpy.context import Context
+from rclpy.executors import Executor
+from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.parameter import Parameter as NodeParameter
+from rclpy.timer import Timer
+
+from drive_can_bridge.configuration.load import (
+    check_dynamic, configuration_from_overrides, declared_parameters,
+)
+from drive_can_bridge.configuration.model import BridgeConfiguration
+from drive_can_bridge.core.errors import ConfigurationError
+from drive_can_bridge.exchange.exchange import BusExchange
+from drive_can_bridge.protocols.families import FAMILIES
+from drive_can_bridge.ros.diagnostics import Diagnostics
+from drive_can_bridge.ros.drive_node import DriveNode
+from drive_can_bridge.ros.mailbox import Mailbox
+from drive_can_bridge.transport import adapters
+from drive_can_bridge.transport.link import steady_now
+
+RCLError = rclpy_implementation.RCLError
+
+NODE_NAME = 'drive_can_bridge'
+#: s that configure waits for the first attempt to open the buses, to report what can never work
+FIRST_ATTEMPT_TIMEOUT = 3.0
+
+SUCCESS = TransitionCallbackReturn.SUCCESS
+FAILURE = TransitionCallbackReturn.FAILURE
+
+
+class BridgeNode(LifecycleNode):
+    """
+    The managed node.
+
+    :param executor: serves this node and all drive nodes.
+    :param fatal: takes the reason when the bridge cannot go on; from any thread.
+    """
+
+    def __init__(self, executor: Executor, fatal: Callable[[str], None], *,
+                 context: Context | None = None, **options: Any) -> None:
+        super().__init__(NODE_NAME, context=context, enable_logger_service=True, **options)
+        self._spinner = executor
+        self._fatal = fatal
+        self._transition_lock = threading.RLock()
+        self._mailbox = Mailbox(self)
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._diagnostics: Diagnostics | None = None
+        self._diagnostics_timer: Timer | None = None
+        self._configuring = False
+        self._ending = False
+        self._dynamic: list[str] = []
+        self._misconfigured: list[str] = []
+        self._leaving: list[DriveNode] = []
+        self.configuration: BridgeConfiguration | None = None
+        self.exchanges: dict[str, BusExchange] = {}
+        self.drives: dict[str, DriveNode] = {}
+        self._guard_transitions()
+        self.add_on_set_parameters_callback(self._check_parameters)
+        self.add_post_set_parameters_callback(self._apply_parameters)
+        executor.add_node(self)
+
+    # -- parameters -------------------------------------------------------------------------------
+
+    @property
+    def overrides(self) -> dict[str, Any]:
+        """What parameter files and command line say, by dotted name."""
+        return {name: parameter.value for name, parameter in self._parameter_overrides.items()}
+
+    @property
+    def autostart(self) -> bool:
+        """Configure and activate without being asked (anything but an explicit ``false``)."""
+        return self.overrides.get('autostart', True) is not False
+
+    @property
+    def is_empty(self) -> bool:
+        """No parameter file reached this node: neither buses nor drives."""
+        return not any(name.startswith(('buses.', 'drives.')) for name in self.overrides)
+
+    def _declare(self, configuration: BridgeConfiguration) -> None:
+        for name, value, description, dynamic in declared_parameters(configuration):
+            if self.has_parameter(name):
+                continue
+            if dynamic:
+                self._dynamic.append(name)
+            self.declare_parameter(
+                name, value, ParameterDescriptor(
+                    description=description, read_only=not dynamic, dynamic_typing=True),
+                ignore_override=True)
+
+    def _check_parameters(self, parameters: list[NodeParameter]) -> SetParametersResult:
+        for parameter in parameters:
+            if parameter.name.startswith(('drives.', 'buses.')) or (
+                    parameter.name in ('diagnostics_period', 'autostart')):
+                problem = check_dynamic(parameter.name, parameter.value)
+                if problem and self.has_parameter(parameter.name):
+                    return SetParametersResult(successful=False, reason=problem)
+        return SetParametersResult(successful=True)
+
+    def _apply_parameters(self, parameters: list[NodeParameter]) -> None:
+        for parameter in parameters:
+            if parameter.name == 'diagnostics_period' and self._diagnostics_timer is not None:
+                self._start_diagnostics_timer(float(parameter.value))
+                continue
+            prefix, _, key = parameter.name.rpartition('.')
+            drive = self.drives.get(prefix.removeprefix('drives.'))
+            if drive is None:
+                continue
+            if key == 'rearm':
+                drive.exchange.reconfigure(drive.session,
+                                           rearm_immediate=parameter.value == 'immediate')
+            elif key in ('command_timeout', 'parameter_timeout'):
+                drive.exchange.reconfigure(drive.session, **{key: float(parameter.value)})
+
+    # -- transitions --------------------------------------------------------------------------------
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Check the parameters, open the buses, make the drive nodes."""
+        return self._transition('configure', self._configure)
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Begin the exchange."""
+        return self._transition('activate', self._activate)
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Stop the drives safely."""
+        return self._transition('deactivate', self._stop_drives)
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Close the buses, remove the drive nodes."""
+        return self._transition('cleanup', self._clean_up)
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Stop the drives safely if they run, then clean up."""
+        def shut_down() -> None:
+            self._stop_drives()
+            self._clean_up()
+        return self._transition('shutdown', shut_down)
+
+    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Get back to a state from which configure works."""
+        return self._transition('error processing', self._clean_up)
+
+    def _transition(self, name: str, action: Callable[[], None]) -> TransitionCallbackReturn:
+        # rclpy swallows exceptions in these callbacks; here they become one line and a failure
+        try:
+            action()
+        except ConfigurationError as error:
+            for problem in error.problems:
+                self.get_logger().error(problem)
+            return FAILURE
+        except Exception as error:
+            self.get_logger().error(f'{name} failed: {type(error).__name__}: {error}')
+            return TransitionCallbackReturn.ERROR
+        return SUCCESS
+
+    def _configure(self) -> None:
+        overrides = self.overrides
+        for name in self._dynamic:  # changed with ros2 param set since
+            overrides[name] = self.get_parameter(name).value
+        configuration = configuration_from_overrides(overrides, adapters=adapters)
+        for warning in configuration.warnings:
+            self.get_logger().warning(warning)
+        self._declare(configuration)
+        self.configuration = configuration
+        self._misconfigured = []
+        self._configuring = True
+        try:
+            self._build(configuration)
+            self._open(configuration)
+        except BaseException:
+            self._clean_up()
+            raise
+        finally:
+            self._configuring = False
+
+    def _build(self, configuration: BridgeConfiguration) -> None:
+        for bus in configuration.buses.values():
+            drives = [drive for drive in configuration.drives.values() if drive.bus == bus.name]
+            families = [FAMILIES[drive.protocol] for drive in drives]
+            sessions = [family.make_session(drive) for family, drive in zip(families, drives)]
+            routes = [[claim.route for claim in family.claims(drive)]
+                      for family, drive in zip(families, drives)]
+            exchange = BusExchange(bus, sessions, routes, self)
+            self.exchanges[bus.name] = exchange
+            for drive, session, family in zip(drives, sessions, families):
+                node = DriveNode(self, drive, session, family, exchange, self._mailbox,
+                                 self._spinner)
+                self.drives[drive.name] = node
+                exchange.attach(session, node)
+
+    def _open(self, configuration: BridgeConfiguration) -> None:
+        for exchange in self.exchanges.values():
+            exchange.open()
+        deadline = steady_now() + FIRST_ATTEMPT_TIMEOUT
+        for exchange in self.exchanges.values():
+            exchange.link.wait_first_attempt(max(0.0, deadline - steady_now()))
+        if self._misconfigured:
+            raise ConfigurationError(self._misconfigured)
+        self._diagnostics = Diagnostics(self, list(self.exchanges.values()),
+                                        list(self.drives.values()))
+        self._start_diagnostics_timer(configuration.diagnostics_period)
+
+    def _activate(self) -> None:
+        for exchange in self.exchanges.values():
+            exchange.activate()
+        self.get_logger().info(
+            f'active: {len(self.drives)} drives on {len(self.exchanges)} buses')
+
+    def _stop_drives(self) -> None:
+        # every bus at the same time: the slowest one decides, not the sum
+        threads = [threading.Thread(target=self._stop_bus, args=(exchange,),
+                                    name=f'stop {exchange.bus.name}')
+                   for exchange in self.exchanges.values() if exchange.active]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+
+    def _stop_bus(self, exchange: BusExchange) -> None:
+        reason = exchange.bus_reason or 'the bus blocks'
+        try:
+            if exchange.deactivate():
+                return
+        except Exception as error:  # noqa: BLE001  outermost call of a thread: nothing is silent
+            reason = f'{type(error).__name__}: {error}'
+        self.get_logger().error(f'bus {exchange.bus.name}: the stop frames could not all be '
+                                f'sent: {reason}')
+
+    def _clean_up(self) -> None:
+        if self._diagnostics_timer is not None:
+            self.destroy_timer(self._diagnostics_timer)
+            self._diagnostics_timer = None
+        if self._diagnostics is not None:
+            self._diagnostics.destroy()
+            self._diagnostics = None
+        for exchange in self.exchanges.values():
+            exchange.close()
+        self._leaving += self.drives.values()
+        self.exchanges.clear()
+        self.drives.clear()
+        self._dismiss()
+
+    def _dismiss(self, _: Any = None) -> None:
+        """Take the drives out of the graph, each as soon as its last caller has an answer."""
+        staying = []
+        for drive in self._leaving:
+            if drive.answer_all():
+                drive.destroy()
+            else:
+                staying.append(drive)
+        self._leaving = staying
+        if staying:
+            self._mailbox.post(self._dismiss)
+
+    # -- from the outside ---------------------------------------------------------------------------
+
+    def start(self) -> bool:
+        """Configure and activate; False when the configuration is wrong (it was logged)."""
+        with self._transition_lock:
+            return (self.trigger_configure() is SUCCESS
+                    and self.trigger_activate() is SUCCESS)
+
+    def stop(self) -> None:
+        """Stop the drives and publish a last diagnostic message; for the end of the process."""
+        self._ending = True
+        if self._transition_lock.acquire(timeout=2.0):
+            try:
+                self._stop_drives()
+                self._publish_diagnostics()
+            finally:
+                self._transition_lock.release()
+
+    def close(self) -> None:
+        """Close what is open. The executor must have stopped."""
+        self._clean_up()
+        while self._leaving:
+            self._leaving.pop().destroy()
+
+    @property
+    def is_active(self) -> bool:
+        """In lifecycle state active."""
+        return bool(self._state_machine.current_state[0] == State.PRIMARY_STATE_ACTIVE)
+
+    def _guard_transitions(self) -> None:
+        """Keep an illegal transition from bringing the executor down (rclpy lets it escape)."""
+        service = self._service_change_state
+        change_state = service.callback
+
+        def guarded(request: Any, response: Any) -> Any:
+            with self._transition_lock:
+                try:
+                    if self._ending:
+                        raise RuntimeError('the bridge is being stopped')
+                    if request.transition.label:  # an unknown one is answered without a word
+                        self._state_machine.get_transition_by_label(request.transition.label)
+                    return change_state(request, response)
+                except (RCLError, RuntimeError) as error:
+                    label = request.transition.label or f'number {request.transition.id}'
+                    state = self._state_machine.current_state[1]
+                    self.get_logger().warning(
+                        f'transition {label} is not possible in state {state}'
+                        f' ({" ".join(str(error).split())})')
+                    response.success = False
+                    return response
+
+        service.callback = guarded
+
+    # -- diagnostics ----------------------------------------------------------------------------------
+
+    @property
+    def diagnostics(self) -> Diagnostics | None:
+        """What reports on buses and drives, from configure to cleanup."""
+        return self._diagnostics
+
+    def _start_diagnostics_timer(self, period: float) -> None:
+        if self._diagnostics_timer is not None:
+            self.destroy_timer(self._diagnostics_timer)
+        self._diagnostics_timer = self.create_timer(period, self._publish_diagnostics,
+                                                    clock=self._steady)
+
+    def _publish_diagnostics(self) -> None:
+        if self._diagnostics is not None:
+            self._diagnostics.publish(steady_now())
+
+    # -- from the exchanges (BusListener) ---------------------------------------------------------------
+
+    def bus_opened(self, bus: str) -> None:
+        """Log it."""
+        self.get_logger().info(f'bus {bus}: open')
+
+    def bus_lost(self, bus: str, reason: str) -> None:
+        """Log it."""
+        exchange = self.exchanges.get(bus)
+        if exchange is not None:  # else it was given up while it was still being opened
+            self.get_logger().error(f'bus {bus}: {reason}; tried again every '
+                                    f'{exchange.bus.reconnect_period:g} s')
+
+    def fatal(self, bus: str, reason: str, *, misconfigured: bool) -> None:
+        """Take note that an exchange cannot go on."""
+        text = f'buses.{bus}: {reason}'
+        if misconfigured and self._configuring:
+            self._misconfigured.append(text)
+        else:
+            self.get_logger().fatal(text)
+            self._fatal(text)

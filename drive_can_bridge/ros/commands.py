@@ -1,0 +1,179 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+Setpoint commands: taken by the exchange at its tick, not by callbacks.
+
+A callback per message makes an executor pay for its whole wait set each time, and a flood of
+commands would starve the services. Here the exchange's timer thread takes what is waiting just
+before a cycle: the newest command goes out in the very next frame, and a flood costs nothing but
+the take. The subscriptions stand in a callback group that no executor ever runs.
+"""
+
+from collections.abc import Callable
+from typing import Any, Protocol
+
+from rclpy.callback_groups import CallbackGroup
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.exceptions import InvalidHandle
+from rclpy.node import Node
+from rclpy.qos import qos_policy_name_from_kind
+from rclpy.subscription import Subscription
+from sensor_msgs.msg import JointState
+
+from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.errors import ValueRefused
+from drive_can_bridge.core.parameters import Value, ValueKind
+from drive_can_bridge.core.session import Session
+from drive_can_bridge.core.setpoints import CommandOutcome
+from drive_can_bridge.ros.quality import command_quality, overriding
+from drive_can_bridge.ros.values import TOPIC_TYPES, value_text
+
+
+class PolledGroup(CallbackGroup):
+    """
+    Subscriptions of this group are taken by hand; an executor never waits for them.
+
+    It does wait for their events, such as a publisher of incompatible quality.
+    """
+
+    def can_execute(self, entity: Any) -> bool:
+        return not isinstance(entity, Subscription)
+
+    def beginning_execution(self, entity: Any) -> bool:
+        return not isinstance(entity, Subscription)
+
+    def ending_execution(self, entity: Any) -> None:
+        pass
+
+
+class Warn(Protocol):
+    """Takes the topic of a warning, and its text; ``once``: no need to repeat it."""
+
+    def __call__(self, topic: str, text: str, *, once: bool = False) -> None:
+        """Log it, or not."""
+
+
+class CommandIntake:
+    """
+    The command subscriptions of one drive.
+
+    :param warn: takes (topic of the warning, text); throttling is its business.
+    """
+
+    def __init__(self, node: Node, drive: DriveConfiguration, session: Session,
+                 warn: Warn) -> None:
+        self._session = session
+        self._warn = warn
+        self._drive = drive
+        self._group = PolledGroup()
+        self._takers: list[tuple[Any, type, Callable[[Any, float], None]]] = []
+        self._subscriptions: list[Subscription] = []
+        self._index = {setpoint.parameter.name: index
+                       for index, setpoint in enumerate(session.setpoints.items)}
+        for name, index in self._index.items():
+            kind = session.setpoints.items[index].parameter.kind
+            self._subscribe(node, TOPIC_TYPES[kind], f'~/command/{name}', self._taker(index))
+        joint = drive.joint
+        if joint is not None:
+            self._subscribe(node, JointState, '~/joint_command', self._take_joint)
+
+    def take(self, now: float) -> None:
+        """Hand all waiting commands to the session, oldest first."""
+        for handle, message_type, take in self._takers:
+            try:
+                taken = handle.take_message(message_type, False)
+                while taken is not None:
+                    take(taken[0], now)
+                    taken = handle.take_message(message_type, False)
+            except InvalidHandle:  # the node is being destroyed
+                return
+
+    def discard(self) -> None:
+        """Throw away what is waiting."""
+        for handle, message_type, _ in self._takers:
+            try:
+                while handle.take_message(message_type, False) is not None:
+                    pass
+            except InvalidHandle:
+                return
+
+    # -- inside ---------------------------------------------------------------------------------
+
+    def _subscribe(self, node: Node, message_type: type, topic: str,
+                   take: Callable[[Any, float], None]) -> None:
+        name = node.resolve_topic_name(topic)
+
+        def incompatible(event: Any) -> None:
+            self._warn(f'quality {name}', f'a publisher of {name} offers incompatible quality of '
+                       f'service ({qos_policy_name_from_kind(event.last_policy_kind)}): nothing '
+                       f'is received from it')
+        subscription = node.create_subscription(
+            message_type, topic, _never, command_quality(), callback_group=self._group,
+            qos_overriding_options=overriding(node, topic),
+            event_callbacks=SubscriptionEventCallbacks(incompatible_qos=incompatible))
+        self._subscriptions.append(subscription)
+        self._takers.append((subscription.handle, message_type, take))
+
+    def _taker(self, index: int) -> Callable[[Any, float], None]:
+        return lambda message, now: self._command(index, message.data, now)
+
+    def _command(self, index: int, value: Value, now: float) -> None:
+        session = self._session
+        try:
+            outcome = session.command(index, value, now)
+        except ValueRefused as error:
+            name = session.setpoints.items[index].parameter.name
+            self._warn(f'refused {name}', f'command {name} refused: {error}')
+            return
+        if outcome is CommandOutcome.NOT_ARMED and session.setpoints.enabled:
+            parameter = session.setpoints.items[index].parameter
+            neutral = value_text(
+                parameter.value_from_raw(session.setpoints.items[index].neutral))
+            self._warn(f'not armed {parameter.name}',
+                       f'command {parameter.name} has no effect: not armed, send {neutral} '
+                       f'once first')
+
+    def _take_joint(self, message: JointState, now: float) -> None:
+        joint = self._drive.joint
+        if joint is None:
+            return
+        try:
+            entry = list(message.name).index(joint.name)
+        except ValueError:
+            self._session.statistics.commands_refused += 1
+            self._warn('joint name', f'joint_command without an entry named {joint.name}',
+                       once=True)
+            return
+        for quantity, values, target in (
+                ('position', message.position, joint.position_command),
+                ('velocity', message.velocity, joint.velocity_command),
+                ('effort', message.effort, joint.effort_command)):
+            if not len(values):
+                continue
+            if target is None:
+                self._refuse(f'joint {quantity}',
+                             f'joint_command has a {quantity}, but joint.{quantity}_command '
+                             f'is not configured')
+            elif entry >= len(values):
+                self._refuse(f'joint {quantity}',
+                             f'joint_command has fewer {quantity} values than names')
+            else:
+                self._command_joint(target, values[entry], now)
+
+    def _command_joint(self, name: str, value: float, now: float) -> None:
+        joint = self._drive.joint
+        index = self._index[name]
+        parameter = self._session.setpoints.items[index].parameter
+        if joint is None:
+            return
+        physical: Value = value / joint.factors[name]
+        if parameter.kind is ValueKind.INTEGER:
+            physical = round(physical) if abs(physical) < 1e15 else physical
+        self._command(index, physical, now)
+
+    def _refuse(self, topic: str, text: str) -> None:
+        self._session.statistics.commands_refused += 1
+        self._warn(topic, text)
+
+
+def _never(_: Any) -> None:
+    raise RuntimeError('command subscriptions are taken by the exchange, not by an executor')

@@ -1,0 +1,208 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""``/diagnostics``: one status per bus and per drive, in words that say what to do."""
+
+from dataclasses import dataclass, field
+import math
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+
+from drive_can_bridge.core.session import DriveState
+from drive_can_bridge.core.statistics import Statistic
+from drive_can_bridge.exchange.exchange import BusExchange
+from drive_can_bridge.ros.drive_node import DriveNode
+from drive_can_bridge.ros.quality import overriding
+from drive_can_bridge.ros.values import value_text
+
+#: bus load above which a bus is never OK
+LOAD_WARNING = 70.0
+#: worst case over no stuff bits: an average frame lies between, this much above the shortest
+STUFFING = 1.11
+
+_NAMES = {DiagnosticStatus.OK: 'OK', DiagnosticStatus.WARN: 'WARN',
+          DiagnosticStatus.ERROR: 'ERROR', DiagnosticStatus.STALE: 'STALE'}
+
+
+@dataclass
+class Report:
+    """One diagnostic status before it becomes a message; views use it as it is."""
+
+    name: str
+    level: bytes
+    message: str
+    facts: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def level_name(self) -> str:
+        """OK, WARN, ERROR or STALE."""
+        return _NAMES[self.level]
+
+
+class BusReporter:
+    """Reports on one bus; remembers the counts of the last report."""
+
+    def __init__(self, exchange: BusExchange) -> None:
+        self._exchange = exchange
+        self._bits = 0
+        self._failures = 0
+        self._error_frames = 0
+        self._reported_at = math.nan
+        self.load_percent = 0.0
+
+    def report(self, now: float) -> Report:
+        """Return the report for the time since the last one."""
+        exchange, link = self._exchange, self._exchange.link
+        bits = exchange.received_bits + exchange.sent_bits
+        elapsed = now - self._reported_at
+        if elapsed > 0:
+            self.load_percent = (100.0 * STUFFING * (bits - self._bits)
+                                 / (elapsed * exchange.bus.bitrate))
+        failures, error_frames = link.send_failures, link.error_frames
+        new_failures = failures - self._failures
+        new_errors = error_frames - self._error_frames
+        self._bits, self._reported_at = bits, now
+        self._failures, self._error_frames = failures, error_frames
+        level, message = DiagnosticStatus.OK, f'{exchange.bus.interface} {exchange.bus.channel}'
+        if exchange.bus_state != 'up':
+            level = DiagnosticStatus.ERROR
+            message = (f'{exchange.bus_state}: {exchange.bus_reason or "not open yet"}; '
+                       f'tried again every {exchange.bus.reconnect_period:g} s')
+        elif new_errors:
+            level = DiagnosticStatus.WARN
+            message = (f'{new_errors} error frames ({link.last_bus_error}): check cable, '
+                       f'termination and bit rate, and that another node is switched on')
+        elif new_failures:
+            level = DiagnosticStatus.WARN
+            message = f'{new_failures} frames not sent: {link.last_error}'
+        elif self.load_percent > LOAD_WARNING:
+            level = DiagnosticStatus.WARN
+            message = (f'bus load {self.load_percent:.0f} %: raise the period of some drives or '
+                       f'the bit rate')
+        return Report(f'bus {exchange.bus.name}', level, message, {
+            'state': exchange.bus_state,
+            'load_percent': f'{self.load_percent:.1f}',
+            'frames_sent': str(link.frames_sent),
+            'frames_received': str(link.frames_received),
+            'frames_rejected': str(exchange.frames_rejected),
+            'error_frames': str(error_frames),
+            'bus_off_count': str(link.bus_off_count),
+            'reconnections': str(link.reconnections),
+            'send_failures': str(failures),
+        })
+
+
+class DriveReporter:
+    """Reports on one drive; remembers the counts of the last report."""
+
+    def __init__(self, drive: DriveNode) -> None:
+        self._drive = drive
+        self._rejected = 0
+
+    def report(self, now: float) -> Report:
+        """Return the report of this moment."""
+        drive, session = self._drive, self._drive.session
+        statistics = session.statistics
+        state = session.state
+        rejected = statistics.rejected - self._rejected
+        self._rejected = statistics.rejected
+        level, message = self._judge(state, rejected)
+        facts = {
+            'state': state.value,
+            'exchanges': str(statistics.exchanges),
+            'missed_exchanges': str(statistics.missed),
+            **_times('latency', statistics.latency),
+            **_times('period_error', statistics.period_error),
+            'command_age_s': f'{session.setpoints.age(now):.3f}',
+            'commands_refused': str(statistics.commands_refused),
+            'frames_rejected': str(statistics.rejected),
+            'parameter_requests_ok': str(statistics.requests_ok),
+            'parameter_requests_failed': str(
+                statistics.requests_failed + drive.requests_refused),
+            'last_parameter_error': statistics.last_request_error,
+        }
+        if session.control is not None:
+            facts['control_state'] = session.control.state
+        return Report(f'drive {drive.name}', level, message, facts)
+
+    def _judge(self, state: DriveState, rejected: int) -> tuple[bytes, str]:
+        drive, session = self._drive, self._drive.session
+        if not session.active:
+            return DiagnosticStatus.STALE, 'bridge inactive: activate it'
+        if state is DriveState.MAPPING_DIFFERS:
+            return (DiagnosticStatus.ERROR,
+                    f'{session.offline_advice}; correct the drive or the configuration, or set '
+                    f'mapping: configure')
+        if state is DriveState.OFFLINE:
+            what = session.offline_advice
+            if drive.exchange.bus_state == 'up':
+                what += '; check its power, cable, station number and bit rate'
+            if not session.ever_online:
+                return DiagnosticStatus.STALE, f'not seen since start: {what}'
+            return DiagnosticStatus.ERROR, f'offline: {what}'
+        if state is DriveState.FAULT:
+            return (DiagnosticStatus.ERROR,
+                    'fault: remove its cause, then call ~/reset_fault and ~/enable')
+        if drive.foreign_text:
+            text, drive.foreign_text = drive.foreign_text, ''
+            return DiagnosticStatus.WARN, f'{text}: there must be one master only'
+        if rejected:
+            return (DiagnosticStatus.WARN,
+                    f'{rejected} frames rejected, the last: {drive.rejected_text}; check for a '
+                    f'second station with the same number')
+        if state is DriveState.NOT_ARMED:
+            return DiagnosticStatus.WARN, self._how_to_arm()
+        return DiagnosticStatus.OK, 'online'
+
+    def _how_to_arm(self) -> str:
+        drive, session = self._drive, self._drive.session
+        name = drive.node.get_fully_qualified_name()
+        wanted = []
+        for setpoint in session.setpoints.waiting:
+            parameter = setpoint.parameter
+            if session.setpoints.rearm_immediate:
+                wanted.append(f'a command to {name}/command/{parameter.name}')
+            else:
+                neutral = value_text(parameter.value_from_raw(setpoint.neutral))
+                wanted.append(f'{neutral} to {name}/command/{parameter.name}')
+        return f'not armed: publish {" and ".join(wanted)}'
+
+
+class Diagnostics:
+    """Publishes the reports of a bridge."""
+
+    def __init__(self, node: Node, exchanges: list[BusExchange],
+                 drives: list[DriveNode]) -> None:
+        self._node = node
+        self._prefix = node.get_fully_qualified_name().lstrip('/')
+        self._publisher = node.create_publisher(
+            DiagnosticArray, '/diagnostics', QoSProfile(depth=10),
+            qos_overriding_options=overriding(node, '/diagnostics'))
+        self.buses = [BusReporter(exchange) for exchange in exchanges]
+        self.drives = [DriveReporter(drive) for drive in drives]
+
+    def publish(self, now: float) -> None:
+        """Publish one status per bus and per drive."""
+        message = DiagnosticArray()
+        message.header.stamp = self._node.get_clock().now().to_msg()
+        for report in self.reports(now):
+            message.status.append(DiagnosticStatus(
+                level=report.level, name=f'{self._prefix}: {report.name}',
+                message=report.message, hardware_id=report.name.split()[-1],
+                values=[KeyValue(key=key, value=value) for key, value in report.facts.items()]))
+        self._publisher.publish(message)
+
+    def reports(self, now: float) -> list[Report]:
+        """Return all reports, buses first."""
+        reporters: list[BusReporter | DriveReporter] = [*self.buses, *self.drives]
+        return [reporter.report(now) for reporter in reporters]
+
+    def destroy(self) -> None:
+        """Take the publisher out of the graph."""
+        self._node.destroy_publisher(self._publisher)
+
+
+def _times(name: str, statistic: Statistic) -> dict[str, str]:
+    return {f'{name}_mean_ms': f'{1e3 * statistic.mean:.3f}',
+            f'{name}_p99_ms': f'{1e3 * statistic.p99:.3f}',
+            f'{name}_max_ms': f'{1e3 * statistic.maximum:.3f}'}

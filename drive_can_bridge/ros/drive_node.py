@@ -1,0 +1,234 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The node of one drive: what its session says becomes topics, what users want goes to the session.
+
+Samples are published in the thread that received the frame; service calls are served in the
+executor thread and get their answers through the mailbox.
+"""
+
+from rclpy.clock import Clock
+from rclpy.exceptions import InvalidHandle
+from rclpy.executors import Executor
+from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.node import Node
+from rclpy.parameter import Parameter as NodeParameter
+from rclpy.task import Future
+from std_msgs.msg import Bool
+
+from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlTicket
+from drive_can_bridge.core.directory import ParameterDirectory
+from drive_can_bridge.core.events import (
+    Event, ForeignMasterSeen, FrameRejected, MappingDiffered, MappingWritten, Noted,
+    ProcessDataReceived, RequestCompleted, SetpointsExpired, StationFound, StationLost,
+)
+from drive_can_bridge.core.parameters import Value
+from drive_can_bridge.core.requests import BRIDGE_INACTIVE, Failure, Outcome, Request
+from drive_can_bridge.core.session import Session
+from drive_can_bridge.exchange.exchange import BusExchange
+from drive_can_bridge.protocols.family import Family
+from drive_can_bridge.ros.commands import CommandIntake
+from drive_can_bridge.ros.control_services import ControlServices
+from drive_can_bridge.ros.mailbox import Mailbox
+from drive_can_bridge.ros.parameter_services import ParameterServices
+from drive_can_bridge.ros.quality import latched_quality, overriding, quality_overrides
+from drive_can_bridge.ros.samples import SamplePublisher
+from drive_can_bridge.ros.stamps import Stamps
+from drive_can_bridge.ros.throttle import Throttle
+
+RCLError = rclpy_implementation.RCLError
+
+
+class DriveNode:
+    """
+    One drive in the ROS graph (a ``DriveListener`` of its exchange).
+
+    :param bridge: the bridge's node; the drive lives in its namespace.
+    """
+
+    def __init__(self, bridge: Node, drive: DriveConfiguration, session: Session, family: Family,
+                 exchange: BusExchange, mailbox: Mailbox, executor: Executor) -> None:
+        self.drive = drive
+        self.session = session
+        self.exchange = exchange
+        self._mailbox = mailbox
+        self._executor = executor
+        self._logger = bridge.get_logger()
+        self._throttle = Throttle(self._warn_now)
+        self._requests: dict[int, tuple[Request, Future]] = {}
+        self._tickets: dict[ControlTicket, Future] = {}
+        self._calls = 0  # service calls that wait for their answer
+        self.requests_refused = 0
+        self.rejected_text = ''
+        self.foreign_text = ''
+        # a local remapping wins over a process-wide ``__node:=``, which would rename every drive;
+        # time and qualities are the bridge's, whose parameters everybody sees
+        self.node = Node(
+            drive.name, namespace=bridge.get_namespace(), context=bridge.context,
+            cli_args=['--ros-args', '-r', f'__node:={drive.name}'],
+            start_parameter_services=False, enable_rosout=False,
+            parameter_overrides=[NodeParameter('start_type_description_service', value=False),
+                                 NodeParameter('use_sim_time', value=False),
+                                 *quality_overrides(bridge)])
+        try:
+            self._populate(bridge.get_clock(), family)
+        except BaseException:
+            self.node.destroy_node()
+            raise
+        executor.add_node(self.node)
+
+    def _populate(self, clock: Clock, family: Family) -> None:
+        """Make the topics and services."""
+        drive, session = self.drive, self.session
+        self.samples = SamplePublisher(self.node, drive, Stamps(clock).at)
+        self._online = self.node.create_publisher(
+            Bool, '~/online', latched_quality(),
+            qos_overriding_options=overriding(self.node, '~/online'))
+        self._online.publish(Bool(data=False))
+        self.commands = CommandIntake(self.node, drive, session, self.warn)
+        directory = ParameterDirectory(drive.profile.parameters,
+                                       lambda name: family.raw_parameter(drive, name))
+        ParameterServices(self.node, directory, clock, submit=self._submit,
+                          write_refusal=session.write_refusal,
+                          active=lambda: session.active, failed=self._parameter_failed)
+        if session.control is not None:
+            ControlServices(self.node, self._ask)
+
+    @property
+    def name(self) -> str:
+        """Name of the drive."""
+        return self.drive.name
+
+    def values(self) -> dict[str, Value]:
+        """Return the newest value of each mapped response parameter; empty while offline."""
+        return self.samples.latest() if self.session.online else {}
+
+    def answer_all(self) -> bool:
+        """
+        Tell whoever still waits for an answer that none will come. The exchange must be closed.
+
+        :return: all calls are answered, and the node may go.
+        """
+        while self._requests:
+            request, future = self._requests.popitem()[1]
+            self._mailbox.complete(future, (Failure(BRIDGE_INACTIVE),) * len(request))
+        while self._tickets:
+            self._mailbox.complete(self._tickets.popitem()[1], (False, BRIDGE_INACTIVE))
+        return not self._calls
+
+    def destroy(self) -> None:
+        """Take the drive out of the graph. The exchange must be closed."""
+        self._executor.remove_node(self.node)
+        self.node.destroy_node()
+
+    # -- log --------------------------------------------------------------------------------------
+
+    def warn(self, topic: str, text: str, *, once: bool = False) -> None:
+        """
+        Log a warning; repetitions of a topic are counted and summed up once in a while.
+
+        :param once: repetitions are not logged at all, until the drive comes online again.
+        """
+        self._throttle(topic, text, once=once)
+
+    def _warn_now(self, text: str) -> None:
+        self._logger.warning(f'{self.name}: {text}')
+
+    # -- from the exchange (DriveListener): the bus lock is held -----------------------------------
+
+    def take_commands(self, now: float) -> None:
+        """Hand the newest commands to the session."""
+        self.commands.take(now)
+
+    def discard_commands(self) -> None:
+        """Throw waiting commands away."""
+        self.commands.discard()
+
+    def process_data(self, event: ProcessDataReceived) -> None:
+        """Publish a sample."""
+        try:
+            self.samples.publish(event.raws, event.received_at)
+        except (InvalidHandle, RCLError) as error:
+            self._cannot_publish(error)
+
+    def handle_event(self, event: Event) -> None:
+        """Publish or log what happened."""
+        try:
+            self._handle_event(event)
+        except (InvalidHandle, RCLError) as error:
+            self._cannot_publish(error)
+
+    def _handle_event(self, event: Event) -> None:
+        if isinstance(event, RequestCompleted):
+            _, future = self._requests.pop(id(event.request))
+            self._mailbox.complete(future, event.outcomes)
+        elif isinstance(event, StationFound):
+            self._online.publish(Bool(data=True))
+            self._throttle.reset()
+            self.rejected_text = ''
+            self._logger.info(f'{self.name}: online')
+        elif isinstance(event, StationLost):
+            self._online.publish(Bool(data=False))
+            self.samples.forget()
+            if self.session.active:
+                self._logger.warning(f'{self.name}: offline: {event.reason}')
+            else:
+                self._logger.info(f'{self.name}: stopped')
+        elif isinstance(event, SetpointsExpired):
+            self.warn('command timeout',
+                      f'no command for {self.session.drive.command_timeout:g} s: '
+                      f'{", ".join(event.names)} neutral until armed again')
+        elif isinstance(event, MappingDiffered):
+            self._logger.error(f'{self.name}: mapping differs, no cyclic frame is sent: '
+                               f'{event.text}')
+        elif isinstance(event, MappingWritten):
+            self._logger.warning(f'{self.name}: maps of the drive rewritten: {event.text}')
+        elif isinstance(event, FrameRejected):
+            self.rejected_text = event.text
+            self.warn('rejected', f'frame rejected: {event.text}')
+        elif isinstance(event, ForeignMasterSeen):
+            self.foreign_text = event.text
+            self.warn('foreign master', event.text)
+        elif isinstance(event, Noted):
+            self._logger.info(f'{self.name}: {event.text}')
+
+    def control_completed(self, outcome: ControlCompleted) -> None:
+        """Answer a control request."""
+        future = self._tickets.pop(outcome.ticket)
+        self._mailbox.complete(future, (outcome.success, outcome.message))
+
+    def _cannot_publish(self, error: Exception) -> None:
+        if self.node.context.ok():
+            self.warn('publish', f'cannot publish: {error}')
+
+    # -- from the executor: users -------------------------------------------------------------------
+
+    async def _submit(self, request: Request) -> tuple[Outcome, ...]:
+        future = Future(executor=self._executor)
+        self._requests[id(request)] = (request, future)
+        self._calls += 1
+        try:
+            self.exchange.submit(self.session, request)
+            outcomes: tuple[Outcome, ...] = await future
+        finally:
+            self._calls -= 1
+        return outcomes
+
+    async def _ask(self, action: ControlAction) -> tuple[bool, str]:
+        future = Future(executor=self._executor)
+        refusal = self.exchange.request_control(
+            self.session, action, lambda ticket: self._tickets.update({ticket: future}))
+        if refusal:
+            return False, refusal
+        self._calls += 1
+        try:
+            answer: tuple[bool, str] = await future
+        finally:
+            self._calls -= 1
+        return answer
+
+    def _parameter_failed(self, what: str, reason: str, uncounted: int) -> None:
+        text = f'{what}: {reason}'
+        self.requests_refused += uncounted
+        self.session.statistics.last_request_error = text
+        self.warn(f'parameter {text}', text)

@@ -1,0 +1,159 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The executable ``drive_can_bridge``.
+
+All executors run in threads; the main thread waits for a signal or a fatal error, and then: stops
+the drives, publishes a last diagnostic message, stops the executor, closes the buses, shuts down.
+
+Loading rclpy and its messages takes a second. Signals are looked after before that, which is why
+everything heavy is imported inside functions here.
+"""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+import os
+import sys
+import tempfile
+from typing import TYPE_CHECKING
+
+from drive_can_bridge.process.signals import SignalWatcher
+
+if TYPE_CHECKING:
+    from drive_can_bridge.ros.bridge_node import BridgeNode
+
+USAGE = """usage: drive_can_bridge --ros-args --params-file FILE [-r ...] [-p ...]
+Bridge motor drives on CAN buses to ROS 2. Only ROS arguments are taken; 'drive_can validate FILE'
+checks a parameter file, 'drive_can demo' shows the bridge with simulated drives."""
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the bridge until a signal; return the exit code."""
+    arguments = list(sys.argv if args is None else args)
+    # in a process of our own, signals are looked after to the very end
+    with SignalWatcher(keep=args is None) as watcher:
+        return watcher.exit_code(_main(watcher, arguments))
+
+
+def _main(watcher: SignalWatcher, arguments: list[str]) -> int:
+    import rclpy
+    from rclpy.executors import ExternalShutdownException
+    from rclpy.signals import SignalHandlerOptions
+    from rclpy.utilities import remove_ros_args
+
+    try:
+        with _quiet_rcl():
+            rest = remove_ros_args(arguments)[1:]
+    except Exception as error:  # noqa: BLE001  it parses them all, files included
+        print(f'drive_can_bridge: {_parse_error(error)}', file=sys.stderr)
+        return 1
+    if rest:
+        if rest[0] in ('-h', '--help'):
+            print(USAGE)
+            return 0
+        print(f'drive_can_bridge: {rest[0]}: only ROS arguments are taken '
+              f'(drive_can_bridge --ros-args --params-file FILE)', file=sys.stderr)
+        return 2
+    try:
+        with _quiet_rcl():
+            rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+    except Exception as error:  # noqa: BLE001  rcl's parse errors come as several types
+        print(f'drive_can_bridge: {_parse_error(error)}', file=sys.stderr)
+        return 1
+    try:
+        return _run(watcher, arguments)
+    except ExternalShutdownException:
+        return 0
+    finally:
+        rclpy.try_shutdown()
+
+
+def _run(watcher: SignalWatcher, arguments: Sequence[str]) -> int:
+    import rclpy
+
+    from drive_can_bridge.ros.bridge_node import BridgeNode
+    from drive_can_bridge.ros.executor_thread import ExecutorThread
+    from drive_can_bridge.transport.port import in_words
+
+    spinner = ExecutorThread('services', lambda text: bridge.get_logger().error(text),
+                             rclpy.get_default_context())
+    try:
+        bridge = BridgeNode(spinner.executor, watcher.fatal)
+    except Exception as error:  # noqa: BLE001  names and namespaces that rcl refuses
+        print(f'drive_can_bridge: {in_words(error)}', file=sys.stderr)
+        return 1
+    if bridge.is_empty:
+        bridge.get_logger().fatal(_nothing_configured(bridge, arguments))
+        bridge.destroy_node()
+        return 1
+    spinner.start()
+    code = 0
+    try:
+        if not watcher.signalled:  # else nothing is begun that had to be stopped
+            if bridge.autostart and not bridge.start():
+                code = 1
+            elif watcher.wait():
+                code = 1
+        bridge.stop()
+    finally:
+        spinner.stop()
+        bridge.close()
+        bridge.destroy_node()
+    return code
+
+
+def _nothing_configured(bridge: 'BridgeNode', arguments: Sequence[str]) -> str:
+    import yaml
+
+    text = (f'node {bridge.get_fully_qualified_name()} got neither buses nor drives: give a '
+            f'parameter file with --ros-args --params-file FILE')
+    for path in _parameter_files(arguments):
+        try:
+            with open(path, encoding='utf-8') as file:
+                content = yaml.safe_load(file)
+        except (OSError, yaml.YAMLError):
+            continue
+        names = ', '.join(map(str, content)) if isinstance(content, dict) else 'no node'
+        text += f'; {path} is for {names}'
+    return text
+
+
+def _parameter_files(arguments: Sequence[str]) -> list[str]:
+    return [value for option, value in zip(arguments, arguments[1:])
+            if option == '--params-file']
+
+
+def _parse_error(error: Exception) -> str:
+    """Return what rcl says without the file positions of its C sources."""
+    from drive_can_bridge.transport.port import in_words
+
+    text = in_words(error)
+    for noise in ('failed to initialize rcl: ',):
+        text = text.replace(noise, '')
+    if text.startswith('['):  # a bare list of what it does not know
+        return f'unknown ROS arguments: {text}'
+    return text.split(', at /')[0]
+
+
+@contextmanager
+def _quiet_rcl() -> Iterator[None]:
+    """Hold back what rcl itself writes to standard error; show it only if all went well."""
+    sys.stderr.flush()
+    saved = os.dup(2)
+    with tempfile.TemporaryFile() as held:
+        os.dup2(held.fileno(), 2)
+        try:
+            yield
+        except BaseException:
+            os.dup2(saved, 2)
+            os.close(saved)
+            raise
+        os.dup2(saved, 2)
+        os.close(saved)
+        held.seek(0)
+        text = held.read().decode(errors='replace')
+        if text:
+            sys.stderr.write(text)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,242 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+A drive's parameters as the parameters of its node.
+
+The six standard services, so that ``ros2 param`` and rqt_reconfigure work on a drive. Reading and
+writing goes over acyclic frames: the callbacks are coroutines that wait for the session's answer
+without holding up the executor.
+"""
+
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+from rcl_interfaces.msg import (
+    ListParametersResult, Parameter as ParameterMessage, ParameterDescriptor, ParameterEvent,
+    ParameterType, ParameterValue, SetParametersResult,
+)
+from rcl_interfaces.srv import (
+    DescribeParameters, GetParameters, GetParameterTypes, ListParameters, SetParameters,
+    SetParametersAtomically,
+)
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.clock import Clock
+from rclpy.node import Node
+from rclpy.qos import qos_profile_parameter_events, qos_profile_parameters
+
+from drive_can_bridge.core.directory import ParameterDirectory
+from drive_can_bridge.core.errors import ValueRefused
+from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.requests import (
+    BRIDGE_INACTIVE, Failure, Outcome, ReadRequest, ReadValue, Request, WriteRequest, Written,
+)
+from drive_can_bridge.ros.values import (
+    descriptor, parameter_value, PARAMETER_TYPES, value_of,
+)
+
+#: separates the levels of a parameter name (rcl_interfaces/srv/ListParameters)
+SEPARATOR = '.'
+
+
+class ParameterServices:
+    """
+    The parameter services of one drive.
+
+    :param clock: for the stamps of what is announced.
+    :param submit: hands a request to the drive's session; awaitable of one outcome per parameter.
+    :param write_refusal: why users may not write a parameter now, or ''.
+    :param active: tells whether the bridge is active; nothing is sent otherwise.
+    :param failed: takes (what was tried, reason) for log and diagnostics, and how many parameters
+        failed without having reached the session, which counts the others.
+    """
+
+    def __init__(self, node: Node, directory: ParameterDirectory, clock: Clock, *,
+                 submit: Callable[[Request], Awaitable[tuple[Outcome, ...]]],
+                 write_refusal: Callable[[Parameter], str],
+                 active: Callable[[], bool],
+                 failed: Callable[[str, str, int], None]) -> None:
+        self._node = node
+        self._directory = directory
+        self._clock = clock
+        self._submit = submit
+        self._write_refusal = write_refusal
+        self._active = active
+        self._failed = failed
+        # reentrant: a request that waits for its drive must not keep the next one from being taken
+        group = ReentrantCallbackGroup()
+        for service_type, name, callback in (
+                (GetParameters, 'get_parameters', self._get),
+                (SetParameters, 'set_parameters', self._set),
+                (SetParametersAtomically, 'set_parameters_atomically', self._set_atomically),
+                (ListParameters, 'list_parameters', self._list),
+                (DescribeParameters, 'describe_parameters', self._describe),
+                (GetParameterTypes, 'get_parameter_types', self._types)):
+            node.create_service(service_type, f'~/{name}', callback,
+                                qos_profile=qos_profile_parameters, callback_group=group)
+        self._events = node.create_publisher(ParameterEvent, '/parameter_events',
+                                             qos_profile_parameter_events)
+
+    # -- reading --------------------------------------------------------------------------------
+
+    async def _get(self, request: Any, response: Any) -> Any:
+        found = [self._directory.find(name) for name in request.names]
+        for name, parameter in zip(request.names, found):
+            if parameter is None:
+                self._failed(f'read {name}', self._directory.unknown(name), 1)
+        values: dict[int, ParameterValue] = {}
+        if self._active():
+            wanted = [(place, parameter) for place, parameter in enumerate(found)
+                      if parameter is not None and parameter.readable]
+            if wanted:
+                outcomes = await self._submit(
+                    ReadRequest(tuple(parameter for _, parameter in wanted)))
+                for (place, parameter), outcome in zip(wanted, outcomes):
+                    if isinstance(outcome, ReadValue):
+                        values[place] = parameter_value(
+                            parameter, parameter.value_from_raw(outcome.raw))
+                    elif isinstance(outcome, Failure):
+                        self._failed(f'read {_title(parameter)}', outcome.reason, 0)
+        elif request.names:
+            self._failed('read parameters', BRIDGE_INACTIVE,
+                         sum(parameter is not None for parameter in found))
+        response.values = [values.get(place, ParameterValue()) for place in range(len(found))]
+        return response
+
+    def _list(self, request: Any, response: Any) -> Any:
+        response.result = list_parameters(list(self._directory.listed), list(request.prefixes),
+                                          request.depth)
+        return response
+
+    def _describe(self, request: Any, response: Any) -> Any:
+        # rcl_interfaces/srv/DescribeParameters: as many descriptors as names, in the same order
+        found = [(name, self._directory.find(name)) for name in request.names]
+        response.descriptors = [
+            ParameterDescriptor(name=name) if parameter is None else descriptor(name, parameter)
+            for name, parameter in found]
+        return response
+
+    def _types(self, request: Any, response: Any) -> Any:
+        found = [self._directory.find(name) for name in request.names]
+        response.types = [
+            ParameterType.PARAMETER_NOT_SET if parameter is None
+            else PARAMETER_TYPES[parameter.kind] for parameter in found]
+        return response
+
+    # -- writing --------------------------------------------------------------------------------
+
+    async def _set(self, request: Any, response: Any) -> Any:
+        results: list[SetParametersResult] = [
+            SetParametersResult() for _ in request.parameters]
+        items: list[tuple[int, Parameter, int]] = []
+        for place, message in enumerate(request.parameters):
+            try:
+                items.append((place, *self._checked(message)))
+            except ValueRefused as error:
+                results[place] = self._refused(message.name, str(error))
+        if items:
+            outcomes = await self._submit(
+                WriteRequest(tuple((parameter, raw) for _, parameter, raw in items)))
+            written = []
+            for (place, parameter, raw), outcome in zip(items, outcomes):
+                name = request.parameters[place].name
+                results[place] = self._result(parameter, name, outcome)
+                if isinstance(outcome, Written):
+                    written.append((name, parameter, raw))
+            self._announce(written)
+        response.results = results
+        return response
+
+    async def _set_atomically(self, request: Any, response: Any) -> Any:
+        items: list[tuple[Parameter, int]] = []
+        for message in request.parameters:
+            try:
+                items.append(self._checked(message))
+            except ValueRefused as error:
+                reason = f'{message.name}: {error}; nothing was written'
+                response.result = self._refused(message.name, reason)
+                return response
+        if not items:
+            response.result = SetParametersResult(successful=True)
+            return response
+        outcomes = await self._submit(WriteRequest(tuple(items), atomic=True))
+        names = [message.name for message in request.parameters]
+        results = [self._result(parameter, name, outcome)
+                   for (parameter, _), name, outcome in zip(items, names, outcomes)]
+        self._announce([(name, parameter, raw) for name, (parameter, raw), outcome
+                        in zip(names, items, outcomes) if isinstance(outcome, Written)])
+        # one reason when all parameters share it, else each with its name
+        reasons = [result.reason for result in results]
+        failed = [f'{name}: {result.reason}' for name, result in zip(names, results)
+                  if not result.successful]
+        text = reasons[0] if len(set(reasons)) == 1 else '; '.join(failed)
+        response.result = SetParametersResult(
+            successful=all(result.successful for result in results), reason=text)
+        return response
+
+    def _checked(self, message: ParameterMessage) -> tuple[Parameter, int]:
+        """
+        Find the parameter that is to be set, and the raw integer.
+
+        :raises ValueRefused: in words.
+        """
+        parameter = self._directory.find(message.name)
+        if parameter is None:
+            raise ValueRefused(self._directory.unknown(message.name))
+        if not self._active():
+            raise ValueRefused(BRIDGE_INACTIVE)
+        for twin in self._directory.twins(parameter) or [parameter]:
+            refusal = self._write_refusal(twin)
+            if refusal:
+                raise ValueRefused(refusal)
+        return parameter, self._directory.raw_from_user(parameter, value_of(message.value))
+
+    def _refused(self, name: str, reason: str) -> SetParametersResult:
+        self._failed(f'set {name}', reason, 1)
+        return SetParametersResult(successful=False, reason=reason)
+
+    def _result(self, parameter: Parameter, name: str, outcome: Outcome) -> SetParametersResult:
+        if isinstance(outcome, Written):
+            return SetParametersResult(successful=True, reason=outcome.note)
+        reason = outcome.reason if isinstance(outcome, Failure) else 'no result'
+        self._failed(f'set {_title(parameter)}', reason, 0)
+        return SetParametersResult(successful=False, reason=reason)
+
+    def _announce(self, written: list[tuple[str, Parameter, int]]) -> None:
+        if not written:
+            return
+        self._events.publish(ParameterEvent(
+            stamp=self._clock.now().to_msg(),
+            node=self._node.get_fully_qualified_name(),
+            changed_parameters=[
+                ParameterMessage(name=name, value=parameter_value(
+                    parameter, parameter.value_from_raw(raw)))
+                for name, parameter, raw in written]))
+
+
+def list_parameters(names: list[str], prefixes: list[str], depth: int) -> ListParametersResult:
+    """
+    Select names as rcl_interfaces/srv/ListParameters says.
+
+    :param prefixes: none means all names; otherwise a name that equals one or lies below one.
+    :param depth: number of levels below the prefix (or in all); 0 means all.
+    """
+    result = ListParametersResult()
+    found_prefixes: set[str] = set()
+    for name in names:
+        if prefixes:
+            inside = any(
+                name == prefix or name.startswith(prefix + SEPARATOR) and (
+                    depth == 0 or name[len(prefix) + 1:].count(SEPARATOR) < depth)
+                for prefix in prefixes)
+        else:
+            inside = depth == 0 or name.count(SEPARATOR) < depth
+        if inside:
+            result.names.append(name)
+            if SEPARATOR in name:
+                found_prefixes.add(name.rsplit(SEPARATOR, 1)[0])
+    result.prefixes = sorted(found_prefixes)
+    return result
+
+
+def _title(parameter: Parameter) -> str:
+    """Name a parameter for the log: ``ramp_time (P30)``."""
+    return f'{parameter.name} ({parameter.address})'

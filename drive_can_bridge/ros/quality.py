@@ -1,0 +1,47 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Quality of service of each kind of topic, and the standard way to override it."""
+
+from rclpy.node import Node
+from rclpy.parameter import Parameter as NodeParameter
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos_overriding_options import QoSOverridingOptions
+
+
+def state_quality() -> QoSProfile:
+    """Values once per exchange: reliable, a short history."""
+    return QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
+
+
+def latched_quality() -> QoSProfile:
+    """Published on change; late joiners get the last one."""
+    return QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE,
+                      durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+def command_quality() -> QoSProfile:
+    """
+    Setpoints: the newest wins.
+
+    A few messages of history all the same: a refused value must not push a good one, sent just
+    before it, out of the queue between two cycles.
+    """
+    return QoSProfile(depth=8, reliability=ReliabilityPolicy.RELIABLE)
+
+
+def overriding(node: Node, topic: str) -> QoSOverridingOptions | None:
+    """
+    Return the overriding options of a topic, or None where nobody overrides anything.
+
+    Declaring three parameters for each of a dozen topics costs every drive some milliseconds at
+    start; almost nobody overrides.
+    """
+    prefix = f'qos_overrides.{node.resolve_topic_name(topic)}.'
+    if any(name.startswith(prefix) for name in node._parameter_overrides):
+        return QoSOverridingOptions.with_default_policies()
+    return None
+
+
+def quality_overrides(node: Node) -> list[NodeParameter]:
+    """Return what a node's parameters say about the quality of any topic."""
+    return [parameter for name, parameter in node._parameter_overrides.items()
+            if name.startswith('qos_overrides.')]
