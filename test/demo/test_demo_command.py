@@ -1,0 +1,176 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""``drive_can demo`` as a user runs it without a terminal."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+import re
+import signal
+import subprocess
+from typing import Any
+
+from demo_builders import Demo, DOMAIN_ID, wait_for
+import pytest
+
+pytest.importorskip('rclpy')
+
+LINE = re.compile(r'(conveyor|lift|turntable) (?:offline|online( \w+=-?[\d.]+( [^\s=]+)?)+)')
+FRAME = re.compile(r'\(\d+\.\d{6}\) (\w+) ([0-9A-F]{3}|[0-9A-F]{8})#((?:[0-9A-F]{2}){0,8})')
+
+OWN_FILE = """
+/cell/own_name:
+  ros__parameters:
+    autostart: false
+    diagnostics_period: 30.0
+    buses:
+      field: {interface: socketcan, channel: can7, bitrate: 500000, fd_option: 1}
+    drives:
+      axis:
+        bus: field
+        protocol: datamodel_extended
+        station: 9
+        profile: datamodel_example
+        cyclic_request: [speed_setpoint]
+        cyclic_response: [actual_speed]
+"""
+
+Start = Callable[..., Demo]
+
+
+@pytest.fixture
+def start(tmp_path: Path) -> Iterator[Start]:
+    demos: list[Demo] = []
+
+    def start_one(*arguments: str, **options: Any) -> Demo:
+        demos.append(Demo(tmp_path, *arguments, **options))
+        return demos[-1]
+    yield start_one
+    for demo in demos:
+        demo.close()
+
+
+def requests(log: Path) -> dict[str, list[str]]:
+    """Return the data of all cyclic requests in a frame log, by identifier."""
+    found: dict[str, list[str]] = {}
+    # the last line may be half written
+    for line in log.read_text(encoding='ascii').split('\n')[:-1]:
+        match = FRAME.fullmatch(line)
+        assert match, line
+        if match[2] in ('003FFFF0', '005FFFF0', '007FFFF0'):
+            found.setdefault(match[2], []).append(match[3])
+    return found
+
+
+@pytest.mark.parametrize('signum', [signal.SIGINT, signal.SIGTERM])
+def test_it_prints_a_line_per_drive_and_stops_them_neutral(start: Start, tmp_path: Path,
+                                                           signum: int) -> None:
+    log = tmp_path / 'frames.log'
+    demo = start('--drive', '--log-frames', str(log))
+    demo.line(r'^conveyor online actual_speed=-?\d+\.\d rpm motor_current=\d+\.\d\d A '
+              r'status_word=\d+$')
+    # lift has a control word, which has to be 1, and a speed setpoint behind it
+    wait_for(lambda: any(re.match('0001(?!0000)', data)
+                         for data in requests(log).get('005FFFF0', [])), 'speed for lift')
+    wait_for(lambda: any(data[:4] != '0000' for data in requests(log)['003FFFF0']),
+             'speed for conveyor')
+    assert demo.end(signum) == 0
+    for identifier, sent in requests(log).items():
+        assert {data.strip('0') for data in sent[-3:]} == {''}, identifier
+    assert len(requests(log)) == 3
+    lines = demo.lines
+    assert all(LINE.fullmatch(line) for line in lines)
+    assert [line.split()[0] for line in lines[:6]] == ['conveyor', 'lift', 'turntable'] * 2
+    assert 'Traceback' not in demo.errors
+    assert log.read_text(encoding='ascii').endswith('\n')
+
+
+def test_it_commands_nothing_unless_asked_to(start: Start, tmp_path: Path) -> None:
+    log = tmp_path / 'frames.log'
+    demo = start('--log-frames', str(log), '--duration', '2.5')
+    assert demo.process.wait(30.0) == 0
+    assert {data.strip('0') for sent in requests(log).values() for data in sent} == {''}
+    assert 4 <= len(demo.lines) <= 9
+
+
+def test_a_silent_drive_is_offline(start: Start) -> None:
+    demo = start('--fault', 'lift:silent')
+    demo.line('^conveyor online')
+    assert demo.line('^lift ') == 'lift offline'
+    assert demo.end(signal.SIGTERM) == 0
+
+
+def test_traffic_stays_on_this_machine_unless_told_otherwise(start: Start) -> None:
+    demo = start('--duration', '0.1', '--domain-id', str(DOMAIN_ID), environment={
+        'ROS_DOMAIN_ID': None, 'ROS_AUTOMATIC_DISCOVERY_RANGE': None})
+    assert demo.process.wait(30.0) == 0
+    assert f'ROS domain {DOMAIN_ID}, on this machine only' in demo.errors
+
+
+def test_any_parameter_file_will_do(start: Start, tmp_path: Path) -> None:
+    file = tmp_path / 'bridge.yaml'
+    file.write_text(OWN_FILE, encoding='utf-8')
+    demo = start('--params-file', str(file))
+    assert re.fullmatch(r'axis online actual_speed=-?\d+\.\d rpm', demo.line('^axis online'))
+    assert demo.end(signal.SIGINT) == 0
+
+
+def test_it_ends_when_nobody_reads(start: Start) -> None:
+    demo = start(stdout=subprocess.PIPE)
+    assert demo.process.stdout is not None
+    demo.process.stdout.readline()
+    demo.process.stdout.close()
+    assert demo.process.wait(10.0) == 1
+    assert 'stopped' in demo.errors
+    assert 'Traceback' not in demo.errors
+
+
+def test_a_second_signal_ends_at_once(start: Start) -> None:
+    demo = start()
+    demo.line('^conveyor online')
+    demo.process.send_signal(signal.SIGTERM)
+    demo.process.send_signal(signal.SIGINT)
+    assert demo.process.wait(2.0) in (128 + signal.SIGINT, 128 + signal.SIGTERM)
+
+
+@pytest.mark.parametrize(('arguments', 'code', 'words'), [
+    (['--fault', 'lift'], 2, 'write DRIVE:FAULT'),
+    (['--fault', 'lfit:silent'], 2, "no drive 'lfit'; drives: conveyor, lift, turntable"),
+    (['--fault', 'lift:slient'], 2, "unknown fault 'slient' (nearest: silent)"),
+    (['--fault', 'lift:stuck=nothing'], 2, 'nothing'),
+    (['--params-file', 'nowhere.yaml'], 1, 'nowhere.yaml: No such file or directory'),
+    (['--log-frames', '/nowhere/frames.log'], 1, '/nowhere/frames.log: No such file'),
+])
+def test_a_mistake_is_one_line(start: Start, arguments: list[str], code: int, words: str) -> None:
+    demo = start(*arguments)
+    assert demo.process.wait(30.0) == code
+    assert demo.lines == []
+    *_, last = demo.errors.splitlines()
+    assert words in last
+    assert 'Traceback' not in demo.errors
+
+
+@pytest.mark.parametrize('arguments', [
+    ['--duration', 'soon'], ['--duration', '-1'], ['--duration', 'nan'], ['--domain-id', '233'],
+    ['--domain-id', '-1'], ['--domain-id', 'x'], ['--speed']])
+def test_wrong_usage(start: Start, arguments: list[str]) -> None:
+    demo = start(*arguments)
+    assert demo.process.wait(30.0) == 2
+    assert demo.errors.startswith('usage: ')
+
+
+def test_the_problems_of_a_parameter_file_have_lines(start: Start, tmp_path: Path) -> None:
+    file = tmp_path / 'bridge.yaml'
+    file.write_text('/**/drive_can_bridge:\n  ros__parameters:\n    buses:\n'
+                    '      main: {interface: virtual, channel: x, bitrat: 1}\n', encoding='utf-8')
+    demo = start('--params-file', str(file))
+    assert demo.process.wait(30.0) == 1
+    assert f'{file}:4: buses.main.bitrat: ' in demo.errors
+
+
+def test_without_ros_it_says_what_to_install(start: Start, tmp_path: Path) -> None:
+    (tmp_path / 'rclpy.py').write_text("raise ModuleNotFoundError('no', name='rclpy')\n",
+                                       encoding='utf-8')
+    demo = start(environment={'PYTHONPATH': f'{tmp_path}:{Path(__file__).parents[2]}'})
+    assert demo.process.wait(30.0) == 1
+    [line] = demo.errors.splitlines()
+    assert 'needs ROS 2' in line
+    assert "pip install '.[ros]'" in line
