@@ -1,0 +1,200 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+Who may import whom.
+
+The tables are the architecture: an import that they do not name is an error, also inside functions
+and below ``TYPE_CHECKING``. Whoever needs a new edge adds it here, and thereby shows it.
+"""
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+import sys
+from typing import NamedTuple
+from xml.etree import ElementTree
+
+import pytest
+
+CHECKOUT = Path(__file__).resolve().parent.parent
+PACKAGE = CHECKOUT / 'drive_can_bridge'
+
+#: Layer: the layers that it may import, besides itself. '' is the package's own __init__.
+#: ``configuration.model`` (plain data) is a layer of its own, below the checks that fill it;
+#: ``ros.demo`` is one above ros, because it joins both ends of the bus in one process.
+INTERNAL: dict[str, set[str]] = {
+    '': set(),
+    'resources': {''},
+    'process': {''},
+    'core': {'', 'configuration.model'},
+    'configuration.model': {'', 'core'},
+    'protocols': {'', 'core', 'configuration.model'},
+    'configuration': {'', 'core', 'configuration.model', 'protocols', 'resources'},
+    'transport': {'', 'core', 'configuration.model'},
+    'exchange': {'', 'core', 'configuration.model', 'protocols', 'transport'},
+    'simulation': {
+        '', 'core', 'configuration.model', 'configuration', 'protocols', 'resources', 'transport'},
+    'ros': {
+        '', 'core', 'configuration.model', 'configuration', 'protocols', 'resources', 'transport',
+        'exchange', 'process'},
+    'ros.demo': {
+        '', 'core', 'configuration.model', 'configuration', 'protocols', 'resources', 'transport',
+        'exchange', 'process', 'simulation', 'ros'},
+    'cli': {
+        '', 'core', 'configuration.model', 'configuration', 'protocols', 'resources', 'transport',
+        'exchange', 'process', 'simulation', 'ros', 'ros.demo'},
+}
+
+ROS_PACKAGES = {
+    'builtin_interfaces', 'diagnostic_msgs', 'lifecycle_msgs', 'rcl_interfaces', 'rclpy',
+    'sensor_msgs', 'std_msgs', 'std_srvs',
+}
+
+#: Layer: what it may import from outside, besides the standard library.
+EXTERNAL: dict[str, set[str]] = {
+    'resources': {'ament_index_python'},
+    'configuration': {'jsonschema', 'yaml'},
+    'transport': {'can', 'serial'},
+    # yaml: only to tell which nodes a parameter file names when none of them is ours
+    'ros': {*ROS_PACKAGES, 'yaml'},
+    'ros.demo': {*ROS_PACKAGES, 'rich'},
+    'cli': {'rich'},
+}
+
+#: Layer: edges that may be used inside functions only, so that importing the layer stays cheap and
+#: works where the other side is missing.
+LAZY = {('cli', 'ros'), ('cli', 'ros.demo')}
+
+#: No clock, no thread, no log, no input or output in here: time and frames are arguments.
+SANS_IO = {'core', 'configuration.model', 'protocols'}
+IMPURE = {
+    'asyncio', 'concurrent', 'datetime', 'logging', 'multiprocessing', 'os', 'pathlib', 'queue',
+    'random', 'select', 'selectors', 'signal', 'socket', 'subprocess', 'threading', 'time',
+}
+
+
+class Import(NamedTuple):
+    """One import statement: what, where, and whether it stands inside a function."""
+
+    name: str
+    line: int
+    lazy: bool
+
+
+def layer_of(module: str) -> str:
+    """Return the layer of a module, given by its name below drive_can_bridge."""
+    parts = module.split('.')
+    nested = '.'.join(parts[:2])
+    return nested if nested in INTERNAL else parts[0]
+
+
+def module_name(path: Path) -> str:
+    """Return a module's name below drive_can_bridge."""
+    parts = list(path.relative_to(PACKAGE).with_suffix('').parts)
+    if parts[-1] == '__init__':
+        parts.pop()
+    return '.'.join(parts)
+
+
+def module_exists(name: str) -> bool:
+    """Tell whether a full name is a module, not something inside one."""
+    path = CHECKOUT.joinpath(*name.split('.'))
+    return path.with_suffix('.py').is_file() or (path / '__init__.py').is_file()
+
+
+def imports_of(path: Path) -> Iterator[Import]:
+    """Go through the imports of a file; names of modules are complete."""
+    package = ['drive_can_bridge', *path.relative_to(PACKAGE).parent.parts]
+    lazy_nodes: set[ast.AST] = set()
+    tree = ast.parse(path.read_text(encoding='utf-8'), str(path))
+    for node in ast.walk(tree):
+        if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
+            lazy_nodes.update(ast.walk(node))
+    for node in ast.walk(tree):
+        lazy = node in lazy_nodes
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                yield Import(alias.name, node.lineno, lazy)
+        elif isinstance(node, ast.ImportFrom):
+            base = node.module or ''
+            if node.level:
+                above = package[:len(package) - node.level + 1]
+                base = '.'.join([*above, base] if base else above)
+            for alias in node.names:
+                inner = f'{base}.{alias.name}'
+                yield Import(inner if module_exists(inner) else base, node.lineno, lazy)
+
+
+SOURCES = sorted(PACKAGE.rglob('*.py'))
+
+
+@pytest.fixture(params=SOURCES, ids=[path.relative_to(PACKAGE).as_posix() for path in SOURCES])
+def source(request: pytest.FixtureRequest) -> Path:
+    """Return each module of the package in turn."""
+    path: Path = request.param
+    return path
+
+
+def test_layer_is_known(source: Path) -> None:
+    assert layer_of(module_name(source)) in INTERNAL
+
+
+def test_imports_of_ours_are_allowed(source: Path) -> None:
+    layer = layer_of(module_name(source))
+    wrong = []
+    for found in imports_of(source):
+        top, _, rest = found.name.partition('.')
+        if top != PACKAGE.name:
+            continue
+        other = layer_of(rest)
+        if other != layer and other not in INTERNAL[layer]:
+            wrong.append(f'{source}:{found.line}: {layer} must not import {found.name}')
+        elif (layer, other) in LAZY and not found.lazy:
+            wrong.append(f'{source}:{found.line}: import {found.name} inside a function')
+    assert not wrong, '\n'.join(wrong)
+
+
+def test_imports_of_others_are_allowed(source: Path) -> None:
+    layer = layer_of(module_name(source))
+    allowed = EXTERNAL.get(layer, set())
+    wrong = []
+    for found in imports_of(source):
+        top = found.name.partition('.')[0]
+        if top == PACKAGE.name:
+            continue
+        if top in sys.stdlib_module_names:
+            if layer in SANS_IO and top in IMPURE:
+                wrong.append(f'{source}:{found.line}: {layer} is sans-IO: no {top}')
+        elif top not in allowed:
+            wrong.append(f'{source}:{found.line}: {layer} must not import {top}')
+    assert not wrong, '\n'.join(wrong)
+
+
+@pytest.mark.parametrize(
+    'source', [path for path in SOURCES if layer_of(module_name(path)) == 'simulation'],
+    ids=lambda path: path.name)
+def test_simulated_drives_share_no_session_with_the_bridge(source: Path) -> None:
+    # They share the codecs; sharing the conversation too, they would agree on its mistakes.
+    wrong = [
+        f'{source}:{found.line}: {found.name}' for found in imports_of(source)
+        if found.name.startswith(PACKAGE.name) and any(
+            part == 'session' or part.endswith('_session') for part in found.name.split('.'))
+    ]
+    assert not wrong, '\n'.join(wrong)
+
+
+def test_tables_have_no_cycle() -> None:
+    # core and configuration.model are one foundation: the session reads a drive's configuration
+    foundation = {'core', 'configuration.model'}
+    remaining = {
+        layer: {other for other in others if not {layer, other} <= foundation}
+        for layer, others in INTERNAL.items()}
+    while remaining:
+        free = {layer for layer, others in remaining.items() if not others & remaining.keys()}
+        assert free, f'cycle among {sorted(remaining)}'
+        remaining = {layer: others for layer, others in remaining.items() if layer not in free}
+
+
+def test_ros_packages_are_declared() -> None:
+    manifest = ElementTree.parse(CHECKOUT / 'package.xml').getroot()
+    declared = {node.text for node in manifest.iter('exec_depend')}
+    assert ROS_PACKAGES <= declared

@@ -1,0 +1,195 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""What is installed: versions agree, and nothing is left behind."""
+
+import ast
+import importlib.util
+from pathlib import Path
+import re
+import runpy
+from types import ModuleType
+from typing import Any
+from unittest import mock
+from xml.etree import ElementTree
+
+import pytest
+
+import drive_can_bridge
+from drive_can_bridge import resources
+
+CHECKOUT = Path(__file__).resolve().parent.parent
+PACKAGE = CHECKOUT / 'drive_can_bridge'
+
+#: the name of a distribution for pip, and the rosdep key of the same thing
+ROSDEP_KEYS = {
+    'python-can': 'python3-can',
+    'PyYAML': 'python3-yaml',
+    'jsonschema': 'python3-jsonschema',
+    'rich': 'python3-rich',
+    'pyserial': 'python3-serial',
+}
+
+
+@pytest.fixture
+def arguments(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    """Return what setup.py tells setuptools."""
+    monkeypatch.chdir(CHECKOUT)
+    with mock.patch('setuptools.setup') as setup:
+        runpy.run_path(str(CHECKOUT / 'setup.py'))
+    setup.assert_called_once()
+    return dict(setup.call_args.kwargs)
+
+
+@pytest.fixture
+def manifest() -> ElementTree.Element:
+    """Return the root of package.xml."""
+    return ElementTree.parse(CHECKOUT / 'package.xml').getroot()
+
+
+def files_below(directory: Path) -> list[Path]:
+    """List what somebody wrote below a directory, leaving out what tools leave there."""
+    return [
+        path for path in sorted(directory.rglob('*'))
+        if path.is_file() and not any(
+            part == '__pycache__' or part.startswith('.')
+            for part in path.relative_to(directory).parts)
+    ]
+
+
+def test_versions_agree(arguments: dict[str, Any], manifest: ElementTree.Element) -> None:
+    assert arguments['version'] == drive_can_bridge.__version__
+    assert manifest.findtext('version') == drive_can_bridge.__version__
+
+
+def test_changelog_tells_of_this_version() -> None:
+    changelog = (CHECKOUT / 'CHANGELOG.rst').read_text(encoding='utf-8')
+    sections = re.findall(r'^(Forthcoming|\d+\.\d+\.\d+) ?.*\n-+$', changelog, re.MULTILINE)
+    assert sections
+    assert sections[0] in ('Forthcoming', drive_can_bridge.__version__)
+
+
+def test_name_and_license_agree(
+    arguments: dict[str, Any], manifest: ElementTree.Element,
+) -> None:
+    assert arguments['name'] == manifest.findtext('name') == PACKAGE.name
+    assert arguments['license'] == manifest.findtext('license')
+    assert (CHECKOUT / 'resource' / PACKAGE.name).is_file()
+
+
+def test_every_folder_with_python_is_an_installed_package(arguments: dict[str, Any]) -> None:
+    folders = {path.parent for path in files_below(PACKAGE) if path.suffix == '.py'}
+    without_init = [folder for folder in folders if not (folder / '__init__.py').is_file()]
+    assert not without_init
+    names = {'.'.join(folder.relative_to(CHECKOUT).parts) for folder in folders}
+    assert set(arguments['packages']) == names
+
+
+def test_every_other_file_in_the_package_is_installed(arguments: dict[str, Any]) -> None:
+    installed: set[Path] = set()
+    for package, patterns in arguments['package_data'].items():
+        for pattern in patterns:
+            installed.update(CHECKOUT.joinpath(*package.split('.')).glob(pattern))
+    others = {path for path in files_below(PACKAGE) if path.suffix != '.py'}
+    assert others <= installed
+
+
+@pytest.mark.parametrize('top', ['config', 'launch'])
+def test_every_shared_file_is_installed(arguments: dict[str, Any], top: str) -> None:
+    installed = {
+        (target, source) for target, sources in arguments['data_files'] for source in sources}
+    for path in files_below(CHECKOUT / top):
+        source = path.relative_to(CHECKOUT)
+        target = f'share/{PACKAGE.name}/{source.parent.as_posix()}'
+        assert (target, source.as_posix()) in installed
+
+
+def test_ros_finds_the_package(arguments: dict[str, Any]) -> None:
+    targets = dict(arguments['data_files'])
+    marker = f'resource/{PACKAGE.name}'
+    assert targets['share/ament_index/resource_index/packages'] == [marker]
+    assert 'package.xml' in targets[f'share/{PACKAGE.name}']
+
+
+def test_executables_have_a_function_behind_them(arguments: dict[str, Any]) -> None:
+    scripts = arguments['entry_points']['console_scripts']
+    assert {script.split(' = ')[0] for script in scripts} == {'drive_can_bridge', 'drive_can'}
+    for script in scripts:
+        module, function = script.split(' = ')[1].split(':')
+        source = CHECKOUT.joinpath(*module.split('.')).with_suffix('.py')
+        tree = ast.parse(source.read_text(encoding='utf-8'))
+        names = [node.name for node in tree.body if isinstance(node, ast.FunctionDef)]
+        assert function in names
+
+
+def test_pip_and_rosdep_bring_the_same(
+    arguments: dict[str, Any], manifest: ElementTree.Element,
+) -> None:
+    by_pip = {re.split('[<>=~!]', entry)[0] for entry in arguments['install_requires']}
+    by_rosdep = {
+        node.text for node in manifest.iter('exec_depend')
+        if (node.text or '').startswith('python3-')}
+    assert {ROSDEP_KEYS[name] for name in by_pip} == by_rosdep
+
+
+def test_drive_can_installs_without_ros(arguments: dict[str, Any]) -> None:
+    needed = arguments['install_requires']
+    assert not [entry for entry in needed if entry.startswith(('ros', 'rcl'))]
+    assert any(entry.startswith('ros-rclpy') for entry in arguments['extras_require']['ros'])
+
+
+def test_sources_carry_their_licence() -> None:
+    bare = []
+    for top in ('drive_can_bridge', 'launch', 'test', 'bench', '.ci'):
+        for path in files_below(CHECKOUT / top):
+            if path.suffix != '.py' or path.stat().st_size == 0:
+                continue
+            head = path.read_text(encoding='utf-8').splitlines()[:2]
+            if not any('Apache License, Version 2.0' in line for line in head):
+                bare.append(path.relative_to(CHECKOUT).as_posix())
+    assert not bare
+
+
+def installed_copy_of_resources(prefix: Path) -> ModuleType:
+    """Load the module out of a prefix as pip or colcon would fill it."""
+    site_packages = prefix / 'lib' / 'python3.99' / 'site-packages' / PACKAGE.name
+    site_packages.mkdir(parents=True)
+    copy = site_packages / 'resources.py'
+    copy.write_bytes((PACKAGE / 'resources.py').read_bytes())
+    spec = importlib.util.spec_from_file_location('resources_of_a_prefix', copy)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_a_checkout_finds_its_own_files() -> None:
+    assert resources.share_directory() == CHECKOUT
+    assert resources.profiles_directory() == CHECKOUT / 'config' / 'profiles'
+    for path in (CHECKOUT / 'config').glob('*.yaml'):
+        assert resources.config_file(path.name) == path
+
+
+def test_an_installed_copy_finds_the_files_of_its_prefix(tmp_path: Path) -> None:
+    module = installed_copy_of_resources(tmp_path)
+    share = tmp_path / 'share' / PACKAGE.name
+    (share / 'config' / 'profiles').mkdir(parents=True)
+    assert module.share_directory() == share
+
+
+def test_a_copy_without_files_says_where_it_looked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    module = installed_copy_of_resources(tmp_path)
+    monkeypatch.setattr(module, '_indexed_share_directory', lambda: None)
+    monkeypatch.setattr('sys.prefix', str(tmp_path / 'elsewhere'))
+    with pytest.raises(FileNotFoundError, match='elsewhere'):
+        module.share_directory()
+
+
+def test_an_unknown_file_is_answered_with_the_known_ones(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    (tmp_path / 'config').mkdir()
+    (tmp_path / 'config' / 'known.yaml').touch()
+    monkeypatch.setattr(resources, 'share_directory', lambda: tmp_path)
+    with pytest.raises(FileNotFoundError, match=r'no other\.yaml in .*, which has: known\.yaml'):
+        resources.config_file('other.yaml')
