@@ -13,9 +13,9 @@ import sys
 from typing import Any
 
 from drive_can_bridge.core.errors import DriveCanError, ValueRefused
-from drive_can_bridge.resources import config_file
 from drive_can_bridge.process import environment
 from drive_can_bridge.process.signals import SignalWatcher
+from drive_can_bridge.resources import config_file
 from drive_can_bridge.simulation.faults import Fault, parse_fault, USAGE
 
 WRONG_USAGE = 2

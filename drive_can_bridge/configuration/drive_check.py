@@ -79,7 +79,7 @@ class DriveChecker:
                  if problem.file == self._tree.file and problem.key.count('.') > 1]
         return not any(str(key) in keys for key in [*own, *noted])
 
-    # -- parts ----------------------------------------------------------------------------------
+    # -- parts ------------------------------------------------------------------------------------
 
     def _note(self, keys: tuple[str, ...], message: str, *, at: Path | None = None) -> None:
         self.problems.append(self._tree.problem((*self._path, *keys), message, at=at))

@@ -207,7 +207,7 @@ class ProfileControl(ControlMachine):
         self._completed: list[ControlCompleted] = []
         self._notes: list[str] = []
 
-    # -- what the session and diagnostics look at -----------------------------------------------
+    # -- what the session and diagnostics look at -------------------------------------------------
 
     @property
     def word(self) -> int:
@@ -256,7 +256,7 @@ class ProfileControl(ControlMachine):
         notes, self._notes = self._notes, []
         return notes
 
-    # -- inputs ---------------------------------------------------------------------------------
+    # -- inputs -----------------------------------------------------------------------------------
 
     def request(self, action: ControlAction, now: float) -> ControlTicket:
         self.handle_timer(now)
@@ -315,7 +315,7 @@ class ProfileControl(ControlMachine):
         if not self._fault:         # a known fault stands until the drive says otherwise
             self._fault = None
 
-    # -- rules ----------------------------------------------------------------------------------
+    # -- rules ------------------------------------------------------------------------------------
 
     def _refusal(self, action: ControlAction) -> str | None:
         """Return why a request cannot be taken, in words."""
@@ -401,7 +401,7 @@ class ProfileControl(ControlMachine):
             return self._sent
         return self._answer is not None and pattern.matches(self._answer) is wanted
 
-    # -- effects --------------------------------------------------------------------------------
+    # -- effects ----------------------------------------------------------------------------------
 
     def _send(self, action: ControlAction) -> None:
         """Make the word of this name the current one."""
@@ -428,7 +428,7 @@ class ProfileControl(ControlMachine):
     def _complete(self, ticket: ControlTicket, success: bool, message: str) -> None:
         self._completed.append(ControlCompleted(ticket, success, message))
 
-    # -- words ----------------------------------------------------------------------------------
+    # -- words ------------------------------------------------------------------------------------
 
     @property
     def _status_text(self) -> str:

@@ -151,7 +151,7 @@ class Parameter:
         """Raw integer that is sent while there is no fresh command."""
         return 0 if self.neutral is None else self.raw_from_value(self.neutral)
 
-    # -- raw <-> word ---------------------------------------------------------------------------
+    # -- raw <-> word -----------------------------------------------------------------------------
 
     def raw_from_word(self, word: int) -> int:
         """Read an unsigned wire word by this parameter's type."""
@@ -163,7 +163,7 @@ class Parameter:
         """Return the unsigned wire word of a raw integer."""
         return raw & (1 << self.type.bits) - 1
 
-    # -- raw <-> value --------------------------------------------------------------------------
+    # -- raw <-> value ----------------------------------------------------------------------------
 
     def value_from_raw(self, raw: int) -> Value:
         """Return the physical value of a raw integer."""

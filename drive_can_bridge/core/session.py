@@ -78,7 +78,7 @@ class Session(ABC):
         self._events: list[Event] = []
         self._cyclic_names = {parameter.name for parameter in drive.cyclic_request}
 
-    # -- life cycle -----------------------------------------------------------------------------
+    # -- life cycle -------------------------------------------------------------------------------
 
     @abstractmethod
     def activate(self, now: float) -> None:
@@ -95,7 +95,7 @@ class Session(ABC):
 
     @abstractmethod
     def bus_up(self, now: float) -> None:
-        """The bus was opened."""
+        """Begin to use the bus: it was opened."""
 
     @abstractmethod
     def bus_down(self, now: float, reason: str) -> None:
@@ -105,11 +105,16 @@ class Session(ABC):
     def time_lost(self, now: float) -> None:
         """Handle a process that stood still: nothing stale goes out, setpoints want re-arming."""
 
-    # -- traffic --------------------------------------------------------------------------------
+    # -- traffic ----------------------------------------------------------------------------------
 
     @abstractmethod
-    def receive_frame(self, frame: Frame, now: float) -> None:
-        """Take a frame that one of the drive's routes matched."""
+    def receive_frame(self, frame: Frame, now: float, age: float = 0.0) -> None:
+        """
+        Take a frame that one of the drive's routes matched.
+
+        :param age: s since it was received. That counts for stamps and latencies only: whatever
+            is sent in answer to it leaves now.
+        """
 
     @abstractmethod
     def handle_timer(self, now: float) -> None:
@@ -133,7 +138,7 @@ class Session(ABC):
             self._events = []
         return events
 
-    # -- users ----------------------------------------------------------------------------------
+    # -- users ------------------------------------------------------------------------------------
 
     def command(self, index: int, value: Value, now: float) -> CommandOutcome:
         """
@@ -203,7 +208,7 @@ class Session(ABC):
         if parameter_timeout is not None:
             self.drive = replace(self.drive, parameter_timeout=parameter_timeout)
 
-    # -- control --------------------------------------------------------------------------------
+    # -- control ----------------------------------------------------------------------------------
 
     def request_control(self, action: ControlAction, now: float) -> ControlTicket | str:
         """
@@ -230,7 +235,7 @@ class Session(ABC):
     def _control_changed(self, now: float) -> None:  # noqa: B027  optional hook
         """React to a control word that may have changed."""
 
-    # -- state ----------------------------------------------------------------------------------
+    # -- state ------------------------------------------------------------------------------------
 
     @property
     def state(self) -> DriveState:

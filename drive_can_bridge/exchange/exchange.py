@@ -63,13 +63,13 @@ class BusListener(Protocol):
     """What an exchange tells about its bus; from the reader or timer thread, lock not held."""
 
     def bus_opened(self, bus: str) -> None:
-        """The bus is there (again)."""
+        """Take note that the bus is there (again)."""
 
     def bus_lost(self, bus: str, reason: str) -> None:
-        """The bus is gone, or could not be opened."""
+        """Take note that the bus is gone, or could not be opened."""
 
     def fatal(self, bus: str, reason: str, *, misconfigured: bool) -> None:
-        """The exchange cannot go on."""
+        """End the bridge: the exchange cannot go on."""
 
 
 class Member:
@@ -117,7 +117,7 @@ class BusExchange:
         self.received_bits = 0
         self.sent_bits = 0
 
-    # -- life cycle -----------------------------------------------------------------------------
+    # -- life cycle -------------------------------------------------------------------------------
 
     def attach(self, session: Session, listener: DriveListener) -> None:
         """Say who listens to a session. Once for each, before ``open``."""
@@ -228,7 +228,7 @@ class BusExchange:
                     self._wake_at = self._pass()
                 self._wake.wait(max(0.0, self._wake_at - self._clock()))
                 self._wake.clear()
-        except Exception as error:  # the outermost loop of a thread: no failure is silent
+        except Exception as error:  # noqa: BLE001  the outermost loop of a thread: no failure is silent
             self._fail(f'{type(error).__name__}: {error}')
 
     def _pass(self) -> float:
@@ -311,7 +311,7 @@ class BusExchange:
         self.bus_state, self.bus_reason = 'failed', reason
         self._listener.fatal(self.bus.name, f'internal error: {reason}', misconfigured=False)
 
-    # -- from session to the outside ----------------------------------------------------------------
+    # -- from session to the outside --------------------------------------------------------------
 
     def _pump(self, member: Member, now: float) -> None:
         """Send what a session wants sent, and tell its listener what happened."""

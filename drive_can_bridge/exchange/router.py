@@ -23,13 +23,7 @@ class Router(Generic[Owner]):
     def add(self, routes: Iterable[Route], owner: Owner) -> None:
         """Send the frames of these routes to ``owner``."""
         for route in routes:
-            for extended, mask, table in self._tables:
-                if extended == route.extended and mask == route.mask:
-                    break
-            else:
-                table = {}
-                self._tables.append((route.extended, route.mask, table))
-            table[route.identifier & route.mask] = owner
+            self._table(route.extended, route.mask)[route.identifier & route.mask] = owner
 
     def find(self, frame: Frame) -> Owner | None:
         """Return the owner of a frame, or None."""
@@ -40,3 +34,11 @@ class Router(Generic[Owner]):
                 if owner is not None:
                     return owner
         return None
+
+    def _table(self, extended: bool, mask: int) -> dict[int, Owner]:
+        for known_extended, known_mask, table in self._tables:
+            if (known_extended, known_mask) == (extended, mask):
+                return table
+        table = {}
+        self._tables.append((extended, mask, table))
+        return table

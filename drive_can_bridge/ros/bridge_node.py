@@ -133,7 +133,7 @@ class BridgeNode(LifecycleNode):
             elif key in ('command_timeout', 'parameter_timeout'):
                 drive.exchange.reconfigure(drive.session, **{key: float(parameter.value)})
 
-    # -- transitions --------------------------------------------------------------------------------
+    # -- transitions ------------------------------------------------------------------------------
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Check the parameters, open the buses, make the drive nodes."""
@@ -170,7 +170,7 @@ class BridgeNode(LifecycleNode):
             for problem in error.problems:
                 self.get_logger().error(problem)
             return FAILURE
-        except Exception as error:
+        except Exception as error:  # noqa: BLE001  see above
             self.get_logger().error(f'{name} failed: {type(error).__name__}: {error}')
             return TransitionCallbackReturn.ERROR
         return SUCCESS
@@ -274,7 +274,7 @@ class BridgeNode(LifecycleNode):
         if staying:
             self._mailbox.post(self._dismiss)
 
-    # -- from the outside ---------------------------------------------------------------------------
+    # -- from the outside -------------------------------------------------------------------------
 
     def start(self) -> bool:
         """Configure and activate; False when the configuration is wrong (it was logged)."""
@@ -327,7 +327,7 @@ class BridgeNode(LifecycleNode):
 
         service.callback = guarded
 
-    # -- diagnostics ----------------------------------------------------------------------------------
+    # -- diagnostics ------------------------------------------------------------------------------
 
     @property
     def diagnostics(self) -> Diagnostics | None:
@@ -344,7 +344,7 @@ class BridgeNode(LifecycleNode):
         if self._diagnostics is not None:
             self._diagnostics.publish(steady_now())
 
-    # -- from the exchanges (BusListener) ---------------------------------------------------------------
+    # -- from the exchanges (BusListener) ---------------------------------------------------------
 
     def bus_opened(self, bus: str) -> None:
         """Log it."""

@@ -96,7 +96,7 @@ class CommandIntake:
             except InvalidHandle:
                 return
 
-    # -- inside ---------------------------------------------------------------------------------
+    # -- inside -----------------------------------------------------------------------------------
 
     def _subscribe(self, node: Node, message_type: type, topic: str,
                    take: Callable[[Any, float], None]) -> None:

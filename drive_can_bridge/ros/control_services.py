@@ -1,5 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""``~/enable``, ``~/reset_fault`` and ``~/quick_stop`` of a drive whose profile has ``control``."""
+"""``~/enable``, ``~/reset_fault``, ``~/quick_stop`` of a drive whose profile has ``control``."""
 
 from collections.abc import Awaitable, Callable
 from typing import Any

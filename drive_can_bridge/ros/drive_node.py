@@ -134,7 +134,7 @@ class DriveNode:
     def _warn_now(self, text: str) -> None:
         self._logger.warning(f'{self.name}: {text}')
 
-    # -- from the exchange (DriveListener): the bus lock is held -----------------------------------
+    # -- from the exchange (DriveListener): the bus lock is held ----------------------------------
 
     def take_commands(self, now: float) -> None:
         """Hand the newest commands to the session."""
@@ -201,7 +201,7 @@ class DriveNode:
         if self.node.context.ok():
             self.warn('publish', f'cannot publish: {error}')
 
-    # -- from the executor: users -------------------------------------------------------------------
+    # -- from the executor: users -----------------------------------------------------------------
 
     async def _submit(self, request: Request) -> tuple[Outcome, ...]:
         future = Future(executor=self._executor)

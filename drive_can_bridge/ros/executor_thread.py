@@ -48,7 +48,7 @@ class ExecutorThread:
                 return
             except InvalidHandle:
                 continue  # what was to be served is gone: a drive's node, after cleanup
-            except Exception as error:  # the outermost loop of a thread: no failure is silent
+            except Exception as error:  # noqa: BLE001  outermost loop: no failure is silent
                 if self._stopping.is_set():
                     return
                 self._report(f'internal error in a callback: {type(error).__name__}: {error}')

@@ -30,7 +30,7 @@ from drive_can_bridge.core.requests import (
     BRIDGE_INACTIVE, Failure, Outcome, ReadRequest, ReadValue, Request, WriteRequest, Written,
 )
 from drive_can_bridge.ros.values import (
-    descriptor, parameter_value, PARAMETER_TYPES, value_of,
+    descriptor, PARAMETER_TYPES, parameter_value, value_of,
 )
 
 #: separates the levels of a parameter name (rcl_interfaces/srv/ListParameters)
@@ -75,7 +75,7 @@ class ParameterServices:
         self._events = node.create_publisher(ParameterEvent, '/parameter_events',
                                              qos_profile_parameter_events)
 
-    # -- reading --------------------------------------------------------------------------------
+    # -- reading ----------------------------------------------------------------------------------
 
     async def _get(self, request: Any, response: Any) -> Any:
         found = [self._directory.find(name) for name in request.names]
@@ -121,7 +121,7 @@ class ParameterServices:
             else PARAMETER_TYPES[parameter.kind] for parameter in found]
         return response
 
-    # -- writing --------------------------------------------------------------------------------
+    # -- writing ----------------------------------------------------------------------------------
 
     async def _set(self, request: Any, response: Any) -> Any:
         results: list[SetParametersResult] = [

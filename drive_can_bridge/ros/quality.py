@@ -8,12 +8,12 @@ from rclpy.qos_overriding_options import QoSOverridingOptions
 
 
 def state_quality() -> QoSProfile:
-    """Values once per exchange: reliable, a short history."""
+    """Return what suits values once per exchange: reliable, a short history."""
     return QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 
 
 def latched_quality() -> QoSProfile:
-    """Published on change; late joiners get the last one."""
+    """Return what suits values published on change: late joiners get the last one."""
     return QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE,
                       durability=DurabilityPolicy.TRANSIENT_LOCAL)
 

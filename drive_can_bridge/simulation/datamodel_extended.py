@@ -43,7 +43,7 @@ class SimulatedDataModelDrive(SimulatedDrive):
         """EEPROM cells written."""
         return self.table.eeprom_writes
 
-    # -- telegrams ------------------------------------------------------------------------------
+    # -- telegrams --------------------------------------------------------------------------------
 
     def _receive(self, frame: Frame, now: float) -> None:
         if (not frame.extended
@@ -80,7 +80,7 @@ class SimulatedDataModelDrive(SimulatedDrive):
         data = extended.pack_words(words)[:used] + JUNK[used:]
         return Frame(request_identifier | extended.DIR, data, True)
 
-    # -- by hand --------------------------------------------------------------------------------
+    # -- by hand ----------------------------------------------------------------------------------
 
     def value(self, name: str, now: float | None = None) -> Value:
         """Return a register; map entries by their raw names, ``p122``."""

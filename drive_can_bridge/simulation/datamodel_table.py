@@ -55,7 +55,7 @@ class DataModelTable:
             self._preset(self._response_numbers, configuration.cyclic_response)
         self._maps_changed()
 
-    # -- maps -----------------------------------------------------------------------------------
+    # -- maps -------------------------------------------------------------------------------------
 
     def clear_maps(self) -> None:
         """Forget both maps."""
@@ -66,7 +66,7 @@ class DataModelTable:
         self.request_map = effective([self._map[number] for number in self._request_numbers])
         self.response_map = effective([self._map[number] for number in self._response_numbers])
 
-    # -- access ---------------------------------------------------------------------------------
+    # -- access -----------------------------------------------------------------------------------
 
     def read(self, number: int, count: int, now: float) -> tuple[int, ...] | None:
         """Read parameters; None where the drive does not answer."""
@@ -125,7 +125,7 @@ class DataModelTable:
             return None
         return self._plant.raw(parameter.name) & 0xFFFF
 
-    # -- raw names ------------------------------------------------------------------------------
+    # -- raw names --------------------------------------------------------------------------------
 
     def name_of(self, raw_name: str) -> str | None:
         """Return the name for ``p<number>``: the profile's, itself for a map entry, or None."""
@@ -153,7 +153,7 @@ class DataModelTable:
         self._map[int(raw_name[1:]) + self._offset] = word
         self._maps_changed()
 
-    # -- inside ---------------------------------------------------------------------------------
+    # -- inside -----------------------------------------------------------------------------------
 
     def _preset(self, numbers: Sequence[int], parameters: Sequence[Parameter]) -> None:
         entries = padded([(p.number or 0) + self._offset for p in parameters])

@@ -57,7 +57,7 @@ class SimulatedDrive(ABC):
         self._stuck: dict[str, Fault] = {}
         self._answer_faults = AnswerFaults(self._foreign_frames)
 
-    # -- input and output -----------------------------------------------------------------------
+    # -- input and output -------------------------------------------------------------------------
 
     def receive_frame(self, frame: Frame, now: float) -> None:
         """Take a frame from the bus. Any frame; what is not for this drive is ignored."""
@@ -88,7 +88,7 @@ class SimulatedDrive(ABC):
         """There are frames or notices to fetch."""
         return bool(self._outbox or self._notices)
 
-    # -- by hand, at the drive ------------------------------------------------------------------
+    # -- by hand, at the drive --------------------------------------------------------------------
 
     def value(self, name: str, now: float | None = None) -> Value:
         """
@@ -166,7 +166,7 @@ class SimulatedDrive(ABC):
             texts.append('off')
         return ', '.join(texts) or 'ok'
 
-    # -- for the families -----------------------------------------------------------------------
+    # -- for the families -------------------------------------------------------------------------
 
     @abstractmethod
     def _receive(self, frame: Frame, now: float) -> None:
@@ -214,7 +214,7 @@ class SimulatedDrive(ABC):
             self._notices.append(f'{self.name}: violation: {rule}')
         self.violations[rule] += 1
 
-    # -- inside ---------------------------------------------------------------------------------
+    # -- inside -----------------------------------------------------------------------------------
 
     def _restart(self, now: float, boot: float, *, forget: bool) -> None:
         self._drop_answers()

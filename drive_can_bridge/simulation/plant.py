@@ -121,7 +121,7 @@ class Plant:
         return (parameter.name in self.axes.setpoints or parameter.name in self._volatile
                 or parameter.name == self._control_name)
 
-    # -- inside ---------------------------------------------------------------------------------
+    # -- inside -----------------------------------------------------------------------------------
 
     def _store(self, name: str, raw: int) -> None:
         self._raw[name] = raw

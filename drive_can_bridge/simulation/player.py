@@ -92,7 +92,7 @@ class BusPlayer:
             self._port.close()
         self._port = None
 
-    # -- thread ---------------------------------------------------------------------------------
+    # -- thread -----------------------------------------------------------------------------------
 
     def _run(self) -> None:
         try:
@@ -168,7 +168,7 @@ class BusPlayer:
                 if any(route.matches(frame) for route in drive.routes(drive.configuration)))
         return found
 
-    # -- the bus --------------------------------------------------------------------------------
+    # -- the bus ----------------------------------------------------------------------------------
 
     def _open(self) -> Port | None:
         try:

@@ -75,7 +75,7 @@ class SlcanAdapter:
         stamp = f'{int(now * 1000.0) % _STAMP_WRAP:04X}' if self._stamps else ''
         return f'{head}{len(frame.data)}{frame.data.hex().upper()}{stamp}\r'.encode()
 
-    # -- inside ---------------------------------------------------------------------------------
+    # -- inside -----------------------------------------------------------------------------------
 
     def _commands(self, data: bytes) -> list[str]:
         """Cut the stream into commands; what is too long to be one is skipped."""

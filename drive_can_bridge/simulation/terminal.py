@@ -135,7 +135,7 @@ class SlcanTerminal:
         os.close(self._master)
         os.close(self._slave)
 
-    # -- inside ---------------------------------------------------------------------------------
+    # -- inside -----------------------------------------------------------------------------------
 
     def _check_open(self) -> None:
         if self._closed:

@@ -73,7 +73,7 @@ def faulted(table: ControlTable = FULL) -> ProfileControl:
     return control
 
 
-# -- the start ----------------------------------------------------------------------------------
+# -- the start ------------------------------------------------------------------------------------
 
 def test_starts_with_disable_and_knows_nothing() -> None:
     control = machine()
@@ -131,7 +131,7 @@ def test_state_in_words(table: ControlTable, raw: int | None, state: str) -> Non
     assert control.fault == (state == 'fault')
 
 
-# -- enable -------------------------------------------------------------------------------------
+# -- enable ---------------------------------------------------------------------------------------
 
 def test_enable_waits_for_ready_then_for_enabled() -> None:
     control = machine()
@@ -355,7 +355,7 @@ def test_second_enable_joins_the_first() -> None:
     assert [done.message for done in completed] == ['enabled', 'enabled']
 
 
-# -- faults and drives that drop out ------------------------------------------------------------
+# -- faults and drives that drop out --------------------------------------------------------------
 
 @pytest.mark.parametrize('before', [(), ((READY, 0.02),)])
 def test_fault_while_enabling_ends_it(before: tuple[tuple[int, float], ...]) -> None:
@@ -424,7 +424,7 @@ def test_dropping_out_needs_a_condition_for_enabled() -> None:
     assert control.word == RUN
 
 
-# -- disable ------------------------------------------------------------------------------------
+# -- disable --------------------------------------------------------------------------------------
 
 def test_disable_waits_until_not_enabled() -> None:
     control = enabled()
@@ -505,7 +505,7 @@ def test_disable_wins_over_a_fault_reset() -> None:
         (RESET_FAULT, False, 'replaced by disable'), (DISABLE, True, 'fault')]
 
 
-# -- quick stop ---------------------------------------------------------------------------------
+# -- quick stop -----------------------------------------------------------------------------------
 
 def test_quick_stop_brakes_until_not_enabled_then_disables() -> None:
     control = enabled()
@@ -711,7 +711,7 @@ def test_fault_reset_with_nothing_to_reset_does_not_disturb_a_stop() -> None:
         RESET_FAULT, False, 'quick_stop under way: try reset_fault again when it has ended')]
 
 
-# -- fault reset --------------------------------------------------------------------------------
+# -- fault reset ----------------------------------------------------------------------------------
 
 def test_reset_pulses_until_the_fault_is_gone_then_disables() -> None:
     control = faulted()
@@ -857,7 +857,7 @@ def test_enable_replaces_a_reset_where_no_fault_is_known() -> None:
     assert control.word == RUN
 
 
-# -- withdraw -----------------------------------------------------------------------------------
+# -- withdraw -------------------------------------------------------------------------------------
 
 def test_withdraw_puts_an_enabled_drive_back() -> None:
     control = enabled()
@@ -937,7 +937,7 @@ def test_withdraw_ends_the_braking_of_a_drive_that_does_not_report() -> None:
     assert control.take_completed() == []
 
 
-# -- whatever happens ---------------------------------------------------------------------------
+# -- whatever happens -----------------------------------------------------------------------------
 
 class AnyConversation(RuleBasedStateMachine):
     """Requests, words, statuses and time in any order, held against the rules of safety."""

@@ -11,7 +11,7 @@ import pytest
 
 from drive_can_bridge.core.directory import ParameterDirectory
 from drive_can_bridge.core.errors import ValueRefused
-from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.parameters import Access, Parameter, Storage
 from drive_can_bridge.protocols.families import FAMILIES
 
 
@@ -42,18 +42,19 @@ def test_raw_name_of_a_listed_parameter_obeys_its_rules() -> None:
     assert names.twins(RAMP) == [RAMP]
 
 
-@pytest.mark.parametrize('first, second, access, storage', [
-    (dict(access=RO, storage=RAM), dict(access=RW, storage=EEPROM), RO, EEPROM),
-    (dict(access=RW, storage=EEPROM), dict(access=RO, storage=RAM), RO, EEPROM),
-    (dict(access=RW, storage=RAM), dict(access=WO, storage=None), WO, None),
-    (dict(access=WO, storage=None), dict(access=RW, storage=RAM), WO, None),
-    (dict(access=RW, storage=RAM), dict(access=RW, storage=RAM), RW, RAM),
+@pytest.mark.parametrize('first, second, wanted', [
+    ((RO, RAM), (RW, EEPROM), (RO, EEPROM)), ((RW, EEPROM), (RO, RAM), (RO, EEPROM)),
+    ((RW, RAM), (WO, None), (WO, None)), ((WO, None), (RW, RAM), (WO, None)),
+    ((RW, RAM), (RW, RAM), (RW, RAM)),
 ])
-def test_two_listed_parameters_with_one_number(first: dict[str, object], second: dict[str, object],
-                                               access: object, storage: object) -> None:
-    raw = directory(parameter('a', 70, **first), parameter('b', 70, **second)).find('p70')
+def test_two_listed_parameters_with_one_number(
+        first: tuple[Access, Storage | None], second: tuple[Access, Storage | None],
+        wanted: tuple[Access, Storage | None]) -> None:
+    raw = directory(*(
+        parameter(name, 70, access=access, storage=storage)
+        for name, (access, storage) in (('a', first), ('b', second)))).find('p70')
     assert raw is not None
-    assert (raw.access, raw.storage) == (access, storage)
+    assert (raw.access, raw.storage) == wanted
 
 
 def test_unknown_names_get_a_hint() -> None:

@@ -14,7 +14,8 @@ from drive_can_bridge.core.parameters import Parameter, ParameterType, ValueKind
 
 
 @pytest.mark.parametrize('entry, word, raw, value', [
-    (SPEED, 0xFA24, -1500, -150.0), (SPEED, 0x7FFF, 32767, 3276.7), (SPEED, 0x8000, -32768, -3276.8),
+    (SPEED, 0xFA24, -1500, -150.0), (SPEED, 0x7FFF, 32767, 3276.7),
+    (SPEED, 0x8000, -32768, -3276.8),
     (GAIN, 0xFFFF, 65535, 65535), (GAIN, 0, 0, 0), (FLAG, 1, 1, True), (FLAG, 0, 0, False),
     (FLAG, 2, 2, True),
     (parameter('wide', 1, type=INT32), 0xFFFFFFFF, -1, -1),

@@ -6,7 +6,7 @@ import math
 from builders import CONTROL, drive, GAIN, parameter, read, SPEED, STATUS, WORD
 import pytest
 
-from drive_can_bridge.core.control import ProfileControl
+from drive_can_bridge.core.control import ControlAction, ControlTicket, ProfileControl
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.events import RequestCompleted
 from drive_can_bridge.core.frame import Frame
@@ -145,7 +145,6 @@ def test_reconfigure_changes_what_is_named() -> None:
 
 
 def test_control_requests_need_a_drive() -> None:
-    from drive_can_bridge.core.control import ControlAction, ControlTicket
     made = session(control=CONTROL)
     made.active = made.bus_available = made.online = True
     assert isinstance(made.request_control(ControlAction.DISABLE, 1.0), ControlTicket)

@@ -15,8 +15,8 @@ from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.configuration.model import BridgeConfiguration, BusConfiguration
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Access, Parameter, ParameterType
-from drive_can_bridge.resources import config_file
 from drive_can_bridge.process import environment
+from drive_can_bridge.resources import config_file
 from drive_can_bridge.ros.demo.frame_log import FrameLog
 from drive_can_bridge.ros.demo.hints import Hint, hints
 from drive_can_bridge.ros.demo.log_lines import LogCapture, parse

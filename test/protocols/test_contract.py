@@ -57,7 +57,7 @@ class Partner(ABC):
     def setpoints(self, sent: str) -> list[int]:
         """Return the raw setpoints that a frame carries; none if it carries none."""
 
-    # -- the bus --------------------------------------------------------------------------------
+    # -- the bus ----------------------------------------------------------------------------------
 
     def deliver(self, sent: list[str]) -> None:
         for text in sent:
@@ -152,7 +152,7 @@ def _partner(make: type[Partner]) -> Partner:
     return partner
 
 
-# -- life cycle -------------------------------------------------------------------------------------
+# -- life cycle -----------------------------------------------------------------------------------
 
 
 def test_nothing_before_activation(make: type[Partner]) -> None:
@@ -259,7 +259,7 @@ def test_life_can_be_repeated(partner: Partner) -> None:
         assert partner.talk.session.online
 
 
-# -- setpoints --------------------------------------------------------------------------------------
+# -- setpoints ------------------------------------------------------------------------------------
 
 
 def test_only_neutral_until_armed(partner: Partner) -> None:
@@ -328,7 +328,7 @@ def test_bad_commands_are_refused(partner: Partner, value: float) -> None:
     assert partner.talk.session.statistics.commands_refused == 1
 
 
-# -- parameters -------------------------------------------------------------------------------------
+# -- parameters -----------------------------------------------------------------------------------
 
 
 def outcomes(partner: Partner) -> list[list[object]]:
@@ -417,7 +417,7 @@ def test_what_users_may_not_write(partner: Partner) -> None:
     assert [refusal(parameter) for parameter in (GAIN, RAMP, ORDER, LIMIT)] == [''] * 4
 
 
-# -- anything -----------------------------------------------------------------------------------------
+# -- anything -------------------------------------------------------------------------------------
 
 
 def test_frames_of_strangers_do_no_harm(partner: Partner) -> None:

@@ -88,7 +88,7 @@ class AcyclicControl:
             self._reading = True
             self._channel.run(self._read(self._status), self._received, now)
 
-    # -- inside ---------------------------------------------------------------------------------
+    # -- inside -----------------------------------------------------------------------------------
 
     def _write(self, parameter: Parameter, word: int) -> Write:
         return Write((parameter.number or 0) + self._offset, (word,),

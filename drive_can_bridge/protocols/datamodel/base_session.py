@@ -52,7 +52,7 @@ class DataModelSession(Session):
         acyclic = self._channel.take_frames()
         return frames + acyclic if acyclic else frames
 
-    # -- user requests --------------------------------------------------------------------------
+    # -- user requests ----------------------------------------------------------------------------
 
     def _enqueue(self, request: Request, now: float) -> None:
         self._users.add(request, now)
@@ -82,7 +82,7 @@ class DataModelSession(Session):
             return 'mapping parameter: not written while the bridge is active'
         return super().write_refusal(parameter)
 
-    # -- losing and rejecting -------------------------------------------------------------------
+    # -- losing and rejecting ---------------------------------------------------------------------
 
     def _lose(self, reason: str, now: float) -> None:
         """Make the drive offline, if it is not."""

@@ -148,7 +148,7 @@ class AcyclicChannel:
         self._held_until = -math.inf
         self._frames: list[Frame] = []
 
-    # -- queueing -------------------------------------------------------------------------------
+    # -- queueing ---------------------------------------------------------------------------------
 
     def run(self, procedure: Procedure, done: Done, now: float, lane: Lane = Lane.OWN) -> None:
         """Queue a procedure; ``done`` gets its return value."""
@@ -216,7 +216,7 @@ class AcyclicChannel:
         if self._busy:
             self.advance(now)
 
-    # -- input ----------------------------------------------------------------------------------
+    # -- input ------------------------------------------------------------------------------------
 
     def receive(self, words: Words, now: float) -> None:
         """Take the answer of the outstanding read (the caller has matched it)."""
@@ -282,7 +282,7 @@ class AcyclicChannel:
             self._frames = []
         return frames
 
-    # -- inside ---------------------------------------------------------------------------------
+    # -- inside -----------------------------------------------------------------------------------
 
     def _order(self) -> tuple[_Queue, _Queue, _Queue]:
         """Return the queues in the order in which they are served now."""

@@ -121,7 +121,7 @@ class DataModelExtended(Family):
         from drive_can_bridge.protocols.datamodel.extended_session import ExtendedSession
         return ExtendedSession(drive)
 
-    # -- parts of the check ---------------------------------------------------------------------
+    # -- parts of the check -----------------------------------------------------------------------
 
     def _check_maps(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         offset = drive.family_options['parameter_offset']

@@ -95,7 +95,7 @@ class ExtendedSession(DataModelSession):
         self._next_cycle = math.inf
         self._missed_in_row = 0
 
-    # -- life cycle -----------------------------------------------------------------------------
+    # -- life cycle -------------------------------------------------------------------------------
 
     def activate(self, now: float) -> None:
         self.active = True
@@ -174,7 +174,7 @@ class ExtendedSession(DataModelSession):
         if self._by_hand is not None:
             self._by_hand.stop()
 
-    # -- maps -----------------------------------------------------------------------------------
+    # -- maps -------------------------------------------------------------------------------------
 
     def _maps_judged(self, verdict: Verdict, text: str, now: float) -> None:
         if verdict is Verdict.AGREE:
@@ -198,7 +198,7 @@ class ExtendedSession(DataModelSession):
             self._advice = f'mapping differs: {event.text}'
         self._events.append(event)
 
-    # -- cyclic exchange ------------------------------------------------------------------------
+    # -- cyclic exchange --------------------------------------------------------------------------
 
     def _start_cycling(self, now: float) -> None:
         self._phase = Phase.CYCLIC
@@ -302,7 +302,7 @@ class ExtendedSession(DataModelSession):
         if self._by_hand is not None:
             self._by_hand.end()
 
-    # -- frames from the drive ------------------------------------------------------------------
+    # -- frames from the drive --------------------------------------------------------------------
 
     def receive_frame(self, frame: Frame, now: float, age: float = 0.0) -> None:
         if frame[0] == self._response_identifier:
@@ -385,7 +385,7 @@ class ExtendedSession(DataModelSession):
             self._by_hand.begin(now)
         self._control_changed(now)
 
-    # -- timer ----------------------------------------------------------------------------------
+    # -- timer ------------------------------------------------------------------------------------
 
     def handle_timer(self, now: float) -> None:
         if now >= self._next_cycle:
@@ -409,7 +409,7 @@ class ExtendedSession(DataModelSession):
             soonest = min(soonest, self._by_hand.look_at)
         return min(soonest, self.control.next_timer())
 
-    # -- control --------------------------------------------------------------------------------
+    # -- control ----------------------------------------------------------------------------------
 
     def _control_changed(self, now: float) -> None:
         """Tell what the machine noted; write a control word that has no slot, on change."""
@@ -422,7 +422,7 @@ class ExtendedSession(DataModelSession):
                 self.online or self._phase is Phase.CYCLIC):
             self._by_hand.update(now)
 
-    # -- state ----------------------------------------------------------------------------------
+    # -- state ------------------------------------------------------------------------------------
 
     @property
     def state(self) -> DriveState:

@@ -84,7 +84,7 @@ class MapSupervision:
         self.look_at = math.inf
         self._running = self._agreed = False
 
-    # -- inside ---------------------------------------------------------------------------------
+    # -- inside -----------------------------------------------------------------------------------
 
     def _read(self, maps: procedures.Maps | None) -> None:
         now = self._channel.now

@@ -20,13 +20,13 @@ from rclpy.signals import SignalHandlerOptions
 from drive_can_bridge.configuration.load import declared_parameters
 from drive_can_bridge.configuration.model import BridgeConfiguration
 from drive_can_bridge.core.errors import DriveCanError
+from drive_can_bridge.process.signals import SignalWatcher
 from drive_can_bridge.ros.bridge_node import BridgeNode
 from drive_can_bridge.ros.demo.commander import Commander
 from drive_can_bridge.ros.demo.frame_log import FrameLog
 from drive_can_bridge.ros.demo.hints import Hint, hints
 from drive_can_bridge.ros.demo.observer import Observer
 from drive_can_bridge.ros.executor_thread import ExecutorThread
-from drive_can_bridge.process.signals import SignalWatcher
 from drive_can_bridge.simulation.faults import Fault
 from drive_can_bridge.simulation.simulation import Simulation
 from drive_can_bridge.transport.link import steady_now

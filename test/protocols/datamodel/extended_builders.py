@@ -1,5 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""The frames of station 1 with the maps 50, 51 and 209, 210, 211, and the way to the first cycle."""
+"""Frames of station 1 with the maps 50, 51 and 209, 210, 211, and the way to its first cycle."""
 
 from typing import Any
 
@@ -25,7 +25,7 @@ def checked(conversation: Conversation, now: float) -> None:
 
 
 def cycling(**options: Any) -> Conversation:
-    """Return a conversation whose maps were verified at 9.997 s; the first cycle is due at 10 s."""
+    """Return a conversation whose maps were verified; the first cycle is due at 10 s."""
     talk = Conversation(drive(**options))
     assert talk.bus_up(9.0) == []
     if options.get('mapping') == 'assume':

@@ -42,7 +42,7 @@ def at_once(talk: Conversation, now: float, answer: str) -> list[str]:
     return request + talk.hears(answer, now + 0.002)
 
 
-# -- in the cyclic request --------------------------------------------------------------------------
+# -- in the cyclic request ------------------------------------------------------------------------
 
 
 def test_word_starts_as_disable_and_takes_its_slot() -> None:
@@ -148,7 +148,7 @@ def test_refusals() -> None:
     assert talk.session.request_control(ControlAction.ENABLE, 3.0) == 'drive offline'
 
 
-# -- written ----------------------------------------------------------------------------------------
+# -- written --------------------------------------------------------------------------------------
 
 
 def test_disable_is_written_as_soon_as_the_drive_is_found() -> None:
@@ -275,7 +275,7 @@ def test_reset_pulse_of_a_drive_that_reports_nothing() -> None:
     assert [done[:2] for done in talk.control_outcomes()] == [('reset_fault', True)]
 
 
-# -- a status word without a slot -------------------------------------------------------------------
+# -- a status word without a slot -----------------------------------------------------------------
 
 
 def apart(**options: object) -> Conversation:

@@ -17,7 +17,7 @@ from drive_can_bridge.core.events import (
 )
 from drive_can_bridge.core.session import DriveState
 
-# -- pace -------------------------------------------------------------------------------------------
+# -- pace -----------------------------------------------------------------------------------------
 
 
 def test_cycles_keep_their_beat() -> None:
@@ -55,13 +55,13 @@ def test_timer_that_is_called_all_the_time_sends_no_more() -> None:
     sent = []
     for step in range(2001):
         now = 10.002 + step * 0.0001
-        for text in talk.at(now):
+        if talk.at(now):
             sent.append(now)
             assert talk.hears(ANSWER, now) == []
     assert len(sent) == 10
 
 
-# -- responses --------------------------------------------------------------------------------------
+# -- responses ------------------------------------------------------------------------------------
 
 
 def test_response_is_published_as_raw_integers_in_slot_order() -> None:
@@ -223,7 +223,7 @@ def test_slots_are_signed_or_not_as_their_types_say() -> None:
     assert exchange(talk, 10.02) == '003FFFF0#FA24FFFF00010000'
 
 
-# -- frames of others -------------------------------------------------------------------------------
+# -- frames of others -----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize('text', [
@@ -274,7 +274,7 @@ def test_answer_that_does_not_match_the_question(text: str) -> None:
     assert talk.hears(REQUEST_MAP, 10.002) == [ASK_RESPONSE_MAP]
 
 
-# -- offline and online -----------------------------------------------------------------------------
+# -- offline and online ---------------------------------------------------------------------------
 
 
 def test_offline_at_the_limit_three_neutral_cycles_then_silence() -> None:
@@ -372,7 +372,7 @@ def test_first_cycle_keeps_its_distance_to_the_last_one() -> None:
     assert talk.session.next_timer() == pytest.approx(10.5)
 
 
-# -- bus and time -----------------------------------------------------------------------------------
+# -- bus and time ---------------------------------------------------------------------------------
 
 
 def test_bus_down_is_silence_and_offline() -> None:

@@ -158,12 +158,12 @@ class SessionMachine(RuleBasedStateMachine):
         self.now = 1000.0
         self.open: list[ReadRequest | WriteRequest] = []
         self.tickets: list[object] = []
-        self.registers = {number: 0 for number in (30, 31, 40, 41, 42, 43, 44, 52, 211, 600)}
+        self.registers = dict.fromkeys((30, 31, 40, 41, 42, 43, 44, 52, 211, 600), 0)
         self.registers.update(zip(range(122, 130), (50, 51, 0, 0, 211, 0, 0, 0)))
         self.registers[211] = 1
         self.unanswered: list[Frame] = []
 
-    # -- looking --------------------------------------------------------------------------------
+    # -- looking ----------------------------------------------------------------------------------
 
     def look(self) -> None:
         """Fetch and check everything that the session gives out."""
@@ -198,7 +198,7 @@ class SessionMachine(RuleBasedStateMachine):
             self.unanswered.append(sent)
             del self.unanswered[:-3]
 
-    # -- the passage of time --------------------------------------------------------------------
+    # -- the passage of time ----------------------------------------------------------------------
 
     @rule(steps=st.integers(1, 30))
     def time_passes_well(self, steps: int) -> None:
@@ -232,7 +232,7 @@ class SessionMachine(RuleBasedStateMachine):
         self.session.time_lost(self.now)
         self.look()
 
-    # -- the drive ------------------------------------------------------------------------------
+    # -- the drive --------------------------------------------------------------------------------
 
     @precondition(lambda self: self.unanswered)
     @rule(choice=st.integers(0, 2))
@@ -289,7 +289,7 @@ class SessionMachine(RuleBasedStateMachine):
     def anything_arrives(self, identifier: int, data: bytes, is_extended: bool) -> None:
         self.hears(Frame(identifier if is_extended else identifier & 0x7FF, data, is_extended))
 
-    # -- users ----------------------------------------------------------------------------------
+    # -- users ------------------------------------------------------------------------------------
 
     @rule(index=st.integers(0, 1), value=st.sampled_from([0.0, 5.0, 7.5]))
     def good_command(self, index: int, value: float) -> None:
@@ -340,7 +340,7 @@ class SessionMachine(RuleBasedStateMachine):
             self.tickets.append(ticket)
         self.look()
 
-    # -- the life of a session ------------------------------------------------------------------
+    # -- the life of a session --------------------------------------------------------------------
 
     @rule(kind=st.integers(0, 5))
     def upset(self, kind: int) -> None:
@@ -402,7 +402,7 @@ class SessionMachine(RuleBasedStateMachine):
         assert not self.tickets
         assert not self.session.online
 
-    # -- always ---------------------------------------------------------------------------------
+    # -- always -----------------------------------------------------------------------------------
 
     @invariant()
     def counts_are_right(self) -> None:

@@ -27,7 +27,7 @@ def asked(**options: object) -> Conversation:
     return talk
 
 
-# -- verify -----------------------------------------------------------------------------------------
+# -- verify ---------------------------------------------------------------------------------------
 
 
 def test_maps_agree() -> None:
@@ -238,7 +238,7 @@ def test_unanswered_look_while_cycling_does_not_matter() -> None:
     assert times == [12.102]
 
 
-# -- other numbers ----------------------------------------------------------------------------------
+# -- other numbers --------------------------------------------------------------------------------
 
 
 def test_bases_and_offset() -> None:
@@ -263,7 +263,7 @@ def test_offset_moves_parameters() -> None:
     assert talk.outcomes() == [[7], ['written']]
 
 
-# -- assume -----------------------------------------------------------------------------------------
+# -- assume ---------------------------------------------------------------------------------------
 
 
 def test_assume_never_looks() -> None:
@@ -295,7 +295,7 @@ def test_assume_goes_on_cycling_after_a_loss() -> None:
     assert exchange(talk, 10.12) == NEUTRAL
 
 
-# -- configure --------------------------------------------------------------------------------------
+# -- configure ------------------------------------------------------------------------------------
 
 
 def number_of(text: str) -> int:
@@ -454,7 +454,7 @@ def test_maps_that_cannot_be_read_are_not_written() -> None:
     assert talk.session.state is DriveState.MAPPING_DIFFERS
 
 
-# -- what is not believed ---------------------------------------------------------------------------
+# -- what is not believed -------------------------------------------------------------------------
 
 
 def test_look_that_began_before_time_was_lost_does_not_count() -> None:

@@ -22,7 +22,7 @@ def quiet(**options: object) -> Conversation:
     return online(period=10.0, **options)
 
 
-# -- reading ----------------------------------------------------------------------------------------
+# -- reading --------------------------------------------------------------------------------------
 
 
 def test_read() -> None:
@@ -138,7 +138,7 @@ def test_look_at_the_maps_goes_between_two_reads_of_a_long_request() -> None:
     answered, now = 0, 10.991
     looks = []
     while now < 11.03:
-        for due, text in talk.until(now):
+        for _, text in talk.until(now):
             if text == ASK_REQUEST_MAP:
                 looks.append(answered)
         outstanding = talk.session._channel.outstanding
@@ -151,7 +151,7 @@ def test_look_at_the_maps_goes_between_two_reads_of_a_long_request() -> None:
     assert 0 < looks[0] < 20
 
 
-# -- writing ----------------------------------------------------------------------------------------
+# -- writing --------------------------------------------------------------------------------------
 
 
 def test_write_to_ram_is_read_back() -> None:
@@ -236,7 +236,7 @@ def test_parameter_65535_is_refused() -> None:
     assert talk.outcomes() == [[9]]
 
 
-# -- EEPROM -----------------------------------------------------------------------------------------
+# -- EEPROM ---------------------------------------------------------------------------------------
 
 
 def test_equal_value_is_not_written_to_eeprom() -> None:
@@ -297,7 +297,7 @@ def test_eeprom_pace_outlives_a_deactivation_and_a_lost_bus() -> None:
     assert talk.until(10.1299) == []
 
 
-# -- together ---------------------------------------------------------------------------------------
+# -- together -------------------------------------------------------------------------------------
 
 
 def test_together_in_one_frame() -> None:
@@ -357,7 +357,7 @@ def test_one_alone_is_written_like_any_other() -> None:
     assert talk.outcomes() == [['written']]
 
 
-# -- refusals ---------------------------------------------------------------------------------------
+# -- refusals -------------------------------------------------------------------------------------
 
 
 def test_inactive_and_bus_down() -> None:
@@ -439,7 +439,7 @@ def test_moved_maps_are_guarded_too() -> None:
     assert refused == [300, 301, 302, 303, 310, 311, 312, 313]
 
 
-# -- beside the cycle -------------------------------------------------------------------------------
+# -- beside the cycle -----------------------------------------------------------------------------
 
 
 def test_acyclic_frames_wait_for_the_cyclic_response() -> None:

@@ -1,5 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""Conversations about setpoints: neutral until armed, fresh or neutral, refused rather than bent."""
+"""Conversations about setpoints: neutral until armed, fresh or neutral, refused, not bent."""
 
 import math
 

@@ -173,7 +173,7 @@ def test_time_lost_while_stopping_goes_on_stopping() -> None:
     silent(talk, 16.0)
 
 
-# -- with a control word ----------------------------------------------------------------------------
+# -- with a control word --------------------------------------------------------------------------
 
 
 def enabled(**options: object) -> Conversation:

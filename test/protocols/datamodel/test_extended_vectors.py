@@ -176,7 +176,7 @@ def test_route_of_a_station_takes_both_directions_and_no_other_station() -> None
             make(128)
 
 
-# -- the manual's worked examples -------------------------------------------------------------------
+# -- the manual's worked examples -----------------------------------------------------------------
 
 
 def test_example_cyclic_request() -> None:

@@ -1,0 +1,205 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""The acyclic channel alone: lanes, pace, repetitions."""
+
+import math
+
+import pytest
+
+from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.protocols.datamodel.channel import (
+    AcyclicChannel, Lane, Procedure, Read, Words, Write,
+)
+
+
+class Line:
+    """A channel whose frames are texts, and the results of its procedures."""
+
+    def __init__(self, *, timeout: float = 0.1, attempts: int = 2, gap: float = 0.02) -> None:
+        self.channel = AcyclicChannel(
+            encode_read=lambda number, count: Frame(number, b'?' * count, True),
+            encode_write=lambda number, words: Frame(number, bytes(words), True),
+            timeout=timeout, attempts=attempts, eeprom_gap=gap)
+        self.results: list[object] = []
+
+    def sent(self) -> list[str]:
+        return [f'{frame.identifier}{"?" if frame.data[:1] == b"?" else "!"}'
+                for frame in self.channel.take_frames()]
+
+    def reads(self, *numbers: int, lane: Lane = Lane.OWN, now: float = 1.0) -> list[str]:
+        self.channel.run(self.reading(numbers), self.results.append, now, lane)
+        return self.sent()
+
+    @staticmethod
+    def reading(numbers: tuple[int, ...]) -> Procedure:
+        found: list[Words | None] = []
+        for number in numbers:
+            found.append((yield Read(number)))
+        return found
+
+    def writes(self, *steps: tuple[int, bool], lane: Lane = Lane.OWN, now: float = 1.0,
+               ) -> list[str]:
+        self.channel.run(self.writing(steps), self.results.append, now, lane)
+        return self.sent()
+
+    @staticmethod
+    def writing(steps: tuple[tuple[int, bool], ...]) -> Procedure:
+        for number, eeprom in steps:
+            yield Write(number, (1,), eeprom)
+        return 'done'
+
+    def answer(self, word: int, now: float) -> list[str]:
+        self.channel.receive((word,), now)
+        return self.sent()
+
+    def at(self, now: float) -> list[str]:
+        self.channel.advance(now)
+        return self.sent()
+
+
+def test_nothing_to_do() -> None:
+    line = Line()
+    assert line.channel.next_timer() == math.inf
+    assert line.at(1.0) == []
+    assert line.channel.outstanding is None
+    assert line.channel.now == 1.0
+
+
+def test_procedure_that_wants_nothing_ends_at_once() -> None:
+    line = Line()
+    assert line.reads() == []
+    assert line.results == [[]]
+    assert line.channel.next_timer() == math.inf
+
+
+def test_lanes_take_turns_after_every_step() -> None:
+    line = Line()
+    assert line.reads(1, 2, 3, lane=Lane.USERS) == ['1?']
+    assert line.reads(11, 12, lane=Lane.OWN) == []
+    assert line.answer(0, 1.01) == ['11?']
+    assert line.answer(0, 1.02) == ['2?']
+    assert line.answer(0, 1.03) == ['12?']
+    assert line.answer(0, 1.04) == ['3?']
+    assert line.answer(0, 1.05) == []
+    assert line.results == [[(0,), (0,)], [(0,), (0,), (0,)]]
+
+
+def test_urgent_goes_first_and_keeps_the_turns() -> None:
+    line = Line()
+    assert line.reads(1, 2, lane=Lane.USERS) == ['1?']
+    line.reads(11, 12, lane=Lane.OWN)
+    assert line.reads(21, lane=Lane.URGENT) == []
+    assert line.reads(22, lane=Lane.URGENT) == []
+    assert line.answer(0, 1.01) == ['21?']
+    assert line.answer(0, 1.02) == ['22?']
+    assert line.answer(0, 1.03) == ['11?']
+    assert line.answer(0, 1.04) == ['2?']
+
+
+def test_urgent_goes_between_two_attempts() -> None:
+    line = Line(attempts=3)
+    line.reads(1, lane=Lane.USERS)
+    line.writes((21, False), lane=Lane.URGENT, now=1.05)
+    assert line.channel.next_timer() == pytest.approx(1.1)
+    assert line.at(1.1) == ['21!']
+    assert line.at(1.1011) == ['1?']
+    assert line.at(1.2011 + 1e-9) == ['1?']
+    assert line.at(1.302) == []
+    assert line.results == ['done', [None]]  # three attempts, whatever came between
+
+
+def test_attempts_of_one_read_may_differ() -> None:
+    line = Line(attempts=3)
+
+    def once() -> Procedure:
+        return (yield Read(1, attempts=1))
+
+    line.channel.run(once(), line.results.append, 1.0)
+    assert line.sent() == ['1?']
+    assert line.at(1.1) == []
+    assert line.results == [None]
+
+
+def test_write_first_overtakes_and_replaces() -> None:
+    line = Line()
+    done: list[str] = []
+    line.reads(1, 2, lane=Lane.USERS)
+    line.channel.write_first(Write(52, (1,), False), lambda: done.append('one'), 1.01)
+    line.channel.write_first(Write(53, (0,), False), lambda: done.append('two'), 1.02)
+    assert line.sent() == []
+    assert line.answer(0, 1.03) == ['53!']
+    assert done == ['two']
+    assert line.at(1.0311) == ['2?']
+
+
+def test_write_first_waits_for_its_eeprom() -> None:
+    line = Line()
+    line.writes((30, True))
+    line.channel.write_first(Write(52, (1,), True), lambda: None, 1.001)
+    assert line.channel.next_timer() == pytest.approx(1.02)
+    assert line.at(1.0199) == []
+    assert line.at(1.0201) == ['52!']
+
+
+def test_write_at_once_asks_only_the_eeprom() -> None:
+    line = Line()
+    assert line.reads(1) == ['1?']
+    line.channel.hold(5.0)
+    assert line.channel.write_at_once(Write(52, (0,), False), 1.01)
+    assert line.sent() == ['52!']
+    assert line.channel.write_at_once(Write(52, (0,), True), 1.01)
+    assert line.channel.eeprom_free_at == pytest.approx(1.03)
+    assert not line.channel.write_at_once(Write(52, (0,), True), 1.02)
+    assert line.channel.write_at_once(Write(52, (0,), False), 1.02)
+    assert line.sent() == ['52!', '52!']
+
+
+def test_what_is_sent_called_back_may_write_again() -> None:
+    line = Line()
+
+    def again() -> None:
+        line.channel.write_first(Write(53, (0,), False), lambda: None, line.channel.now)
+
+    line.channel.write_first(Write(52, (0,), False), again, 1.0)
+    assert line.sent() == ['52!']
+    assert line.at(1.001) == ['53!']
+
+
+def test_hold_and_release() -> None:
+    line = Line()
+    line.channel.hold(1.5)
+    assert line.reads(1) == []
+    assert line.channel.next_timer() == 1.5
+    line.channel.release(1.1)
+    assert line.sent() == ['1?']
+    line.answer(0, 1.2)
+    line.channel.hold(2.0)
+    line.channel.release(1.9)
+    assert line.reads(2, now=1.9) == ['2?']
+
+
+def test_clear_forgets_everything_but_the_eeprom() -> None:
+    line = Line()
+    line.writes((30, True))
+    line.reads(1, lane=Lane.USERS)
+    line.reads(2, lane=Lane.USERS)
+    line.reads(3)
+    line.channel.write_first(Write(52, (1,), False), lambda: None, 1.0)
+    assert line.channel.waiting_users == 1
+    line.channel.clear()
+    assert line.channel.next_timer() == math.inf
+    assert line.channel.waiting_users == 0
+    assert line.at(2.0) == []
+    assert line.results == ['done']
+    line.channel.clear()
+    assert line.reads(4, now=1.019) == []
+    assert line.at(1.02) == ['4?']
+
+
+def test_two_waiting_users() -> None:
+    line = Line()
+    line.reads(1, lane=Lane.USERS)
+    line.reads(2, lane=Lane.USERS)
+    line.reads(3, lane=Lane.USERS)
+    assert line.channel.waiting_users == 2
+    line.answer(0, 1.01)
+    assert line.channel.waiting_users == 1
