@@ -7,6 +7,7 @@ words), the others keep what is written, within the limits of the profile.
 """
 
 from collections.abc import Callable, Collection, Sequence
+import math
 import zlib
 
 from drive_can_bridge.core.errors import ValueRefused
@@ -22,6 +23,11 @@ from drive_can_bridge.simulation.status import State, StatusWord
 WARNING_TEMPERATURE = 80.0
 #: what a fault code shows while there is a fault
 FAULT_CODE = 7
+
+#: share of the link voltage by which the mains swing it, and how fast (rad/s): of a drive at rest it
+#: is the one value that moves, so that whoever looks sees that it is alive
+MAINS_SWING = 0.005
+MAINS_RATE = 2.0 * math.pi * 0.3
 
 
 class Plant:
@@ -164,7 +170,8 @@ class Plant:
         if quantity is Quantity.VOLTAGE:
             if {'motor', 'output'} & set(parameter.name.split('_')):
                 return lambda: full * 0.7 * abs(motor.share_of_rated_speed)
-            return lambda: full * (1.0 - 0.02 * motor.current)
+            return lambda: full * (1.0 - 0.02 * motor.current + MAINS_SWING * math.sin(
+                MAINS_RATE * (self._now or 0.0)))
         if quantity is Quantity.TORQUE:
             return lambda: full * motor.torque
         if quantity is Quantity.POWER:

@@ -66,7 +66,7 @@ def test_it_prints_a_line_per_drive_and_stops_them_neutral(start: Start, tmp_pat
     log = tmp_path / 'frames.log'
     demo = start('--drive', '--log-frames', str(log))
     demo.line(r'^conveyor online actual_speed=-?\d+\.\d rpm motor_current=\d+\.\d\d A '
-              r'status_word=\d+$')
+              r'status_word=\d+ dc_link_voltage=\d+\.\d V$')
     # lift has a control word, which has to be 1, and a speed setpoint behind it
     wait_for(lambda: any(re.match('0001(?!0000)', data)
                          for data in requests(log).get('005FFFF0', [])), 'speed for lift')
