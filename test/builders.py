@@ -177,7 +177,7 @@ class Conversation:
     def commands(self, index: int, value: Value, now: float) -> CommandOutcome:
         return self.session.command(index, value, now)
 
-    def events(self, *kinds: type) -> list[Event]:
+    def events(self, *kinds: type) -> list[Any]:
         """Return the events since the last call, or only those of some kinds."""
         self.log += self.session.take_events()
         found, self.log = self.log, []

@@ -24,8 +24,8 @@ WARNING_TEMPERATURE = 80.0
 #: what a fault code shows while there is a fault
 FAULT_CODE = 7
 
-#: share of the link voltage by which the mains swing it, and how fast (rad/s): of a drive at rest it
-#: is the one value that moves, so that whoever looks sees that it is alive
+#: share of the link voltage by which the mains swing it, and how fast (rad/s): of a drive at rest
+#: it is the one value that moves, so that whoever looks sees that it is alive
 MAINS_SWING = 0.005
 MAINS_RATE = 2.0 * math.pi * 0.3
 

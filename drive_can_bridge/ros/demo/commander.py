@@ -38,6 +38,8 @@ SINE_PERIOD = 20.0
 AMPLITUDE = 0.3
 #: s until ~/enable is tried again after it was refused
 _ENABLE_AGAIN = 5.0
+#: s more to wait for an answer that does not come
+_ANSWER_TIMEOUT = 4.0
 
 
 class _DriveCommander:
@@ -80,7 +82,9 @@ class _DriveCommander:
 
     def _ask(self, now: float) -> None:
         client = self._client
-        if client is None or self._asking or now < self._ask_at or not client.service_is_ready():
+        # an answer may get lost on its way: a service may answer before it knows where to
+        if (client is None or now < self._ask_at + (_ANSWER_TIMEOUT if self._asking else 0.0)
+                or not client.service_is_ready()):
             return
         self._asking = True
         self._ask_at = now + _ENABLE_AGAIN
