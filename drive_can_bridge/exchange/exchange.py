@@ -271,7 +271,7 @@ class BusExchange:
             if member is None:
                 self.frames_rejected += 1
                 return
-            member.session.receive_frame(frame, now - age)
+            member.session.receive_frame(frame, now, age)
             self._pump(member, now)
             due = member.session.next_timer()
         if due < self._wake_at:

@@ -1,11 +1,12 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """What sessions with DataModel drives share, whatever their identifiers look like."""
 
+from abc import abstractmethod
 from collections.abc import Callable
 
 from drive_can_bridge.configuration.model import DriveConfiguration
 from drive_can_bridge.core.control import ControlMachine, ProfileControl
-from drive_can_bridge.core.events import FrameRejected, StationLost
+from drive_can_bridge.core.events import FrameRejected, Noted, StationLost
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.requests import Request
@@ -82,7 +83,7 @@ class DataModelSession(Session):
             return 'mapping parameter: not written while the bridge is active'
         return super().write_refusal(parameter)
 
-    # -- losing and rejecting ---------------------------------------------------------------------
+    # -- for the families -------------------------------------------------------------------------
 
     def _lose(self, reason: str, now: float) -> None:
         """Make the drive offline, if it is not."""
@@ -102,6 +103,17 @@ class DataModelSession(Session):
         if self.control is not None:
             self.control.withdraw(reason, now)
             self._control_changed(now)
+
+    def _control_changed(self, now: float) -> None:
+        """Tell what the control machine noted; then see to its word."""
+        if self.control is not None:
+            for note in self.control.take_notes():
+                self._events.append(Noted(note))
+            self._update_control_word(now)
+
+    @abstractmethod
+    def _update_control_word(self, now: float) -> None:
+        """Write a control word that changed, unless it goes with the cycle."""
 
     def _reject(self, text: str) -> None:
         self.statistics.rejected += 1

@@ -190,6 +190,24 @@ def decode(frame: Frame, *, count: int = SLOTS, strict: bool = False) -> Telegra
     return ReadRequest(station, number, length)
 
 
+def decode_answer(frame: Frame, station: int, question: tuple[int, int] | None, *,
+                  strict: bool = False) -> tuple[int, ...]:
+    """
+    Decode the answer to a read request.
+
+    :param question: number and count that were asked for; None: nothing was.
+    :return: the words.
+    :raises RemoteProtocolError: anything else, malformed, or of another station.
+    """
+    telegram = decode(frame, strict=strict)
+    if telegram.station != station:
+        raise RemoteProtocolError(f'{frame}: not from station {station}')
+    if not isinstance(telegram, ReadResponse) or (
+            (telegram.number, len(telegram.words)) != question):
+        raise RemoteProtocolError(f'{frame}: nobody asked for it')
+    return telegram.words
+
+
 def unpack_words(data: bytes, count: int, *, strict: bool = False) -> tuple[int, ...]:
     """
     Unpack the first ``count`` words of a payload.

@@ -21,8 +21,7 @@ import math
 from drive_can_bridge.configuration.model import DriveConfiguration
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.events import (
-    Event, ForeignMasterSeen, MappingDiffered, Noted, ProcessDataReceived, SetpointsExpired,
-    StationFound,
+    Event, ForeignMasterSeen, MappingDiffered, ProcessDataReceived, SetpointsExpired, StationFound,
 )
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.requests import BRIDGE_INACTIVE, BUS_DOWN
@@ -32,12 +31,14 @@ from drive_can_bridge.protocols.datamodel.acyclic_control import control_by_hand
 from drive_can_bridge.protocols.datamodel.base_session import DataModelSession
 from drive_can_bridge.protocols.datamodel.map_supervision import MapSupervision, Verdict
 from drive_can_bridge.protocols.datamodel.process_words import (
-    slot_of, unpack_available, wire_numbers, words_struct,
+    slot_of, unpack_unusual, wire_numbers, words_struct,
 )
 
 #: longest pause between the neutral cycles of a stop, however long the period is
 STOP_SPACING_MAX = 0.1
 LOOKING = 'being looked for'
+#: direction and station of an identifier
+FROM_WHOM = extended.DIR | extended.STATION_MASK
 
 
 class Phase(Enum):
@@ -72,7 +73,6 @@ class ExtendedSession(DataModelSession):
         self._pack = words_struct(drive.cyclic_request, unsigned=self._control_slot).pack
         self._padding = extended.PADDING[len(drive.cyclic_request)]
         self._unpack = words_struct(drive.cyclic_response).unpack_from
-        self._needed = 2 * len(drive.cyclic_response)
         self._maps = MapSupervision(
             self._channel, request_base=self._request_base, response_base=self._response_base,
             request=wire_numbers(drive.cyclic_request, self._offset),
@@ -143,10 +143,7 @@ class ExtendedSession(DataModelSession):
 
     def _begin(self, now: float) -> None:
         """Start over: nothing is known of the drive."""
-        if self.online:
-            self._lose('the drive is being reconnected', now)
-        else:
-            self._withdraw('the drive is being reconnected', now)
+        (self._lose if self.online else self._withdraw)('the drive is being reconnected', now)
         self._stopping = False
         self._stop_awaiting()
         self._missed_in_row = 0
@@ -239,13 +236,8 @@ class ExtendedSession(DataModelSession):
             self._count_down(now)
             return
         self._next_cycle += period
-        if self._next_cycle < soonest:
-            self._skip_cycles(soonest)
-
-    def _skip_cycles(self, soonest: float) -> None:
-        """Leave out cycles that are overdue, and keep to the beat: never catch up in a burst."""
-        period = self.drive.period
-        self._next_cycle += math.ceil((soonest - self._next_cycle) / period) * period
+        if self._next_cycle < soonest:  # late: leave cycles out, keep the beat, never in a burst
+            self._next_cycle += math.ceil((soonest - self._next_cycle) / period) * period
 
     def _count_down(self, now: float) -> None:
         """Handle the last cycles before silence."""
@@ -308,27 +300,21 @@ class ExtendedSession(DataModelSession):
         if frame[0] == self._response_identifier:
             self._receive_cyclic(frame[1], now, now - age)
             return
-        if not frame.extended or (frame.identifier ^ self._request_identifier
-                                  ) & extended.STATION_MASK:
-            self._reject(f'{frame}: not from this station')
-            return
-        if not frame.identifier & extended.DIR:
+        if frame.extended and frame.identifier & FROM_WHOM == self._request_identifier & FROM_WHOM:
             self._events.append(ForeignMasterSeen(
                 f'another master sends requests to station {self.drive.station}: {frame}'))
             return
+        step = self._channel.outstanding
         try:
-            telegram = extended.decode(frame, strict=self._strict)
+            words = extended.decode_answer(
+                frame, self.drive.station, None if step is None else (step.number, step.count),
+                strict=self._strict)
         except RemoteProtocolError as error:
             self._reject(str(error))
             return
-        step = self._channel.outstanding
-        if not isinstance(telegram, extended.ReadResponse) or step is None or (
-                telegram.number, len(telegram.words)) != (step.number, step.count):
-            self._reject(f'{frame}: nobody asked for it')
-            return
         if len(frame.data) != extended.PAYLOAD:
             self.statistics.short += 1
-        self._channel.receive(telegram.words, now)
+        self._channel.receive(words, now)
 
     def _receive_cyclic(self, data: bytes, now: float, received_at: float) -> None:
         """Take a cyclic response. The fast path of the reader."""
@@ -342,10 +328,14 @@ class ExtendedSession(DataModelSession):
         if len(data) == extended.PAYLOAD:
             raws: tuple[int, ...] = self._unpack(data)
         else:
-            usable = self._unpack_short(data)
-            if usable is None:
-                return
-            raws = usable
+            raws, wrong = unpack_unusual(
+                self.drive.cyclic_response, data, strict=self._strict)
+            if wrong:
+                self._reject(f'cyclic response with {wrong}')
+                if not raws:
+                    return
+            else:
+                statistics.short += 1
         self._awaiting = False
         self._missed_in_row = 0
         statistics.exchanges += 1
@@ -362,17 +352,6 @@ class ExtendedSession(DataModelSession):
             self._control_changed(now)
         self._events.append(ProcessDataReceived(raws, received_at))
         self._channel.release(now)
-
-    def _unpack_short(self, data: bytes) -> tuple[int, ...] | None:
-        """Unpack a response of unusual length; None when it is of no use."""
-        if self._strict:
-            self._reject(f'cyclic response with {len(data)} data bytes instead of 8')
-            return None
-        if len(data) >= self._needed:
-            self.statistics.short += 1
-            return self._unpack(data)
-        self._reject(f'cyclic response with {len(data)} data bytes, {self._needed} needed')
-        return unpack_available(self.drive.cyclic_response, data) or None
 
     def _found(self, now: float) -> None:
         self.online = True
@@ -409,20 +388,10 @@ class ExtendedSession(DataModelSession):
             soonest = min(soonest, self._by_hand.look_at)
         return min(soonest, self.control.next_timer())
 
-    # -- control ----------------------------------------------------------------------------------
-
-    def _control_changed(self, now: float) -> None:
-        """Tell what the machine noted; write a control word that has no slot, on change."""
-        control = self.control
-        if control is None:
-            return
-        for note in control.take_notes():
-            self._events.append(Noted(note))
+    def _update_control_word(self, now: float) -> None:
         if self._by_hand is not None and not self._stopping and (
                 self.online or self._phase is Phase.CYCLIC):
             self._by_hand.update(now)
-
-    # -- state ------------------------------------------------------------------------------------
 
     @property
     def state(self) -> DriveState:

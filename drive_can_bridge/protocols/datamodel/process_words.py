@@ -9,6 +9,7 @@ Words are 16 bit, high byte first, slot 0 in BYTE0 and BYTE1, as in all telegram
 import struct
 
 from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.protocols.datamodel.extended import PAYLOAD
 
 
 def words_struct(parameters: tuple[Parameter, ...], *, unsigned: int | None = None,
@@ -23,9 +24,19 @@ def words_struct(parameters: tuple[Parameter, ...], *, unsigned: int | None = No
         for slot, parameter in enumerate(parameters)))
 
 
-def unpack_available(parameters: tuple[Parameter, ...], data: bytes) -> tuple[int, ...]:
-    """Unpack as many whole words as a short payload holds."""
-    return words_struct(parameters[:len(data) // 2]).unpack_from(data)
+def unpack_unusual(parameters: tuple[Parameter, ...], data: bytes, *,
+                   strict: bool) -> tuple[tuple[int, ...], str]:
+    """
+    Unpack a payload that has not eight bytes.
+
+    :return: the words that it holds, as far as they are wanted; and what is wrong with it, ''
+        where it holds them all and that will do.
+    """
+    if strict:
+        return (), f'{len(data)} data bytes instead of {PAYLOAD}'
+    needed = 2 * len(parameters)
+    raws = words_struct(parameters[:len(data) // 2]).unpack_from(data)
+    return raws, '' if len(data) >= needed else f'{len(data)} data bytes, {needed} needed'
 
 
 def slot_of(parameters: tuple[Parameter, ...], name: str) -> int | None:

@@ -49,6 +49,7 @@ def test_acyclic_telegrams(station: int, window: tuple[int, list[int]]) -> None:
        st.booleans())
 @example(0x103FFFF0, b'', True, 4, False)
 @example(0x103FFFFF, bytes(8), True, 4, False)
+@example(0x102FFFF2, bytes(8), True, 4, False)
 @example(0x3F1, bytes(8), False, 4, False)
 def test_anything(identifier: int, data: bytes, is_extended: bool, count: int,
                   strict: bool) -> None:
@@ -60,6 +61,8 @@ def test_anything(identifier: int, data: bytes, is_extended: bool, count: int,
         return
     assert is_extended
     assert telegram.station == identifier >> 21 & 0x7F
+    if identifier & 0xF:
+        assert (identifier >> 4 & 0xFFFF) + (identifier & 0xF) <= 0x10000
     if not isinstance(telegram, extended.ReadRequest):
         assert len(data) >= 2 * len(telegram.words)
         assert len(data) == 8 or not strict

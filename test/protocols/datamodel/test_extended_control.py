@@ -161,6 +161,14 @@ def test_disable_is_written_as_soon_as_the_drive_is_found() -> None:
     assert exchange(talk, 10.02) == NEUTRAL       # on change only
 
 
+def test_disable_is_written_whenever_the_drive_is_found() -> None:
+    talk = beside()
+    talk.bus_down(10.01)
+    talk.bus_up(11.0)
+    assert talk.at(11.0) == [NEUTRAL]
+    assert talk.hears(READY, 11.002) == [DISABLE]
+
+
 def test_enable_is_written_on_change() -> None:
     talk = beside()
     exchange(talk, 10.02)

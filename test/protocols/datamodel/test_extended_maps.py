@@ -426,12 +426,16 @@ def test_rewrite_that_somebody_undoes_is_not_repeated_at_once() -> None:
 
 def test_rewrites_after_a_quiet_minute_are_prompt_again() -> None:
     keeper = MapKeeper(99, 51, 0, 0, 209, 0, 0, 0)
+    keeper.read_only = {122}
     talk = configured(keeper)
-    keeper.live(talk, 10.2)
-    for now in (80.0, 150.0, 220.0):
-        keeper.live(talk, now)
+    keeper.live(talk, 100.0)           # by now the pause is a minute
+    keeper.read_only.clear()
+    keeper.registers[122] = 50         # somebody helped
+    keeper.live(talk, 300.0)
+    for _ in range(2):
         keeper.registers[122] = 99
-        keeper.live(talk, now + 3.0)
+        now = talk.session.next_timer()
+        keeper.live(talk, now + 2.5)
         assert keeper.registers[122] == 50
 
 

@@ -1,0 +1,147 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""An exchange without a bus: a link that keeps what it is given, a clock that is set by hand."""
+
+from collections.abc import Sequence
+import time
+from typing import Any
+
+from builders import drive, frame
+
+from drive_can_bridge.configuration.model import BusConfiguration, DriveConfiguration
+from drive_can_bridge.core.control import ControlCompleted
+from drive_can_bridge.core.events import Event, ProcessDataReceived
+from drive_can_bridge.core.frame import Frame, Route
+from drive_can_bridge.core.session import Session
+from drive_can_bridge.exchange.exchange import BusExchange
+from drive_can_bridge.protocols.families import FAMILIES
+
+
+class FakeLink:
+    """Keeps the frames."""
+
+    def __init__(self) -> None:
+        self.sent: list[str] = []
+        self.refusing = False
+        self.started = self.stopped = False
+
+    def start(self) -> None:
+        self.started = True
+
+    def stop(self) -> None:
+        self.stopped = True
+
+    def send(self, sent: Frame) -> bool:
+        if self.refusing:
+            return False
+        self.sent.append(str(sent))
+        return True
+
+    def take(self) -> list[str]:
+        sent, self.sent = self.sent, []
+        return sent
+
+
+class DriveNotes:
+    """A drive's listener that keeps what it is told, and hands over commands."""
+
+    def __init__(self, session: Session) -> None:
+        self.session = session
+        self.samples: list[ProcessDataReceived] = []
+        self.events: list[Event] = []
+        self.outcomes: list[ControlCompleted] = []
+        self.commands: list[tuple[int, float]] = []
+        self.discarded = 0
+        self.failing = False
+
+    def take_commands(self, now: float) -> None:
+        if self.failing:
+            raise ZeroDivisionError('a defect')
+        for index, value in self.commands:
+            self.session.command(index, value, now)
+        self.commands.clear()
+
+    def discard_commands(self) -> None:
+        self.discarded += 1
+        self.commands.clear()
+
+    def process_data(self, event: ProcessDataReceived) -> None:
+        self.samples.append(event)
+
+    def handle_event(self, event: Event) -> None:
+        self.events.append(event)
+
+    def control_completed(self, outcome: ControlCompleted) -> None:
+        self.outcomes.append(outcome)
+
+
+class BusNotes:
+    """A bus listener that keeps what it is told."""
+
+    def __init__(self) -> None:
+        self.told: list[tuple[Any, ...]] = []
+
+    def bus_opened(self, bus: str) -> None:
+        self.told.append(('opened', bus))
+
+    def bus_lost(self, bus: str, reason: str) -> None:
+        self.told.append(('lost', bus, reason))
+
+    def fatal(self, bus: str, reason: str, *, misconfigured: bool) -> None:
+        self.told.append(('fatal', bus, reason, misconfigured))
+
+
+class Bench:
+    """An exchange on the bench."""
+
+    def __init__(self, *drives: DriveConfiguration, sessions: Sequence[Session] = (),
+                 real_time: bool = False) -> None:
+        drives = drives or (drive(name='first', station=1), drive(name='second', station=2))
+        self.now = 10.0
+        self.step = 0.0
+        self.sessions = list(sessions) or [
+            FAMILIES[entry.protocol].make_session(entry) for entry in drives]
+        self.routes = [[claim.route for claim in FAMILIES[entry.protocol].claims(entry)]
+                       for entry in drives]
+        self.bus_notes = BusNotes()
+        self.exchange = BusExchange(
+            BusConfiguration('main', 'virtual', 'x'), self.sessions, self.routes, self.bus_notes,
+            clock=time.monotonic if real_time else self.clock)
+        self.link = FakeLink()
+        self.exchange.link = self.link  # type: ignore[assignment]
+        self.notes = [DriveNotes(session) for session in self.sessions]
+        for session, notes in zip(self.sessions, self.notes):
+            self.exchange.attach(session, notes)
+
+    def clock(self) -> float:
+        """Return the time; looking at it may take time."""
+        self.now += self.step
+        return self.now
+
+    def at(self, now: float) -> list[str]:
+        """Let the timer pass once; return what was sent."""
+        self.now = now
+        with self.exchange.lock:
+            self.exchange._pass()
+        return self.link.take()
+
+    def hears(self, text: str, now: float, age: float = 0.0) -> list[str]:
+        """Receive a frame."""
+        self.now = now
+        self.exchange.frame_received(frame(text), age)
+        return self.link.take()
+
+    def online(self) -> None:
+        """Bring the drive of station 1 online, at 10.002 s."""
+        self.now = 9.998
+        self.exchange._last_pass = self.now
+        self.exchange.bus_opened()
+        self.exchange.activate()
+        self.hears('102007A4#0032003300000000', 9.999)
+        self.hears('102007E4#00D100D200D30000', 10.0)
+        self.at(10.0)
+        self.hears('103FFFF0#03E800FA00010000', 10.002)
+
+
+def all_routes(bench: Bench) -> list[Route]:
+    """Return the routes of every drive."""
+    return [route for routes in bench.routes for route in routes]

@@ -1,0 +1,400 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""The exchange of one bus, without a bus: routing, time, stops, and who is told what."""
+
+import threading
+import time
+
+from builders import CONTROL, drive, GAIN, RAMP, read, SPEED, WORD, write
+from exchange_builders import all_routes, Bench, BusNotes
+import pytest
+
+from drive_can_bridge.configuration.model import BusConfiguration
+from drive_can_bridge.core.control import ControlAction, ControlTicket
+from drive_can_bridge.core.events import RequestCompleted, StationFound, StationLost
+from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.requests import Failure, ReadValue
+from drive_can_bridge.exchange.exchange import BusExchange, PASS_PERIOD
+
+ZEROS = '0000000000000000'
+NEUTRAL = f'003FFFF0#{ZEROS}'
+ASK_MAP_1, ASK_MAP_2 = f'002007A4#{ZEROS}', f'004007A4#{ZEROS}'
+ANSWER = '103FFFF0#03E800FA00010000'
+
+
+def wait_for(condition: object, timeout: float = 10.0) -> None:
+    deadline = time.monotonic() + timeout
+    while not condition():  # type: ignore[operator]
+        if time.monotonic() > deadline:
+            raise AssertionError('waited in vain')
+        time.sleep(0.001)
+
+
+# -- routing --------------------------------------------------------------------------------------
+
+
+def test_both_begin_when_bus_and_activity_are_there() -> None:
+    bench = Bench()
+    bench.exchange.bus_opened()
+    assert bench.link.take() == []
+    bench.exchange.activate()
+    assert bench.link.take() == [ASK_MAP_1, ASK_MAP_2]
+    assert bench.exchange.bus_state == 'up'
+    assert bench.bus_notes.told == [('opened', 'main')]
+
+
+def test_frames_go_to_the_session_of_their_station() -> None:
+    bench = Bench()
+    bench.exchange.bus_opened()
+    bench.exchange.activate()
+    bench.link.take()
+    assert bench.hears('104007A4#0032003300000000', 10.001) == [f'004007E4#{ZEROS}']
+    assert bench.hears('102007A4#0032003300000000', 10.002) == [f'002007E4#{ZEROS}']
+
+
+@pytest.mark.parametrize('text', [
+    '106007A4#0032003300000000',      # station 3
+    '7A4#0032003300000000', '000#',   # 11 bits
+])
+def test_frames_of_nobody_are_counted_by_the_bus(text: str) -> None:
+    bench = Bench()
+    bench.exchange.bus_opened()
+    bench.exchange.activate()
+    bench.link.take()
+    assert bench.hears(text, 10.001) == []
+    assert bench.exchange.frames_rejected == 1
+    assert [session.statistics.rejected for session in bench.sessions] == [0, 0]
+
+
+def test_rejected_frames_of_a_drive_are_its_own() -> None:
+    bench = Bench()
+    bench.hears('104001E0#0000000000000000', 10.0)
+    assert bench.exchange.frames_rejected == 0
+    assert [session.statistics.rejected for session in bench.sessions] == [0, 1]
+
+
+def test_eleven_bit_twin_of_a_response_reaches_nobody() -> None:
+    bench = Bench()
+    bench.online()
+    bench.at(10.02)
+    bench.exchange.frame_received(Frame(0x7F0, bytes(8), False), 0.0)
+    assert bench.sessions[0].statistics.missed == 0
+    assert bench.exchange.frames_rejected == 1
+
+
+def test_routes_become_filters_of_the_link() -> None:
+    bench = Bench()
+    made = BusExchange(BusConfiguration('main', 'virtual', 'x'), bench.sessions, bench.routes,
+                       BusNotes())
+    assert list(made.link._routes) == all_routes(bench)
+    assert made.link._send_timeout == pytest.approx(0.01)  # half a cycle
+
+
+# -- time -----------------------------------------------------------------------------------------
+
+
+def test_samples_and_events_reach_their_listener() -> None:
+    bench = Bench()
+    bench.online()
+    first, second = bench.notes
+    assert [event.raws for event in first.samples] == [(1000, 250, 1)]
+    assert first.samples[0].received_at == 10.002
+    assert first.events == [StationFound()]
+    assert second.samples == second.events == []
+
+
+def test_age_of_a_frame_is_taken_off_its_stamp() -> None:
+    bench = Bench()
+    bench.online()
+    bench.at(10.02)
+    bench.hears(ANSWER, 10.025, age=0.004)
+    assert bench.notes[0].samples[-1].received_at == pytest.approx(10.021)
+
+
+def test_commands_are_taken_just_before_a_cycle() -> None:
+    bench = Bench(drive(rearm_immediate=True))
+    bench.online()
+    bench.notes[0].commands.append((0, 100.0))
+    assert bench.at(10.01) == []
+    assert bench.notes[0].commands
+    assert bench.at(10.02) == ['003FFFF0#03E8000000000000']
+    assert not bench.notes[0].commands
+
+
+def test_pass_says_when_the_next_is_due() -> None:
+    bench = Bench(drive())
+    bench.online()
+    assert bench.exchange._pass() == pytest.approx(10.02)
+    bench.at(10.02)
+    assert bench.exchange._pass() == pytest.approx(10.04)
+    idle = Bench()
+    assert idle.exchange._pass() == pytest.approx(10.0 + PASS_PERIOD)
+
+
+def test_lost_time_is_noticed_by_the_timer() -> None:
+    bench = Bench(drive(rearm_immediate=True))
+    bench.online()
+    bench.notes[0].commands.append((0, 100.0))
+    assert bench.at(10.02) == ['003FFFF0#03E8000000000000']
+    bench.hears(ANSWER, 10.021)
+    bench.notes[0].commands.append((0, 100.0))
+
+    sent = bench.at(11.03)
+
+    assert bench.notes[0].discarded == 2  # at activation, and now
+    assert bench.notes[0].commands == []
+    assert sent == [ASK_MAP_1]
+    assert bench.notes[0].events[-1] == StationLost('the bridge stood still')
+    assert not bench.sessions[0].online
+
+
+def test_a_little_less_is_not_lost() -> None:
+    bench = Bench(drive())
+    bench.online()
+    bench.at(10.02)
+    bench.hears(ANSWER, 10.021)
+    assert bench.at(11.0199) == [NEUTRAL]
+    assert bench.sessions[0].online
+
+
+def test_lost_time_is_noticed_by_the_reader_first() -> None:
+    bench = Bench(drive(rearm_immediate=True))
+    bench.online()
+    bench.at(10.02)
+    # the answer lay in a queue while the process stood still
+    assert bench.hears(ANSWER, 15.0) == [ASK_MAP_1]
+    assert len(bench.notes[0].samples) == 1
+    assert not bench.sessions[0].online
+    assert bench.at(15.0) == []
+    assert bench.notes[0].discarded == 2
+
+
+def test_time_is_not_lost_while_inactive() -> None:
+    bench = Bench(drive())
+    bench.at(10.0)
+    bench.at(500.0)
+    assert bench.notes[0].discarded == 0
+    bench.now = 900.0
+    bench.exchange.bus_opened()
+    bench.exchange.activate()
+    assert bench.link.take() == [ASK_MAP_1]
+    assert bench.at(900.001) == []
+    assert bench.notes[0].discarded == 1
+
+
+# -- stopping -------------------------------------------------------------------------------------
+
+
+def test_deactivate_waits_for_the_neutral_cycles() -> None:
+    bench = Bench(drive(rearm_immediate=True))
+    bench.online()
+    bench.notes[0].commands.append((0, 100.0))
+    bench.at(10.02)
+    bench.step = 0.001  # the timer thread is not there: whoever waits does its work
+    assert bench.exchange.deactivate() is True
+    assert bench.link.take() == [NEUTRAL] * 3
+    assert bench.sessions[0].stopped
+    assert bench.now < 10.3
+    assert not bench.exchange.active
+
+
+def test_deactivate_with_the_timer_thread() -> None:
+    bench = Bench(drive(period=0.005, mapping='assume'), real_time=True)
+    bench.exchange.bus_opened()
+    bench.exchange.open()
+    assert bench.link.started
+    bench.exchange.activate()
+    wait_for(lambda: len(bench.link.sent) >= 5)
+    assert bench.exchange.deactivate() is True
+    sent = bench.link.take()
+    assert set(sent) == {NEUTRAL}
+    assert len(sent) >= 8
+    assert bench.sessions[0].stopped
+    bench.exchange.close()
+    assert bench.link.stopped
+    assert not any(thread.name == 'exchange main' for thread in threading.enumerate())
+    assert bench.bus_notes.told == [('opened', 'main')]
+
+
+def test_deactivate_gives_up_in_the_end() -> None:
+    bench = Bench(drive())
+    bench.online()
+    bench.step = 0.01
+    bench.exchange._stopped = lambda: False  # type: ignore[method-assign]
+    started = bench.now
+    assert bench.exchange.deactivate() is False
+    assert 0.5 < bench.now - started < 1.0
+
+
+def test_deactivate_without_a_bus_is_done_at_once() -> None:
+    bench = Bench()
+    bench.exchange.activate()
+    assert bench.exchange.deactivate() is True
+    assert bench.link.take() == []
+
+
+# -- users ----------------------------------------------------------------------------------------
+
+
+def test_requests_are_sent_at_once_and_answered_as_events() -> None:
+    bench = Bench(drive())
+    bench.online()
+    request = read(GAIN)
+    bench.now = 10.003
+    bench.exchange.submit(bench.sessions[0], request)
+    assert bench.link.take() == [f'00200281#{ZEROS}']
+    bench.hears('10200281#0007000000000000', 10.004)
+    assert bench.notes[0].events[-1] == RequestCompleted(request, (ReadValue(7),))
+
+
+def test_request_to_an_inactive_bridge() -> None:
+    bench = Bench(drive())
+    bench.exchange.submit(bench.sessions[0], write((GAIN, 1)))
+    event, = bench.notes[0].events
+    assert event.outcomes == (Failure('bridge inactive'),)
+
+
+def test_ticket_is_registered_before_its_outcome_comes() -> None:
+    bench = Bench(drive(control=CONTROL, request=(WORD, SPEED), mapping='assume'))
+    bench.exchange.bus_opened()
+    bench.exchange.activate()
+    bench.at(10.0)
+    bench.hears(ANSWER, 10.002)
+    bench.at(10.02)
+    bench.hears(ANSWER, 10.022)
+    tickets: list[ControlTicket] = []
+
+    def register(ticket: ControlTicket) -> None:
+        assert bench.notes[0].outcomes == []
+        tickets.append(ticket)
+
+    assert bench.exchange.request_control(
+        bench.sessions[0], ControlAction.DISABLE, register) == ''
+    outcome, = bench.notes[0].outcomes
+    assert [outcome.ticket] == tickets
+    assert outcome.success
+
+
+def test_control_request_that_is_not_taken() -> None:
+    bench = Bench(drive())
+    reason = bench.exchange.request_control(
+        bench.sessions[0], ControlAction.ENABLE, lambda ticket: None)
+    assert reason == 'the profile has no control section'
+
+
+def test_reconfigure() -> None:
+    bench = Bench(drive())
+    bench.exchange.reconfigure(bench.sessions[0], command_timeout=0.1)
+    assert bench.sessions[0].setpoints.timeout == 0.1
+
+
+# -- the bus --------------------------------------------------------------------------------------
+
+
+def test_bus_that_is_lost_and_comes_back() -> None:
+    bench = Bench(drive())
+    bench.online()
+    bench.exchange.bus_lost('unplugged')
+    assert (bench.exchange.bus_state, bench.exchange.bus_reason) == ('down', 'unplugged')
+    assert bench.notes[0].events[-1] == StationLost('bus down: unplugged')
+    assert bench.at(10.1) == []
+    bench.exchange.bus_opened()
+    assert bench.link.take() == [ASK_MAP_1]
+    assert (bench.exchange.bus_state, bench.exchange.bus_reason) == ('up', '')
+    assert bench.bus_notes.told == [
+        ('opened', 'main'), ('lost', 'main', 'unplugged'), ('opened', 'main')]
+
+
+def test_bits_on_the_bus() -> None:
+    bench = Bench(drive())
+    bench.exchange.bus_opened()
+    bench.exchange.activate()
+    assert bench.exchange.sent_bits == 131       # without stuff bits, as in the golden vectors
+    bench.hears('7F1#2211000000000000', 10.001)
+    assert bench.exchange.received_bits == 111
+    bench.hears('102007A4#00320033', 10.002)
+    assert bench.exchange.received_bits == 111 + 99
+
+
+def test_frames_that_were_not_sent_do_not_count() -> None:
+    bench = Bench(drive())
+    bench.link.refusing = True
+    bench.exchange.bus_opened()
+    bench.exchange.activate()
+    assert bench.exchange.sent_bits == 0
+
+
+# -- what must not happen -------------------------------------------------------------------------
+
+
+def test_misconfigured_bus_is_fatal() -> None:
+    bench = Bench(drive())
+    bench.exchange.bus_misconfigured('no such interface')
+    assert bench.bus_notes.told == [('fatal', 'main', 'no such interface', True)]
+    assert bench.exchange.bus_state == 'misconfigured'
+
+
+def test_defect_of_the_reader_is_fatal() -> None:
+    bench = Bench(drive())
+    bench.exchange.link_failed('KeyError: 5')
+    assert bench.bus_notes.told == [('fatal', 'main', 'internal error: KeyError: 5', False)]
+    assert bench.exchange.bus_state == 'failed'
+
+
+def test_defect_in_the_timer_thread_is_told_not_swallowed() -> None:
+    bench = Bench(drive(mapping='assume', period=0.005), real_time=True)
+    bench.exchange.bus_opened()
+    bench.exchange.open()
+    bench.exchange.activate()
+    wait_for(lambda: bench.link.sent)
+    bench.notes[0].failing = True
+    wait_for(lambda: len(bench.bus_notes.told) > 1)
+    assert bench.bus_notes.told[-1] == (
+        'fatal', 'main', 'internal error: ZeroDivisionError: a defect', False)
+    # the lock is free, and the drives are stopped all the same
+    bench.notes[0].failing = False
+    bench.link.take()
+    assert bench.exchange.deactivate() is True
+    assert bench.link.take() == [NEUTRAL] * 3
+    bench.exchange.close()
+
+
+def test_whatever_is_due_sooner_wakes_the_timer() -> None:
+    bench = Bench(drive(period=5.0, mapping='assume', parameter_retries=0))
+    bench.exchange.bus_opened()
+    bench.exchange.activate()
+    bench.at(10.0)
+    bench.hears(ANSWER, 10.001)
+    exchange = bench.exchange
+    exchange._wake_at = exchange._pass()
+    exchange._wake.clear()
+    exchange.submit(bench.sessions[0], read(GAIN))
+    assert exchange._wake.is_set()            # its time-out comes before the next pass
+
+    exchange._wake_at = 10.01
+    exchange._wake.clear()
+    bench.hears('10200281#0007000000000000', 10.003)
+    assert not exchange._wake.is_set()        # nothing to wait for any more
+    exchange._wake_at = 20.0
+    bench.hears('7F1#00', 10.004)
+    assert not exchange._wake.is_set()
+    bench.hears('102001E0#0000000000000000', 10.005)
+    assert exchange._wake.is_set()            # the next cycle comes before that
+
+
+def test_age_of_a_frame_does_not_shorten_the_pause_after_an_eeprom_write() -> None:
+    bench = Bench(drive(period=5.0, mapping='assume'))
+    bench.exchange.bus_opened()
+    bench.exchange.activate()
+    bench.at(10.0)
+    bench.hears(ANSWER, 10.001)
+    bench.now = 10.1
+    bench.exchange.submit(bench.sessions[0], write((RAMP, 5)))
+    assert bench.hears('102001E1#0004000000000000', 10.11, age=0.009)[-1].startswith('003001E1')
+    assert bench.at(10.1295) == []
+    assert bench.at(10.1301) == [f'002001E1#{ZEROS}']
+
+
+def test_close_without_open() -> None:
+    bench = Bench(drive())
+    bench.exchange.close()
+    assert bench.link.stopped
