@@ -1,0 +1,209 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""A bridge with the drives at the other end of its buses."""
+
+from collections.abc import Callable
+import copy
+import gc
+import itertools
+from pathlib import Path
+import struct
+import threading
+import time
+from types import TracebackType
+from typing import Any
+
+import can
+from clients import patience
+import pytest
+
+pytest.importorskip('rclpy', reason='ROS 2 is not installed: rclpy cannot be imported')
+
+import rclpy
+from rclpy.context import Context
+from rclpy.signals import SignalHandlerOptions
+import yaml
+
+from drive_can_bridge.configuration.load import configuration_from_file
+from drive_can_bridge.ros.bridge_node import BridgeNode
+from drive_can_bridge.ros.executor_thread import ExecutorThread
+from drive_can_bridge.simulation.simulation import PlayedDrive, Simulation
+
+_COUNTER = itertools.count(1)
+
+#: generous: nothing may depend on how busy the machine is
+CONVEYOR: dict[str, Any] = {
+    'bus': 'main', 'protocol': 'datamodel_extended', 'station': 1, 'profile': 'datamodel_example',
+    'period': 0.02, 'cyclic_request': ['speed_setpoint', 'torque_limit'],
+    'cyclic_response': ['actual_speed', 'motor_current', 'status_word'],
+    'command_timeout': 10.0, 'missed_limit': 25, 'parameter_timeout': 0.5,
+}
+#: the same with a control word
+LIFT: dict[str, Any] = {
+    **CONVEYOR, 'station': 2, 'profile': 'datamodel_control_example',
+    'cyclic_request': ['control_word', 'speed_setpoint'],
+    'cyclic_response': ['status_word', 'actual_speed'], 'control_timeout': 5.0,
+}
+#: drives that tell soon when something is missing, for the tests of what happens then
+HASTY: dict[str, Any] = {'missed_limit': 5, 'parameter_timeout': 0.05}
+
+
+def parameters(*, buses: dict[str, Any] | None = None, **drives: dict[str, Any]) -> dict[str, Any]:
+    """Return the parameters of a bridge with these drives; the conveyor without any."""
+    return {
+        'diagnostics_period': 0.1,
+        'buses': buses or {'main': {'interface': 'virtual', 'bitrate': 1_000_000,
+                                    'reconnect_period': 0.1}},
+        'drives': drives or {'conveyor': CONVEYOR}}
+
+
+class Bridge:
+    """
+    A BridgeNode in a context of its own, and simulated drives.
+
+    :param content: parameters as a dictionary, or the text of a parameter file; None: a conveyor.
+        A bus without a channel gets one that nobody else has.
+    :param arguments: further ROS arguments, ``-r __ns:=/cell1``.
+    :param simulated: play the drives.
+    :param autostart: configure and activate.
+    :param key: to whom the parameter file is addressed.
+    """
+
+    def __init__(self, directory: Path, content: Any = None, *, arguments: tuple[str, ...] = (),
+                 simulated: bool = True, autostart: bool = True,
+                 key: str = '/**/drive_can_bridge') -> None:
+        number = next(_COUNTER)
+        self.file = directory / f'bridge_{number}.yaml'
+        if not isinstance(content, str):
+            content = copy.deepcopy(content or parameters())
+            for name, bus in content['buses'].items():
+                bus.setdefault('channel', f'ros_test_{number}_{name}')
+            content = yaml.dump({key: {'ros__parameters': content}}, Dumper=_Dumper,
+                                sort_keys=False)
+        self.file.write_text(content, encoding='utf-8')
+        self._simulated = simulated
+        self._autostart = autostart
+        self.fatal: list[str] = []
+        self.errors: list[str] = []
+        self.simulation: Simulation | None = None
+        self._closed = False
+        self.context = Context()
+        rclpy.init(args=['--ros-args', '--params-file', str(self.file), *arguments],
+                   context=self.context, signal_handler_options=SignalHandlerOptions.NO)
+        self.spinner = ExecutorThread('services', self.errors.append, self.context)
+        self.node = BridgeNode(self.spinner.executor, self.fatal.append, context=self.context)
+
+    def begin(self) -> None:
+        """Start the simulation and the bridge."""
+        if self._simulated:
+            self.simulation = Simulation(configuration_from_file(self.file),
+                                         complain=self.errors.append)
+            self.simulation.start()
+        self.spinner.start()
+        if self._autostart:
+            assert self.node.start(), 'the bridge did not start'
+
+    @property
+    def played(self) -> dict[str, PlayedDrive]:
+        """The simulated drives by name."""
+        assert self.simulation is not None
+        return self.simulation.drives
+
+    def channel(self, bus: str = 'main') -> str:
+        """Return the channel of a bus."""
+        return str(self.node.overrides[f'buses.{bus}.channel'])
+
+    def record(self, bus: str = 'main') -> 'Recorder':
+        """Record the frames of a bus; use as a context manager."""
+        return Recorder(self.channel(bus))
+
+    def online(self, *names: str, timeout: float = 20.0) -> None:
+        """Wait until drives are online; all of them by default."""
+        deadline = time.monotonic() + patience(timeout)
+        while not all(self.node.drives[name].session.online
+                      for name in names or self.node.drives):
+            assert time.monotonic() < deadline, 'the drives do not come online'
+            time.sleep(0.01)
+
+    def close(self) -> None:
+        """End everything, in the order of the executable."""
+        if self._closed:
+            return
+        self._closed = True
+        self.node.stop()
+        self.spinner.stop()
+        self.node.close()
+        self.node.destroy_node()
+        # rclpy's state machine keeps a node in the graph for as long as it is in memory
+        del self.node, self.spinner
+        gc.collect()
+        self.context.try_shutdown()
+        del self.context
+        gc.collect()
+        if self.simulation is not None:
+            self.simulation.stop()
+
+
+class Recorder:
+    """All frames on a virtual bus, in order: (identifier, data)."""
+
+    def __init__(self, channel: str) -> None:
+        self._channel = channel
+        self._frames: list[tuple[int, bytes]] = []
+        self._ending = threading.Event()
+
+    def __enter__(self) -> 'Recorder':
+        self._bus = can.Bus(interface='virtual', channel=self._channel, ignore_config=True)
+        self._thread = threading.Thread(target=self._run, name='recorder')
+        self._thread.start()
+        return self
+
+    def __exit__(self, exception_type: type[BaseException] | None,
+                 exception: BaseException | None, traceback: TracebackType | None) -> None:
+        self._ending.set()
+        self._thread.join()
+        self._bus.shutdown()
+
+    def _run(self) -> None:
+        while not self._ending.is_set():
+            message = self._bus.recv(0.02)
+            if message is not None:
+                self._frames.append((message.arbitration_id, bytes(message.data)))
+
+    def frames(self, *identifiers: int) -> list[tuple[int, bytes]]:
+        """Return the frames so far, or only those of some identifiers."""
+        return [frame for frame in list(self._frames)
+                if not identifiers or frame[0] in identifiers]
+
+    def words(self, station: int = 1) -> tuple[int, ...]:
+        """Return the signed words of the last cyclic request to a station; () without any."""
+        sent = self.cycles(station)
+        return sent[-1] if sent else ()
+
+    def cycles(self, station: int = 1) -> list[tuple[int, ...]]:
+        """Return the signed words of all cyclic requests to a station."""
+        return [struct.unpack('>4h', data)
+                for _, data in self.frames(cyclic_identifier(station))]
+
+    def clear(self) -> None:
+        """Forget what was seen."""
+        self._frames.clear()
+
+    def send(self, identifier: int, data: bytes, *, extended: bool = True) -> None:
+        """Send a frame as a stranger."""
+        self._bus.send(can.Message(arbitration_id=identifier, data=data,
+                                   is_extended_id=extended))
+
+
+StartBridge = Callable[..., Bridge]
+
+
+def cyclic_identifier(station: int) -> int:
+    """Return the identifier of a drive's cyclic request."""
+    return station << 21 | 0x1FFFF0
+
+
+class _Dumper(yaml.SafeDumper):
+    """Without aliases: rcl knows none."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        return True

@@ -1,0 +1,44 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""What must be gone after a bridge has ended."""
+
+import gc
+import threading
+import time
+
+import can.interfaces.virtual
+from clients import Client, patience
+
+from drive_can_bridge.ros.drive_node import DriveNode
+
+#: beginnings of the names of threads that a bridge or a simulation starts
+THREADS = ('bus ', 'exchange ', 'services', 'simulation ', 'stop ')
+
+
+def threads() -> list[str]:
+    """Return the names of running threads of bridges and simulations."""
+    return [thread.name for thread in threading.enumerate() if thread.name.startswith(THREADS)]
+
+
+def open_channels() -> list[str]:
+    """Return the virtual buses that somebody has open."""
+    return [str(channel) for channel, queues in can.interfaces.virtual.channels.items() if queues]
+
+
+def drive_nodes() -> int:
+    """Return how many drive nodes are still in memory."""
+    gc.collect()
+    return sum(isinstance(thing, DriveNode) for thing in gc.get_objects())
+
+
+def assert_nothing_left(client: Client) -> None:
+    """Fail if a thread, an open bus, a node or a drive is left over."""
+    deadline = time.monotonic() + patience(10.0)
+    gc.collect()
+    while True:
+        left = {'threads': threads(), 'buses': open_channels(),
+                'nodes': sorted(set(client.nodes()) - {client.full_name})}
+        if not any(left.values()):
+            break
+        assert time.monotonic() < deadline, left
+        time.sleep(0.02)
+    assert not drive_nodes(), f'{drive_nodes()} drive nodes are still in memory'

@@ -1,0 +1,273 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Setpoints from topics to the wire: arming, ageing, refusals."""
+
+import math
+from typing import Any
+
+from bridges import Bridge, CONVEYOR, HASTY, parameters, Recorder, StartBridge
+from clients import Client, wait_until
+import pytest
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Bool, Float64, Int64
+
+SPEED, LIMIT = '/conveyor/command/speed_setpoint', '/conveyor/command/torque_limit'
+DRIVE = 'drive_can_bridge: drive conveyor'
+
+
+def until_sent(recorder: Recorder, slot: int, raw: int) -> None:
+    wait_until(lambda: recorder.words()[slot:slot + 1] == (raw,),
+               what=f'{raw} in slot {slot}; last: {recorder.words()}')
+
+
+def refused(one: Bridge) -> int:
+    return one.node.drives['conveyor'].session.statistics.commands_refused
+
+
+def cycles_pass(one: Bridge, count: int = 5) -> None:
+    """Wait until that many further exchanges are over."""
+    statistics = one.node.drives['conveyor'].session.statistics
+    start = statistics.exchanges
+    wait_until(lambda: statistics.exchanges >= start + count)
+
+
+def arm(client: Client, recorder: Recorder, speed: float = 100.0) -> None:
+    client.publish(SPEED, Float64(data=0.0))
+    client.publish(SPEED, Float64(data=speed))
+    until_sent(recorder, 0, round(10 * speed))
+
+
+def test_only_neutral_arms(bridge: StartBridge, client: Client) -> None:
+    one = bridge()
+    one.online()
+    with one.record() as recorder:
+        client.publish(SPEED, Float64(data=100.0))
+        client.wait_logged('command speed_setpoint has no effect: not armed, send 0 once first')
+        client.publish(SPEED, Float64(data=0.2))
+        cycles_pass(one)
+        assert set(recorder.cycles()) == {(0, 0, 0, 0)}
+        client.publish(SPEED, Float64(data=-0.1))  # within one raw step
+        until_sent(recorder, 0, -1)
+        client.publish(SPEED, Float64(data=123.4))
+        until_sent(recorder, 0, 1234)
+        # each setpoint has to be armed by itself
+        client.publish(LIMIT, Float64(data=50.0))
+        cycles_pass(one)
+        assert recorder.words()[:2] == (1234, 0)
+        client.publish(LIMIT, Float64(data=0.0))
+        client.publish(LIMIT, Float64(data=50.0))
+        until_sent(recorder, 1, 500)
+    assert refused(one) == 0
+
+
+def test_newest_wins(bridge: StartBridge, client: Client) -> None:
+    one = bridge()
+    one.online()
+    with one.record() as recorder:
+        arm(client, recorder)
+        for value in range(200):
+            client.publish(SPEED, Float64(data=float(value)))
+        until_sent(recorder, 0, 1990)
+        cycles_pass(one)
+        assert recorder.words()[0] == 1990
+
+
+def test_time_out_goes_neutral_by_setpoint(bridge: StartBridge, client: Client) -> None:
+    one = bridge(parameters(conveyor={**CONVEYOR, 'command_timeout': 2.0}))
+    one.online()
+    with one.record() as recorder:
+        client.publish(LIMIT, Float64(data=0.0))
+        client.publish(LIMIT, Float64(data=30.0))
+        arm(client, recorder)
+        until_sent(recorder, 1, 300)
+
+        def kept() -> bool:
+            client.publish(SPEED, Float64(data=100.0))
+            return recorder.words()[1] == 0
+        wait_until(kept, what='the limit alone to go neutral')
+        assert recorder.words()[0] == 1000
+        client.wait_logged('conveyor: no command for 2 s: torque_limit neutral until armed again')
+        until_sent(recorder, 0, 0)
+        client.publish(SPEED, Float64(data=100.0))
+        cycles_pass(one)
+        assert recorder.words()[0] == 0
+        status = client.diagnostics(DRIVE, lambda drive: drive['state'] == 'not armed')
+        assert status['level'] == 'WARN'
+        assert '0 to /conveyor/command/speed_setpoint' in status['message']
+
+
+@pytest.mark.parametrize('value, reason', [
+    (math.nan, 'nan is not a finite number'), (math.inf, 'inf is not a finite number'),
+    (-math.inf, '-inf is not a finite number'),
+    (3000.1, '3000.1 is out of range: -3000 to 3000 rpm')])
+def test_refused_commands_change_nothing(bridge: StartBridge, client: Client, value: float,
+                                         reason: str) -> None:
+    one = bridge()
+    one.online()
+    with one.record() as recorder:
+        arm(client, recorder)
+        recorder.clear()
+        client.publish(SPEED, Float64(data=value))
+        wait_until(lambda: refused(one) == 1)
+        client.wait_logged(f'conveyor: command speed_setpoint refused: {reason}')
+        cycles_pass(one)
+        assert set(recorder.cycles()) == {(1000, 0, 0, 0)}
+        client.diagnostics(DRIVE, lambda drive: drive['commands_refused'] == '1')
+        client.publish(SPEED, Float64(data=200.0))
+        until_sent(recorder, 0, 2000)
+
+
+def test_refused_commands_do_not_refresh_the_age(bridge: StartBridge, client: Client) -> None:
+    one = bridge(parameters(conveyor={**CONVEYOR, 'command_timeout': 1.0}))
+    one.online()
+    with one.record() as recorder:
+        arm(client, recorder)
+
+        def neutral() -> bool:
+            client.publish(SPEED, Float64(data=math.nan))
+            return recorder.words()[0] == 0
+        wait_until(neutral)
+
+
+PROFILE = """
+protocols: [datamodel_extended]
+parameters:
+  counts: {number: 51, type: int16, storage: ram, neutral: 5}
+  brake: {number: 52, type: bool, storage: ram}
+  wide: {number: 53, type: uint16, storage: ram, scale: 0.5}
+  actual: {number: 209, type: int16, access: ro}
+"""
+
+
+def test_integers_and_bools(bridge: StartBridge, client: Client, tmp_path: Any) -> None:
+    profile = tmp_path / 'typed.yaml'
+    profile.write_text(PROFILE, encoding='utf-8')
+    one = bridge(parameters(conveyor={
+        **CONVEYOR, 'profile': str(profile), 'cyclic_request': ['counts', 'brake', 'wide'],
+        'cyclic_response': ['actual']}))
+    one.online()
+    status = client.diagnostics(DRIVE, lambda drive: drive['state'] == 'not armed')
+    assert '5 to /conveyor/command/counts' in status['message']
+    assert 'false to /conveyor/command/brake' in status['message']
+    with one.record() as recorder:
+        wait_until(recorder.words)
+        assert recorder.words() == (5, 0, 0, 0)
+        client.publish('/conveyor/command/counts', Int64(data=6))
+        until_sent(recorder, 0, 6)
+        client.publish('/conveyor/command/counts', Int64(data=-32768))
+        until_sent(recorder, 0, -32768)
+        client.publish('/conveyor/command/counts', Int64(data=32768))
+        client.wait_logged('command counts refused: 32768 is not representable: int16 carries '
+                           '-32768 to 32767')
+        client.publish('/conveyor/command/counts', Int64(data=2 ** 62))
+        wait_until(lambda: refused(one) == 2)
+        # true is one raw step away from neutral, and arms
+        client.publish('/conveyor/command/brake', Bool(data=True))
+        until_sent(recorder, 1, 1)
+        client.publish('/conveyor/command/wide', Float64(data=0.0))
+        client.publish('/conveyor/command/wide', Float64(data=32767.5))
+        until_sent(recorder, 2, -1)
+        client.publish('/conveyor/command/wide', Float64(data=-0.3))
+        wait_until(lambda: refused(one) == 3)
+        assert recorder.words()[:3] == (-32768, 1, -1)
+
+
+def test_joint_command(bridge: StartBridge, client: Client) -> None:
+    one = bridge(parameters(conveyor={
+        **CONVEYOR, 'joint': {
+            'name': 'belt', 'velocity': 'actual_speed', 'velocity_command': 'speed_setpoint',
+            'effort_command': 'torque_limit', 'gear_ratio': 10.0}}))
+    one.online()
+    topic = '/conveyor/joint_command'
+    one_rpm = 2 * math.pi / 60 / 10
+    with one.record() as recorder:
+        client.publish(topic, JointState(name=['belt'], velocity=[0.0], effort=[0.0]))
+        client.publish(topic, JointState(name=['other', 'belt'], velocity=[9.0, 120 * one_rpm],
+                                         effort=[9.0, 25.0]))
+        wait_until(lambda: recorder.words()[:2] == (1200, 250))
+        client.publish(topic, JointState(name=['belt'], velocity=[60 * one_rpm]))
+        wait_until(lambda: recorder.words()[:2] == (600, 250))
+        assert refused(one) == 0
+        client.listen()
+        for count in range(1, 4):
+            client.publish(topic, JointState(name=['chain'], velocity=[0.0]))
+            wait_until(lambda count=count: refused(one) == count)
+        client.publish(topic, JointState(name=['other', 'belt'], velocity=[1.0]))
+        wait_until(lambda: refused(one) == 4)
+        client.wait_logged('conveyor: joint_command has fewer velocity values than names')
+        client.publish(topic, JointState(name=['belt'], position=[1.0]))
+        wait_until(lambda: refused(one) == 5)
+        client.wait_logged('joint_command has a position, but joint.position_command is not')
+        client.publish(topic, JointState(name=['belt'], velocity=[math.nan]))
+        client.wait_logged('command speed_setpoint refused: nan')
+        warnings = [text for text in client.logged() if 'without an entry' in text]
+        assert warnings == ['conveyor: joint_command without an entry named belt']
+        client.publish(topic, JointState(name=['belt']))
+        client.publish(topic, JointState(name=['belt'], velocity=[30 * one_rpm]))
+        wait_until(lambda: recorder.words()[:2] == (300, 250))
+        assert refused(one) == 6
+
+
+def test_commands_while_offline_have_no_effect_later(bridge: StartBridge,
+                                                     client: Client) -> None:
+    one = bridge(parameters(conveyor={**CONVEYOR, **HASTY, 'rearm': 'immediate'}))
+    one.online()
+    with one.record() as recorder:
+        client.publish(SPEED, Float64(data=100.0))
+        until_sent(recorder, 0, 1000)
+        one.played['conveyor'].fault('silent')
+        wait_until(lambda: not one.node.drives['conveyor'].session.online)
+        client.publish(SPEED, Float64(data=300.0))
+        client.publish(SPEED, Float64(data=math.nan))
+        wait_until(lambda: refused(one) == 1)
+        recorder.clear()
+        one.played['conveyor'].fault('ok')
+        one.online()
+        cycles_pass(one)
+        assert {words[0] for words in recorder.cycles()} == {0}
+        client.publish(SPEED, Float64(data=200.0))
+        until_sent(recorder, 0, 2000)
+
+
+def test_reconnection_wants_arming_again(bridge: StartBridge, client: Client) -> None:
+    one = bridge(parameters(conveyor={**CONVEYOR, **HASTY}))
+    one.online()
+    with one.record() as recorder:
+        arm(client, recorder)
+        one.played['conveyor'].fault('silent')
+        wait_until(lambda: not one.node.drives['conveyor'].session.online)
+        one.played['conveyor'].fault('ok')
+        one.online()
+        recorder.clear()
+        client.publish(SPEED, Float64(data=100.0))
+        cycles_pass(one)
+        assert {words[0] for words in recorder.cycles()} == {0}
+        arm(client, recorder, 50.0)
+
+
+def test_incompatible_publishers_are_told_about(bridge: StartBridge, client: Client) -> None:
+    one = bridge()
+    one.online()
+    client.node.create_publisher(Float64, SPEED, QoSProfile(
+        depth=1, reliability=ReliabilityPolicy.BEST_EFFORT))
+    client.wait_logged(f'conveyor: a publisher of {SPEED} offers incompatible quality of service '
+                       f'(RELIABILITY): nothing is received from it')
+
+
+def test_lost_time_wants_arming_again(bridge: StartBridge, client: Client,
+                                      monkeypatch: pytest.MonkeyPatch) -> None:
+    one = bridge(parameters(conveyor={**CONVEYOR, 'command_timeout': 0}))
+    one.online()
+    exchange = one.node.exchanges['main']
+    with one.record() as recorder:
+        arm(client, recorder)
+        clock = exchange._clock
+        # as if the process had stood still for three seconds
+        monkeypatch.setattr(exchange, '_clock', lambda: clock() + 3.0)
+        until_sent(recorder, 0, 0)
+        one.online()
+        recorder.clear()
+        client.publish(SPEED, Float64(data=100.0))
+        cycles_pass(one)
+        assert {words[0] for words in recorder.cycles()} == {0}
+        arm(client, recorder)

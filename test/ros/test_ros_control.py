@@ -1,0 +1,152 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""``~/enable``, ``~/reset_fault`` and ``~/quick_stop``."""
+
+from typing import Any
+
+from bridges import HASTY, LIFT, parameters, StartBridge
+from clients import Client, wait_until
+import pytest
+from std_msgs.msg import Float64
+from std_srvs.srv import SetBool, Trigger
+
+DRIVE = 'drive_can_bridge: drive lift'
+#: the control word has a slot, or is written on change
+WITH_SLOT = LIFT
+BY_HAND = {**LIFT, 'cyclic_request': ['speed_setpoint']}
+#: neither word has one
+BLIND = {**BY_HAND, 'cyclic_response': ['actual_speed']}
+
+
+def enable(client: Client, value: bool = True) -> tuple[bool, str]:
+    answer = client.call('/lift/enable', SetBool, SetBool.Request(data=value))
+    return answer.success, answer.message
+
+
+def trigger(client: Client, name: str) -> tuple[bool, str]:
+    answer = client.call(f'/lift/{name}', Trigger)
+    return answer.success, answer.message
+
+
+@pytest.mark.parametrize('lift', [WITH_SLOT, BY_HAND, BLIND], ids=['slot', 'by hand', 'blind'])
+def test_enable_and_disable(bridge: StartBridge, client: Client, lift: dict[str, Any]) -> None:
+    one = bridge(parameters(lift=lift))
+    one.online()
+    drive = one.played['lift']
+    assert drive.value('control_word') == 0
+    assert enable(client, False)[0]
+    success, message = enable(client)
+    assert success and message == 'enabled', message
+    assert drive.value('control_word') == 1
+    assert int(drive.value('status_word')) & 2
+    assert enable(client)[0]  # it is already
+    success, message = enable(client, False)
+    assert success, message
+    assert not int(drive.value('status_word')) & 2
+    assert drive.value('control_word') == 0
+
+
+def test_the_control_word_has_no_topic(bridge: StartBridge, client: Client) -> None:
+    bridge(parameters(lift=LIFT, conveyor={**LIFT, 'station': 3, 'profile': 'datamodel_example',
+                                           'cyclic_request': ['speed_setpoint']}))
+    topics = dict(client.node.get_topic_names_and_types())
+    wait_until(lambda: '/lift/command/speed_setpoint' in dict(
+        client.node.get_topic_names_and_types()))
+    assert '/lift/command/control_word' not in topics
+    services = dict(client.node.get_service_names_and_types())
+    wait_until(lambda: '/lift/enable' in dict(client.node.get_service_names_and_types()))
+    assert '/conveyor/enable' not in services
+
+
+@pytest.mark.parametrize('lift', [WITH_SLOT, BY_HAND], ids=['slot', 'by hand'])
+def test_fault_and_reset(bridge: StartBridge, client: Client, lift: dict[str, Any]) -> None:
+    one = bridge(parameters(lift=lift))
+    one.online()
+    drive = one.played['lift']
+    assert trigger(client, 'reset_fault')[0]  # without a fault it succeeds
+    assert enable(client)[0]
+    drive.fault('trip')
+    status = client.diagnostics(DRIVE, lambda drive: drive['state'] == 'fault')
+    assert status['level'] == 'ERROR'
+    assert '~/reset_fault' in status['message'] and '~/enable' in status['message']
+    wait_until(lambda: drive.value('control_word') == 0)
+    assert enable(client) == (False, 'fault: reset it first')
+    assert trigger(client, 'quick_stop')[0]
+    success, message = trigger(client, 'reset_fault')
+    assert success, message
+    wait_until(lambda: drive.value('control_word') == 0)
+    assert not int(drive.value('status_word')) & 2  # nothing but a new enable starts it
+    client.diagnostics(DRIVE, lambda drive: drive['state'] == 'not armed')
+    assert enable(client)[0]
+
+
+def test_a_fault_that_lasts_cannot_be_reset(bridge: StartBridge, client: Client) -> None:
+    one = bridge(parameters(lift={**LIFT, 'control_timeout': 0.5}))
+    one.online()
+    one.played['lift'].fault('trip=3600')
+    client.diagnostics(DRIVE, lambda drive: drive['state'] == 'fault')
+    success, message = trigger(client, 'reset_fault')
+    assert not success and 'fault still present' in message
+
+
+def test_quick_stop(bridge: StartBridge, client: Client) -> None:
+    one = bridge(parameters(lift=LIFT))
+    one.online()
+    assert trigger(client, 'quick_stop')[0]  # while disabled it succeeds
+    assert enable(client)[0]
+    client.publish('/lift/command/speed_setpoint', Float64(data=0.0))
+    client.publish('/lift/command/speed_setpoint', Float64(data=300.0))
+    wait_until(lambda: float(one.played['lift'].value('actual_speed')) > 50.0)
+    with one.record() as recorder:
+        success, message = trigger(client, 'quick_stop')
+        assert success, message
+        assert 2 in {words[0] for words in recorder.cycles(2)}
+    assert not int(one.played['lift'].value('status_word')) & 2
+    wait_until(lambda: one.played['lift'].value('control_word') == 0)
+
+
+def test_enable_that_gets_stuck_names_the_state(bridge: StartBridge, client: Client) -> None:
+    one = bridge(parameters(lift={**LIFT, 'control_timeout': 0.5}))
+    one.online()
+    one.played['lift'].set_value('status_word', 0)
+    success, message = enable(client)
+    assert not success and 'stuck in state' in message and '0.5 s' in message
+    assert one.played['lift'].value('control_word') == 0
+
+
+def test_all_refuse_while_offline(bridge: StartBridge, client: Client) -> None:
+    one = bridge(parameters(lift={**LIFT, **HASTY}))
+    one.online()
+    assert enable(client)[0]
+    one.played['lift'].fault('silent')
+    wait_until(lambda: not one.node.drives['lift'].session.online)
+    assert enable(client) == (False, 'drive offline')
+    assert enable(client, False) == (False, 'drive offline')
+    assert trigger(client, 'reset_fault') == (False, 'drive offline')
+    assert trigger(client, 'quick_stop') == (False, 'drive offline')
+    one.played['lift'].fault('ok')
+    one.online()
+    wait_until(lambda: one.played['lift'].value('control_word') == 0)
+    assert not int(one.played['lift'].value('status_word')) & 2
+
+
+def test_going_offline_answers_what_is_under_way(bridge: StartBridge, client: Client) -> None:
+    one = bridge(parameters(lift={**LIFT, **HASTY, 'control_timeout': 60.0}))
+    one.online()
+    one.played['lift'].set_value('status_word', 0)
+    future = client.ask('/lift/enable', SetBool, SetBool.Request(data=True))
+    wait_until(lambda: one.node.drives['lift'].session.control.pending)
+    one.played['lift'].fault('off')
+    wait_until(future.done)
+    assert not future.result().success and 'no cyclic response' in future.result().message
+
+
+def test_inactive_refuses(bridge: StartBridge, client: Client) -> None:
+    one = bridge(parameters(lift={**LIFT, 'control_timeout': 60.0}))
+    one.online()
+    one.played['lift'].set_value('status_word', 0)
+    future = client.ask('/lift/enable', SetBool, SetBool.Request(data=True))
+    wait_until(lambda: one.node.drives['lift'].session.control.pending)
+    assert client.transition(4)
+    wait_until(future.done)
+    assert (future.result().success, future.result().message) == (False, 'bridge inactive')
+    assert enable(client) == (False, 'bridge inactive')

@@ -1,0 +1,175 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""What ``/diagnostics`` says, and that it says what to do."""
+
+import math
+from typing import Any
+
+from bridges import CONVEYOR, HASTY, parameters, StartBridge
+from clients import Client, ERROR, wait_until
+from diagnostic_msgs.msg import DiagnosticArray
+import pytest
+from std_msgs.msg import Float64
+
+from drive_can_bridge.core.errors import BusUnavailable
+from drive_can_bridge.transport import link
+
+BUS, DRIVE = 'drive_can_bridge: bus main', 'drive_can_bridge: drive conveyor'
+BUS_KEYS = {
+    'state', 'load_percent', 'frames_sent', 'frames_received', 'frames_rejected', 'error_frames',
+    'bus_off_count', 'reconnections', 'send_failures'}
+DRIVE_KEYS = {
+    'state', 'exchanges', 'missed_exchanges', 'latency_mean_ms', 'latency_p99_ms',
+    'latency_max_ms', 'period_error_mean_ms', 'period_error_p99_ms', 'period_error_max_ms',
+    'command_age_s', 'commands_refused', 'frames_rejected', 'parameter_requests_ok',
+    'parameter_requests_failed', 'last_parameter_error'}
+
+
+def test_names_and_keys(bridge: StartBridge, client: Client) -> None:
+    one = bridge(parameters(conveyor=CONVEYOR, other={**CONVEYOR, 'station': 2}))
+    one.online()
+    message = client.topic('/diagnostics', DiagnosticArray).wait()
+    assert [status.name for status in message.status] == [
+        BUS, DRIVE, 'drive_can_bridge: drive other']
+    assert message.header.stamp.sec > 0
+    for status, keys in zip(message.status, (BUS_KEYS, DRIVE_KEYS, DRIVE_KEYS)):
+        assert keys <= {pair.key for pair in status.values}
+        assert status.message
+
+
+def test_a_drive_that_works(bridge: StartBridge, client: Client) -> None:
+    one = bridge(parameters(conveyor={**CONVEYOR, 'cyclic_request': ['speed_setpoint']}))
+    one.online()
+    status = client.diagnostics(DRIVE, lambda drive: drive['state'] == 'not armed')
+    assert status['level'] == 'WARN' and status['command_age_s'] == 'nan'
+    assert 'publish 0 to /conveyor/command/speed_setpoint' in status['message']
+    client.publish('/conveyor/command/speed_setpoint', Float64(data=0.0))
+    status = client.diagnostics(DRIVE, lambda drive: drive['state'] == 'online')
+    assert status['level'] == 'OK'
+    assert float(status['command_age_s']) >= 0.0
+    status = client.diagnostics(DRIVE, lambda drive: int(drive['exchanges']) > 10)
+    for name in ('latency', 'period_error'):
+        values = [float(status[f'{name}_{what}_ms']) for what in ('mean', 'p99', 'max')]
+        assert all(math.isfinite(value) for value in values) and values[2] >= values[0]
+    bus = client.diagnostics(BUS, lambda bus: int(bus['frames_received']) > 10)
+    assert bus['level'] == 'OK' and bus['state'] == 'up'
+    assert 0.0 < float(bus['load_percent']) < 100.0
+    assert int(bus['frames_sent']) >= 10
+
+
+def test_rearm_immediate_takes_any_command(bridge: StartBridge, client: Client) -> None:
+    bridge(parameters(conveyor={**CONVEYOR, 'rearm': 'immediate'}))
+    status = client.diagnostics(DRIVE, lambda drive: drive['state'] == 'not armed')
+    assert 'publish a command to /conveyor/command/speed_setpoint' in status['message']
+
+
+def test_offline_says_where_to_look(bridge: StartBridge, client: Client) -> None:
+    one = bridge(parameters(conveyor={**CONVEYOR, **HASTY}), autostart=False)
+    one.played['conveyor'].fault('off')
+    assert client.transition(1) and client.transition(3)
+    status = client.diagnostics(DRIVE, lambda drive: 'no answer' in drive['message'])
+    assert (status['state'], status['level']) == ('offline', 'STALE')
+    assert 'not seen since start' in status['message'] and 'station' in status['message']
+    one.played['conveyor'].fault('ok')
+    client.diagnostics(DRIVE, lambda drive: drive['state'] == 'not armed')
+    one.played['conveyor'].fault('off')
+    status = client.diagnostics(DRIVE, lambda drive: drive['state'] == 'offline')
+    assert status['level'] == 'ERROR' and 'check' in status['message']
+    assert int(status['missed_exchanges']) >= 5
+
+
+def test_strangers_are_counted_and_told(bridge: StartBridge, client: Client) -> None:
+    one = bridge()
+    one.online()
+    with one.record() as recorder:
+        for _ in range(3):  # nobody asked for parameter 99
+            recorder.send(0x10200000 | 99 << 4 | 1, bytes(8))
+        status = client.diagnostics(DRIVE, lambda drive: int(drive['frames_rejected']) >= 3)
+        client.wait_logged('conveyor: frame rejected')
+        recorder.send(0x00200000 | 30 << 4 | 1, bytes(8))
+        client.wait_logged('another master sends requests to station 1')
+        recorder.send(0x102, bytes(8), extended=False)
+        recorder.send(0x10200000 | 99 << 4 | 1, bytes(3))
+    assert status['parameter_requests_failed'] == '0'
+    client.diagnostics(DRIVE, lambda drive: int(drive['frames_rejected']) >= 4)
+
+
+def test_a_bus_that_is_not_there_yet(bridge: StartBridge, client: Client,
+                                     monkeypatch: pytest.MonkeyPatch) -> None:
+    there = False
+    original = link.open_port
+
+    def open_port(*arguments: Any) -> Any:
+        if not there:
+            raise BusUnavailable('virtual: no such device')
+        return original(*arguments)
+    monkeypatch.setattr(link, 'open_port', open_port)
+    one = bridge()
+    assert client.wait_logged('virtual: no such device', ERROR) == (
+        'bus main: virtual: no such device; tried again every 0.1 s')
+    bus = client.diagnostics(BUS)
+    assert (bus['state'], bus['level']) == ('down', 'ERROR')
+    assert 'no such device' in bus['message'] and 'tried again every 0.1 s' in bus['message']
+    drive = client.diagnostics(DRIVE)
+    assert (drive['state'], drive['level']) == ('offline', 'STALE')
+    assert 'bus down' in drive['message'] and 'power' not in drive['message']
+    assert client.set('/conveyor', ramp_time=1.0) == [(False, 'bus down')]
+    assert client.get('/conveyor', 'ramp_time') == [None]
+    client.wait_logged('conveyor: read ramp_time (P30): bus down')
+    there = True
+    one.online()
+    client.diagnostics(BUS, lambda bus: bus['state'] == 'up' and bus['level'] == 'OK')
+    one.node.exchanges['main'].link._loss = 'unplugged'
+    wait_until(lambda: not one.node.drives['conveyor'].session.online)
+    one.online()
+    client.diagnostics(BUS, lambda bus: bus['reconnections'] == '1')
+    assert not one.fatal
+
+
+def test_mapping_differs(bridge: StartBridge, client: Client) -> None:
+    one = bridge(autostart=False)
+    drive = one.played['conveyor']
+    drive.set_value('p123', 99)
+    assert client.transition(1)
+    with one.record() as recorder:
+        assert client.transition(3)
+        client.wait_logged('conveyor: mapping differs, no cyclic frame is sent: request map is '
+                           '50, 99, configured 50, 51', ERROR)
+        status = client.diagnostics(DRIVE, lambda drive: drive['state'] == 'mapping differs')
+        assert status['level'] == 'ERROR'
+        assert 'request map is 50, 99, configured 50, 51' in status['message']
+        assert 'mapping: configure' in status['message']
+        # parameter services work meanwhile
+        drive.set_value('ramp_time', 1.5)
+        assert client.get('/conveyor', 'ramp_time', 'p123') == [pytest.approx(1.5), 99]
+        assert client.set('/conveyor', jog_speed=2.0) == [(True, '')]
+        assert not recorder.cycles()
+        # it is looked at again without being asked
+        drive.set_value('p123', 51)
+        one.online()
+        wait_until(recorder.cycles)
+
+
+def test_forgotten_maps_stop_the_cycle(bridge: StartBridge, client: Client) -> None:
+    one = bridge(parameters(conveyor={**CONVEYOR, **HASTY}))
+    one.online()
+    drive = one.played['conveyor']
+    drive.fault('forget=0')
+    client.wait_logged('conveyor: mapping differs, no cyclic frame is sent: request map is empty',
+                       ERROR)
+    status = client.diagnostics(DRIVE, lambda drive: drive['state'] == 'mapping differs')
+    assert status['level'] == 'ERROR'
+    for name, number in (('p126', 209), ('p127', 210), ('p128', 211), ('p122', 50),
+                         ('p123', 51)):
+        drive.set_value(name, number)
+    one.online()
+
+
+def test_mapping_configure_rewrites(bridge: StartBridge, client: Client) -> None:
+    one = bridge(parameters(conveyor={**CONVEYOR, 'mapping': 'configure'}))
+    one.online()
+    client.wait_logged('conveyor: maps of the drive rewritten: request map [50, 51], response map '
+                       '[209, 210, 211]')
+    drive = one.played['conveyor']
+    assert [drive.value(f'p{number}') for number in range(122, 130)] == [
+        50, 51, 0, 0, 209, 210, 211, 0]
+    assert not drive.violations

@@ -1,0 +1,247 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""The bridge as a managed node."""
+
+import gc
+from pathlib import Path
+from typing import Any
+
+from bridges import Bridge, CONVEYOR, LIFT, parameters, StartBridge
+from clients import Client, ERROR, wait_until
+from leaks import drive_nodes, open_channels, threads
+from lifecycle_msgs.msg import Transition
+import pytest
+from rcl_interfaces.srv import GetParameters
+from std_msgs.msg import Bool, Float64
+
+CONFIGURE, ACTIVATE = Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE
+DEACTIVATE, CLEANUP = Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP
+UNCONFIGURED_SHUTDOWN = Transition.TRANSITION_UNCONFIGURED_SHUTDOWN
+INACTIVE_SHUTDOWN = Transition.TRANSITION_INACTIVE_SHUTDOWN
+ACTIVE_SHUTDOWN = Transition.TRANSITION_ACTIVE_SHUTDOWN
+DRIVE = 'drive_can_bridge: drive conveyor'
+
+LEGAL = {
+    'unconfigured': {CONFIGURE: 'inactive', UNCONFIGURED_SHUTDOWN: 'finalized'},
+    'inactive': {ACTIVATE: 'active', CLEANUP: 'unconfigured', INACTIVE_SHUTDOWN: 'finalized'},
+    'active': {DEACTIVATE: 'inactive', ACTIVE_SHUTDOWN: 'finalized'},
+    'finalized': {},
+}
+WAY = {'unconfigured': (), 'inactive': (CONFIGURE,), 'active': (CONFIGURE, ACTIVATE),
+       'finalized': (UNCONFIGURED_SHUTDOWN,)}
+
+
+def waiting(bridge: StartBridge, content: Any = None, **options: Any) -> Bridge:
+    return bridge(content, autostart=False, **options)
+
+
+@pytest.mark.parametrize('state', LEGAL)
+def test_illegal_transitions_fail_and_do_no_harm(bridge: StartBridge, client: Client,
+                                                 state: str) -> None:
+    waiting(bridge)
+    client.listen()
+    for transition in WAY[state]:
+        assert client.transition(transition)
+    assert client.state() == state
+    illegal = {CONFIGURE, ACTIVATE, DEACTIVATE, CLEANUP, UNCONFIGURED_SHUTDOWN,
+               INACTIVE_SHUTDOWN, ACTIVE_SHUTDOWN, Transition.TRANSITION_CREATE,
+               Transition.TRANSITION_DESTROY, Transition.TRANSITION_ON_CONFIGURE_SUCCESS,
+               99} - set(LEGAL[state])
+    for transition in illegal:
+        assert not client.transition(transition)
+        client.wait_logged(f'transition number {transition} is not possible in state {state}')
+    assert not client.transition(label='dance')
+    client.wait_logged(f'transition dance is not possible in state {state}')
+    assert client.state() == state
+
+
+@pytest.mark.parametrize('state, transition, target', [
+    (state, transition, target) for state, targets in LEGAL.items()
+    for transition, target in targets.items()])
+def test_legal_transitions(bridge: StartBridge, client: Client, state: str, transition: int,
+                           target: str) -> None:
+    one = waiting(bridge)
+    for step in WAY[state]:
+        assert client.transition(step)
+    assert client.transition(transition)
+    assert client.state() == target
+    present = target in ('inactive', 'active')
+    wait_until(lambda: ('/conveyor' in client.nodes()) is present)
+    wait_until(lambda: bool(one.node.drives) is present and bool(one.node.exchanges) is present)
+    if target == 'active':
+        one.online()
+
+
+def test_labels_and_repetition(bridge: StartBridge, client: Client) -> None:
+    one = waiting(bridge)
+    for label, state in (('configure', 'inactive'), ('activate', 'active'),
+                         ('deactivate', 'inactive'), ('activate', 'active'),
+                         ('deactivate', 'inactive'), ('cleanup', 'unconfigured'),
+                         ('configure', 'inactive'), ('activate', 'active'),
+                         ('shutdown', 'finalized')):
+        assert client.transition(label=label), label
+        assert client.state() == state
+        if state == 'active':
+            one.online()
+
+
+def test_inactive_sends_nothing(bridge: StartBridge, client: Client) -> None:
+    one = waiting(bridge)
+    assert client.transition(CONFIGURE)
+    client.listen()
+    with one.record() as recorder:
+        client.publish('/conveyor/command/speed_setpoint', Float64(data=0.0))
+        assert client.get('/conveyor', 'ramp_time', 'nothing') == [None, None]
+        assert client.set('/conveyor', ramp_time=1.0, jog_speed=1.0) == [
+            (False, 'bridge inactive')] * 2
+        assert client.set_atomically('/conveyor', jog_speed=1.0) == (
+            False, 'jog_speed: bridge inactive; nothing was written')
+        status = client.diagnostics(DRIVE)
+        assert status['state'] == 'offline' and 'inactive' in status['message']
+        client.diagnostics('drive_can_bridge: bus main', lambda bus: bus['state'] == 'up')
+        assert not recorder.frames()
+    client.wait_logged('read parameters: bridge inactive')
+    online = client.latched('/conveyor/online', Bool)
+    wait_until(lambda: online.values == [False])
+
+
+def test_a_broken_configuration_can_be_corrected(bridge: StartBridge, client: Client,
+                                                 tmp_path: Path) -> None:
+    profile = tmp_path / 'mine.yaml'
+    good = ('protocols: [datamodel_extended]\nparameters:\n'
+            '  speed: {number: 50, type: int16, storage: ram}\n'
+            '  actual: {number: 209, type: int16, access: ro}\n')
+    profile.write_text(good, 'utf-8')
+    one = waiting(bridge, parameters(conveyor={
+        **CONVEYOR, 'profile': str(profile), 'cyclic_request': ['speed'],
+        'cyclic_response': ['actual']}))
+    profile.write_text(good.replace('int16', 'int17'), 'utf-8')
+    for _ in range(2):
+        assert not client.transition(CONFIGURE)
+        assert client.state() == 'unconfigured'
+    errors = wait_until(lambda: client.logged(ERROR))
+    assert any(str(profile) in text and ':3:' in text and 'int17' in text for text in errors)
+    assert not one.node.drives and not one.node.exchanges
+    assert not [name for name in threads() if name.startswith(('bus', 'exchange'))]
+    profile.write_text(good, 'utf-8')
+    assert client.transition(CONFIGURE)
+    assert client.transition(ACTIVATE)
+    one.online()
+
+
+def test_a_failing_part_leaves_nothing_behind(bridge: StartBridge, client: Client,
+                                              monkeypatch: pytest.MonkeyPatch) -> None:
+    from drive_can_bridge.ros import drive_node
+    one = waiting(bridge, parameters(conveyor=CONVEYOR, lift=LIFT))
+    before = threads()
+
+    def fail(*_: Any) -> None:
+        raise RuntimeError('no more services')
+    monkeypatch.setattr(drive_node.ControlServices, '__init__', fail)
+    assert not client.transition(CONFIGURE)
+    client.wait_logged('configure failed: RuntimeError: no more services', ERROR)
+    assert client.state() == 'unconfigured'
+    wait_until(lambda: not {'/conveyor', '/lift'} & set(client.nodes()))
+    assert sorted(threads()) == sorted(before)
+    monkeypatch.undo()
+    assert client.transition(CONFIGURE) and client.transition(ACTIVATE)
+    one.online()
+
+
+@pytest.mark.parametrize('transition', [DEACTIVATE, ACTIVE_SHUTDOWN])
+def test_stopping_sends_neutral_cycles(bridge: StartBridge, client: Client,
+                                       transition: int) -> None:
+    one = bridge(parameters(conveyor=CONVEYOR, lift=LIFT))
+    one.online()
+    with one.record() as recorder:
+        client.publish('/conveyor/command/speed_setpoint', Float64(data=0.0))
+        client.publish('/conveyor/command/speed_setpoint', Float64(data=100.0))
+        wait_until(lambda: recorder.words()[:1] == (1000,))
+        assert client.transition(transition)
+        cycles = recorder.cycles()
+        neutral = len(cycles) - max(place for place, words in enumerate(cycles) if words[0]) - 1
+        assert neutral >= 3
+        assert len(recorder.cycles(2)) >= 3
+        recorder.clear()
+        # some service calls later there still is silence
+        for _ in range(20):
+            client.state()
+        assert not recorder.frames()
+
+
+def test_cleanup_frees_the_bus(bridge: StartBridge, client: Client) -> None:
+    one = bridge()
+    one.online()
+    channel = one.channel()
+    assert one.simulation is not None
+    assert client.transition(DEACTIVATE)
+    assert client.transition(CLEANUP)
+    one.simulation.stop()
+    assert channel not in open_channels()
+    assert not [name for name in threads() if name.startswith(('bus', 'exchange'))]
+    wait_until(lambda: '/conveyor' not in client.nodes())
+
+
+@pytest.mark.parametrize('steps', [(DEACTIVATE, CLEANUP), (ACTIVE_SHUTDOWN,)],
+                         ids=['cleanup', 'shutdown'])
+def test_callers_are_answered_before_a_drive_goes(bridge: StartBridge, client: Client,
+                                                  steps: tuple[int, ...]) -> None:
+    one = bridge(parameters(conveyor={**CONVEYOR, 'missed_limit': 100000,
+                                      'parameter_timeout': 60.0}))
+    one.online()
+    one.played['conveyor'].fault('silent')
+    futures = [client.ask('/conveyor/get_parameters', GetParameters,
+                          GetParameters.Request(names=['ramp_time'])) for _ in range(10)]
+    wait_until(lambda: one.node.drives['conveyor']._calls == 10)
+    for step in steps:
+        assert client.transition(step)
+    wait_until(lambda: all(future.done() for future in futures))
+    wait_until(lambda: '/conveyor' not in client.nodes())
+    wait_until(lambda: not one.node._leaving)
+
+
+def test_ten_rounds_leak_nothing(bridge: StartBridge, client: Client) -> None:
+    one = waiting(bridge, parameters(conveyor=CONVEYOR, lift=LIFT))
+    before = threads()
+    entities = []
+    for _ in range(10):
+        assert client.transition(CONFIGURE)
+        assert client.transition(ACTIVATE)
+        one.online()
+        assert client.get('/conveyor', 'ramp_time') != [None]
+        assert client.transition(DEACTIVATE)
+        assert client.transition(CLEANUP)
+        assert sorted(threads()) == sorted(before)
+        entities.append(sum(len(list(kind)) for kind in (
+            one.node.publishers, one.node.subscriptions, one.node.timers, one.node.services,
+            one.node.waitables, one.node.guards)))
+    assert len(set(entities)) == 1
+    wait_until(lambda: not {'/conveyor', '/lift'} & set(client.nodes()))
+
+    def forgotten() -> bool:
+        client.state()  # an executor forgets what it did last when it does something else
+        return drive_nodes() == 0
+    wait_until(forgotten, what='drive nodes to be forgotten')
+    gc.collect()
+
+
+def test_dynamic_parameters_survive_a_new_configuration(bridge: StartBridge,
+                                                        client: Client) -> None:
+    content = parameters()
+    del content['drives']['conveyor']['command_timeout']
+    one = bridge(content)
+    assert client.set('/drive_can_bridge', drives__conveyor__command_timeout=7,
+                      drives__conveyor__rearm='immediate', diagnostics_period=0.2) == [
+        (True, '')] * 3
+    for transition in (DEACTIVATE, CLEANUP, CONFIGURE, ACTIVATE):
+        assert client.transition(transition)
+    setpoints = one.node.drives['conveyor'].session.setpoints
+    assert setpoints.timeout == 7.0 and setpoints.rearm_immediate
+
+
+def test_no_transition_after_the_end_has_begun(bridge: StartBridge, client: Client) -> None:
+    one = bridge()
+    assert client.transition(DEACTIVATE)
+    one.node.stop()
+    assert not client.transition(ACTIVATE)
+    client.wait_logged('transition number 3 is not possible in state inactive '
+                       '(the bridge is being stopped)')

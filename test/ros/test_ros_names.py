@@ -1,0 +1,113 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Names: namespaces, remaps, two bridges, qualities."""
+
+from bridges import Bridge, CONVEYOR, LIFT, parameters, StartBridge
+from clients import Client, wait_until
+import pytest
+from rcl_interfaces.msg import ParameterEvent
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from std_msgs.msg import Bool, Float64
+from std_srvs.srv import SetBool
+
+
+def own_nodes(client: Client) -> set[str]:
+    """Return the nodes of bridges, but those whose names begin with an underscore."""
+    return {name for name in client.nodes()
+            if name != client.full_name and not name.rsplit('/', 1)[1].startswith('_')}
+
+
+@pytest.mark.parametrize('argument', ['__ns:=/cell1', 'drive_can_bridge:__ns:=/cell1'])
+def test_namespace(bridge: StartBridge, client: Client, argument: str) -> None:
+    one = bridge(arguments=('-r', argument))
+    one.online()
+    wait_until(lambda: own_nodes(client) == {'/cell1/drive_can_bridge', '/cell1/conveyor'})
+    response = client.topic('/cell1/conveyor/response', ParameterEvent).wait()
+    assert response.node == '/cell1/conveyor'
+    client.topic('/cell1/conveyor/actual_speed', Float64).wait()
+    online = client.latched('/cell1/conveyor/online', Bool)
+    wait_until(lambda: online.values[-1:] == [True])
+    events = client.parameter_events('/cell1/conveyor')
+    assert client.set('/cell1/conveyor', ramp_time=3.0) == [(True, '')]
+    wait_until(lambda: events)
+    client.diagnostics('cell1/drive_can_bridge: bus main')
+    status = client.diagnostics('cell1/drive_can_bridge: drive conveyor',
+                                lambda drive: drive['state'] == 'not armed')
+    assert '/cell1/conveyor/command/speed_setpoint' in status['message']
+    with one.record() as recorder:
+        client.publish('/cell1/conveyor/command/speed_setpoint', Float64(data=0.0))
+        client.publish('/cell1/conveyor/command/speed_setpoint', Float64(data=1.0))
+        wait_until(lambda: recorder.words()[:1] == (10,))
+
+
+def test_the_bridge_can_be_called_something_else(bridge: StartBridge, client: Client) -> None:
+    one = bridge(arguments=('-r', '__node:=x', '-r', '__ns:=/cell2'), key='/**/x')
+    one.online()
+    wait_until(lambda: own_nodes(client) == {'/cell2/x', '/cell2/conveyor'})
+    client.diagnostics('cell2/x: drive conveyor')
+    assert client.get('/cell2/x', 'drives.conveyor.station') == [1]
+    assert client.get('/cell2/conveyor', 'ramp_time') != [None]
+
+
+def test_the_bridge_cannot_be_called_like_a_drive(bridge: StartBridge,
+                                                  client: Client) -> None:
+    bridge(arguments=('-r', '__node:=conveyor'), key='/**/conveyor', autostart=False)
+    assert not client.transition(1, node='/conveyor')
+    client.wait_logged('drives.conveyor: the name of the bridge itself')
+
+
+def test_topics_and_services_of_a_drive_are_remapped(bridge: StartBridge,
+                                                     client: Client) -> None:
+    one = bridge(parameters(conveyor=CONVEYOR, lift=LIFT), arguments=(
+        '-r', 'conveyor:~/actual_speed:=/belt/speed',
+        '-r', '/conveyor/command/speed_setpoint:=/belt/setpoint',
+        '-r', 'lift:~/enable:=/lift_on'))
+    one.online()
+    client.topic('/belt/speed', Float64).wait()
+    with one.record() as recorder:
+        client.publish('/belt/setpoint', Float64(data=0.0))
+        client.publish('/belt/setpoint', Float64(data=2.0))
+        wait_until(lambda: recorder.words()[:1] == (20,))
+    assert client.call('/lift_on', SetBool, SetBool.Request(data=True)).success
+    topics = dict(client.node.get_topic_names_and_types())
+    assert '/lift/actual_speed' in topics
+    assert not {'/conveyor/actual_speed', '/conveyor/command/speed_setpoint'} & set(topics)
+
+
+def test_two_bridges_in_one_graph(bridge: StartBridge, client: Client) -> None:
+    ones: list[Bridge] = [bridge(arguments=('-r', f'__ns:=/cell{number}'))
+                          for number in (1, 2)]
+    for number, one in enumerate(ones, 1):
+        one.online()
+        one.played['conveyor'].set_value('ramp_time', float(number))
+    for number in (1, 2):
+        assert client.get(f'/cell{number}/conveyor', 'ramp_time') == [float(number)]
+        client.diagnostics(f'cell{number}/drive_can_bridge: drive conveyor')
+    assert client.transition(4, node='/cell1/drive_can_bridge')
+    assert client.state('/cell2/drive_can_bridge') == 'active'
+    online = client.latched('/cell2/conveyor/online', Bool)
+    wait_until(lambda: online.values[-1:] == [True])
+
+
+OVERRIDES = {
+    '/conveyor/actual_speed': {'publisher': {'reliability': 'best_effort', 'depth': 3}},
+    '/conveyor/command/speed_setpoint': {'subscription': {'reliability': 'best_effort'}},
+    '/conveyor/online': {'publisher': {'depth': 5}},
+}
+
+
+@pytest.mark.parametrize('key', ['/**/drive_can_bridge', '/**'])
+def test_quality_can_be_overridden(bridge: StartBridge, client: Client, key: str) -> None:
+    one = bridge({**parameters(), 'qos_overrides': OVERRIDES}, key=key)
+    one.online()
+    wait_until(lambda: client.node.get_publishers_info_by_topic('/conveyor/actual_speed'))
+    [info] = client.node.get_publishers_info_by_topic('/conveyor/actual_speed')
+    assert info.qos_profile.reliability is ReliabilityPolicy.BEST_EFFORT
+    [info] = client.node.get_publishers_info_by_topic('/conveyor/motor_current')
+    assert info.qos_profile.reliability is ReliabilityPolicy.RELIABLE
+    unreliable = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
+    client.topic('/conveyor/actual_speed', Float64, unreliable).wait()
+    publisher = client.publisher('/conveyor/command/speed_setpoint', Float64, unreliable)
+    with one.record() as recorder:
+        for value in (0.0, 3.0):
+            publisher.publish(Float64(data=value))
+        wait_until(lambda: recorder.words()[:1] == (30,))

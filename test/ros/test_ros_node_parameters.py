@@ -1,0 +1,102 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""The parameters of the bridge's own node."""
+
+from bridges import CONVEYOR, LIFT, parameters, StartBridge
+from clients import Client, wait_until
+import pytest
+from rcl_interfaces.srv import DescribeParameters, ListParameters
+
+BRIDGE = '/drive_can_bridge'
+
+
+def test_everything_can_be_read(bridge: StartBridge, client: Client) -> None:
+    one = bridge(parameters(conveyor={
+        **CONVEYOR, 'command_timeout': 3,
+        'joint': {'name': 'belt', 'velocity': 'actual_speed'}}, lift=LIFT))
+    expected = {
+        'autostart': True, 'diagnostics_period': 0.1, 'profile_directories': [''],
+        'buses.main.interface': 'virtual', 'buses.main.bitrate': 1_000_000,
+        'buses.main.channel': one.channel(), 'buses.main.reconnect_period': 0.1,
+        'drives.conveyor.bus': 'main', 'drives.conveyor.protocol': 'datamodel_extended',
+        'drives.conveyor.station': 1, 'drives.conveyor.profile': 'datamodel_example',
+        'drives.conveyor.period': 0.02, 'drives.conveyor.command_timeout': 3.0,
+        'drives.conveyor.cyclic_request': ['speed_setpoint', 'torque_limit'],
+        'drives.conveyor.missed_limit': 25, 'drives.conveyor.rearm': 'neutral',
+        'drives.conveyor.parameter_retries': 2, 'drives.conveyor.verify_writes': True,
+        'drives.conveyor.mapping': 'verify', 'drives.conveyor.request_map_base': 122,
+        'drives.conveyor.joint.name': 'belt', 'drives.conveyor.joint.gear_ratio': 1.0,
+        'drives.lift.station': 2, 'drives.lift.control_timeout': 5.0, 'use_sim_time': False}
+    assert client.get(BRIDGE, *expected) == list(expected.values())
+    names = client.call(f'{BRIDGE}/list_parameters', ListParameters).result.names
+    assert set(expected) <= set(names)
+    descriptors = client.call(
+        f'{BRIDGE}/describe_parameters', DescribeParameters,
+        DescribeParameters.Request(names=['drives.conveyor.period',
+                                          'drives.conveyor.rearm'])).descriptors
+    assert [entry.read_only for entry in descriptors] == [True, False]
+    assert all(entry.description for entry in descriptors)
+
+
+@pytest.mark.parametrize('name, value', [
+    ('autostart', False), ('buses.main.bitrate', 125000), ('drives.conveyor.station', 5),
+    ('drives.conveyor.period', 0.1), ('drives.conveyor.cyclic_request', ['speed_setpoint']),
+    ('profile_directories', ['/']), ('drives.conveyor.mapping', 'assume')])
+def test_most_cannot_be_set(bridge: StartBridge, client: Client, name: str,
+                            value: object) -> None:
+    bridge()
+    before = client.get(BRIDGE, name)
+    [(success, reason)] = client.set(BRIDGE, **{name: value})
+    assert not success and 'read-only' in reason
+    assert client.get(BRIDGE, name) == before
+
+
+@pytest.mark.parametrize('name, value, words', [
+    ('drives.conveyor.command_timeout', -1.0, '-1.0 is out of range'),
+    ('drives.conveyor.command_timeout', float('nan'), 'nan is not a finite number'),
+    ('drives.conveyor.command_timeout', float('inf'), 'inf is not a finite number'),
+    ('drives.conveyor.command_timeout', 'soon', "'soon' is"),
+    ('drives.conveyor.command_timeout', True, 'true is'),
+    ('drives.conveyor.command_timeout', None, 'allowed is'),
+    ('drives.conveyor.parameter_timeout', 0, '0 is out of range'),
+    ('drives.conveyor.rearm', 'never', "'never' is unknown"),
+    ('drives.conveyor.rearm', 1, '1 is'),
+    ('diagnostics_period', 0.0, '0.0 is out of range'),
+    ('diagnostics_period', ['1'], 'a list'),
+    ('drives.conveyor.color', 'red', 'undeclared'),
+    ('drives.elevator.rearm', 'neutral', 'undeclared')])
+def test_bad_values_are_refused_in_words(bridge: StartBridge, client: Client, name: str,
+                                         value: object, words: str) -> None:
+    one = bridge()
+    before = client.get(BRIDGE, name)
+    [(success, reason)] = client.set(BRIDGE, **{name: value})
+    assert not success and words in reason, reason
+    assert client.get(BRIDGE, name) == before
+    one.online()
+
+
+def test_dynamic_ones_take_effect(bridge: StartBridge, client: Client) -> None:
+    one = bridge()
+    one.online()
+    session = one.node.drives['conveyor'].session
+    assert client.set(BRIDGE, drives__conveyor__command_timeout=4,
+                      drives__conveyor__parameter_timeout=0.05,
+                      drives__conveyor__rearm='immediate', diagnostics_period=1) == [
+        (True, '')] * 4
+    assert session.setpoints.timeout == 4.0 and session.setpoints.rearm_immediate
+    assert client.get(BRIDGE, 'drives.conveyor.command_timeout', 'diagnostics_period') == [4, 1]
+    client.get('/conveyor', 'p35')
+    client.wait_logged('conveyor: read p35 (P35): no answer in 0.05 s, 3 attempts')
+    assert client.set(BRIDGE, diagnostics_period=0.05) == [(True, '')]
+    client.diagnostics('drive_can_bridge: drive conveyor',
+                       lambda drive: 'a command to' in drive['message'])
+    assert client.set_atomically(
+        BRIDGE, drives__conveyor__rearm='neutral',
+        drives__conveyor__command_timeout=-1)[0] is False
+    assert session.setpoints.rearm_immediate
+
+
+def test_changes_are_announced(bridge: StartBridge, client: Client) -> None:
+    bridge()
+    events = client.parameter_events(BRIDGE)
+    client.set(BRIDGE, drives__conveyor__command_timeout=1.5)
+    wait_until(lambda: {'drives.conveyor.command_timeout': 1.5} in events)

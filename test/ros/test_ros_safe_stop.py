@@ -1,0 +1,81 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""How the bridge lets go of its drives."""
+
+from typing import Any
+
+from bridges import Bridge, LIFT, parameters, Recorder, StartBridge
+from clients import Client, ERROR, wait_until
+import pytest
+from std_msgs.msg import Bool, Float64
+from std_srvs.srv import SetBool
+
+from drive_can_bridge.exchange.exchange import BusExchange
+
+LIFTS = parameters(lift=LIFT)
+
+
+def run(bridge: StartBridge, client: Client, content: Any = LIFTS) -> Bridge:
+    """Return a bridge with an enabled lift that moves."""
+    one = bridge(content)
+    one.online()
+    assert client.call('/lift/enable', SetBool, SetBool.Request(data=True)).success
+    for value in (0.0, 100.0):
+        client.publish('/lift/command/speed_setpoint', Float64(data=value))
+    wait_until(lambda: float(one.played['lift'].value('actual_speed')) > 10.0)
+    return one
+
+
+def last_cycles(recorder: Recorder) -> list[tuple[int, ...]]:
+    return recorder.cycles(2)[-3:]
+
+
+def test_stop_sends_neutral_and_disable(bridge: StartBridge, client: Client) -> None:
+    one = run(bridge, client)
+    online = client.latched('/lift/online', Bool)
+    with one.record() as recorder:
+        wait_until(lambda: recorder.words(2)[:2] == (1, 1000))
+        one.node.stop()
+        assert last_cycles(recorder) == [(0, 0, 0, 0)] * 3
+        wait_until(lambda: online.values[-1:] == [False])
+        recorder.clear()
+        for _ in range(20):
+            client.state()
+        assert not recorder.frames()
+    wait_until(lambda: one.played['lift'].value('speed_setpoint') == 0.0)
+    client.diagnostics('drive_can_bridge: drive lift', lambda drive: drive['state'] == 'offline')
+
+
+def test_a_control_word_without_slot_is_written_at_the_end(bridge: StartBridge,
+                                                           client: Client) -> None:
+    one = run(bridge, client, parameters(lift={**LIFT, 'cyclic_request': ['speed_setpoint']}))
+    assert one.played['lift'].value('control_word') == 1
+    with one.record() as recorder:
+        one.node.stop()
+        assert last_cycles(recorder) == [(0, 0, 0, 0)] * 3
+    wait_until(lambda: one.played['lift'].value('control_word') == 0)
+
+
+def test_a_dead_timer_thread_ends_the_bridge_safely(bridge: StartBridge, client: Client,
+                                                    monkeypatch: pytest.MonkeyPatch) -> None:
+    one = run(bridge, client)
+    exchange = one.node.exchanges['main']
+    original = BusExchange._pass
+
+    def fail(exchange: BusExchange) -> float:
+        monkeypatch.setattr(BusExchange, '_pass', original)
+        raise RuntimeError('a defect')
+    with one.record() as recorder:
+        monkeypatch.setattr(BusExchange, '_pass', fail)
+        wait_until(lambda: one.fatal)
+        assert one.fatal == ['buses.main: internal error: RuntimeError: a defect']
+        wait_until(lambda: not exchange._thread.is_alive())
+        one.node.stop()
+        wait_until(lambda: last_cycles(recorder) == [(0, 0, 0, 0)] * 3)
+    client.wait_logged('internal error: RuntimeError: a defect', ERROR)
+
+
+def test_stopping_twice_is_harmless(bridge: StartBridge, client: Client) -> None:
+    one = run(bridge, client)
+    one.node.stop()
+    one.node.stop()
+    assert client.state() == 'active'

@@ -1,0 +1,287 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+Processes as a user starts them: output in files, waiting for lines, signals, an orderly end.
+
+Whoever waits here waits for a condition, with a deadline that only a hang exceeds.
+"""
+
+from collections.abc import Callable, Sequence
+import json
+import os
+from pathlib import Path
+import re
+import signal
+import subprocess
+import sys
+import time
+from typing import Any
+
+#: an emulated machine is this much slower
+SLOWNESS = 12.0 if os.environ.get('DRIVE_CAN_EMULATED') else 1.0
+#: s after which a thing that has not happened never will
+DEADLINE = 25.0 * SLOWNESS
+
+ROOT = Path(__file__).resolve().parents[2]
+#: executable -> module, for trees that are not installed
+EXECUTABLES = {'drive_can_bridge': 'drive_can_bridge.ros.main',
+               'drive_can': 'drive_can_bridge.cli.main'}
+
+
+def wait_for(condition: Callable[[], Any], what: str, timeout: float = DEADLINE) -> Any:
+    """Wait until a condition is true, and return what it returned."""
+    deadline = time.monotonic() + timeout
+    while True:
+        value = condition()
+        if value:
+            return value
+        if time.monotonic() > deadline:
+            raise AssertionError(f'waited {timeout:g} s for {what}')
+        time.sleep(0.005)
+
+
+def command_line(name: str) -> list[str]:
+    """Return how an executable of the package is started."""
+    script = Path(sys.executable).with_name(name)
+    if script.exists():
+        return [str(script)]
+    return [sys.executable, '-m', EXECUTABLES[name]]
+
+
+def environment() -> dict[str, str]:
+    """Return the environment of started processes: this tree first, English, unbuffered."""
+    paths = [str(ROOT), *filter(None, [os.environ.get('PYTHONPATH')])]
+    return {**os.environ, 'PYTHONPATH': os.pathsep.join(paths), 'PYTHONUNBUFFERED': '1',
+            'LC_ALL': 'C.UTF-8', 'COLUMNS': '99'}
+
+
+class Process:
+    """A process with its standard output and standard error in files."""
+
+    def __init__(self, command: Sequence[str], directory: Path, name: str) -> None:
+        self.name = name
+        self.command = list(command)
+        self.out = directory / f'{name}.out'
+        self.err = directory / f'{name}.err'
+        with self.out.open('wb') as out, self.err.open('wb') as err:
+            self.process = subprocess.Popen(self.command, stdin=subprocess.PIPE, stdout=out,
+                                            stderr=err, env=environment())
+
+    @property
+    def pid(self) -> int:
+        return self.process.pid
+
+    @property
+    def running(self) -> bool:
+        return self.process.poll() is None
+
+    @property
+    def lines(self) -> list[str]:
+        """Whole lines of standard output so far."""
+        return _whole_lines(self.out)
+
+    @property
+    def errors(self) -> list[str]:
+        """Whole lines of standard error so far."""
+        return _whole_lines(self.err)
+
+    def line(self, pattern: str, *, errors: bool = False, since: int = 0,
+             timeout: float = DEADLINE) -> str:
+        """Wait for a line that contains the pattern, from line number ``since`` on."""
+        expression = re.compile(pattern)
+
+        def find() -> str | None:
+            ended = not self.running  # first: what it wrote last is in the file then
+            for line in (self.errors if errors else self.lines)[since:]:
+                if expression.search(line):
+                    return line
+            if ended:
+                raise AssertionError(f'{self.name} ended ({self.process.returncode}) without a '
+                                     f'line {pattern!r}')
+            return None
+        return str(wait_for(find, f'a line {pattern!r} of {self.name}', timeout))
+
+    def error(self, pattern: str, *, since: int = 0, timeout: float = DEADLINE) -> str:
+        """Wait for a line of standard error."""
+        return self.line(pattern, errors=True, since=since, timeout=timeout)
+
+    def write(self, text: str) -> None:
+        """Write a line to standard input."""
+        assert self.process.stdin is not None
+        self.process.stdin.write(f'{text}\n'.encode())
+        self.process.stdin.flush()
+
+    def send(self, number: int) -> None:
+        """Send a signal."""
+        self.process.send_signal(number)
+
+    def wait(self, timeout: float = DEADLINE) -> int:
+        """Wait for the end; return the exit code."""
+        try:
+            return self.process.wait(timeout)
+        except subprocess.TimeoutExpired:
+            raise AssertionError(f'{self.name} did not end in {timeout:g} s') from None
+
+    def end(self, number: int = signal.SIGTERM, timeout: float = DEADLINE) -> int:
+        """Send a signal and wait for the end; return the exit code."""
+        self.send(number)
+        return self.wait(timeout)
+
+    def kill(self) -> None:
+        """End it, whatever it is doing."""
+        if self.running:
+            self.process.kill()
+        self.process.wait()
+        if self.process.stdin is not None:
+            try:
+                self.process.stdin.close()
+            except OSError:
+                pass
+
+    def dump(self) -> str:
+        """Return the command, the exit code and the end of both outputs."""
+        texts = [f'{" ".join(self.command)}\nexit code: {self.process.poll()}']
+        for title, path in (('standard output', self.out), ('standard error', self.err)):
+            lines = path.read_text(encoding='utf-8', errors='replace').splitlines()
+            left_out = len(lines) - 100
+            note = f' (without the first {left_out} lines)' if left_out > 0 else ''
+            texts += [f'--- {title}{note}', *lines[-100:]]
+        return '\n'.join(texts)
+
+
+class Processes:
+    """The processes of one test; their outputs are in a directory."""
+
+    def __init__(self, directory: Path) -> None:
+        self.directory = directory
+        self.started: list[Process] = []
+        #: shown and looked at like the others, but not ended with them
+        self.guests: list[Process] = []
+
+    def start(self, command: Sequence[str], name: str) -> Process:
+        """Start anything."""
+        number = sum(process.name.rstrip('0123456789') == name for process in self.started)
+        process = Process(command, self.directory, name + (str(number + 1) if number else ''))
+        self.started.append(process)
+        return process
+
+    def drive_can(self, *arguments: str) -> Process:
+        """Start the command ``drive_can``."""
+        return self.start([*command_line('drive_can'), *arguments], arguments[0].strip('-'))
+
+    def simulator(self, file: Path, *arguments: str, link: bool = True) -> 'Simulator':
+        """Start simulated drives behind pseudo-terminals, which ``links/`` points to."""
+        where = ['--pty-link', str(self.directory / 'links')] if link else []
+        process = self.drive_can('simulate', '--params-file', str(file), *where, '--log-frames',
+                                 *arguments)
+        process.__class__ = Simulator
+        assert isinstance(process, Simulator)
+        process.line('^drive ')
+        return process
+
+    def bridge(self, file: Path | None, namespace: str = '', *arguments: str) -> Process:
+        """Start the bridge."""
+        options = ['--params-file', str(file)] if file else []
+        if namespace:
+            options += ['-r', f'__ns:=/{namespace}']
+        return self.start([*command_line('drive_can_bridge'), '--ros-args', *options,
+                           *arguments], 'bridge')
+
+    def end(self) -> None:
+        """End what is still running."""
+        for process in self.started:
+            process.kill()
+
+    def tracebacks(self) -> list[str]:
+        """Return the names of the processes that showed a traceback."""
+        return [process.name for process in (*self.started, *self.guests)
+                if b'Traceback' in process.out.read_bytes() + process.err.read_bytes()]
+
+    def dump(self) -> str:
+        """Return all outputs."""
+        return '\n\n'.join(f'=== {process.name}: {process.dump()}'
+                           for process in (*self.started, *self.guests))
+
+
+class Simulator(Process):
+    """``drive_can simulate --log-frames``: also a witness of what was on the bus."""
+
+    def frames(self, pattern: str = '', since: int = 0) -> list[str]:
+        """Return the logged frames, as ``003FFFF0#0000000000000000 R``; R: from the bridge."""
+        expression = re.compile(pattern)
+        frames = [line.split(' ', 2)[2] for line in self.lines if line.startswith('(')]
+        return [frame for frame in frames[since:] if expression.search(frame)]
+
+    def frame(self, pattern: str, since: int = 0, count: int = 1) -> list[str]:
+        """Wait for ``count`` frames that match."""
+        def find() -> list[str] | None:
+            assert self.running, f'{self.name} has ended'
+            found = self.frames(pattern, since)
+            return found if len(found) >= count else None
+        found: list[str] = wait_for(find, f'{count} frames {pattern!r}')
+        return found
+
+
+class Client:
+    """The client script ``ros_client.py``: ROS as other processes see it."""
+
+    def __init__(self, directory: Path) -> None:
+        self.process = Process([sys.executable, str(Path(__file__).with_name('ros_client.py'))],
+                               directory, 'client')
+        self._answers = 0
+
+    def ask(self, action: str, timeout: float = DEADLINE, **arguments: Any) -> Any:
+        """Let the client do something; return its answer."""
+        self.process.write(json.dumps({'action': action, 'timeout': timeout, **arguments}))
+        self._answers += 1
+        wanted = self._answers
+        wait_for(lambda: len(self.process.lines) >= wanted or not self.process.running,
+                 f'the client to {action} {arguments}', timeout + DEADLINE)
+        answer = json.loads(self.process.lines[wanted - 1])
+        if 'failure' in answer:
+            raise AssertionError(f'{action} {arguments}: {answer["failure"]}')
+        return answer['result']
+
+    def publish(self, topic: str, value: float, *, rate: float = 50.0) -> None:
+        """Publish a value again and again, until told something else."""
+        self.ask('publish', topic=topic, value=value, rate=rate)
+
+    def silence(self, topic: str) -> None:
+        """Publish nothing any more."""
+        self.ask('publish', topic=topic, value=None, rate=1.0)
+
+    def value(self, topic: str, low: float, high: float, *, kind: str = 'Float64') -> float:
+        """Wait for a value within limits that arrives after this call."""
+        return float(self.ask('value', topic=topic, kind=kind, low=low, high=high))
+
+    def values(self, topic: str) -> list[float]:
+        """Return the different values that have arrived since the last ``value``, sorted."""
+        found: list[float] = self.ask('values', topic=topic)
+        return found
+
+    def online(self, drive: str, wanted: bool = True) -> None:
+        """Wait until the drive's latched topic says online, or offline."""
+        self.ask('latched', topic=f'{drive}/online', wanted=wanted)
+
+    def get(self, drive: str, *names: str) -> list[Any]:
+        """Call GetParameters; None is NOT_SET."""
+        values: list[Any] = self.ask('get', drive=drive, names=names)
+        return values
+
+    def set(self, drive: str, *, atomic: bool = False, **values: Any) -> list[tuple[bool, str]]:
+        """Call SetParameters; return success and reason of each."""
+        answer = self.ask('set_atomically' if atomic else 'set', drive=drive, values=values)
+        return [(bool(success), str(reason)) for success, reason in answer]
+
+    def diagnostics(self, name: str, **conditions: str) -> dict[str, str]:
+        """
+        Return the next diagnostic status of that name whose facts match these patterns.
+
+        It has ``level``, ``message`` and every key.
+        """
+        facts: dict[str, str] = self.ask('diagnostics', name=name, conditions=conditions)
+        return facts
+
+
+def _whole_lines(path: Path) -> list[str]:
+    text = path.read_text(encoding='utf-8', errors='replace')
+    return text[:text.rfind('\n') + 1].splitlines()

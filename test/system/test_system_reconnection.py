@@ -1,0 +1,113 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""What the bridge does when its bus or a drive goes away and comes back."""
+
+from pathlib import Path
+import signal
+
+from parameter_files import bridge_file, CONVEYOR
+from processes import Client, Process, Processes, Simulator
+
+CYCLIC = '^003FFFF0#'
+NEUTRAL = '^003FFFF0#0{16} R'
+#: anything cyclic with a setpoint that is not neutral
+MOVING = '^003FFFF0#(?!0{16} R)'
+MISSED_LIMIT = 4
+
+
+def status_of(drive: str) -> str:
+    """Return the name of a drive's diagnostic status."""
+    namespace, name = drive.strip('/').split('/')
+    return f'{namespace}/drive_can_bridge: drive {name}'
+
+
+def move(client: Client, drive: str) -> None:
+    """Arm the speed setpoint, and let it stand at 150 rpm."""
+    client.publish(f'{drive}/command/speed_setpoint', 0.0)
+    client.diagnostics(status_of(drive), message='not armed: publish 0 to [^ ]*/torque_limit$')
+    client.publish(f'{drive}/command/speed_setpoint', 150.0)
+    client.value(f'{drive}/actual_speed', 145.0, 155.0)
+
+
+def start_moving(client: Client, drive: str) -> None:
+    """Wait until the drive is there, and let it move."""
+    client.online(drive)
+    move(client, drive)
+
+
+def rearm_and_move(client: Client, drive: str, bridge: Process, simulator: Simulator,
+                   since: int = 0) -> None:
+    """
+    See that a drive that came back stands still, and moves again after a neutral command.
+
+    The publisher of its setpoint went on all the time.
+    """
+    client.online(drive)
+    client.diagnostics(status_of(drive), message='not armed: .*/speed_setpoint')
+    bridge.error('command speed_setpoint has no effect: not armed, send 0 once first')
+    simulator.frame(NEUTRAL, since, count=10)
+    assert not simulator.frames(MOVING, since)
+    move(client, drive)
+    assert simulator.frames(MOVING, since)
+
+
+def test_simulator_is_killed_and_restarted(processes: Processes, client: Client, namespace: str,
+                                           tmp_path: Path) -> None:
+    file = bridge_file(tmp_path)
+    simulator = processes.simulator(file)
+    bridge = processes.bridge(file, namespace)
+    drive = f'/{namespace}/conveyor'
+    start_moving(client, drive)
+    simulator.send(signal.SIGKILL)
+    client.online(drive, wanted=False)
+    bridge.error('conveyor: offline: bus down: (receive|send): .*')
+    lost = bridge.error(r'bus main: .*; tried again every 0\.2 s')
+    assert '[ERROR]' in lost
+    facts = client.diagnostics(f'{namespace}/drive_can_bridge: bus main', state='^down$')
+    assert facts['level'] == '2'
+    assert client.get(drive, 'ramp_time') == [None]
+    assert client.set(drive, ramp_time=1.0) == [(False, 'bus down')]
+    # the same failure is told once, not at every attempt
+    client.diagnostics(f'{namespace}/drive_can_bridge: bus main', state='^down$')
+    lines = [line.split(': ', 1)[1] for line in bridge.errors if 'bus main: ' in line]
+    assert len(lines) == len(set(lines))
+
+    again = processes.simulator(file)
+    rearm_and_move(client, drive, bridge, again)
+    facts = client.diagnostics(f'{namespace}/drive_can_bridge: bus main', state='^up$')
+    assert facts['reconnections'] == '1'
+    # maps first, as at the start
+    requests = again.frames(' R$')
+    first = next(place for place, frame in enumerate(requests) if frame.startswith('003FFFF0'))
+    assert {'002007A4#0000000000000000 R', '002007E4#0000000000000000 R'} <= set(requests[:first])
+    assert bridge.end() == 0
+
+
+def test_drive_falls_silent_and_comes_back(processes: Processes, client: Client, namespace: str,
+                                           tmp_path: Path) -> None:
+    file = bridge_file(tmp_path,
+                       drives={'conveyor': {**CONVEYOR, 'period': 0.1,
+                                              'missed_limit': MISSED_LIMIT}})
+    simulator = processes.simulator(file)
+    bridge = processes.bridge(file, namespace)
+    drive = f'/{namespace}/conveyor'
+    start_moving(client, drive)
+    simulator.write('conveyor silent')
+    client.online(drive, wanted=False)
+    bridge.error('conveyor: offline: no cyclic response for 4 cycles')
+    facts = client.diagnostics(f'{namespace}/drive_can_bridge: drive conveyor', state='offline')
+    assert facts['level'] == '2'
+    assert facts['message'].startswith('offline: no cyclic response for 4 cycles')
+
+    # counted in frames: after the last answer, missed_limit requests, then neutral ones, then
+    # silence but for the look at the maps
+    frames = simulator.frames()
+    last = max(place for place, frame in enumerate(frames) if frame.startswith('103FFFF0'))
+    simulator.frame('^002007A4', since=last, count=3)
+    after = [frame for frame in simulator.frames(' R$', since=last) if '003FFFF0' in frame]
+    assert [frame.split('#')[1] for frame in after] == (
+        ['05DC000000000000 R'] * MISSED_LIMIT + ['0000000000000000 R'] * 3)
+
+    back = len(simulator.frames())
+    simulator.write('conveyor ok')
+    rearm_and_move(client, drive, bridge, simulator, back)
+    assert bridge.end() == 0

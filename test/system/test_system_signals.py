@@ -1,0 +1,193 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""SIGINT, SIGTERM, SIGSTOP and SIGKILL of the bridge, whatever it is doing."""
+
+from collections.abc import Iterator
+import os
+from pathlib import Path
+import select
+import signal
+import tty
+
+from parameter_files import bridge_file, CONVEYOR
+from processes import Client, Process, Processes, wait_for
+import pytest
+from test_system_reconnection import NEUTRAL, rearm_and_move, start_moving
+
+BOTH = pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM],
+                               ids=['SIGINT', 'SIGTERM'])
+
+
+def looks_after_signals(process: Process) -> bool:
+    """Tell whether the process has taken SIGTERM over: from then on it is the bridge's code."""
+    status = Path(f'/proc/{process.pid}/status').read_text(encoding='ascii')
+    caught = next(line for line in status.splitlines() if line.startswith('SigCgt'))
+    return bool(int(caught.split()[1], 16) & 1 << signal.SIGTERM - 1)
+
+
+@BOTH
+def test_while_active(processes: Processes, client: Client, namespace: str, tmp_path: Path,
+                      number: int) -> None:
+    file = bridge_file(tmp_path)
+    simulator = processes.simulator(file)
+    bridge = processes.bridge(file, namespace)
+    start_moving(client, f'/{namespace}/conveyor')
+    assert bridge.end(number) == 0
+    # nobody tells the drive that a bridge has gone: three neutral frames have to
+    requests = [frame for frame in simulator.frames(' R$') if frame.startswith('003FFFF0')]
+    assert requests[-3:] == ['003FFFF0#0000000000000000 R'] * 3
+    assert '003FFFF0#05DC000000000000 R' in requests[-8:]
+    # and then nothing at all
+    client.online(f'/{namespace}/conveyor', wanted=False)
+    count = len(simulator.frames(' R$'))
+    simulator.write('list')
+    simulator.line('^conveyor: ')
+    assert len(simulator.frames(' R$')) == count
+    bridge.error('conveyor: stopped')
+    assert not [line for line in bridge.errors if '[ERROR]' in line or '[WARN]' in line
+                and 'not armed' not in line]
+
+
+@BOTH
+def test_while_the_bus_is_absent(processes: Processes, namespace: str, tmp_path: Path,
+                                 number: int) -> None:
+    bridge = processes.bridge(bridge_file(tmp_path, channel='/dev/no_such_adapter'), namespace)
+    bridge.error('active: 1 drives on 1 buses')
+    assert bridge.end(number) == 0
+    text, = [line for line in bridge.errors if 'bus main' in line]
+    assert '/dev/no_such_adapter' in text
+    assert 'tried again every 0.2 s' in text
+
+
+@BOTH
+def test_while_unconfigured(processes: Processes, client: Client, namespace: str, tmp_path: Path,
+                            number: int) -> None:
+    bridge = processes.bridge(bridge_file(tmp_path, autostart=False), namespace)
+    node = f'/{namespace}/drive_can_bridge'
+    assert client.ask('transition', node=node, number=3) is False  # activate: not possible
+    bridge.error('transition .*is not possible in state unconfigured')
+    assert bridge.end(number) == 0
+    assert not [line for line in bridge.errors if 'bus main' in line]
+
+
+def test_while_inactive(processes: Processes, client: Client, namespace: str,
+                        tmp_path: Path) -> None:
+    file = bridge_file(tmp_path, autostart=False)
+    simulator = processes.simulator(file)
+    bridge = processes.bridge(file, namespace)
+    drive = f'/{namespace}/conveyor'
+    assert client.ask('transition', node=f'/{namespace}/drive_can_bridge', number=1) is True
+    client.online(drive, wanted=False)
+    bridge.error('bus main: open')
+    assert client.get(drive, 'ramp_time') == [None]
+    assert client.set(drive, ramp_time=1.0) == [(False, 'bridge inactive')]
+    assert bridge.end() == 0
+    assert simulator.frames() == []
+
+
+@pytest.mark.parametrize(('number', 'library'), [
+    (signal.SIGINT, ''), (signal.SIGTERM, ''), (signal.SIGINT, '_rclpy_pybind11'),
+    (signal.SIGTERM, 'librmw_fastrtps_cpp'), (signal.SIGINT, 'lifecycle_msgs')])
+def test_during_start_up(processes: Processes, namespace: str, tmp_path: Path, number: int,
+                         library: str) -> None:
+    # some moments of the start-up, told by what has been loaded by then
+    bridge = processes.bridge(bridge_file(tmp_path, channel='/dev/no_such_adapter'), namespace)
+    maps = Path(f'/proc/{bridge.pid}/maps')
+
+    def reached() -> bool:
+        loaded = maps.read_text(encoding='utf-8')
+        ready = looks_after_signals(bridge)
+        # loading the ROS libraries takes a second, in which a signal must not go wrong
+        assert ready or '_rclpy_pybind11' not in loaded
+        return ready and library in loaded
+    wait_for(reached, f'{library} loaded')
+    assert bridge.end(number) == 0
+    assert not [line for line in bridge.errors if 'bus main' not in line and 'active' not in line]
+
+
+@pytest.fixture
+def full_terminal() -> Iterator[str]:
+    """Return a pseudo-terminal that takes nothing more: nobody reads, and its buffer is full."""
+    reading, writing = os.openpty()
+    tty.setraw(writing)
+    os.set_blocking(writing, False)
+    # the kernel moves what it took from one buffer to the next, and has room again
+    while select.select([], [writing], [], 0.3)[1]:
+        try:
+            os.write(writing, bytes(100))
+        except BlockingIOError:
+            pass
+    yield os.ttyname(writing)
+    os.close(reading)
+    os.close(writing)
+
+
+def test_second_signal_ends_at_once(processes: Processes, client: Client, namespace: str,
+                                    tmp_path: Path, full_terminal: str) -> None:
+    bridge = processes.bridge(bridge_file(tmp_path, channel=full_terminal), namespace)
+    # its reader hangs in an open that never ends; the node is there all the same
+    bridge.error('active: 1 drives on 1 buses')
+    facts = client.diagnostics(f'{namespace}/drive_can_bridge: bus main', state='opening')
+    assert facts['level'] == '2'
+    bridge.send(signal.SIGINT)
+    bridge.send(signal.SIGTERM)
+    # which of them comes first is up to the kernel
+    assert bridge.wait() in (128 + signal.SIGINT, 128 + signal.SIGTERM)
+
+
+def test_two_signals_while_active(processes: Processes, client: Client, namespace: str,
+                                  tmp_path: Path) -> None:
+    file = bridge_file(tmp_path)
+    simulator = processes.simulator(file)
+    bridge = processes.bridge(file, namespace)
+    start_moving(client, f'/{namespace}/conveyor')
+    bridge.send(signal.SIGINT)
+    bridge.send(signal.SIGTERM)
+    assert bridge.wait() in (128 + signal.SIGINT, 128 + signal.SIGTERM)
+    # whoever stops a whole group of processes sends two at once: the drive is told all the same
+    assert [frame for frame in simulator.frames(' R$') if frame.startswith('003FFFF0')][-1:] == [
+        '003FFFF0#0000000000000000 R']
+
+
+def test_process_that_stood_still(processes: Processes, client: Client, namespace: str,
+                                  tmp_path: Path) -> None:
+    # a command would still be fresh: only the lost time may stop it
+    file = bridge_file(tmp_path, drives={'conveyor': {**CONVEYOR, 'command_timeout': 60.0}})
+    simulator = processes.simulator(file)
+    bridge = processes.bridge(file, namespace)
+    drive = f'/{namespace}/conveyor'
+    start_moving(client, drive)
+    bridge.send(signal.SIGSTOP)
+    count = len(simulator.frames())
+    # more than the second after which nothing is believed any more
+    client.ask('rest', seconds=1.5)
+    stopped = len(simulator.frames())
+    # what was on its way when it stopped, and nothing else
+    assert len(simulator.frames(' R$', since=count)) <= 2
+    bridge.send(signal.SIGCONT)
+    bridge.error('conveyor: offline: the bridge stood still')
+    requests = wait_for(lambda: [frame for frame in simulator.frames(' R$', since=stopped)
+                                 if len(simulator.frames(NEUTRAL, since=stopped)) >= 3],
+                        'neutral frames')
+    # no burst of what would have been due in the meantime: one frame at most was under way
+    assert sum(frame.startswith('003FFFF0#05DC') for frame in requests) <= 1
+    rearm_and_move(client, drive, bridge, simulator, stopped + 4)
+    assert bridge.end() == 0
+
+
+def test_killed(processes: Processes, client: Client, namespace: str, tmp_path: Path) -> None:
+    file = bridge_file(tmp_path)
+    simulator = processes.simulator(file)
+    bridge = processes.bridge(file, namespace)
+    start_moving(client, f'/{namespace}/conveyor')
+    assert bridge.end(signal.SIGKILL) == -signal.SIGKILL
+    # nothing is left behind that goes on feeding the drive, or keeps the adapter busy
+    simulator.write('list')
+    simulator.line('^conveyor: ')
+    count = len(simulator.frames())
+    second = processes.bridge(file, f'{namespace}_again')
+    drive = f'/{namespace}_again/conveyor'
+    client.publish(f'{drive}/command/speed_setpoint', 150.0)
+    requests = simulator.frame(' R$', since=count, count=10)
+    assert not requests[0].startswith('003FFFF0')
+    rearm_and_move(client, drive, second, simulator, count)
+    assert second.end() == 0

@@ -1,0 +1,150 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The same on a real SocketCAN bus, with candump as the witness.
+
+Needs an interface named by DRIVE_CAN_SOCKETCAN, or vcan0; interfaces that are taken down and
+deleted are made here, which needs root.
+"""
+
+from collections.abc import Iterator
+import os
+from pathlib import Path
+import re
+import shutil
+import subprocess
+
+from parameter_files import bridge_file, CONVEYOR
+from processes import Client, Processes, SLOWNESS, wait_for
+import pytest
+from test_system_reconnection import rearm_and_move, start_moving
+
+CHANNEL = os.environ.get('DRIVE_CAN_SOCKETCAN', 'vcan0')
+#: made and deleted here
+OWN = 'vcandrive'
+PERIOD = 0.1
+DRIVES = {'conveyor': {**CONVEYOR, 'period': PERIOD, 'parameter_timeout': 0.3 * SLOWNESS,
+                       'command_timeout': 5.0 * SLOWNESS}}
+
+pytestmark = [
+    pytest.mark.socketcan, pytest.mark.timeout(120 * SLOWNESS),
+    pytest.mark.skipif(not Path('/sys/class/net', CHANNEL).exists(),
+                       reason=f'no SocketCAN interface {CHANNEL}; name one by '
+                              f'DRIVE_CAN_SOCKETCAN'),
+]
+
+
+def ip(*arguments: str) -> None:
+    """Run ``ip``."""
+    subprocess.run(['ip', *arguments], check=True, capture_output=True, timeout=60)
+
+
+def make_own() -> None:
+    """Create the interface of our own, and switch it on."""
+    ip('link', 'add', 'dev', OWN, 'type', 'vcan')
+    ip('link', 'set', 'dev', OWN, 'up')
+
+
+@pytest.fixture
+def own() -> Iterator[str]:
+    """Return a CAN interface that a test may do anything with."""
+    if os.geteuid() != 0:
+        pytest.skip('taking interfaces down needs root')
+    try:
+        make_own()
+    except (OSError, subprocess.CalledProcessError) as error:
+        pytest.skip(f'no virtual CAN interface can be made: {error}')
+    yield OWN
+    subprocess.run(['ip', 'link', 'delete', 'dev', OWN], check=False, capture_output=True)
+
+
+def seen(lines: list[str], interface: str) -> list[tuple[float, str]]:
+    """Return time and frame of candump's log lines."""
+    matches = [re.fullmatch(rf'\(([0-9.]+)\) {interface} (\S+)(?: [RT])?', line)
+               for line in lines]
+    assert all(matches)
+    return [(float(match.group(1)), match.group(2)) for match in matches if match]
+
+
+@pytest.mark.skipif(shutil.which('candump') is None, reason='candump is not installed')
+def test_candump_sees_the_right_frames(processes: Processes, client: Client, namespace: str,
+                                       tmp_path: Path) -> None:
+    file = bridge_file(tmp_path, interface='socketcan', channel=CHANNEL, drives=DRIVES)
+    candump = processes.start(['stdbuf', '-oL', 'candump', '-L', CHANNEL], 'candump')
+    simulator = processes.simulator(file, link=False)
+    assert f'bus main: socketcan {CHANNEL}' in simulator.lines
+    bridge = processes.bridge(file, namespace)
+    drive = f'/{namespace}/conveyor'
+    start_moving(client, drive)
+    assert client.set(drive, ramp_time=7.25) == [(True, '')]
+    assert client.get(drive, 'ramp_time') == [7.25]
+    simulator.write('conveyor stuck=ramp_time')
+    simulator.line('conveyor: fault stuck')
+    assert client.set(drive, ramp_time=8.0) == [(False, 'read back 7.25 instead of 8')]
+    assert client.get(drive, 'p9999') == [None]
+    bridge.error(r'conveyor: read p9999 \(P9999\): no answer in')
+    assert bridge.end() == 0
+    requests = len(simulator.frames('^003FFFF0.* R$'))
+    wait_for(lambda: sum('003FFFF0#' in line for line in candump.lines) >= requests, 'candump')
+
+    frames = seen(candump.lines, CHANNEL)
+    texts = [text for _, text in frames]
+    assert texts[:4] == ['002007A4#0000000000000000', texts[1], '002007E4#0000000000000000',
+                         texts[3]]
+    assert texts[1].startswith('102007A4#00320033')
+    assert texts[3].startswith('102007E4#00D100D200D3')
+    assert texts[4] == '003FFFF0#0000000000000000'
+    cyclic = [(at, text) for at, text in frames if text.startswith('003FFFF0#')]
+    assert [text for _, text in cyclic[-3:]] == ['003FFFF0#0000000000000000'] * 3
+    assert '003FFFF0#05DC000000000000' in texts
+    assert '003001E1#02D5000000000000' in texts
+    # as many as the period allows, and not many fewer
+    cycles = (cyclic[-1][0] - cyclic[0][0]) / PERIOD
+    assert 0.5 * cycles <= len(cyclic) <= cycles + 3
+    answers = sum(text.startswith('103FFFF0#') for text in texts)
+    assert abs(answers - len(cyclic)) <= 1
+    assert candump.running
+
+
+def test_interface_taken_down_and_up(processes: Processes, client: Client, namespace: str,
+                                     tmp_path: Path, own: str) -> None:
+    file = bridge_file(tmp_path, interface='socketcan', channel=own, drives=DRIVES)
+    simulator = processes.simulator(file, link=False)
+    bridge = processes.bridge(file, namespace)
+    drive = f'/{namespace}/conveyor'
+    bus = f'{namespace}/drive_can_bridge: bus main'
+    start_moving(client, drive)
+    ip('link', 'set', 'dev', own, 'down')
+    client.online(drive, wanted=False)
+    assert 'Network is down' in bridge.error(r'bus main: .*tried again every 0\.2 s')
+    for _ in range(3):  # at every attempt: SocketCAN opens an interface that is down
+        facts = client.diagnostics(bus)
+        assert (facts['state'], facts['level']) == ('down', '2')
+        assert 'Network is down' in facts['message']
+    assert client.set(drive, ramp_time=1.0) == [(False, 'bus down')]
+    # told when it went and how the next attempt fails, then no more
+    assert len([line for line in bridge.errors if 'bus main: ' in line]) <= 3
+    simulator.error('lost|Network is down')
+    count = len(simulator.frames())
+    ip('link', 'set', 'dev', own, 'up')
+    rearm_and_move(client, drive, bridge, simulator, count)
+    assert client.diagnostics(bus)['state'] == 'up'
+    assert bridge.end() == 0
+
+
+def test_interface_deleted_and_created(processes: Processes, client: Client, namespace: str,
+                                       tmp_path: Path, own: str) -> None:
+    file = bridge_file(tmp_path, interface='socketcan', channel=own, drives=DRIVES)
+    simulator = processes.simulator(file, link=False)
+    bridge = processes.bridge(file, namespace)
+    drive = f'/{namespace}/conveyor'
+    start_moving(client, drive)
+    ip('link', 'delete', 'dev', own)
+    client.online(drive, wanted=False)
+    bridge.error(r'bus main: socketcan \w+: .*No such device')
+    facts = client.diagnostics(f'{namespace}/drive_can_bridge: bus main', state='^down$')
+    assert 'No such device' in facts['message']
+    count = len(simulator.frames())
+    make_own()
+    rearm_and_move(client, drive, bridge, simulator, count)
+    assert bridge.end() == 0
+    assert simulator.end() == 0

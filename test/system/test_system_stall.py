@@ -1,0 +1,86 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""An adapter that stops taking data: told, waited for, and nothing stale reaches the drive."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from parameter_files import bridge_file, CONVEYOR
+from processes import Client, Processes
+import pytest
+from slcan_peer import Peer, ZEROS
+
+CYCLIC_REQUEST = 'T003FFFF08'
+MISSED_LIMIT = 40
+#: what a terminal holds ready for its reader; nobody can take that back
+READY = 4096
+
+
+@pytest.fixture
+def peer(tmp_path: Path) -> Iterator[Peer]:
+    started = Peer(tmp_path / 'links' / 'main', {
+        CYCLIC_REQUEST: f'T103FFFF08{ZEROS}', f'T002001E18{ZEROS}': f'T102001E180064{ZEROS[4:]}'})
+    yield started
+    started.close()
+
+
+def test_adapter_that_takes_nothing(processes: Processes, client: Client, namespace: str,
+                                    tmp_path: Path, peer: Peer) -> None:
+    # the drive's maps are not looked at, so that it is fed even while it is offline: the kernel's
+    # buffers fill, and the oldest frames in them tell the drive to move
+    file = bridge_file(tmp_path, bus={'bitrate': 1_000_000}, drives={'conveyor': {
+        **CONVEYOR, 'mapping': 'assume', 'period': 0.005, 'missed_limit': MISSED_LIMIT}})
+    bridge = processes.bridge(file, namespace)
+    drive = f'/{namespace}/conveyor'
+    bus = f'{namespace}/drive_can_bridge: bus main'
+    client.online(drive)
+    client.publish(f'{drive}/command/speed_setpoint', 0.0)
+    client.diagnostics(f'{namespace}/drive_can_bridge: drive conveyor',
+                       message='not armed: publish 0 to [^ ]*/torque_limit$')
+    client.publish(f'{drive}/command/speed_setpoint', 150.0)
+    peer.wait_for(f'{CYCLIC_REQUEST}05DC')
+
+    peer.stop_reading()
+    client.online(drive, wanted=False)
+    line = bridge.error(r'bus main: send: .*; tried again every 0\.2 s')
+    assert 'the adapter takes no more data' in line
+    # it goes on: requests are answered, diagnostics appear
+    assert client.get(drive, 'ramp_time') == [None]
+    facts = client.diagnostics(bus, send_failures='^[1-9]')
+    assert facts['level'] == '2' or facts['state'] == 'up'
+
+    count = peer.read_again()
+    client.online(drive)
+    peer.wait_for('O', count)
+    reopened = count + peer.lines[count:].index('O')
+    requests = peer.wait_for(CYCLIC_REQUEST, reopened, 20)
+    assert set(requests) == {CYCLIC_REQUEST + ZEROS}
+    # before that: no more than the kernel cannot take back, neutral as soon as the drive was
+    # offline, and no command that was made of a torn one
+    old = peer.lines[count:reopened]
+    assert sum(len(line) + 1 for line in old) <= 2 * READY
+    whole = [line for line in old if len(line) >= len(CYCLIC_REQUEST + ZEROS)]
+    assert set(whole) <= {CYCLIC_REQUEST + ZEROS, f'{CYCLIC_REQUEST}05DC{ZEROS[4:]}'}
+    assert sum('05DC' in line for line in whole) <= MISSED_LIMIT + 5
+    assert old[-4:].count('C') >= 1
+    assert not [line for line in old if line.endswith('C') and len(line) > 1]
+    assert client.get(drive, 'ramp_time') == [1.0]
+    client.publish(f'{drive}/command/speed_setpoint', 0.0)
+    client.diagnostics(f'{namespace}/drive_can_bridge: drive conveyor',
+                       message='not armed: publish 0 to [^ ]*/torque_limit$')
+    client.publish(f'{drive}/command/speed_setpoint', 150.0)
+    peer.wait_for(f'{CYCLIC_REQUEST}05DC', count)
+    assert bridge.end() == 0
+    frames = [line for line in peer.lines if line.startswith('T')]
+    assert frames[-3:] == [CYCLIC_REQUEST + ZEROS] * 3
+
+
+def test_stop_while_the_adapter_takes_nothing(processes: Processes, client: Client,
+                                              namespace: str, tmp_path: Path, peer: Peer) -> None:
+    file = bridge_file(tmp_path, bus={'bitrate': 1_000_000, 'reconnect_period': 0.01}, drives={
+        'conveyor': {**CONVEYOR, 'mapping': 'assume', 'period': 0.005,
+                     'missed_limit': MISSED_LIMIT}})
+    bridge = processes.bridge(file, namespace)
+    client.online(f'/{namespace}/conveyor')
+    peer.stop_reading()
+    bridge.error('the adapter takes no more data')
+    assert bridge.end() == 0
