@@ -180,6 +180,9 @@ class BridgeNode(LifecycleNode):
         for name in self._dynamic:  # changed with ros2 param set since
             overrides[name] = self.get_parameter(name).value
         configuration = configuration_from_overrides(overrides, adapters=adapters)
+        if self.get_name() in configuration.drives:
+            raise ConfigurationError([f'drives.{self.get_name()}: the name of the bridge itself '
+                                      f'(remapped), allowed is another one'])
         for warning in configuration.warnings:
             self.get_logger().warning(warning)
         self._declare(configuration)

@@ -46,8 +46,8 @@ class ExecutorThread:
                 self.executor.spin_once()
             except (ExternalShutdownException, ShutdownException):
                 return
-            except InvalidHandle:
-                continue  # what was to be served is gone: a drive's node, after cleanup
+            except InvalidHandle:  # what was to be served is gone: a drive's node, after cleanup
+                self._stopping.wait(ERROR_PAUSE)
             except Exception as error:  # noqa: BLE001  outermost loop: no failure is silent
                 if self._stopping.is_set():
                     return

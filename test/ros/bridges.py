@@ -202,6 +202,13 @@ def cyclic_identifier(station: int) -> int:
     return station << 21 | 0x1FFFF0
 
 
+def acyclic(recorder: Recorder) -> list[tuple[int, bytes]]:
+    """Return what was sent to station 1 beside cycles and looks at the maps."""
+    return [(identifier, data) for identifier, data in recorder.frames()
+            if identifier >> 21 == 1 and identifier & 0x1FFFF0 != 0x1FFFF0
+            and not 122 <= (identifier >> 4 & 0xFFFF) <= 129]
+
+
 class _Dumper(yaml.SafeDumper):
     """Without aliases: rcl knows none."""
 

@@ -12,7 +12,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from processes import Client, Processes
+from processes import Client, DEADLINE, Processes
 import pytest
 
 # Before the first process starts: nothing leaves this machine, and others on it are left alone.
@@ -21,6 +21,14 @@ os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
 
 _COUNTER = itertools.count(1)
 _PROCESSES = pytest.StashKey[Processes]()
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Give these tests more time than their own deadlines."""
+    here = Path(__file__).parent
+    for item in items:
+        if here in item.path.parents:
+            item.add_marker(pytest.mark.timeout(5 * DEADLINE))
 
 
 @pytest.hookimpl(wrapper=True)

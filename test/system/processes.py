@@ -19,7 +19,7 @@ from typing import Any
 #: an emulated machine is this much slower
 SLOWNESS = 12.0 if os.environ.get('DRIVE_CAN_EMULATED') else 1.0
 #: s after which a thing that has not happened never will
-DEADLINE = 25.0 * SLOWNESS
+DEADLINE = 60.0 * SLOWNESS
 
 ROOT = Path(__file__).resolve().parents[2]
 #: executable -> module, for trees that are not installed

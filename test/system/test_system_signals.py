@@ -43,8 +43,7 @@ def test_while_active(processes: Processes, client: Client, namespace: str, tmp_
     simulator.line('^conveyor: ')
     assert len(simulator.frames(' R$')) == count
     bridge.error('conveyor: stopped')
-    assert not [line for line in bridge.errors if '[ERROR]' in line or '[WARN]' in line
-                and 'not armed' not in line]
+    assert not [line for line in bridge.errors if '[ERROR]' in line]
 
 
 @BOTH

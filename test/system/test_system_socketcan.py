@@ -26,7 +26,7 @@ DRIVES = {'conveyor': {**CONVEYOR, 'period': PERIOD, 'parameter_timeout': 0.3 * 
                        'command_timeout': 5.0 * SLOWNESS}}
 
 pytestmark = [
-    pytest.mark.socketcan, pytest.mark.timeout(120 * SLOWNESS),
+    pytest.mark.socketcan,
     pytest.mark.skipif(not Path('/sys/class/net', CHANNEL).exists(),
                        reason=f'no SocketCAN interface {CHANNEL}; name one by '
                               f'DRIVE_CAN_SOCKETCAN'),
