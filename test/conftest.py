@@ -1,2 +1,34 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""Puts this directory on the path: every test may import ``builders``."""
+"""
+Puts this directory on the path: every test may import ``builders``.
+
+Gives the test run a ROS domain of its own, before anything of ROS is imported: nothing leaves this
+machine, and two test runs on it never meet. The lock ends with the process.
+"""
+
+import fcntl
+import os
+from pathlib import Path
+import tempfile
+
+DOMAINS = range(10, 90)
+
+
+def _own_domain() -> tuple[int, int]:
+    """Return a domain that no other test run has, and the descriptor of its lock."""
+    folder = Path(tempfile.gettempdir())
+    for domain in DOMAINS:
+        lock = os.open(folder / f'drive_can_bridge_test_domain_{domain}', os.O_CREAT | os.O_RDWR,
+                       0o666)
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            os.close(lock)
+        else:
+            return domain, lock
+    raise RuntimeError(f'all ROS domains {DOMAINS.start} to {DOMAINS.stop - 1} are in use')
+
+
+_DOMAIN, _LOCK = _own_domain()
+os.environ['ROS_DOMAIN_ID'] = str(_DOMAIN)
+os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'

@@ -14,10 +14,6 @@ from typing import Any
 
 import can
 from clients import patience
-import pytest
-
-pytest.importorskip('rclpy', reason='ROS 2 is not installed: rclpy cannot be imported')
-
 import rclpy
 from rclpy.context import Context
 from rclpy.signals import SignalHandlerOptions

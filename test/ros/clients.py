@@ -8,10 +8,6 @@ import threading
 import time
 from typing import Any
 
-import pytest
-
-pytest.importorskip('rclpy', reason='ROS 2 is not installed: rclpy cannot be imported')
-
 from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.msg import (

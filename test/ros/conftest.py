@@ -17,11 +17,24 @@ import pytest
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 os.environ.setdefault('ROS_DOMAIN_ID', str(10 + os.getpid() % 80))
 
-# Without rclpy every module here skips itself, in clients.py.
-if TYPE_CHECKING or importlib.util.find_spec('rclpy') is not None:
+MISSING = importlib.util.find_spec('rclpy') is None
+if TYPE_CHECKING or not MISSING:
     from bridges import Bridge, StartBridge
     from clients import Client, ClientContext
     from leaks import assert_nothing_left
+
+
+class _Skipped(pytest.Module):
+    """A module that cannot even be imported."""
+
+    def collect(self) -> list[pytest.Item]:
+        pytest.skip('ROS 2 is not installed: rclpy cannot be imported', allow_module_level=True)
+
+
+def pytest_pycollect_makemodule(module_path: Path, parent: pytest.Collector,
+                                ) -> pytest.Module | None:
+    """Skip everything in here where ROS 2 is missing."""
+    return _Skipped.from_parent(parent, path=module_path) if MISSING else None
 
 
 @pytest.fixture(scope='session')

@@ -31,7 +31,7 @@ def test_commands_and_parameters(processes: Processes, client: Client, namespace
     client.value(f'{drive}/actual_speed', -0.5, 0.5)
     assert not simulator.frames(RUNNING)
     status = f'{namespace}/drive_can_bridge: drive conveyor'
-    facts = client.diagnostics(status, state='^not armed$')
+    facts = client.diagnostics(status, state='^not armed$', message='^not armed')
     assert facts['level'] == '1'
     assert facts['message'] == (f'not armed: publish 0 to {drive}/command/speed_setpoint and 0 to '
                                 f'{drive}/command/torque_limit')
