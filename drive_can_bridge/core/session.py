@@ -131,6 +131,9 @@ class Session(ABC):
             self._frames = []
         return frames
 
+    def frames_left(self, now: float) -> None:  # noqa: B027  optional hook
+        """Take note that the frames last taken have been sent: pauses begin now, not before."""
+
     def take_events(self) -> list[Event]:
         """Return what happened since the last call."""
         events = self._events

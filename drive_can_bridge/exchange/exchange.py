@@ -228,7 +228,7 @@ class BusExchange:
                     self._wake_at = self._pass()
                 self._wake.wait(max(0.0, self._wake_at - self._clock()))
                 self._wake.clear()
-        except Exception as error:  # noqa: BLE001  the outermost loop of a thread: no failure is silent
+        except Exception as error:  # noqa: BLE001  outermost loop: no failure is silent
             self._fail(f'{type(error).__name__}: {error}')
 
     def _pass(self) -> float:
@@ -240,6 +240,7 @@ class BusExchange:
             session = member.session
             due = session.next_timer()
             if due <= now:
+                now = self._clock()  # the drives before took their time
                 member.listener.take_commands(now)
                 session.handle_timer(now)
                 self._pump(member, now)
@@ -316,9 +317,12 @@ class BusExchange:
     def _pump(self, member: Member, now: float) -> None:
         """Send what a session wants sent, and tell its listener what happened."""
         session = member.session
-        for frame in session.take_frames():
-            if self.link.send(frame):
-                self.sent_bits += _bits(frame)
+        frames = session.take_frames()
+        if frames:
+            for frame in frames:
+                if self.link.send(frame):
+                    self.sent_bits += _bits(frame)
+            session.frames_left(self._clock())
         for event in session.take_events():
             if type(event) is ProcessDataReceived:
                 member.listener.process_data(event)

@@ -53,6 +53,9 @@ class DataModelSession(Session):
         acyclic = self._channel.take_frames()
         return frames + acyclic if acyclic else frames
 
+    def frames_left(self, now: float) -> None:
+        self._channel.frames_left(now)
+
     # -- user requests ----------------------------------------------------------------------------
 
     def _enqueue(self, request: Request, now: float) -> None:

@@ -145,6 +145,7 @@ class AcyclicChannel:
         self._deadline = math.inf
         self._not_before = -math.inf
         self._eeprom_free_at = -math.inf
+        self._eeprom_leaving = False
         self._held_until = -math.inf
         self._frames: list[Frame] = []
 
@@ -275,6 +276,12 @@ class AcyclicChannel:
                 return self._ready_at(queue.step)
         return math.inf
 
+    def frames_left(self, now: float) -> None:
+        """Take note that the frames are on their way: the pause of the EEPROM begins now."""
+        if self._eeprom_leaving:
+            self._eeprom_leaving = False
+            self._eeprom_free_at = max(self._eeprom_free_at, now + self._eeprom_gap)
+
     def take_frames(self) -> list[Frame]:
         """Return the frames to be sent."""
         frames = self._frames
@@ -327,3 +334,4 @@ class AcyclicChannel:
         self._not_before = now + WRITE_SPACING
         if write.eeprom:
             self._eeprom_free_at = now + self._eeprom_gap
+            self._eeprom_leaving = True

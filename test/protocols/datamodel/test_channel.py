@@ -203,3 +203,11 @@ def test_two_waiting_users() -> None:
     assert line.channel.waiting_users == 2
     line.answer(0, 1.01)
     assert line.channel.waiting_users == 1
+
+
+def test_the_pause_of_the_eeprom_begins_when_the_write_has_left() -> None:
+    line = Line()
+    line.writes((30, True), now=1.0)
+    line.channel.frames_left(1.009)  # the bus was busy
+    assert line.reads(30, now=1.02) == []
+    assert line.channel.next_timer() == pytest.approx(1.029)
