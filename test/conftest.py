@@ -26,7 +26,8 @@ def _own_domain() -> tuple[int, int]:
             os.close(lock)
         else:
             return domain, lock
-    raise RuntimeError(f'all ROS domains {DOMAINS.start} to {DOMAINS.stop - 1} are in use')
+    # a file system without locks, or very many runs: any domain will do
+    return DOMAINS.start + os.getpid() % len(DOMAINS), -1
 
 
 _DOMAIN, _LOCK = _own_domain()
