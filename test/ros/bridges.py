@@ -13,7 +13,7 @@ from types import TracebackType
 from typing import Any
 
 import can
-from clients import patience
+from clients import patience, wait_until
 import rclpy
 from rclpy.context import Context
 from rclpy.signals import SignalHandlerOptions
@@ -25,22 +25,24 @@ from drive_can_bridge.ros.executor_thread import ExecutorThread
 from drive_can_bridge.simulation.simulation import PlayedDrive, Simulation
 
 _COUNTER = itertools.count(1)
+#: an identifier that nobody listens to
+MARK = 0x7FF
 
 #: generous: nothing may depend on how busy the machine is
 CONVEYOR: dict[str, Any] = {
     'bus': 'main', 'protocol': 'datamodel_extended', 'station': 1, 'profile': 'datamodel_example',
     'period': 0.02, 'cyclic_request': ['speed_setpoint', 'torque_limit'],
     'cyclic_response': ['actual_speed', 'motor_current', 'status_word'],
-    'command_timeout': 10.0, 'missed_limit': 25, 'parameter_timeout': 0.5,
+    'command_timeout': 20.0, 'missed_limit': 100, 'parameter_timeout': 2.0,
 }
 #: the same with a control word
 LIFT: dict[str, Any] = {
     **CONVEYOR, 'station': 2, 'profile': 'datamodel_control_example',
     'cyclic_request': ['control_word', 'speed_setpoint'],
-    'cyclic_response': ['status_word', 'actual_speed'], 'control_timeout': 5.0,
+    'cyclic_response': ['status_word', 'actual_speed'], 'control_timeout': 20.0,
 }
 #: drives that tell soon when something is missing, for the tests of what happens then
-HASTY: dict[str, Any] = {'missed_limit': 5, 'parameter_timeout': 0.05}
+HASTY: dict[str, Any] = {'missed_limit': 10, 'parameter_timeout': 0.2}
 
 
 def parameters(*, buses: dict[str, Any] | None = None, **drives: dict[str, Any]) -> dict[str, Any]:
@@ -170,6 +172,19 @@ class Recorder:
         return [frame for frame in list(self._frames)
                 if not identifiers or frame[0] in identifiers]
 
+    def requests(self) -> list[tuple[int, bytes]]:
+        """Return what was sent to drives so far, and really all of it."""
+        self.catch_up()
+        return [frame for frame in self.frames() if frame[0] < 0x10000000]
+
+    def catch_up(self) -> None:
+        """Wait until everything is recorded that is on the bus by now."""
+        mark = next(_COUNTER).to_bytes(8, 'big')
+        with can.Bus(interface='virtual', channel=self._channel, ignore_config=True) as bus:
+            bus.send(can.Message(arbitration_id=MARK, data=mark, is_extended_id=False))
+        wait_until(lambda: (MARK, mark) in self._frames)
+        self._frames.remove((MARK, mark))
+
     def words(self, station: int = 1) -> tuple[int, ...]:
         """Return the signed words of the last cyclic request to a station; () without any."""
         sent = self.cycles(station)
@@ -200,6 +215,7 @@ def cyclic_identifier(station: int) -> int:
 
 def acyclic(recorder: Recorder) -> list[tuple[int, bytes]]:
     """Return what was sent to station 1 beside cycles and looks at the maps."""
+    recorder.catch_up()
     return [(identifier, data) for identifier, data in recorder.frames()
             if identifier >> 21 == 1 and identifier & 0x1FFFF0 != 0x1FFFF0
             and not 122 <= (identifier >> 4 & 0xFFFF) <= 129]

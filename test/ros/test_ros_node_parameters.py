@@ -21,11 +21,11 @@ def test_everything_can_be_read(bridge: StartBridge, client: Client) -> None:
         'drives.conveyor.station': 1, 'drives.conveyor.profile': 'datamodel_example',
         'drives.conveyor.period': 0.02, 'drives.conveyor.command_timeout': 3.0,
         'drives.conveyor.cyclic_request': ['speed_setpoint', 'torque_limit'],
-        'drives.conveyor.missed_limit': 25, 'drives.conveyor.rearm': 'neutral',
+        'drives.conveyor.missed_limit': 100, 'drives.conveyor.rearm': 'neutral',
         'drives.conveyor.parameter_retries': 2, 'drives.conveyor.verify_writes': True,
         'drives.conveyor.mapping': 'verify', 'drives.conveyor.request_map_base': 122,
         'drives.conveyor.joint.name': 'belt', 'drives.conveyor.joint.gear_ratio': 1.0,
-        'drives.lift.station': 2, 'drives.lift.control_timeout': 5.0, 'use_sim_time': False}
+        'drives.lift.station': 2, 'drives.lift.control_timeout': 20.0, 'use_sim_time': False}
     assert client.get(BRIDGE, *expected) == list(expected.values())
     names = client.call(f'{BRIDGE}/list_parameters', ListParameters).result.names
     assert set(expected) <= set(names)

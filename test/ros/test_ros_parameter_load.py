@@ -51,7 +51,7 @@ def test_a_thousand_calls_in_flight(bridge: StartBridge, client: Client) -> None
 
 def test_busy(bridge: StartBridge, client: Client) -> None:
     one = bridge(parameters(conveyor={**CONVEYOR, 'missed_limit': 1000,
-                                      'parameter_timeout': 2.0, 'parameter_retries': 0}))
+                                      'parameter_timeout': 30.0, 'parameter_retries': 0}))
     one.online()
     one.played['conveyor'].fault('silent')
     service = client.service('/conveyor/set_parameters', SetParameters)

@@ -56,13 +56,14 @@ def test_one_bad_name_takes_no_other_along(bridge: StartBridge, client: Client) 
     # 30 to 34 exist, 35 and 36 do not
     values = client.get('/conveyor', 'p33', 'p34', 'p35', 'p36')
     assert values[1] == 1 and values[0] is not None and values[2:] == [None, None]
-    text = 'conveyor: read p35 (P35): no answer in 0.05 s, 3 attempts'
+    text = 'conveyor: read p35 (P35): no answer in 0.2 s, 3 attempts'
     assert client.wait_logged('p35') == text
     client.get('/conveyor', 'p35')
     client.get('/conveyor', 'p35')
     assert client.get('/conveyor', 'p31') != [None]
     assert client.logged().count(text) == 1
-    assert not [line for line in client.logged() if 'p35' in line and line != text]
+    # what is held back is counted, should the machine be that slow
+    assert not [line for line in client.logged() if 'p35' in line and not line.startswith(text)]
     status = client.diagnostics(DRIVE, lambda drive: 'P35' in drive['last_parameter_error'])
     assert status['last_parameter_error'] == text.removeprefix('conveyor: ')
 

@@ -26,6 +26,7 @@ def run(bridge: StartBridge, client: Client, content: Any = LIFTS) -> Bridge:
 
 
 def last_cycles(recorder: Recorder) -> list[tuple[int, ...]]:
+    recorder.catch_up()
     return recorder.cycles(2)[-3:]
 
 
@@ -40,7 +41,7 @@ def test_stop_sends_neutral_and_disable(bridge: StartBridge, client: Client) -> 
         recorder.clear()
         for _ in range(20):
             client.state()
-        assert not recorder.frames()
+        assert not recorder.requests()
     wait_until(lambda: one.played['lift'].value('speed_setpoint') == 0.0)
     client.diagnostics('drive_can_bridge: drive lift', lambda drive: drive['state'] == 'offline')
 

@@ -54,7 +54,7 @@ def test_types_follow_the_one_rule(bridge: StartBridge, client: Client, tmp_path
 
 
 def test_every_parameter_once_per_exchange(bridge: StartBridge, client: Client) -> None:
-    one = bridge()
+    one = bridge(parameters(conveyor={**CONVEYOR, 'missed_limit': 25}))
     one.online()
     values = [client.topic('/conveyor/actual_speed', Float64),
               client.topic('/conveyor/motor_current', Float64),
