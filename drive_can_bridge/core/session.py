@@ -28,7 +28,7 @@ from drive_can_bridge.core.events import Event, RequestCompleted
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.requests import (
-    BRIDGE_INACTIVE, BUS_DOWN, BUSY, Failure, Outcome, Request, Written,
+    BRIDGE_INACTIVE, BUS_DOWN, BUSY, Failure, Outcome, Request,
 )
 from drive_can_bridge.core.setpoints import CommandOutcome, Setpoints
 from drive_can_bridge.core.statistics import DriveStatistics
@@ -255,8 +255,3 @@ class Session(ABC):
     @abstractmethod
     def offline_advice(self) -> str:
         """While not online: what is missing and what to look at; '' while online."""
-
-
-def successes(count: int, note: str = '') -> tuple[Written, ...]:
-    """Return ``count`` successful write outcomes."""
-    return (Written(note),) * count

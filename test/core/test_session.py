@@ -10,8 +10,8 @@ from drive_can_bridge.core.control import ControlAction, ControlTicket, ProfileC
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.events import RequestCompleted
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.core.requests import Failure, Request, Written
-from drive_can_bridge.core.session import DriveState, Session, successes
+from drive_can_bridge.core.requests import Failure, Request
+from drive_can_bridge.core.session import DriveState, Session
 
 
 class Idle(Session):
@@ -150,7 +150,3 @@ def test_control_requests_need_a_drive() -> None:
     assert isinstance(made.request_control(ControlAction.DISABLE, 1.0), ControlTicket)
     assert made.take_control_outcomes() == []
     assert session().take_control_outcomes() == []
-
-
-def test_successes() -> None:
-    assert successes(2, 'note') == (Written('note'), Written('note'))
