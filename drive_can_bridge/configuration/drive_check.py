@@ -19,7 +19,7 @@ from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import Access, Parameter, Storage
 from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.protocols.families import FAMILIES
-from drive_can_bridge.protocols.family import Family
+from drive_can_bridge.protocols.family import Complaint, Family
 
 BRIDGE_NAME = 'drive_can_bridge'
 _NO_PROFILE = Profile('', '', '', ())
@@ -62,7 +62,8 @@ class DriveChecker:
         self._check_status(drive)
         if not family.cyclic and not drive.cyclic_response and not self._is_damaged(_LISTS[1]):
             self._note((_LISTS[1],), f'empty, allowed in {family.name} is at least one parameter')
-        self.problems.extend(self._complaints(family, drive))
+        self.problems.extend(self._placed(family.check(drive)))
+        self.warnings.extend(self._placed(family.warnings(drive)))
         if 'joint' not in self._entry:
             return drive
         checker = JointChecker(self._tree, self._path, drive)
@@ -176,9 +177,9 @@ class DriveChecker:
                 f'{show(control.status_parameter)} is missing: without the status word the bridge '
                 'cannot tell whether the drive is enabled'))
 
-    def _complaints(self, family: Family, drive: DriveConfiguration) -> Iterator[Problem]:
-        """Ask the family, and put its complaints where they belong."""
-        for key, message in family.check(drive):
+    def _placed(self, complaints: Iterator[Complaint]) -> Iterator[Problem]:
+        """Put what a family complains about where it belongs."""
+        for key, message in complaints:
             parts = tuple(key.split('.')) if key else ()
             if parts[:1] == ('profile',) and len(parts) > 1 and self._loaded is not None:
                 yield self._loaded.tree.problem(parts[1:], message)

@@ -21,7 +21,7 @@ from drive_can_bridge.configuration.problems import (
 from drive_can_bridge.configuration.profiles import ProfileStore
 from drive_can_bridge.configuration.schema import defaults, definition, parameter_file_schema
 from drive_can_bridge.configuration.schema_check import check_schema
-from drive_can_bridge.configuration.traffic_check import collisions, overloads
+from drive_can_bridge.configuration.traffic_check import collisions, misfits, overloads, too_fast
 from drive_can_bridge.core.errors import ConfigurationError
 from drive_can_bridge.protocols.families import FAMILIES
 
@@ -103,6 +103,8 @@ def _configuration(tree: Tree, problems: list[Problem], adapters: Adapters | Non
         wrong, suspicious = overloads(tree, bus, [d for d in paced if d.bus == bus.name])
         problems.extend(wrong)
         warnings.extend(suspicious)
+        problems.extend(too_fast(tree, bus, [d for d in paced if d.bus == bus.name]))
+    problems.extend(misfits(tree, paced))
     if not drive_count and not tree.is_damaged(('drives',)):
         warnings.append(tree.problem(('drives',), 'no drive is configured'))
     if problems:

@@ -1,7 +1,8 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""What drives do to each other on a bus: colliding identifiers, and the load they add up to."""
+"""What drives do to each other on a bus: colliding identifiers, the load they add up to, time."""
 
 from collections.abc import Iterable, Iterator
+import math
 
 from drive_can_bridge.configuration.model import BusConfiguration, DriveConfiguration
 from drive_can_bridge.configuration.problems import Problem, Tree
@@ -53,3 +54,28 @@ def overloads(tree: Tree, bus: BusConfiguration, drives: Iterable[DriveConfigura
         return [tree.problem(path, f'{figure}, allowed is {100 * LOAD_MAX:.0f} %: use longer '
                                    'periods, fewer drives or a higher bit rate')], []
     return [], [tree.problem(path, f'{figure}, recommended is at most {100 * LOAD_WARNING:.0f} %')]
+
+
+def too_fast(tree: Tree, bus: BusConfiguration, drives: Iterable[DriveConfiguration],
+             ) -> Iterator[Problem]:
+    """Yield a problem for every drive whose round of polling does not fit its period."""
+    for drive in drives:
+        shortest = FAMILIES[drive.protocol].shortest_period(drive, bus.bitrate)
+        if drive.period < shortest:
+            # rounded up: what is named here has to pass
+            allowed = math.ceil(shortest * 1e5 - 1e-6) / 1e5
+            yield tree.problem(
+                ('drives', drive.name, 'period'),
+                f'{drive.period:g} s is too short for a round of polling at {bus.bitrate} bit/s, '
+                f'allowed is at least {allowed:g} s')
+
+
+def misfits(tree: Tree, drives: Iterable[DriveConfiguration]) -> Iterator[Problem]:
+    """Yield what drives of one family on one bus cannot do together."""
+    groups: dict[tuple[str, str], list[DriveConfiguration]] = {}
+    for drive in drives:
+        groups.setdefault((drive.bus, drive.protocol), []).append(drive)
+    for (_, protocol), together in groups.items():
+        for drive, (key, message) in FAMILIES[protocol].check_together(together):
+            parts = tuple(key.split('.')) if key else ()
+            yield tree.problem(('drives', drive.name, *parts), message)

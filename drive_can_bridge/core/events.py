@@ -13,7 +13,7 @@ class ProcessDataReceived(NamedTuple):
 
     A named tuple: it is made once per exchange.
 
-    :param raws: raw integers in the order of ``cyclic_response``; fewer than configured when the
+    :param raws: raw integers in the order of ``Session.sample_parameters``; fewer when the
         response was too short.
     :param received_at: receive time of the frame (steady clock, s).
     """

@@ -78,6 +78,16 @@ class Session(ABC):
         self._events: list[Event] = []
         self._cyclic_names = {parameter.name for parameter in drive.cyclic_request}
 
+    @property
+    def builtin_parameters(self) -> tuple[Parameter, ...]:
+        """What every sample carries besides ``cyclic_response``; families that have it say so."""
+        return ()
+
+    @property
+    def sample_parameters(self) -> tuple[Parameter, ...]:
+        """The parameters of a sample, in the order of ``ProcessDataReceived.raws``."""
+        return (*self.drive.cyclic_response, *self.builtin_parameters)
+
     # -- life cycle -------------------------------------------------------------------------------
 
     @abstractmethod
@@ -250,6 +260,15 @@ class Session(ABC):
         if self.setpoints.waiting:
             return DriveState.NOT_ARMED
         return DriveState.ONLINE
+
+    @property
+    def warning(self) -> str:
+        """Why all is not well although the drive is online, and what to do; '' otherwise."""
+        return ''
+
+    def facts(self) -> dict[str, str]:
+        """Return what diagnostics show of this family beyond what all families have."""
+        return {}
 
     @property
     @abstractmethod

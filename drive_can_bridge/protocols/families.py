@@ -1,9 +1,23 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The table of protocol families. A new family adds one row."""
 
+from collections.abc import Sequence
+
+from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.datamodel.extended_family import DataModelExtended
 from drive_can_bridge.protocols.family import Family
 
 FAMILIES: dict[str, Family] = {family.name: family for family in (
     DataModelExtended(),
 )}
+
+
+def make_sessions(drives: Sequence[DriveConfiguration]) -> list[Session]:
+    """Make the sessions of all drives of one bus, in the same order."""
+    made: dict[str, Session] = {}
+    for name in dict.fromkeys(drive.protocol for drive in drives):
+        together = [drive for drive in drives if drive.protocol == name]
+        made.update(zip((drive.name for drive in together),
+                        FAMILIES[name].make_sessions(together)))
+    return [made[drive.name] for drive in drives]

@@ -7,7 +7,7 @@ through the row in :mod:`drive_can_bridge.protocols.families`.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 from drive_can_bridge.configuration.model import DriveConfiguration
@@ -55,12 +55,31 @@ class Family(ABC):
     name: str
     #: has a cyclic service of its own (False: the exchange is emulated by polling)
     cyclic: bool
+    #: knows control and status word by itself; profiles have no ``control`` section
+    control_built_in: bool = False
     #: JSON Schema properties of the keys that only this family has; each has a ``default``
     options_schema: dict[str, Any]
 
     @abstractmethod
     def check(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         """Yield everything that this family cannot do with the drive as configured."""
+
+    def check_together(self, drives: Sequence[DriveConfiguration],
+                       ) -> Iterator[tuple[DriveConfiguration, Complaint]]:
+        """Yield what drives of this family on one bus cannot do together, each at its drive."""
+        yield from ()
+
+    def warnings(self, drive: DriveConfiguration) -> Iterator[Complaint]:
+        """Yield what is allowed but suspicious."""
+        yield from ()
+
+    def shortest_period(self, drive: DriveConfiguration, bitrate: int) -> float:
+        """
+        Return the shortest ``period`` that the exchange fits into, in s; 0: any.
+
+        Polled families have one: the sum of all frame times of a round at this bit rate.
+        """
+        return 0.0
 
     @abstractmethod
     def claims(self, drive: DriveConfiguration) -> list[Claim]:
@@ -82,3 +101,7 @@ class Family(ABC):
     @abstractmethod
     def make_session(self, drive: DriveConfiguration) -> Session:
         """Make the drive's session. Nothing is sent before ``activate``."""
+
+    def make_sessions(self, drives: Sequence[DriveConfiguration]) -> list[Session]:
+        """Make the sessions of all drives of this family on one bus, in the same order."""
+        return [self.make_session(drive) for drive in drives]

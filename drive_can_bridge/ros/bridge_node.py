@@ -33,7 +33,7 @@ from drive_can_bridge.configuration.load import (
 from drive_can_bridge.configuration.model import BridgeConfiguration
 from drive_can_bridge.core.errors import ConfigurationError
 from drive_can_bridge.exchange.exchange import BusExchange
-from drive_can_bridge.protocols.families import FAMILIES
+from drive_can_bridge.protocols.families import FAMILIES, make_sessions
 from drive_can_bridge.ros.diagnostics import Diagnostics
 from drive_can_bridge.ros.drive_node import DriveNode
 from drive_can_bridge.ros.mailbox import Mailbox
@@ -202,7 +202,7 @@ class BridgeNode(LifecycleNode):
         for bus in configuration.buses.values():
             drives = [drive for drive in configuration.drives.values() if drive.bus == bus.name]
             families = [FAMILIES[drive.protocol] for drive in drives]
-            sessions = [family.make_session(drive) for family, drive in zip(families, drives)]
+            sessions = make_sessions(drives)
             routes = [[claim.route for claim in family.claims(drive)]
                       for family, drive in zip(families, drives)]
             exchange = BusExchange(bus, sessions, routes, self)

@@ -13,7 +13,7 @@ from drive_can_bridge.core.events import Event, ProcessDataReceived
 from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.exchange.exchange import BusExchange
-from drive_can_bridge.protocols.families import FAMILIES
+from drive_can_bridge.protocols.families import FAMILIES, make_sessions
 
 
 class FakeLink:
@@ -98,8 +98,7 @@ class Bench:
         drives = drives or (drive(name='first', station=1), drive(name='second', station=2))
         self.now = 10.0
         self.step = 0.0
-        self.sessions = list(sessions) or [
-            FAMILIES[entry.protocol].make_session(entry) for entry in drives]
+        self.sessions = list(sessions) or make_sessions(drives)
         self.routes = [[claim.route for claim in FAMILIES[entry.protocol].claims(entry)]
                        for entry in drives]
         self.bus_notes = BusNotes()
