@@ -1,0 +1,199 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The exchange of protocols that have no cyclic service: a round of reads, and writes on change.
+
+Families whose drives answer single requests only (``datamodel_standard``, ``canopen_pkw``)
+emulate the exchange: once a period they read everything in ``cyclic_response``, in as few reads
+as possible, and publish it together; what is in ``cyclic_request`` they write when it changes and
+again after ``refresh_interval``. What to read and when to write is decided here; how, in the
+families.
+"""
+
+from collections.abc import Container, Iterable, Mapping, Sequence
+import math
+from typing import NamedTuple
+
+#: s that a drive is given for each request of a round, beside the time of the frames
+REQUEST_TIME = 0.001
+
+
+class Place(NamedTuple):
+    """
+    Where a parameter stands.
+
+    :param address: number of its first word.
+    :param width: words that it takes: 1, or 2 for 32 bits.
+    """
+
+    address: int
+    width: int = 1
+
+
+class Chunk(NamedTuple):
+    """
+    What one read asks for.
+
+    :param address: number of the first word.
+    :param size: consecutive words.
+    """
+
+    address: int
+    size: int
+
+
+def plan_reads(places: Iterable[Place], size: int, *, known: Container[int] = ()) -> list[Chunk]:
+    """
+    Cover parameters by as few reads as possible.
+
+    Each read begins where the first uncovered parameter begins and reaches as far as it can: no
+    other choice of intervals of a fixed length needs fewer.
+
+    :param size: words that a read can bring.
+    :param known: addresses that may be read although nobody wants them, in order to bridge a gap.
+        An address that the drive does not know would cost the whole read.
+
+    >>> plan_reads([Place(212), Place(209), Place(210)], 4, known={211})
+    [Chunk(address=209, size=4)]
+    >>> plan_reads([Place(212), Place(209), Place(210)], 4)
+    [Chunk(address=209, size=2), Chunk(address=212, size=1)]
+    """
+    chunks: list[Chunk] = []
+    for place in sorted(set(places)):
+        end = place.address + place.width
+        if chunks:
+            address, length = chunks[-1]
+            reached = address + length
+            if end <= reached:
+                continue
+            if end - address <= size and all(
+                    gap in known for gap in range(reached, place.address)):
+                chunks[-1] = Chunk(address, end - address)
+                continue
+        chunks.append(Chunk(*place))
+    return chunks
+
+
+def round_time(frame_bits: Iterable[int], requests: int, bitrate: int) -> float:
+    """
+    Return how long a round takes at worst, in s.
+
+    :param frame_bits: length of every frame of the round with maximal stuffing.
+    :param requests: reads and writes.
+    """
+    return sum(frame_bits) / bitrate + requests * REQUEST_TIME
+
+
+class Beat:
+    """
+    The rhythm of the rounds: absolute deadlines a period apart.
+
+    A round that could not begin in time begins late; rounds that were missed altogether are left
+    out, and the beat is kept.
+
+    :ivar due: when the next round is to begin; infinity: never.
+    """
+
+    __slots__ = ('_began_at', 'due', 'period')
+
+    def __init__(self, period: float) -> None:
+        self.period = period
+        self.due = math.inf
+        self._began_at = math.nan
+
+    def start(self, now: float) -> None:
+        """Begin with the next round now."""
+        self.due = now
+        self._began_at = math.nan
+
+    def stop(self) -> None:
+        """Plan no further round."""
+        self.due = math.inf
+
+    def begun(self, now: float) -> float:
+        """
+        Take note that a round begins, and plan the next.
+
+        :return: distance to the previous one less the period, in s; NaN for the first.
+        """
+        error = abs(now - self._began_at - self.period)
+        self._began_at = now
+        self.due += self.period
+        soonest = now + 0.5 * self.period
+        if self.due < soonest:
+            self.due += math.ceil((soonest - self.due) / self.period) * self.period
+        return error
+
+
+class WriteSchedule:
+    """
+    Which setpoints have to be written: those that changed, and those not written for a while.
+
+    Values are looked at when a frame is made, not when it becomes due: the newest one wins.
+
+    :param count: number of setpoints.
+    :param refresh: s after which an unchanged one is written again; 0: never.
+    """
+
+    def __init__(self, count: int, refresh: float) -> None:
+        self._refresh = refresh
+        self._written: list[int | None] = [None] * count
+        self._written_at = [-math.inf] * count
+        self._due: list[int] = []
+
+    def forget(self) -> None:
+        """Take note that nothing is known of the drive: everything is due at the next look."""
+        self._written = [None] * len(self._written)
+        self._due.clear()
+
+    def look(self, raws: Sequence[int], now: float) -> None:
+        """
+        Find out what is due, once a period.
+
+        :param raws: what the setpoints are now.
+        """
+        for index, raw in enumerate(raws):
+            if index not in self._due and (
+                    raw != self._written[index]
+                    or 0.0 < self._refresh <= now - self._written_at[index]):
+                self._due.append(index)
+
+    @property
+    def waiting(self) -> bool:
+        """Something is due."""
+        return bool(self._due)
+
+    def next(self) -> int:
+        """Return the index of the setpoint to be written next, which is due no more."""
+        return self._due.pop(0)
+
+    def written(self, index: int, raw: int, now: float) -> None:
+        """Take note of what the drive was told (and, where it acknowledges, has confirmed)."""
+        self._written[index] = raw
+        self._written_at[index] = now
+
+    def failed(self, index: int) -> None:
+        """Take note that nobody knows what the drive has: it is due at the next look."""
+        self._written[index] = None
+
+
+class Round:
+    """
+    The words that a round has brought so far.
+
+    :param places: of all parameters, in the order of ``cyclic_response``.
+    """
+
+    def __init__(self, places: Sequence[Place]) -> None:
+        self._places = places
+        self._words: dict[int, int] = {}
+
+    def take(self, chunk: Chunk, words: Sequence[int]) -> None:
+        """Take the answer of a read."""
+        self._words.update(zip(range(chunk.address, chunk.address + chunk.size), words))
+
+    def words(self) -> list[tuple[int, ...]]:
+        """Return the words of each parameter, lowest address first."""
+        found: Mapping[int, int] = self._words
+        return [tuple(found[address] for address in range(place.address,
+                                                          place.address + place.width))
+                for place in self._places]

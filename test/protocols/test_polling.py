@@ -1,0 +1,125 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""How the exchange of polled protocols is planned."""
+
+from itertools import combinations
+import math
+
+from hypothesis import given, strategies as st
+import pytest
+
+from drive_can_bridge.protocols.polling import (
+    Beat, Chunk, Place, plan_reads, Round, round_time, WriteSchedule,
+)
+
+
+def plan(*numbers: int, size: int = 4, known: set[int] | None = None) -> list[tuple[int, int]]:
+    return [tuple(chunk) for chunk in
+            plan_reads([Place(number) for number in numbers], size, known=known or set())]
+
+
+def test_consecutive_numbers_share_a_read() -> None:
+    assert plan(209, 210, 211) == [(209, 3)]
+    assert plan(209, 210, 211, 212) == [(209, 4)]
+    assert plan(209, 210, 211, 212, 213) == [(209, 4), (213, 1)]
+
+
+def test_order_and_repetition_do_not_matter() -> None:
+    assert plan(211, 209, 210, 209) == [(209, 3)]
+
+
+def test_a_gap_is_bridged_over_what_the_drive_knows() -> None:
+    assert plan(209, 211) == [(209, 1), (211, 1)]
+    assert plan(209, 211, known={210}) == [(209, 3)]
+    assert plan(209, 212, known={210}) == [(209, 1), (212, 1)]
+    assert plan(209, 213, known={210, 211, 212}) == [(209, 1), (213, 1)]
+
+
+def test_words_of_32_bits_stay_together() -> None:
+    assert plan_reads([Place(455), Place(500, 2), Place(502, 2)], 2) == [
+        Chunk(455, 1), Chunk(500, 2), Chunk(502, 2)]
+    assert plan_reads([Place(500, 2), Place(501)], 2) == [Chunk(500, 2)]
+    assert plan_reads([Place(499), Place(500, 2)], 2) == [Chunk(499, 1), Chunk(500, 2)]
+
+
+@given(st.sets(st.integers(0, 12), min_size=1), st.sets(st.integers(0, 12)), st.integers(1, 4))
+def test_no_plan_needs_fewer_reads(wanted: set[int], known: set[int], size: int) -> None:
+    chunks = plan_reads([Place(number) for number in wanted], size, known=known)
+    covered = [number for chunk in chunks
+               for number in range(chunk.address, chunk.address + chunk.size)]
+    assert wanted <= set(covered) <= wanted | known
+    assert len(set(covered)) == len(covered)
+    assert max(chunk.size for chunk in chunks) <= size
+    allowed = wanted | known
+    runs = [frozenset(range(first, first + length))
+            for first in wanted for length in range(1, size + 1)
+            if set(range(first, first + length)) <= allowed]
+    assert not any(wanted <= frozenset().union(*some)
+                   for some in combinations(set(runs), len(chunks) - 1) if some)
+
+
+def test_the_time_of_a_round() -> None:
+    # one read of two frames and one write at 125 kbit/s: 405 bits, two requests
+    assert round_time([135, 135, 135], 2, 125_000) == pytest.approx(0.00324 + 0.002)
+
+
+def test_rounds_keep_their_beat() -> None:
+    beat = Beat(0.02)
+    assert beat.due == math.inf
+    beat.start(10.0)
+    assert beat.due == 10.0
+    assert math.isnan(beat.begun(10.0))
+    assert beat.due == pytest.approx(10.02)
+    assert beat.begun(10.021) == pytest.approx(0.001)
+    assert beat.due == pytest.approx(10.04)
+    assert beat.begun(10.095) == pytest.approx(0.054)
+    assert beat.due == pytest.approx(10.12), 'not 10.1: no burst'
+    beat.stop()
+    assert beat.due == math.inf
+
+
+def test_setpoints_are_written_on_change_and_again_after_a_while() -> None:
+    writes = WriteSchedule(2, 0.5)
+    writes.look([0, 7], 10.0)
+    assert [writes.next(), writes.next()] == [0, 1]
+    assert not writes.waiting
+    writes.written(0, 0, 10.0)
+    writes.written(1, 7, 10.001)
+    writes.look([0, 7], 10.4)
+    assert not writes.waiting
+    writes.look([0, 8], 10.42)
+    writes.look([0, 8], 10.44)
+    assert writes.next() == 1
+    writes.written(1, 8, 10.44)
+    writes.look([0, 8], 10.5)
+    assert writes.next() == 0
+    assert not writes.waiting
+
+
+def test_without_refresh_only_changes_are_written() -> None:
+    writes = WriteSchedule(1, 0.0)
+    writes.look([3], 10.0)
+    writes.written(writes.next(), 3, 10.0)
+    writes.look([3], 1e6)
+    assert not writes.waiting
+
+
+def test_what_failed_and_what_was_forgotten_is_due_again() -> None:
+    writes = WriteSchedule(2, 0.0)
+    writes.look([1, 2], 10.0)
+    writes.written(writes.next(), 1, 10.0)
+    index = writes.next()
+    writes.failed(index)
+    writes.look([1, 2], 10.1)
+    assert writes.next() == 1
+    assert not writes.waiting
+    writes.written(1, 2, 10.1)
+    writes.forget()
+    writes.look([1, 2], 10.2)
+    assert [writes.next(), writes.next()] == [0, 1]
+
+
+def test_a_round_hands_out_words_by_parameter() -> None:
+    result = Round([Place(500, 2), Place(455), Place(501)])
+    result.take(Chunk(455, 1), (0x2083,))
+    result.take(Chunk(500, 2), (0, 900))
+    assert result.words() == [(0, 900), (0x2083,), (900,)]
