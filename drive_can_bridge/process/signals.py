@@ -21,6 +21,9 @@ from types import TracebackType
 #: through the launch that started it: without this grace the second signal would end the process
 #: before its first neutral frame.
 GRACE = 0.3
+#: s within which the same signal counts once: timeout(1), for one, sends it to its child and, in the
+#: next breath, to its whole process group
+SAME_BREATH = 0.05
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
@@ -82,7 +85,7 @@ class SignalWatcher:
             return None
 
     def _watch(self) -> None:
-        first = 0.0
+        first, first_number = 0.0, 0
         while True:
             received = self._read.recv(1)
             if not received:
@@ -91,10 +94,12 @@ class SignalWatcher:
             if number not in SIGNALS:
                 continue
             if self._signalled:
+                if number == first_number and time.monotonic() - first < SAME_BREATH:
+                    continue
                 self._second = number
                 time.sleep(max(0.0, first + GRACE - time.monotonic()))
                 os._exit(128 + number)
-            first = time.monotonic()
+            first, first_number = time.monotonic(), number
             self._signalled = True
             self._reasons.put('')
 

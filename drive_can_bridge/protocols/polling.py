@@ -13,6 +13,8 @@ from collections.abc import Container, Iterable, Mapping, Sequence
 import math
 from typing import NamedTuple
 
+#: s by which sums of periods are wrong
+_TOLERANCE = 1e-6
 #: s that a drive is given for each request of a round, beside the time of the frames
 REQUEST_TIME = 0.001
 
@@ -154,8 +156,14 @@ class WriteSchedule:
         for index, raw in enumerate(raws):
             if index not in self._due and (
                     raw != self._written[index]
-                    or 0.0 < self._refresh <= now - self._written_at[index]):
+                    or 0.0 < self._refresh <= now - self._written_at[index] + _TOLERANCE):
                 self._due.append(index)
+
+    def hurry(self, index: int) -> None:
+        """Let a setpoint go before all others, if it is due."""
+        if index in self._due:
+            self._due.remove(index)
+            self._due.insert(0, index)
 
     @property
     def waiting(self) -> bool:

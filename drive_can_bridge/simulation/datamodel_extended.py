@@ -10,38 +10,26 @@ not define. Unused bytes of a response hold junk, since the manual calls them un
 from collections.abc import Sequence
 
 from drive_can_bridge.configuration.model import DriveConfiguration
-from drive_can_bridge.core.errors import RemoteProtocolError, ValueRefused
+from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.frame import Frame, Route
-from drive_can_bridge.core.parameters import Value
 from drive_can_bridge.protocols.datamodel import extended
-from drive_can_bridge.simulation.datamodel_table import DataModelTable
-from drive_can_bridge.simulation.drive import EEPROM_TIME, SimulatedDrive
-
-JUNK = bytes([0xA5]) * extended.PAYLOAD
+from drive_can_bridge.simulation.datamodel_drive import DataModelDrive, JUNK
+from drive_can_bridge.simulation.drive import EEPROM_TIME
 
 
-class SimulatedDataModelDrive(SimulatedDrive):
+class SimulatedDataModelDrive(DataModelDrive):
     """One DataModel drive with 29-bit identifiers. See the base class."""
 
     def __init__(self, configuration: DriveConfiguration, *, neighbours: Sequence[Route] = (),
                  eeprom_time: float = EEPROM_TIME) -> None:
         super().__init__(configuration, neighbours=neighbours, eeprom_time=eeprom_time)
-        self.station = configuration.station
-        self.table = DataModelTable(configuration, self.plant, eeprom_time=eeprom_time,
-                                    violation=self._violation)
         self._request_bits = self.station << extended.STATION_SHIFT
         self._cyclic_identifier = extended.cyclic_request_identifier(self.station)
-        self._foreign_turn = 0
 
     @classmethod
     def routes(cls, configuration: DriveConfiguration) -> list[Route]:
         """Return all identifiers of the station."""
         return [extended.station_route(configuration.station)]
-
-    @property
-    def eeprom_writes(self) -> int:
-        """EEPROM cells written."""
-        return self.table.eeprom_writes
 
     # -- telegrams --------------------------------------------------------------------------------
 
@@ -80,35 +68,7 @@ class SimulatedDataModelDrive(SimulatedDrive):
         data = extended.pack_words(words)[:used] + JUNK[used:]
         return Frame(request_identifier | extended.DIR, data, True)
 
-    # -- by hand ----------------------------------------------------------------------------------
-
-    def value(self, name: str, now: float | None = None) -> Value:
-        """Return a register; map entries by their raw names, ``p122``."""
-        known = self._known(name)
-        if known not in self.plant.parameters:
-            return self.table.map_entry(known)
-        return super().value(known, now)
-
-    def set_value(self, name: str, value: Value, now: float | None = None) -> None:
-        """Set a register; map entries by their raw names, ``p122``."""
-        known = self._known(name)
-        if known in self.plant.parameters:
-            super().set_value(known, value, now)
-        elif isinstance(value, int):
-            self.table.set_map_entry(known, value)
-        else:
-            raise ValueRefused(f'{value!r} is not a parameter number: 0 to 65535')
-
-    def _known(self, name: str) -> str:
-        if name in self.plant.parameters:
-            return name
-        known = self.table.name_of(name)
-        return super()._known(name) if known is None else known
-
-    def _power_on(self, *, forget: bool) -> None:
-        super()._power_on(forget=forget)
-        if forget:
-            self.table.clear_maps()
+    # -- faults -----------------------------------------------------------------------------------
 
     def _foreign_frames(self, answer: Frame) -> list[Frame]:
         """Return one of: the answer of an absent station, an 11-bit twin, a write echo."""
@@ -129,6 +89,3 @@ class SimulatedDataModelDrive(SimulatedDrive):
             return [] if self._belongs_to_neighbour(frame) else [frame]
         # drives do not acknowledge writes: nobody may take this for one
         return [Frame(extended.DIR | self._request_bits | extended.W | 30 << 4 | 1, junk, True)]
-
-    def _belongs_to_neighbour(self, frame: Frame) -> bool:
-        return any(route.matches(frame) for route in self.neighbours)

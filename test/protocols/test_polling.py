@@ -95,6 +95,14 @@ def test_setpoints_are_written_on_change_and_again_after_a_while() -> None:
     assert not writes.waiting
 
 
+def test_one_may_go_before_the_others() -> None:
+    writes = WriteSchedule(3, 0.0)
+    writes.hurry(2)
+    writes.look([1, 2, 3], 10.0)
+    writes.hurry(2)
+    assert [writes.next(), writes.next(), writes.next()] == [2, 0, 1]
+
+
 def test_without_refresh_only_changes_are_written() -> None:
     writes = WriteSchedule(1, 0.0)
     writes.look([3], 10.0)

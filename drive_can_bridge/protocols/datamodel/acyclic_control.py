@@ -43,6 +43,7 @@ class AcyclicControl:
         self._changed = changed
         self._written: int | None = None
         self._reading = False
+        self._outdated = False  # what is being read was asked before the word left
         self._watching = False
 
     def begin(self, now: float) -> None:
@@ -86,6 +87,7 @@ class AcyclicControl:
         self.look_at = math.inf
         if self._status is not None and not self._reading:
             self._reading = True
+            self._outdated = False
             self._channel.run(self._read(self._status), self._received, now)
 
     # -- inside -----------------------------------------------------------------------------------
@@ -95,6 +97,7 @@ class AcyclicControl:
                      parameter.storage is not Storage.RAM)
 
     def _sent(self) -> None:
+        self._outdated = self._reading
         self._control.word_sent(self._channel.now)
         self._changed(self._channel.now)
 
@@ -107,10 +110,10 @@ class AcyclicControl:
         self._reading = False
         if not self._watching:
             return
-        if raw is not None:
+        if raw is not None and not self._outdated:
             self._control.status_received(raw, now)
             self._changed(now)
-        self.look_at = min(self.look_at, now + (
+        self.look_at = now if self._outdated else min(self.look_at, now + (
             STATUS_PERIOD_PENDING if self._control.pending else STATUS_PERIOD))
 
 

@@ -3,6 +3,7 @@
 
 from abc import abstractmethod
 from collections.abc import Callable
+import math
 
 from drive_can_bridge.configuration.model import DriveConfiguration
 from drive_can_bridge.core.control import ControlMachine, ProfileControl
@@ -11,21 +12,29 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.requests import Request
 from drive_can_bridge.core.session import DriveState, Session
-from drive_can_bridge.protocols.datamodel.channel import AcyclicChannel, Words
+from drive_can_bridge.protocols.datamodel.acyclic_control import control_by_hand
+from drive_can_bridge.protocols.datamodel.channel import AcyclicChannel, Polling, Words
 from drive_can_bridge.protocols.datamodel.extended import SLOTS
+from drive_can_bridge.protocols.datamodel.process_words import slot_of
 from drive_can_bridge.protocols.datamodel.user_requests import UserRequests
+
+#: longest pause between the neutral cycles of a stop, however long the period is
+STOP_SPACING_MAX = 0.1
 
 
 class DataModelSession(Session):
     """
-    The acyclic channel, the requests of users in it, and the rules for parameter numbers.
+    The acyclic channel, the requests of users and the control word in it.
 
     :param encode_read: (number, count) -> frame.
     :param encode_write: (number, words) -> frame.
+    :param together: parameters that fit one write frame.
+    :param polling: given where the exchange itself goes through the channel.
     """
 
     def __init__(self, drive: DriveConfiguration, *, encode_read: Callable[[int, int], Frame],
-                 encode_write: Callable[[int, Words], Frame]) -> None:
+                 encode_write: Callable[[int, Words], Frame], together: int,
+                 polling: Polling | None = None) -> None:
         table = drive.profile.control
         control: ControlMachine | None = None
         if table is not None:
@@ -38,10 +47,17 @@ class DataModelSession(Session):
         self._channel = AcyclicChannel(
             encode_read=encode_read, encode_write=encode_write,
             timeout=drive.parameter_timeout, attempts=drive.parameter_retries + 1,
-            eeprom_gap=options['eeprom_write_gap'])
+            eeprom_gap=options['eeprom_write_gap'], polling=polling)
         self._users = UserRequests(
             self._channel, drive, offline=lambda: self.state is DriveState.OFFLINE,
-            offset=self._offset, complete=self._complete)
+            offset=self._offset, together=together, complete=self._complete)
+        status_name = table.status_parameter or '' if table is not None else ''
+        self._control_slot = slot_of(drive.cyclic_request, self._control_name)
+        self._status_slot = slot_of(drive.cyclic_response, status_name)
+        self._by_hand = control_by_hand(
+            drive, self._channel, self.control, self._control_changed,
+            word=self._control_name if self._control_slot is None else '',
+            status=status_name if self._status_slot is None else '')
         self._advice = 'not activated'
 
     @property
@@ -55,6 +71,9 @@ class DataModelSession(Session):
 
     def frames_left(self, now: float) -> None:
         self._channel.frames_left(now)
+
+    def facts(self) -> dict[str, str]:
+        return {'short_frames': str(self.statistics.short)}
 
     # -- user requests ----------------------------------------------------------------------------
 
@@ -71,6 +90,8 @@ class DataModelSession(Session):
     def _clear_channel(self) -> None:
         """Forget everything acyclic, and whatever waits for its outcome."""
         self._channel.clear()
+        if self._by_hand is not None:
+            self._by_hand.stop()
 
     def reconfigure(self, *, command_timeout: float | None = None,
                     rearm_immediate: bool | None = None,
@@ -106,6 +127,25 @@ class DataModelSession(Session):
         if self.control is not None:
             self.control.withdraw(reason, now)
             self._control_changed(now)
+        if self._by_hand is not None:
+            self._by_hand.end()
+
+    def _serve_control(self, now: float) -> None:
+        """Do what is due for the control and status word."""
+        if self.control is None:
+            return
+        if self._by_hand is not None and now >= self._by_hand.look_at:
+            self._by_hand.look(now)
+        if now >= self.control.next_timer():
+            self.control.handle_timer(now)
+            self._control_changed(now)
+
+    def _control_timer(self) -> float:
+        """Return when ``_serve_control`` wants to be called."""
+        if self.control is None:
+            return math.inf
+        due = self.control.next_timer()
+        return due if self._by_hand is None else min(due, self._by_hand.look_at)
 
     def _control_changed(self, now: float) -> None:
         """Tell what the control machine noted; then see to its word."""

@@ -12,14 +12,19 @@ step                result sent back
 ``Write(n, words)`` None, as soon as the frame is handed out (nobody acknowledges it)
 =================== ==================================================================
 
-Order: every lane runs its procedures one after the other. Urgent ones come first; our own and
-those of users take turns after every step, so that neither a flood of users nor a silent parameter
-keeps the other waiting for more than one read. A control word goes before all of them, and takes
-the place of one that has not left yet (:meth:`~AcyclicChannel.write_first`).
+Order: both lanes run their procedures one after the other. Our own and those of users take turns
+after every step, so that neither a flood of users nor a silent parameter keeps the other waiting
+for more than one read. Where our own are the exchange itself (:class:`Polling`), they run to their
+end, and users get one step in between and whatever time is left. A control word goes before all of
+them, and takes the place of one that has not left yet (:meth:`~AcyclicChannel.write_first`).
 
 Pace: at least 20 ms lie between two EEPROM writes to a station and between such a write and the
 next read (manual, "Scrittura di un parametro": "almeno 20msec"); a frame leaves only while no
 cyclic request is under way, because nothing is known about how many requests a drive can hold.
+
+Quarantine: where an answer does not say what it answers (11-bit identifiers), a read that nobody
+answered is followed by a silence. What arrives in it belongs to the past, is thrown away, and
+begins the silence anew.
 """
 
 from collections import deque
@@ -32,8 +37,9 @@ from typing import Any, Union
 from drive_can_bridge.core.frame import Frame
 
 #: s between an unacknowledged write and the next acyclic frame, so that a drive with a single
-#: receive buffer has fetched the first
-WRITE_SPACING = 0.001
+#: receive buffer has fetched the first; and, where answers carry no address, between an answer and
+#: the next read
+SPACING = 0.001
 
 
 @dataclass(frozen=True)
@@ -64,9 +70,20 @@ Sent = Callable[[], None]
 class Lane(Enum):
     """Who a procedure works for."""
 
-    URGENT = 'setpoints and control words: before everything else'
     OWN = 'map checks and polling'
     USERS = 'parameter services'
+
+
+@dataclass(frozen=True)
+class Polling:
+    """
+    What is different where the exchange itself goes through the channel.
+
+    :param quarantine: s of silence after a read that nobody answered, or an answer that nobody
+        asked for.
+    """
+
+    quarantine: float
 
 
 class _Queue:
@@ -120,21 +137,28 @@ class AcyclicChannel:
     :param timeout: s to wait for an answer.
     :param attempts: how often a read is sent before it counts as unanswered.
     :param eeprom_gap: s after an EEPROM write.
+    :param polling: given where the exchange itself goes through the channel. Writes that go first
+        then do not wait for the answer of a read: nobody answers writes.
     :ivar now: ``now`` of the call being served, for whoever is called back.
+    :ivar asked_at: when the last read was sent.
     """
 
     def __init__(self, *, encode_read: Callable[[int, int], Frame],
                  encode_write: Callable[[int, Words], Frame],
-                 timeout: float, attempts: int, eeprom_gap: float) -> None:
+                 timeout: float, attempts: int, eeprom_gap: float,
+                 polling: Polling | None = None) -> None:
         self._encode_read = encode_read
         self._encode_write = encode_write
         self.timeout = timeout
         self.attempts = attempts
         self.now = -math.inf
+        self.asked_at = -math.inf
         self._eeprom_gap = eeprom_gap
+        self._polled = polling is not None
+        self._quarantine = polling.quarantine if polling is not None else 0.0
         self._queues = {lane: _Queue() for lane in Lane}
-        urgent, own, users = self._queues.values()
-        self._orders = (urgent, own, users), (urgent, users, own)
+        own, users = self._queues.values()
+        self._orders = (own, users), (users, own)
         self._own, self._users = own, users
         self._users_next = False
         self._serving = own  # whose step is under way, or was last
@@ -144,6 +168,7 @@ class AcyclicChannel:
         self._outstanding = False
         self._deadline = math.inf
         self._not_before = -math.inf
+        self._quiet_until = -math.inf
         self._eeprom_free_at = -math.inf
         self._eeprom_leaving = False
         self._held_until = -math.inf
@@ -181,7 +206,13 @@ class AcyclicChannel:
         return True
 
     def clear(self) -> None:
-        """Forget everything under way. Nobody is told: that is the caller's business."""
+        """
+        Forget everything under way. Nobody is told: that is the caller's business.
+
+        An answer may still be on its way. It must not meet the next read.
+        """
+        if self._outstanding and self._polled:
+            self._quiet_until = self._deadline + self._quarantine
         for queue in self._queues.values():
             queue.clear()
         self._first = None
@@ -207,6 +238,11 @@ class AcyclicChannel:
         """When the next EEPROM write, or read, may follow."""
         return self._eeprom_free_at
 
+    @property
+    def free_at(self) -> float:
+        """When the next write to RAM may follow."""
+        return self._not_before
+
     def hold(self, until: float) -> None:
         """Send nothing before ``until``: a cyclic request is under way."""
         self._held_until = until
@@ -222,8 +258,14 @@ class AcyclicChannel:
     def receive(self, words: Words, now: float) -> None:
         """Take the answer of the outstanding read (the caller has matched it)."""
         self.now = now
+        if self._polled:  # a second answer, if there is one, must not meet the next read
+            self._not_before = max(self._not_before, now + SPACING)
         self._finish(words)
         self.advance(now)
+
+    def disturbed(self, now: float) -> None:
+        """Take note of an answer that nobody asked for: more may follow."""
+        self._quiet_until = max(self._quiet_until, now + self._quarantine)
 
     def advance(self, now: float) -> None:
         """Do all that is possible now."""
@@ -241,19 +283,14 @@ class AcyclicChannel:
         """Do the next thing; False when it cannot be done yet."""
         if self._outstanding:
             if now < self._deadline:
-                return False
+                return self._polled and self._advance_first(now)
+            self._quiet_until = max(self._quiet_until, now + self._quarantine)
             if self._serving.attempts_left <= 0:
                 self._finish(None)
                 return True
             self._outstanding = False
         if self._first is not None:
-            write, sent = self._first
-            if now < self._ready_at(write):
-                return False
-            self._first = None
-            self._send_write(write, now)
-            sent()
-            return True
+            return self._advance_first(now)
         step = self._choose()
         if step is None:
             self._busy = self._first is not None
@@ -263,11 +300,25 @@ class AcyclicChannel:
         self._send(step, now)
         return True
 
+    def _advance_first(self, now: float) -> bool:
+        """Write what goes before everything else, if there is such a thing and it may go."""
+        if self._first is None:
+            return False
+        write, sent = self._first
+        if now < self._ready_at(write):
+            return False
+        self._first = None
+        self._send_write(write, now)
+        sent()
+        return True
+
     def next_timer(self) -> float:
         """Return when ``advance`` wants to be called."""
         if not self._busy:
             return math.inf
         if self._outstanding:
+            if self._first is not None and self._polled:
+                return min(self._deadline, self._ready_at(self._first[0]))
             return self._deadline
         if self._first is not None:
             return self._ready_at(self._first[0])
@@ -291,7 +342,7 @@ class AcyclicChannel:
 
     # -- inside -----------------------------------------------------------------------------------
 
-    def _order(self) -> tuple[_Queue, _Queue, _Queue]:
+    def _order(self) -> tuple[_Queue, _Queue]:
         """Return the queues in the order in which they are served now."""
         return self._orders[self._users_next]
 
@@ -305,24 +356,29 @@ class AcyclicChannel:
         return None
 
     def _finish(self, result: Words | None) -> None:
-        """End the step under way; then it is another lane's turn."""
+        """End the step under way; then it is the other lane's turn."""
         queue = self._serving
         self._outstanding = False
         self._deadline = math.inf
-        if queue is self._own or queue is self._users:
-            self._users_next = queue is self._own
+        if queue is self._users:
+            self._users_next = False
+        elif not self._polled:
+            self._users_next = True
         queue.resume(result, self.attempts)
+        if queue is self._own and queue.step is None:
+            self._users_next = True
 
     def _ready_at(self, step: Step) -> float:
         ready = max(self._held_until, self._not_before)
-        if isinstance(step, Read) or step.eeprom:
-            ready = max(ready, self._eeprom_free_at)
-        return ready
+        if isinstance(step, Read):
+            return max(ready, self._eeprom_free_at, self._quiet_until)
+        return max(ready, self._eeprom_free_at) if step.eeprom else ready
 
     def _send(self, step: Step, now: float) -> None:
         if isinstance(step, Read):
             self._frames.append(self._encode_read(step.number, step.count))
             self._outstanding = True
+            self.asked_at = now
             self._serving.attempts_left -= 1
             self._deadline = now + self.timeout
         else:
@@ -331,7 +387,7 @@ class AcyclicChannel:
 
     def _send_write(self, write: Write, now: float) -> None:
         self._frames.append(self._encode_write(write.number, write.words))
-        self._not_before = now + WRITE_SPACING
+        self._not_before = now + SPACING
         if write.eeprom:
             self._eeprom_free_at = now + self._eeprom_gap
             self._eeprom_leaving = True

@@ -1,41 +1,28 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""
-The row of the family table for the DataModel protocol with 29-bit identifiers.
-
-Numbers in a profile are those of the drive's manual. What goes over the wire, in identifiers and
-in map entries, is ``number + parameter_offset``; a few drives count from 0 on one side and from 1
-on the other.
-"""
+"""The row of the family table for the DataModel protocol with 29-bit identifiers."""
 
 from collections.abc import Iterator
-import re
 from typing import Any
 
 from drive_can_bridge.configuration.model import DriveConfiguration
 from drive_can_bridge.core.frame import Route
-from drive_can_bridge.core.parameters import Parameter, ParameterType
+from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.session import Session
-from drive_can_bridge.protocols.datamodel.extended import (
-    CYCLIC_PARAMETER, SLOTS, STATION_MASK, STATION_MAX, STATION_SHIFT,
+from drive_can_bridge.protocols.datamodel.common_family import (
+    COMMON_OPTIONS, DataModelFamily, NUMBER_MAX,
 )
-from drive_can_bridge.protocols.datamodel.mapping import REQUEST_MAP_BASE, RESPONSE_MAP_BASE
-from drive_can_bridge.protocols.family import Claim, Complaint, Family
+from drive_can_bridge.protocols.datamodel.extended import (
+    SLOTS, STATION_MASK, STATION_MAX, STATION_SHIFT,
+)
+from drive_can_bridge.protocols.family import Claim, Complaint
 
-#: the manual recommends not to cycle faster
-FASTEST_PERIOD = 0.005
-#: the manual's least time between two EEPROM writes
-EEPROM_WRITE_GAP = 0.02
-NUMBER_MAX = 0xFFFF
 #: worst-case stuffing, eight bytes, 29-bit identifier, with the interframe space
 FRAME_BITS = 160
 #: both maps are read once a second, request and response each
 MAPPING_CHECK_BITS = 4 * FRAME_BITS
 
-_RAW_NAME = re.compile(r'p([0-9]{1,5})', re.ASCII)
-_PROTOCOLS = frozenset(('datamodel_extended', 'datamodel_standard'))
 
-
-class DataModelExtended(Family):
+class DataModelExtended(DataModelFamily):
     """DataModel, 29-bit identifiers: a cyclic service of four words each way, acyclic access."""
 
     name = 'datamodel_extended'
@@ -48,49 +35,8 @@ class DataModelExtended(Family):
             'enum': ['verify', 'configure', 'assume'],
             'default': 'verify',
         },
-        'request_map_base': {
-            'description': 'Number of the first of the four parameters that map the request.',
-            'type': 'integer', 'minimum': 1, 'maximum': NUMBER_MAX - SLOTS,
-            'default': REQUEST_MAP_BASE,
-        },
-        'response_map_base': {
-            'description': 'Number of the first of the four parameters that map the response.',
-            'type': 'integer', 'minimum': 1, 'maximum': NUMBER_MAX - SLOTS,
-            'default': RESPONSE_MAP_BASE,
-        },
-        'parameter_offset': {
-            'description': 'Added to every parameter number on the wire.',
-            'type': 'integer', 'minimum': -NUMBER_MAX, 'maximum': NUMBER_MAX, 'default': 0,
-        },
-        'eeprom_write_gap': {
-            'description': 's between EEPROM writes to the station; the manual demands 0.02.',
-            'type': 'number', 'minimum': EEPROM_WRITE_GAP, 'maximum': 60.0,
-            'default': EEPROM_WRITE_GAP,
-        },
-        'length_policy': {
-            'description': 'lenient accepts responses with fewer than 8 bytes that hold what is '
-                           'needed, strict does not.',
-            'enum': ['lenient', 'strict'],
-            'default': 'lenient',
-        },
-        'allow_fast_cycle': {
-            'description': 'Permit a period under 5 ms.',
-            'type': 'boolean',
-            'default': False,
-        },
+        **COMMON_OPTIONS,
     }
-
-    def check(self, drive: DriveConfiguration) -> Iterator[Complaint]:
-        """Yield everything that this family cannot do with the drive as configured."""
-        if not 1 <= drive.station <= STATION_MAX:
-            yield Complaint('station', f'{drive.station} is out of range, '
-                                       f'allowed is 1 to {STATION_MAX} ({self.name})')
-        if drive.period < FASTEST_PERIOD and not drive.family_options['allow_fast_cycle']:
-            yield Complaint('period', f'{drive.period:g} s is too fast, allowed is at least '
-                                      f'{FASTEST_PERIOD:g} s unless allow_fast_cycle is true')
-        yield from self._check_maps(drive)
-        yield from self._check_lists(drive)
-        yield from self._check_profile(drive)
 
     def claims(self, drive: DriveConfiguration) -> list[Claim]:
         """Return all identifiers of the drive on its bus: every frame of its station."""
@@ -104,17 +50,6 @@ class DataModelExtended(Family):
             return exchange
         return exchange + MAPPING_CHECK_BITS
 
-    def raw_parameter(self, drive: DriveConfiguration, name: str) -> Parameter | None:
-        """Resolve ``p<number>``: an unsigned 16-bit parameter of unknown storage."""
-        match = _RAW_NAME.fullmatch(name)
-        if match is None:
-            return None
-        number = int(match.group(1))
-        wire = number + drive.family_options['parameter_offset']
-        if number > NUMBER_MAX or not 0 <= wire <= NUMBER_MAX:
-            return None
-        return Parameter(name=name, number=number, listed=False)
-
     def make_session(self, drive: DriveConfiguration) -> Session:
         """Make the drive's session. Nothing is sent before ``activate``."""
         # Imported late: configuration checks read this table without any need of sessions.
@@ -123,21 +58,10 @@ class DataModelExtended(Family):
 
     # -- parts of the check -----------------------------------------------------------------------
 
-    def _check_maps(self, drive: DriveConfiguration) -> Iterator[Complaint]:
-        offset = drive.family_options['parameter_offset']
-        for key in ('request_map_base', 'response_map_base'):
-            base = drive.family_options[key]
-            if not 0 <= base + offset <= NUMBER_MAX - SLOTS:
-                yield Complaint(key, f'{base} with parameter_offset {offset} is out of range, '
-                                     f'allowed on the wire is 0 to {NUMBER_MAX - SLOTS}')
-        request = drive.family_options['request_map_base']
-        response = drive.family_options['response_map_base']
-        if abs(request - response) < SLOTS:
-            # at the key that was given; the other one has its default
-            moved = request != REQUEST_MAP_BASE and response == RESPONSE_MAP_BASE
-            yield Complaint('request_map_base' if moved else 'response_map_base',
-                            f'{request} and {response} overlap, allowed is a distance of {SLOTS} '
-                            'or more')
+    def _check_station(self, drive: DriveConfiguration) -> Iterator[Complaint]:
+        if not 1 <= drive.station <= STATION_MAX:
+            yield Complaint('station', f'{drive.station} is out of range, '
+                                       f'allowed is 1 to {STATION_MAX} ({self.name})')
 
     def _check_lists(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         offset = drive.family_options['parameter_offset']
@@ -150,50 +74,4 @@ class DataModelExtended(Family):
                 if parameter.number is not None and parameter.number + offset == 0:
                     yield Complaint(key, f"'{parameter.name}' has number 0 on the wire, which "
                                          f'ends a map; allowed is 1 to {NUMBER_MAX}')
-        yield from self._check_request(drive)
-
-    def _check_request(self, drive: DriveConfiguration) -> Iterator[Complaint]:
-        """Look for setpoints that would overwrite each other, or the maps themselves."""
-        numbers: dict[int, str] = {}
-        for parameter in drive.cyclic_request:
-            if parameter.number is None:
-                continue
-            if parameter.number in numbers:
-                yield Complaint('cyclic_request',
-                                f"'{parameter.name}' and '{numbers[parameter.number]}' are both "
-                                f'{parameter.address}, allowed is one of them')
-            numbers.setdefault(parameter.number, parameter.name)
-            for key in ('request_map_base', 'response_map_base'):
-                base = drive.family_options[key]
-                if base <= parameter.number < base + SLOTS:
-                    yield Complaint('cyclic_request',
-                                    f"'{parameter.name}' ({parameter.address}) is a mapping "
-                                    f'parameter, allowed are others than {base} to '
-                                    f'{base + SLOTS - 1}')
-
-    def _check_profile(self, drive: DriveConfiguration) -> Iterator[Complaint]:
-        offset = drive.family_options['parameter_offset']
-        shared = not _PROTOCOLS.issuperset(drive.profile.protocols)
-        for name, parameter in drive.profile.parameters.items():
-            place = f'profile.parameters.{name}'
-            if parameter.type in (ParameterType.INT32, ParameterType.UINT32):
-                yield Complaint(f'{place}.type', f'{parameter.type.value} does not exist in '
-                                                 f'{self.name}, allowed are bool, int16, uint16')
-            if parameter.number is None:
-                yield Complaint(f'{place}.number', f'missing, allowed in {self.name} is '
-                                                   f'0 to {NUMBER_MAX}')
-                continue
-            if not 0 <= parameter.number <= NUMBER_MAX:
-                yield Complaint(f'{place}.number', f'{parameter.number} is out of range, '
-                                                   f'allowed is 0 to {NUMBER_MAX}')
-            elif not 0 <= parameter.number + offset <= NUMBER_MAX:
-                yield Complaint('parameter_offset', f"{offset} moves '{name}' "
-                                                    f'({parameter.address}) out of the allowed '
-                                                    f'0 to {NUMBER_MAX}')
-            elif parameter.writable and parameter.number + offset == CYCLIC_PARAMETER:
-                yield Complaint(f'{place}.access', f'{parameter.access.value} is impossible, '
-                                                   f'{CYCLIC_PARAMETER} is never written; '
-                                                   f'allowed is ro')
-            if parameter.subindex is not None and not shared:
-                yield Complaint(f'{place}.subindex', f'{self.name} knows no sub-index, '
-                                                     f'allowed is number alone')
+        yield from super()._check_lists(drive)

@@ -27,15 +27,12 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.requests import BRIDGE_INACTIVE, BUS_DOWN
 from drive_can_bridge.core.session import DriveState, STOP_CYCLES
 from drive_can_bridge.protocols.datamodel import extended
-from drive_can_bridge.protocols.datamodel.acyclic_control import control_by_hand
-from drive_can_bridge.protocols.datamodel.base_session import DataModelSession
+from drive_can_bridge.protocols.datamodel.base_session import DataModelSession, STOP_SPACING_MAX
 from drive_can_bridge.protocols.datamodel.map_supervision import MapSupervision, Verdict
 from drive_can_bridge.protocols.datamodel.process_words import (
-    slot_of, unpack_unusual, wire_numbers, words_struct,
+    unpack_unusual, wire_numbers, words_struct,
 )
 
-#: longest pause between the neutral cycles of a stop, however long the period is
-STOP_SPACING_MAX = 0.1
 LOOKING = 'being looked for'
 #: direction and station of an identifier
 FROM_WHOM = extended.DIR | extended.STATION_MASK
@@ -60,16 +57,13 @@ class ExtendedSession(DataModelSession):
             drive,
             encode_read=lambda number, count: extended.encode_read_request(
                 station, number, count),
-            encode_write=lambda number, words: extended.encode_write(station, number, words))
+            encode_write=lambda number, words: extended.encode_write(station, number, words),
+            together=extended.SLOTS)
         options = drive.family_options
         self._verify: bool = options['mapping'] != 'assume'
         self._strict: bool = options['length_policy'] == 'strict'
         self._request_identifier = extended.cyclic_request_identifier(station)
         self._response_identifier = self._request_identifier | extended.DIR
-        self._control_slot = slot_of(drive.cyclic_request, self._control_name)
-        table = drive.profile.control
-        status_name = table.status_parameter or '' if table is not None else ''
-        self._status_slot = slot_of(drive.cyclic_response, status_name)
         self._pack = words_struct(drive.cyclic_request, unsigned=self._control_slot).pack
         self._padding = extended.PADDING[len(drive.cyclic_request)]
         self._unpack = words_struct(drive.cyclic_response).unpack_from
@@ -79,10 +73,6 @@ class ExtendedSession(DataModelSession):
             response=wire_numbers(drive.cyclic_response, self._offset),
             rewrite=options['mapping'] == 'configure',
             emit=self._maps_reported, judged=self._maps_judged)
-        self._by_hand = control_by_hand(
-            drive, self._channel, self.control, self._control_changed,
-            word=self._control_name if self._control_slot is None else '',
-            status=status_name if self._status_slot is None else '')
         self._phase = Phase.IDLE
         self._cycles_left = -1  # cycles still to be sent in LEAVING or before a stop; -1: no end
         self._stopping = False
@@ -168,8 +158,6 @@ class ExtendedSession(DataModelSession):
     def _clear_channel(self) -> None:
         super()._clear_channel()
         self._maps.stop()
-        if self._by_hand is not None:
-            self._by_hand.stop()
 
     # -- maps -------------------------------------------------------------------------------------
 
@@ -289,11 +277,6 @@ class ExtendedSession(DataModelSession):
         self._forgiven = self._awaiting
         self._awaiting = False
 
-    def _withdraw(self, reason: str, now: float) -> None:
-        super()._withdraw(reason, now)
-        if self._by_hand is not None:
-            self._by_hand.end()
-
     # -- frames from the drive --------------------------------------------------------------------
 
     def receive_frame(self, frame: Frame, now: float, age: float = 0.0) -> None:
@@ -371,22 +354,13 @@ class ExtendedSession(DataModelSession):
             self._cycle(now)
         if now >= self._maps.look_at:
             self._maps.look(now)
-        if self.control is not None:
-            if self._by_hand is not None and now >= self._by_hand.look_at:
-                self._by_hand.look(now)
-            if now >= self.control.next_timer():
-                self.control.handle_timer(now)
-                self._control_changed(now)
+        self._serve_control(now)
         if now >= self._channel.next_timer():
             self._channel.advance(now)
 
     def next_timer(self) -> float:
-        soonest = min(self._next_cycle, self._channel.next_timer(), self._maps.look_at)
-        if self.control is None:
-            return soonest
-        if self._by_hand is not None:
-            soonest = min(soonest, self._by_hand.look_at)
-        return min(soonest, self.control.next_timer())
+        return min(self._next_cycle, self._channel.next_timer(), self._maps.look_at,
+                   self._control_timer())
 
     def _update_control_word(self, now: float) -> None:
         if self._by_hand is not None and not self._stopping and (

@@ -29,6 +29,7 @@ class Conditions:
 
     :param offline: tells whether nobody is there; then one unanswered read ends the request.
     :param offset: added to every parameter number that goes over the wire.
+    :param together: parameters that fit one write frame.
     """
 
     offline: Callable[[], bool]
@@ -36,6 +37,7 @@ class Conditions:
     attempts: int
     verify: bool
     offset: int
+    together: int = SLOTS
 
     def no_answer(self) -> Failure:
         """Say that nobody answered."""
@@ -144,7 +146,7 @@ def write_parameter(parameter: Parameter, raw: int, conditions: Conditions,
 def write_together(items: Sequence[tuple[Parameter, int]], conditions: Conditions,
                    ) -> Generator[Step, Reply, tuple[Outcome, ...]]:
     """Write consecutive parameters in one frame, or nothing (``set_parameters_atomically``)."""
-    refusal = together_refusal(items)
+    refusal = together_refusal(items, conditions.together)
     if refusal:
         return (Failure(refusal),) * len(items)
     if len(items) == 1:
@@ -165,17 +167,18 @@ def write_together(items: Sequence[tuple[Parameter, int]], conditions: Condition
         for parameter, raw in items)
 
 
-def together_refusal(items: Sequence[tuple[Parameter, int]]) -> str:
+def together_refusal(items: Sequence[tuple[Parameter, int]], size: int = SLOTS) -> str:
     """Say why these parameters do not fit one write frame; '' if they do."""
     if len(items) < 2:
         return ''
     numbers = sorted(parameter.number or 0 for parameter, _ in items)
     consecutive = numbers == list(range(numbers[0], numbers[0] + len(numbers)))
     volatile = all(parameter.storage is Storage.RAM for parameter, _ in items)
-    if len(items) <= SLOTS and consecutive and volatile:
+    if len(items) <= size and consecutive and volatile:
         return ''
-    return (f'cannot be written in one frame, nothing was written: at most {SLOTS} parameters '
-            f'with consecutive numbers and storage ram fit')
+    what = ('one parameter fits' if size == 1 else
+            f'at most {size} parameters with consecutive numbers and storage ram fit')
+    return f'cannot be written in one frame, nothing was written: {what}'
 
 
 def read_maps(request_base: int, response_base: int, *, needed: tuple[int, ...] | None = None,

@@ -15,15 +15,17 @@ class UserRequests:
 
     :param offline: tells whether nobody is there.
     :param offset: added to parameter numbers on the wire.
+    :param together: parameters that fit one write frame.
     :param complete: takes a request and one outcome for each of its parameters.
     """
 
     def __init__(self, channel: AcyclicChannel, drive: DriveConfiguration, *,
-                 offline: Callable[[], bool], offset: int,
+                 offline: Callable[[], bool], offset: int, together: int,
                  complete: Callable[[Request, tuple[Outcome, ...]], None]) -> None:
         self._channel = channel
         self._offline = offline
         self._offset = offset
+        self._together = together
         self._complete = complete
         self._open: list[Request] = []
         self.reconfigure(drive)
@@ -34,7 +36,7 @@ class UserRequests:
         self._conditions = procedures.Conditions(
             offline=self._offline, timeout=drive.parameter_timeout,
             attempts=drive.parameter_retries + 1, verify=drive.verify_writes,
-            offset=self._offset)
+            offset=self._offset, together=self._together)
 
     @property
     def waiting(self) -> int:

@@ -7,18 +7,20 @@ import pytest
 
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.protocols.datamodel.channel import (
-    AcyclicChannel, Lane, Procedure, Read, Words, Write,
+    AcyclicChannel, Lane, Polling, Procedure, Read, Words, Write,
 )
 
 
 class Line:
     """A channel whose frames are texts, and the results of its procedures."""
 
-    def __init__(self, *, timeout: float = 0.1, attempts: int = 2, gap: float = 0.02) -> None:
+    def __init__(self, *, timeout: float = 0.1, attempts: int = 2, gap: float = 0.02,
+                 quarantine: float | None = None) -> None:
         self.channel = AcyclicChannel(
             encode_read=lambda number, count: Frame(number, b'?' * count, True),
             encode_write=lambda number, words: Frame(number, bytes(words), True),
-            timeout=timeout, attempts=attempts, eeprom_gap=gap)
+            timeout=timeout, attempts=attempts, eeprom_gap=gap,
+            polling=None if quarantine is None else Polling(quarantine))
         self.results: list[object] = []
 
     def sent(self) -> list[str]:
@@ -81,30 +83,6 @@ def test_lanes_take_turns_after_every_step() -> None:
     assert line.answer(0, 1.04) == ['3?']
     assert line.answer(0, 1.05) == []
     assert line.results == [[(0,), (0,)], [(0,), (0,), (0,)]]
-
-
-def test_urgent_goes_first_and_keeps_the_turns() -> None:
-    line = Line()
-    assert line.reads(1, 2, lane=Lane.USERS) == ['1?']
-    line.reads(11, 12, lane=Lane.OWN)
-    assert line.reads(21, lane=Lane.URGENT) == []
-    assert line.reads(22, lane=Lane.URGENT) == []
-    assert line.answer(0, 1.01) == ['21?']
-    assert line.answer(0, 1.02) == ['22?']
-    assert line.answer(0, 1.03) == ['11?']
-    assert line.answer(0, 1.04) == ['2?']
-
-
-def test_urgent_goes_between_two_attempts() -> None:
-    line = Line(attempts=3)
-    line.reads(1, lane=Lane.USERS)
-    line.writes((21, False), lane=Lane.URGENT, now=1.05)
-    assert line.channel.next_timer() == pytest.approx(1.1)
-    assert line.at(1.1) == ['21!']
-    assert line.at(1.1011) == ['1?']
-    assert line.at(1.2011 + 1e-9) == ['1?']
-    assert line.at(1.302) == []
-    assert line.results == ['done', [None]]  # three attempts, whatever came between
 
 
 def test_attempts_of_one_read_may_differ() -> None:
@@ -211,3 +189,53 @@ def test_the_pause_of_the_eeprom_begins_when_the_write_has_left() -> None:
     line.channel.frames_left(1.009)  # the bus was busy
     assert line.reads(30, now=1.02) == []
     assert line.channel.next_timer() == pytest.approx(1.029)
+
+
+# -- where the exchange itself goes through the channel -------------------------------------------
+
+
+def test_a_round_is_interrupted_once_at_most() -> None:
+    line = Line(quarantine=0.1)
+    line.reads(1, 2, 3)
+    line.reads(11, 12, lane=Lane.USERS)
+    sent = ['1?']
+    for step in range(1, 5):
+        line.answer(0, 1.0 + 0.01 * step)
+        sent += line.at(1.001 + 0.01 * step)
+    assert sent == ['1?', '2?', '3?', '11?', '12?']
+
+
+def test_users_are_owed_a_step_after_each_round() -> None:
+    line = Line(quarantine=0.1)
+    line.reads(1)
+    line.answer(0, 1.01)
+    line.reads(11, 12, 13, lane=Lane.USERS, now=1.011)
+    line.reads(2, 3, now=1.012)
+    line.reads(4, now=1.012)
+    sent = []
+    for step in range(2, 7):
+        line.answer(0, 1.0 + 0.01 * step)
+        sent += line.at(1.001 + 0.01 * step)
+    assert sent == ['2?', '3?', '12?', '4?', '13?']
+
+
+def test_writes_that_go_first_do_not_wait_for_answers() -> None:
+    line = Line(quarantine=0.1)
+    line.reads(1)
+    line.channel.write_first(Write(52, (1,), False), lambda: None, 1.01)
+    assert line.sent() == ['52!']
+    line.channel.write_first(Write(52, (0,), False), lambda: None, 1.0105)
+    assert line.channel.next_timer() == pytest.approx(1.011)
+    assert line.at(1.011) == ['52!']
+    assert line.channel.outstanding is not None
+    assert line.channel.next_timer() == pytest.approx(1.1)
+
+
+def test_silence_after_a_read_that_nobody_answered() -> None:
+    line = Line(quarantine=0.3, attempts=1)
+    line.reads(1, 2)
+    assert line.at(1.1) == []
+    assert line.channel.next_timer() == pytest.approx(1.4)
+    line.channel.disturbed(1.35)
+    assert line.at(1.6) == []
+    assert line.at(1.6501) == ['2?']

@@ -1,0 +1,324 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The conversation with one DataModel drive that uses 11-bit identifiers.
+
+There is no cyclic service: once a period all of ``cyclic_response`` is read in one round, and what
+changed in ``cyclic_request`` is written, one parameter a frame. Rounds go on while the drive is
+silent; that is how it is found. Setpoints are written only to a drive that answers, and three
+times neutral to one that was lost or is to be left alone, since nobody acknowledges writes.
+
+Setpoints do not wait for answers: they go out while a read is under way, or in quarantine.
+"""
+
+from enum import Enum
+import math
+
+from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.errors import RemoteProtocolError
+from drive_can_bridge.core.events import (
+    ForeignMasterSeen, ProcessDataReceived, SetpointsExpired, StationFound,
+)
+from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.requests import BRIDGE_INACTIVE, BUS_DOWN
+from drive_can_bridge.core.session import STOP_CYCLES
+from drive_can_bridge.protocols.datamodel import standard
+from drive_can_bridge.protocols.datamodel.base_session import DataModelSession, STOP_SPACING_MAX
+from drive_can_bridge.protocols.datamodel.channel import Polling, Procedure, Read, Write
+from drive_can_bridge.protocols.datamodel.standard_round import places, reads
+from drive_can_bridge.protocols.polling import Beat, Round, WriteSchedule
+
+LOOKING = 'no answer to reads: drive silent, wrong station, bit rate or identifier mode'
+
+
+class Phase(Enum):
+    """What the session is doing."""
+
+    IDLE = 'idle'
+    POLLING = 'polling'
+    STOPPING = 'last neutral setpoints'
+
+
+class StandardSession(DataModelSession):
+    """Rounds of reads, setpoints on change, and the acyclic frames between them."""
+
+    def __init__(self, drive: DriveConfiguration) -> None:
+        options = drive.family_options
+        request = standard.identifier(options['request_id_base'], drive.station)
+        super().__init__(
+            drive,
+            encode_read=lambda number, count: standard.encode_read_request(
+                request, number, count),
+            encode_write=lambda number, words: standard.encode_write(request, number, *words),
+            together=1, polling=Polling(options['quarantine']))
+        self._request_identifier = request
+        self._identifiers = request, standard.identifier(
+            options['response_id_base'], drive.station)
+        self._strict: bool = options['length_policy'] == 'strict'
+        self._places = places(drive)
+        self._reads = reads(drive)
+        self._status_read = None if self._status_slot is None else next(
+            chunk for chunk in self._reads if chunk.address
+            <= self._places[self._status_slot].address < chunk.address + chunk.size)
+        self._writes = WriteSchedule(len(drive.cyclic_request), options['refresh_interval'])
+        self._phase = Phase.IDLE
+        self._beat = Beat(drive.period)
+        self._farewells = 0  # how often everything is still to be written neutral
+        self._in_round = False
+        self._void = False  # this round began before the process stood still
+        self._round_began = -math.inf
+        self._status_asked_at = -math.inf
+        self._word_written_at = -math.inf
+        self._received_at = -math.inf
+        self._expected = False  # the answer of a read that nobody wants any more may come
+        self._missed_in_row = 0
+
+    # -- life cycle -------------------------------------------------------------------------------
+
+    def activate(self, now: float) -> None:
+        self.active = True
+        self.ever_online = False
+        if self.bus_available:
+            self._begin(now)
+
+    def deactivate(self, now: float) -> None:
+        self.active = False
+        told = self.online or self._farewells > 0
+        self._fail_requests(BRIDGE_INACTIVE)
+        if self._phase is Phase.IDLE or not told:
+            self._withdraw(BRIDGE_INACTIVE, now)
+            self._go_idle('deactivated')
+            return
+        self._phase = Phase.STOPPING  # from here on the control word goes with the setpoints
+        self._withdraw(BRIDGE_INACTIVE, now)
+        self._farewells = STOP_CYCLES
+        self._beat.start(now)
+
+    @property
+    def stopped(self) -> bool:
+        return self._phase is Phase.IDLE
+
+    def bus_up(self, now: float) -> None:
+        self.bus_available = True
+        if self.active:
+            self._begin(now)
+
+    def bus_down(self, now: float, reason: str) -> None:
+        self.bus_available = False
+        self._fail_requests(BUS_DOWN)
+        self._lose(f'bus down: {reason}', now)
+        self._go_idle(f'bus down: {reason}')
+        self._frames.clear()
+
+    def time_lost(self, now: float) -> None:
+        if self._phase is Phase.POLLING:
+            self._lose('the bridge stood still', now)
+            self._void = self._in_round
+            self._beat.start(now)
+
+    def _begin(self, now: float) -> None:
+        """Start over: nothing is known of the drive."""
+        self._lose('the drive is being reconnected', now)
+        self._advice = LOOKING
+        self._phase = Phase.POLLING
+        self._missed_in_row = 0
+        self._beat.start(now)
+
+    def _lose(self, reason: str, now: float) -> None:
+        if self.online:
+            # it may only have lost its voice: tell it to stand still before it is left alone
+            self._farewells = STOP_CYCLES
+        super()._lose(reason, now)
+
+    def _go_idle(self, advice: str) -> None:
+        self._phase = Phase.IDLE
+        self._farewells = 0
+        self._beat.stop()
+        self._writes.forget()
+        self.setpoints.enabled = False
+        self._clear_channel()
+        self._advice = advice
+        self._be_offline(advice)
+
+    def _clear_channel(self) -> None:
+        self._expected = self._expected or self._channel.outstanding is not None
+        super()._clear_channel()
+        self._in_round = False
+
+    # -- the beat ---------------------------------------------------------------------------------
+
+    def handle_timer(self, now: float) -> None:
+        if now >= self._beat.due:
+            self._tick(now)
+        self._write_setpoint(now)
+        self._serve_control(now)
+        if now >= self._channel.next_timer():
+            self._channel.advance(now)
+        if self._phase is Phase.STOPPING and not self._farewells and not self._writes.waiting:
+            self._frames += self._channel.take_frames()
+            self._go_idle('deactivated')
+
+    def next_timer(self) -> float:
+        soonest = min(self._beat.due, self._channel.next_timer(), self._control_timer())
+        return min(soonest, self._channel.free_at) if self._writes.waiting else soonest
+
+    def _tick(self, now: float) -> None:
+        """Begin a period: look what is to be written, then read."""
+        if self._farewells:
+            self._say_farewell(now)
+        elif self.online:
+            expired = self.setpoints.expire(now)
+            if expired:
+                self._events.append(SetpointsExpired(
+                    tuple(setpoint.parameter.name for setpoint in expired)))
+            self._writes.look(self._raws(), now)
+        if self._phase is Phase.STOPPING:
+            self._beat.due = now + min(self.drive.period, STOP_SPACING_MAX)
+            return
+        error = self._beat.begun(now)
+        if not self._in_round:
+            if not math.isnan(error):
+                self.statistics.period_error.add(error)
+            self._in_round = True
+            self._void = False
+            self._round_began = now
+            self._write_setpoint(now)  # before the first read
+            self._channel.run(self._round(), self._round_done, now)
+        elif now - self._round_began > self._patience:
+            self._miss(now)  # somebody keeps disturbing; nothing was read for too long
+
+    @property
+    def _patience(self) -> float:
+        """Return what a round may take when a read of a user and one of its own go unanswered."""
+        return 2 * (self.drive.period + self.drive.parameter_timeout
+                    + float(self.drive.family_options['quarantine']))
+
+    def _say_farewell(self, now: float) -> None:
+        """Tell the drive to stand still, once more."""
+        self._writes.forget()
+        self._writes.look(self._raws(), now)
+        if self._by_hand is not None:
+            written = self._by_hand.write_at_once(now)
+            if not written and self._channel.eeprom_free_at <= now + STOP_SPACING_MAX:
+                return  # an EEPROM is busy: the word goes another time
+        self._farewells -= 1
+
+    # -- setpoints --------------------------------------------------------------------------------
+
+    def _raws(self) -> list[int]:
+        raws = [setpoint.raw for setpoint in self.setpoints.items]
+        if self.control is not None and self._control_slot is not None:
+            raws.insert(self._control_slot, self.control.word)
+        return raws
+
+    def _write_setpoint(self, now: float) -> None:
+        """Write one that is due, if there is one, with the value that it has now."""
+        if not self._writes.waiting or now < self._channel.free_at:
+            return
+        index = self._writes.next()
+        parameter, raw = self.drive.cyclic_request[index], self._raws()[index]
+        # What is sent cyclically is volatile: EEPROM parameters are refused by the configuration.
+        self._channel.write_at_once(
+            Write((parameter.number or 0) + self._offset, (parameter.word_from_raw(raw),),
+                  eeprom=False), now)
+        self._writes.written(index, raw, now)
+        if index == self._control_slot and self.control is not None:
+            self._word_written_at = now
+            self.control.word_sent(now)
+            self._control_changed(now)
+
+    def _update_control_word(self, now: float) -> None:
+        if not self.online or self._phase is not Phase.POLLING:
+            return
+        if self._control_slot is not None:
+            # a stop does not wait for the next period, nor for setpoints
+            self._writes.look(self._raws(), now)
+            self._writes.hurry(self._control_slot)
+            self._write_setpoint(now)
+        elif self._by_hand is not None:
+            self._by_hand.update(now)
+
+    # -- rounds -----------------------------------------------------------------------------------
+
+    def _round(self) -> Procedure:
+        result = Round(self._places)
+        for chunk in self._reads:
+            words = yield Read(chunk.address, chunk.size, attempts=1)
+            if words is None:
+                return None
+            if chunk is self._status_read:
+                self._status_asked_at = self._channel.asked_at
+            result.take(chunk, words)
+        return tuple(
+            parameter.raw_from_word(word)
+            for parameter, (word,) in zip(self.drive.cyclic_response, result.words()))
+
+    def _round_done(self, raws: tuple[int, ...] | None) -> None:
+        now = self._channel.now
+        self._in_round = False
+        if self._void:
+            return
+        if raws is None:
+            self._miss(now)
+            return
+        statistics = self.statistics
+        self._missed_in_row = 0
+        statistics.exchanges += 1
+        statistics.latency.add(max(0.0, self._received_at - self._round_began))
+        if not self.online:
+            self._found(now)
+        # a status that was asked for before the word left says nothing about the word
+        if (self.control is not None and self._status_slot is not None
+                and self._status_asked_at > self._word_written_at):
+            self.control.status_received(raws[self._status_slot], now)
+            self._control_changed(now)
+        self._events.append(ProcessDataReceived(raws, self._received_at))
+
+    def _found(self, now: float) -> None:
+        self.online = True
+        self.ever_online = True
+        self._advice = ''
+        self._farewells = 0
+        self.setpoints.disarm()
+        self.setpoints.enabled = True
+        self._events.append(StationFound())
+        self._writes.forget()
+        self._writes.look(self._raws(), now)
+        if self._by_hand is not None:
+            self._by_hand.begin(now)
+        self._control_changed(now)
+
+    def _miss(self, now: float) -> None:
+        self.statistics.missed += 1
+        self._missed_in_row += 1
+        if self.online and self._missed_in_row >= self.drive.missed_limit:
+            self._lose(f'no complete round of reads for {self.drive.missed_limit} periods', now)
+        elif not self.online:
+            self._advice = LOOKING
+
+    # -- frames from the drive --------------------------------------------------------------------
+
+    def receive_frame(self, frame: Frame, now: float, age: float = 0.0) -> None:
+        if frame.extended or frame.identifier not in self._identifiers:
+            self._reject(f'{frame}: of somebody else')
+            return
+        if frame.identifier == self._request_identifier:
+            self._events.append(ForeignMasterSeen(
+                f'another master sends requests to station {self.drive.station}: {frame}'))
+            return
+        step = self._channel.outstanding
+        if step is None:
+            self._channel.disturbed(now)
+            if self._expected:
+                self._expected = False
+            else:
+                self._reject(f'{frame}: nobody asked for it')
+            return
+        try:
+            words = standard.decode_read_response(frame, step.count, strict=self._strict)
+        except RemoteProtocolError as error:
+            self._reject(str(error))
+            return
+        if len(frame.data) != standard.PAYLOAD:
+            self.statistics.short += 1
+        self._received_at = now - age
+        self._channel.receive(words, now)

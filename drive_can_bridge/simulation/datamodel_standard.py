@@ -1,0 +1,84 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+A simulated drive that speaks the DataModel protocol with 11-bit identifiers.
+
+It answers reads of parameters that exist, and nothing else. Unused words of a response hold junk,
+since the manual does not define them.
+"""
+
+from collections.abc import Sequence
+
+from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.errors import RemoteProtocolError
+from drive_can_bridge.core.frame import Frame, Route, STANDARD_IDENTIFIER_MAX
+from drive_can_bridge.protocols.datamodel import standard
+from drive_can_bridge.simulation.datamodel_drive import DataModelDrive, JUNK
+from drive_can_bridge.simulation.drive import EEPROM_TIME
+
+
+class SimulatedDataModelStandardDrive(DataModelDrive):
+    """One DataModel drive with 11-bit identifiers. See the base class."""
+
+    def __init__(self, configuration: DriveConfiguration, *, neighbours: Sequence[Route] = (),
+                 eeprom_time: float = EEPROM_TIME) -> None:
+        super().__init__(configuration, neighbours=neighbours, eeprom_time=eeprom_time)
+        self._request_identifier, self._response_identifier = _identifiers(configuration)
+
+    @classmethod
+    def routes(cls, configuration: DriveConfiguration) -> list[Route]:
+        """Return both identifiers of the drive."""
+        return [Route(identifier, STANDARD_IDENTIFIER_MAX, False)
+                for identifier in _identifiers(configuration)]
+
+    # -- telegrams --------------------------------------------------------------------------------
+
+    def _receive(self, frame: Frame, now: float) -> None:
+        if frame.extended:
+            return
+        if frame.identifier == self._response_identifier:
+            self._violation('frame that only this drive may send')
+            return
+        if frame.identifier != self._request_identifier:
+            return
+        try:
+            request = standard.decode_request(frame)
+        except RemoteProtocolError:
+            self._violation('frame that the manual does not define (ignored)')
+            return
+        self.requests += 1
+        self.plant.advance(now)
+        if isinstance(request, standard.Write):
+            if any(frame.data[5:]):
+                self._violation('write with unused bytes other than 00h')
+            self.table.write(request.number, (request.word,), now)
+            return
+        if any(frame.data[4:]):
+            self._violation('read request with unused bytes other than 00h')
+        words = self.table.read(request.number, request.count, now)
+        if words is not None:
+            used = standard.encode_read_response(
+                self._response_identifier, words).data[:2 * len(words)]
+            self._answer(Frame(self._response_identifier, used + JUNK[len(used):], False), now)
+
+    # -- faults -----------------------------------------------------------------------------------
+
+    def _foreign_frames(self, answer: Frame) -> list[Frame]:
+        """Return one of: a 29-bit twin, the answer of an absent station, a frame of CANopen."""
+        junk = bytes([0x5A]) * standard.PAYLOAD
+        self._foreign_turn += 1
+        turn = self._foreign_turn % 3
+        if turn == 1:
+            made = Frame(answer.identifier, junk, True)
+        elif turn == 2:
+            made = Frame(answer.identifier ^ 0x8, junk, False)
+        else:
+            made = Frame(0x701, b'\x05', False)
+        return [] if self._belongs_to_neighbour(made) else [made]
+
+
+def _identifiers(configuration: DriveConfiguration) -> tuple[int, int]:
+    options = configuration.family_options
+    return (standard.identifier(options.get('request_id_base', standard.REQUEST_ID_BASE),
+                                configuration.station),
+            standard.identifier(options.get('response_id_base', standard.RESPONSE_ID_BASE),
+                                configuration.station))

@@ -1,0 +1,60 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""What counts as a second signal."""
+
+import signal
+import subprocess
+import sys
+
+import pytest
+
+#: tells when it is ready, stops for a second after the first signal, and reports its exit code
+PROGRAM = '''
+import sys, time
+from drive_can_bridge.process.signals import SignalWatcher
+with SignalWatcher() as watcher:
+    print('ready', flush=True)
+    watcher.wait()
+    print('stopping', flush=True)
+    time.sleep(1.0)
+    sys.exit(watcher.exit_code(0))
+'''
+
+
+def run(*numbers: int, line: str = 'ready') -> int:
+    """Send signals, all but the first after ``line`` was printed; return the exit code."""
+    with subprocess.Popen([sys.executable, '-c', PROGRAM], stdout=subprocess.PIPE,
+                          text=True) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == 'ready\n'
+        process.send_signal(numbers[0])
+        if line == 'stopping':
+            assert process.stdout.readline() == 'stopping\n'
+        for number in numbers[1:]:
+            process.send_signal(number)
+        return process.wait(timeout=20)
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_one_signal(number: int) -> None:
+    assert run(number) == 0
+
+
+def test_the_same_signal_in_the_same_breath_is_one_signal() -> None:
+    assert run(signal.SIGINT, signal.SIGINT) == 0
+
+
+def test_another_signal_is_a_second_one() -> None:
+    assert run(signal.SIGTERM, signal.SIGINT, line='stopping') == 128 + signal.SIGINT
+
+
+def test_a_second_signal_later_ends_at_once() -> None:
+    with subprocess.Popen([sys.executable, '-c', PROGRAM], stdout=subprocess.PIPE,
+                          text=True) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == 'ready\n'
+        process.send_signal(signal.SIGTERM)
+        assert process.stdout.readline() == 'stopping\n'
+        with pytest.raises(subprocess.TimeoutExpired):
+            process.wait(timeout=0.2)
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(timeout=20) == 128 + signal.SIGTERM

@@ -1,0 +1,137 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+Answers of 11-bit drives do not say what they answer. None may be taken for another.
+
+The drive here answers late, twice, or not at all; every register holds a value that no other
+register has ever had, so that an answer in the wrong place is seen.
+"""
+
+import heapq
+import random
+
+from builders import Conversation, drive, parameter, RO, RW
+import pytest
+
+from drive_can_bridge.core.events import ProcessDataReceived, RequestCompleted
+from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.requests import Failure, ReadRequest, ReadValue
+
+#: where the round reads, and where users read
+POLLED = tuple(parameter(f'polled_{number}', number, access=RO) for number in (200, 201, 210, 300))
+ASKED = tuple(parameter(f'asked_{number}', number, access=RW) for number in range(20, 60, 3))
+READS = 10_000
+
+
+class LateDrive:
+    """
+    A drive that answers reads after a while of its own choosing.
+
+    :param lateness: (random numbers) -> s until the answer comes; more than one, or none.
+    """
+
+    def __init__(self, chance: random.Random) -> None:
+        self.chance = chance
+        self.reads = 0
+        self.history: dict[int, set[int]] = {}
+        self.words: dict[int, int] = {}
+        self.fresh = iter(chance.sample(range(0x10000), 0x10000))
+        self.answers: list[tuple[float, int, Frame]] = []
+
+    def word(self, number: int) -> int:
+        """Return what a register holds; now and then it changes."""
+        if number not in self.words or self.chance.random() < 0.002:
+            word = next(self.fresh, None)
+            if word is not None:
+                self.words[number] = word
+                self.history.setdefault(number, set()).add(word)
+        return self.words[number]
+
+    def hear(self, frame: Frame, now: float) -> None:
+        if frame.data[0] != 3:
+            return
+        self.reads += 1
+        number = int.from_bytes(frame.data[1:3], 'little')
+        words = [self.word(number + place) for place in range(frame.data[3])]
+        data = b''.join(word.to_bytes(2, 'little') for word in words).ljust(8, b'\xEE')
+        for lateness in self.latenesses():
+            heapq.heappush(self.answers, (now + lateness, self.reads, Frame(0x7F1, data, False)))
+
+    def latenesses(self) -> list[float]:
+        dice = self.chance.random()
+        if dice < 0.05:
+            return []
+        if dice < 0.25:
+            return [0.15 + self.chance.uniform(-0.045, 0.045)]
+        if dice < 0.27:
+            return [0.002, 0.0025]
+        return [self.chance.uniform(0.0002, 0.004)]
+
+
+@pytest.mark.parametrize('seed', [1, 2])
+def test_no_answer_is_ever_taken_for_another(seed: int) -> None:
+    chance = random.Random(seed)
+    partner = LateDrive(chance)
+    talk = Conversation(drive(
+        'datamodel_standard', table=(*POLLED, *ASKED), request=(), response=POLLED,
+        parameter_retries=1))
+    session = talk.session
+    now = 10.0
+    session.bus_up(now)
+    session.activate(now)
+    samples = good = failed = 0
+    open_requests = 0
+    while partner.reads < READS:
+        due = session.next_timer()
+        if partner.answers and partner.answers[0][0] <= due:
+            now, _, frame = heapq.heappop(partner.answers)
+            session.receive_frame(frame, now)
+        else:
+            now = max(now, due)
+            session.handle_timer(now)
+        if open_requests < 3 and chance.random() < 0.3:
+            open_requests += 1
+            session.submit(ReadRequest(tuple(
+                chance.sample(ASKED, chance.randint(1, 4)))), now)
+        for frame in session.take_frames():
+            partner.hear(frame, now)
+        for event in session.take_events():
+            if isinstance(event, ProcessDataReceived):
+                samples += 1
+                for parameter_, raw in zip(POLLED, event.raws):
+                    assert raw in partner.history[parameter_.number]
+            elif isinstance(event, RequestCompleted):
+                open_requests -= 1
+                assert isinstance(event.request, ReadRequest)
+                for parameter_, outcome in zip(event.request.parameters, event.outcomes):
+                    if isinstance(outcome, ReadValue):
+                        good += 1
+                        assert outcome.raw in partner.history[parameter_.number]
+                    else:
+                        failed += 1
+                        assert isinstance(outcome, Failure)
+                        assert 'no answer' in outcome.reason
+    assert samples > 200
+    assert good > 500
+    assert failed > 50
+    assert session.statistics.rejected > 500, 'late answers are counted'
+
+
+def test_a_drive_that_is_always_150_ms_late_is_offline_and_nothing_is_published() -> None:
+    talk = Conversation(drive('datamodel_standard', table=(*POLLED, *ASKED), request=(),
+                              response=POLLED))
+    session, now, late = talk.session, 10.0, []
+    session.bus_up(now)
+    session.activate(now)
+    while now < 60.0:
+        due = session.next_timer()
+        if late and late[0][0] <= due:
+            now, frame = late.pop(0)
+            session.receive_frame(frame, now)
+        else:
+            now = max(now, due)
+            session.handle_timer(now)
+        late += [(now + 0.15, Frame(0x7F1, bytes(8), False)) for _ in session.take_frames()]
+        assert not [event for event in session.take_events()
+                    if isinstance(event, ProcessDataReceived)]
+    assert not session.online
+    assert session.statistics.missed > 100

@@ -1,0 +1,616 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""The conversation with an 11-bit drive: literal times, literal bytes."""
+
+import math
+
+from builders import (
+    ACTUAL, CONTROL, Conversation, CURRENT, DAMPING, drive, frame, GAIN, KEY, ORDER, parameter,
+    RAMP, read, RO, SPEED, STATUS, TABLE, WORD, write,
+)
+import pytest
+from standard_builders import (
+    ANSWER, ASK, LIMIT_ZERO, online, polling, round_of, SPEED_ZERO,
+)
+
+from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.events import (
+    ForeignMasterSeen, FrameRejected, ProcessDataReceived, SetpointsExpired, StationFound,
+    StationLost,
+)
+from drive_can_bridge.core.session import DriveState
+from drive_can_bridge.core.setpoints import CommandOutcome
+from drive_can_bridge.protocols.families import FAMILIES
+
+FAMILY = FAMILIES['datamodel_standard']
+FAR = parameter('heat', 220, access=RO)
+GAP = parameter('torque', 213, access=RO)
+
+
+# -- rounds ---------------------------------------------------------------------------------------
+
+
+def test_a_round_is_published_with_the_time_of_its_last_answer() -> None:
+    talk = polling()
+    assert talk.hears(ANSWER, 10.002) == []
+    assert talk.events(StationFound, ProcessDataReceived) == [
+        StationFound(), ProcessDataReceived((1000, 250, 1), 10.002)]
+    assert talk.session.statistics.exchanges == 1
+    assert talk.session.statistics.latency.maximum == pytest.approx(0.002)
+
+
+def test_the_stamp_is_the_receive_time() -> None:
+    talk = polling()
+    talk.session.receive_frame(frame(ANSWER), 10.004, age=0.001)
+    sample, = talk.events(ProcessDataReceived)
+    assert sample.received_at == pytest.approx(10.003)
+
+
+def test_rounds_keep_the_period() -> None:
+    talk = online()
+    for cycle in range(1, 100):
+        assert set(round_of(talk, 10.0 + 0.02 * cycle)) <= {SPEED_ZERO, LIMIT_ZERO}
+        assert talk.samples() == [(1000, 250, 1)]
+    assert talk.session.statistics.missed == 0
+    assert talk.session.statistics.period_error.maximum == pytest.approx(0.0, abs=1e-9)
+
+
+def test_several_reads_are_one_sample() -> None:
+    talk = polling(table=(*TABLE, FAR), response=(FAR, ACTUAL, CURRENT, STATUS))
+    assert talk.hears(ANSWER, 10.002) == []
+    assert talk.samples() == []
+    assert talk.until(10.01) == [(10.003, '3F1#03DC000100000000')]
+    talk.hears('7F1#2A00FFFFFFFFFFFF', 10.004)
+    assert talk.samples() == [(42, 1000, 250, 1)]
+    assert talk.session.statistics.exchanges == 1
+
+
+def test_a_gap_is_bridged_over_listed_parameters() -> None:
+    talk = online(table=(*TABLE, parameter('hidden', 212), GAP), response=(ACTUAL, CURRENT, STATUS))
+    assert talk.session.online
+    first = polling_of(table=(*TABLE, parameter('hidden', 212, access=RO), GAP),
+                       response=(CURRENT, GAP))
+    assert first == ['3F1#03D2000400000000']
+    # without an entry in the profile nobody knows whether the drive has 212
+    assert polling_of(table=(*TABLE, GAP), response=(STATUS, GAP)) == ['3F1#03D3000100000000']
+
+
+def polling_of(**options: object) -> list[str]:
+    talk = Conversation(drive('datamodel_standard', **options))
+    talk.bus_up(9.0)
+    talk.activate(10.0)
+    return talk.at(10.0)
+
+
+def test_negative_values() -> None:
+    talk = polling()
+    talk.hears('7F1#18FC06FF01000000', 10.002)
+    assert talk.samples() == [(-1000, -250, 1)]
+
+
+def test_a_silent_drive_is_asked_again_and_again_and_gets_nothing_else() -> None:
+    talk = polling()
+    sent = talk.until(12.0)
+    assert {text for _, text in sent} == {ASK}
+    # 0.1 s for the answer, 0.1 s of quarantine
+    assert [when for when, _ in sent[:3]] == pytest.approx([10.2, 10.4, 10.6])
+    assert talk.session.state is DriveState.OFFLINE
+    assert talk.session.statistics.missed == 10
+    assert 'drive silent, wrong station' in talk.session.offline_advice
+
+
+def test_three_failed_rounds_are_the_end_of_online() -> None:
+    talk = online()
+    assert [text for _, text in talk.until(10.12)] == [ASK]
+    assert talk.session.statistics.missed == 1
+    assert talk.session.online
+    talk.until(10.6)
+    assert talk.events(StationLost) == [
+        StationLost('no complete round of reads for 3 periods')]
+    assert talk.session.statistics.missed == 3
+
+
+def test_one_failed_read_of_a_round_publishes_nothing() -> None:
+    talk = polling(table=(*TABLE, FAR), response=(ACTUAL, CURRENT, STATUS, FAR))
+    talk.hears(ANSWER, 10.002)
+    talk.until(10.15)
+    assert talk.samples() == []
+    assert not talk.session.online
+    assert talk.session.statistics.missed == 1
+
+
+def test_it_comes_back_neutral() -> None:
+    talk = online(rearm_immediate=True)
+    assert talk.commands(0, 150.0, 10.01) is CommandOutcome.ARMED
+    assert round_of(talk, 10.02) == ['3F1#063200DC05000000']
+    talk.until(10.9)
+    assert not talk.session.online
+    talk.events()
+    sent = talk.until(11.1)
+    assert {text for _, text in sent} == {ASK}
+    ask = sent[-1][0]
+    assert talk.hears(ANSWER, ask + 0.002) == []
+    assert talk.session.online
+    assert [text for _, text in talk.until(ask + 0.006)] == [SPEED_ZERO, LIMIT_ZERO]
+
+
+def test_a_lost_drive_is_told_three_times_to_stand_still() -> None:
+    talk = online(rearm_immediate=True)
+    talk.commands(0, 150.0, 10.01)
+    sent = [(when, text) for when, text in talk.until(11.5) if text != ASK]
+    told = [text for _, text in sent]
+    # 150 rpm, and again after refresh_interval unless the command expired before
+    assert told[0] == '3F1#063200DC05000000'
+    lost = told[1:]
+    assert lost[-6:] == [SPEED_ZERO, LIMIT_ZERO] * 3
+    assert '3F1#063200DC05000000' not in lost
+
+
+# -- setpoints ------------------------------------------------------------------------------------
+
+
+def test_setpoints_are_written_on_change_one_per_frame() -> None:
+    talk = online(rearm_immediate=True)
+    talk.commands(0, 150.0, 10.011)
+    talk.commands(1, 100.0, 10.012)
+    assert talk.until(10.0235) == [
+        (10.02, '3F1#063200DC05000000'), (10.021, '3F1#063300E803000000'), (10.022, ASK)]
+    talk.hears(ANSWER, 10.024)
+    assert round_of(talk, 10.04) == []
+
+
+def test_the_newest_command_wins_even_while_another_waits_for_its_turn() -> None:
+    talk = online(rearm_immediate=True)
+    talk.commands(0, 150.0, 10.011)
+    talk.commands(1, 100.0, 10.012)
+    assert talk.at(10.02) == ['3F1#063200DC05000000']
+    talk.commands(1, 50.0, 10.0205)
+    assert talk.until(10.0212) == [(10.021, '3F1#063300F401000000')]
+
+
+def test_unchanged_setpoints_are_refreshed() -> None:
+    talk = online()
+    refreshed = []
+    for cycle in range(1, 60):
+        refreshed += [(cycle, text) for text in round_of(talk, 10.0 + 0.02 * cycle)]
+    # written at 10.003 and 10.004, due again 0.5 s later: in the round of 10.52
+    assert refreshed == [(26, SPEED_ZERO), (26, LIMIT_ZERO), (51, SPEED_ZERO), (52, LIMIT_ZERO)]
+
+
+def test_without_refresh_interval_only_changes_are_written() -> None:
+    talk = online(refresh_interval=0.0)
+    assert [round_of(talk, 10.0 + 0.02 * cycle) for cycle in range(1, 100)] == [[]] * 99
+
+
+def test_setpoints_go_out_while_a_read_is_unanswered() -> None:
+    talk = online(rearm_immediate=True)
+    assert talk.until(10.0205) == [(10.02, ASK)]
+    talk.commands(0, 150.0, 10.03)
+    assert talk.until(10.05) == [(10.04, '3F1#063200DC05000000')]
+    talk.commands(0, 160.0, 10.05)
+    assert talk.until(10.07) == [(10.06, '3F1#0632004006000000')]
+    # and in quarantine
+    talk.until(10.13)
+    talk.commands(0, 170.0, 10.13)
+    assert talk.until(10.15) == [(10.14, '3F1#063200A406000000')]
+
+
+def test_a_command_that_nobody_repeats_expires() -> None:
+    talk = online(rearm_immediate=True, command_timeout=0.1)
+    talk.commands(0, 150.0, 10.01)
+    assert round_of(talk, 10.02) == ['3F1#063200DC05000000']
+    for cycle in range(2, 6):
+        assert round_of(talk, 10.0 + 0.02 * cycle) == []
+    assert round_of(talk, 10.12) == [SPEED_ZERO]
+    assert talk.events(SetpointsExpired) == [SetpointsExpired(('speed_setpoint',))]
+
+
+def test_setpoints_of_unknown_storage_know_no_eeprom_pause() -> None:
+    speed = parameter('speed', 50)
+    talk = polling(table=(*TABLE[1:], speed), request=(speed,), rearm_immediate=True)
+    talk.hears(ANSWER, 10.002)
+    assert talk.until(10.01) == [(10.003, SPEED_ZERO)]
+    talk.commands(0, 7, 10.011)
+    assert talk.until(10.0215) == [(10.02, '3F1#0632000700000000'), (10.021, ASK)]
+
+
+# -- quarantine -----------------------------------------------------------------------------------
+
+
+def test_a_late_answer_is_not_the_next_one() -> None:
+    talk = online()
+    assert talk.until(10.0205) == [(10.02, ASK)]
+    talk.submits(read(GAIN), 10.03)
+    assert [text for _, text in talk.until(10.12)] == []
+    # 150 ms after its request: nobody waits for it any more, and it begins the silence anew
+    assert talk.hears(ANSWER, 10.17) == []
+    assert talk.session.statistics.rejected == 1
+    assert len(talk.events(FrameRejected)) == 1
+    assert [when for when, text in talk.until(10.3) if text.startswith('3F1#03')] == [
+        pytest.approx(10.27)]
+    assert talk.samples() == []
+
+
+def test_an_answer_that_nobody_asked_for_is_followed_by_silence() -> None:
+    talk = online()
+    assert talk.hears(ANSWER, 10.015) == []
+    assert talk.samples() == []
+    assert talk.session.statistics.rejected == 1
+    assert [when for when, text in talk.until(10.2) if text == ASK] == [pytest.approx(10.115)]
+
+
+def test_a_second_answer_does_not_meet_the_next_read() -> None:
+    talk = polling(table=(*TABLE, FAR), response=(ACTUAL, CURRENT, STATUS, FAR))
+    talk.hears(ANSWER, 10.002)
+    assert talk.hears(ANSWER, 10.0025) == []
+    assert talk.session.statistics.rejected == 1
+    assert talk.samples() == []
+
+
+def test_quarantine_outlives_a_restart_of_the_exchange() -> None:
+    talk = online()
+    assert talk.until(10.0205) == [(10.02, ASK)]
+    talk.deactivate(10.03)
+    talk.until(10.1)
+    assert talk.session.stopped
+    talk.activate(10.1)
+    assert talk.until(10.219) == []
+    # what was on its way is no surprise, but nobody's answer
+    talk.events()
+    assert talk.hears(ANSWER, 10.1895) == []
+    assert talk.events(FrameRejected, ProcessDataReceived) == []
+    talk.until(10.28)
+    assert not talk.session.online
+
+
+def test_disturbance_without_end_is_offline() -> None:
+    talk = online()
+    now = 10.015
+    while now < 13.0:
+        talk.hears(ANSWER, now)
+        talk.until(now + 0.05)
+        now += 0.05
+    assert not talk.session.online
+    assert talk.session.statistics.missed >= 3
+
+
+def test_other_identifiers_and_formats_are_nobodys_answer() -> None:
+    talk = polling()
+    for text in ('000007F1#E803FA0001000000', '7F2#E803FA0001000000', '103FFFF0#0000000000000000'):
+        talk.hears(text, 10.001)
+    assert talk.samples() == []
+    assert talk.session.statistics.rejected == 3
+    talk.hears(ANSWER, 10.002)
+    assert talk.samples() == [(1000, 250, 1)]
+
+
+@pytest.mark.parametrize(('policy', 'samples', 'rejected', 'short'), [
+    ('lenient', [(1000, 250, 1)], 0, 1), ('strict', [], 1, 0)])
+def test_length_policy(policy: str, samples: list[object], rejected: int, short: int) -> None:
+    talk = polling(length_policy=policy)
+    talk.hears('7F1#E803FA000100', 10.002)
+    assert talk.samples() == samples
+    assert talk.session.statistics.rejected == rejected
+    assert talk.session.facts() == {'short_frames': str(short)}
+
+
+def test_an_answer_that_is_too_short_is_none() -> None:
+    talk = polling()
+    talk.hears('7F1#E803FA0001', 10.002)
+    assert talk.samples() == []
+    assert talk.session.statistics.rejected == 1
+    assert talk.session.statistics.missed == 0
+
+
+def test_a_second_master_is_reported() -> None:
+    talk = online()
+    talk.hears('3F1#0632006400000000', 10.01)
+    seen, = talk.events(ForeignMasterSeen)
+    assert '3F1#0632006400000000' in seen.text
+    assert talk.session.statistics.rejected == 0
+
+
+# -- parameter requests ---------------------------------------------------------------------------
+
+
+def test_reads_share_frames() -> None:
+    talk = online()
+    assert talk.submits(read(GAIN, DAMPING, RAMP), 10.01) == ['3F1#031E000100000000']
+    talk.hears('7F1#E803000000000000', 10.012)
+    assert talk.until(10.0135) == [(10.013, '3F1#0328000200000000')]
+    talk.hears('7F1#0500070000000000', 10.015)
+    assert talk.outcomes() == [[5, 7, 1000]]
+
+
+def test_a_write_to_ram_is_read_back() -> None:
+    talk = online()
+    assert talk.submits(write((GAIN, 300)), 10.005) == ['3F1#0628002C01000000']
+    assert talk.until(10.007) == [(10.006, '3F1#0328000100000000')]
+    talk.hears('7F1#2C01000000000000', 10.008)
+    assert talk.outcomes() == [['written']]
+
+
+def test_an_eeprom_write_is_preceded_by_a_read_and_followed_by_a_pause_for_reads() -> None:
+    talk = online()
+    assert talk.submits(write((RAMP, 300)), 10.005) == ['3F1#031E000100000000']
+    talk.hears('7F1#C800000000000000', 10.007)
+    assert talk.until(10.009) == [(10.008, '3F1#061E002C01000000')]
+    talk.session.frames_left(10.008)
+    # the round of 10.02 waits, too; setpoints do not
+    talk.commands(0, 0.0, 10.009)
+    talk.commands(0, 10.0, 10.009)
+    assert talk.until(10.0275) == [(10.02, '3F1#0632006400000000')]
+    assert [text for _, text in talk.until(10.0281)] == [ASK]
+    talk.hears(ANSWER, 10.03)
+    assert talk.until(10.032) == [(10.031, '3F1#031E000100000000')]
+    talk.hears('7F1#2C01000000000000', 10.033)
+    assert talk.outcomes() == [['written']]
+    assert talk.session.statistics.missed == 0
+
+
+def test_a_value_that_is_there_already_is_not_written() -> None:
+    talk = online()
+    talk.submits(write((RAMP, 300)), 10.005)
+    talk.hears('7F1#2C01000000000000', 10.007)
+    assert talk.outcomes() == [['written']]
+    assert talk.until(10.019) == []
+
+
+def test_two_eeprom_writes_lie_20_ms_apart() -> None:
+    talk = online(verify_writes=False)
+    assert talk.submits(write((KEY, 1), (KEY, 2)), 10.005) == ['3F1#062C000100000000']
+    assert talk.until(10.0255) == [(10.025, ASK)]  # reads wait, too
+    talk.hears(ANSWER, 10.027)
+    assert talk.until(10.03) == [(10.028, '3F1#062C000200000000')]
+
+
+def test_a_read_is_repeated_after_the_quarantine_only() -> None:
+    talk = online(parameter_retries=1, missed_limit=99)
+    talk.submits(read(GAIN), 10.005)
+    sent = []
+    now = 10.005
+    while now < 10.8 and not (done := talk.outcomes()):
+        for when, text in talk.until(now):
+            sent.append((when, text))
+            if text == ASK:
+                talk.hears(ANSWER, when + 0.001)
+        now += 0.0005
+    assert done == [['no answer in 0.1 s, 2 attempts']]
+    again, = [when for when, text in sent if text == '3F1#0328000100000000']
+    assert again >= 10.205
+
+
+def test_one_parameter_is_all_that_fits_a_frame() -> None:
+    talk = online()
+    assert talk.submits(write((GAIN, 1), (DAMPING, 2), atomic=True), 10.005) == []
+    assert talk.outcomes() == [[
+        'cannot be written in one frame, nothing was written: one parameter fits'] * 2]
+    assert talk.submits(write((GAIN, 1), atomic=True), 10.005) == ['3F1#0628000100000000']
+
+
+def test_rounds_go_on_between_two_requests() -> None:
+    talk = online()
+    for _ in range(40):
+        talk.submits(read(GAIN), 10.01)
+    now, asked = 10.01, []
+    talk.hears('7F1#0100000000000000', 10.0105)
+    while now < 10.5:
+        for when, text in talk.until(now):
+            if text == ASK:
+                asked.append(when)
+                talk.hears(ANSWER, when + 0.002)
+            elif text.startswith('3F1#03'):
+                talk.hears('7F1#0100000000000000', when + 0.002)
+        now += 0.0001
+    assert len(talk.outcomes()) == 40
+    # a read of a user holds a round up for the time of that read, not more
+    assert max(abs(b - a - 0.02) for a, b in zip(asked, asked[1:])) < 0.0035
+
+
+def test_users_get_one_step_a_round_however_long_it_is() -> None:
+    many = tuple(parameter(f'p_{number}', number, access=RO) for number in range(300, 340, 2))
+    talk = Conversation(
+        drive('datamodel_standard', table=(*TABLE, *many), response=many, period=0.02))
+    talk.bus_up(9.0)
+    talk.activate(10.0)
+    now, order = 10.0, []
+    submitted = False
+    while now < 10.4:
+        for when, text in talk.until(now):
+            if text.startswith('3F1#03'):
+                order.append(int(text[8:10] + text[6:8], 16))
+                talk.hears('7F1#0100000000000000', when + 0.002)
+        if talk.session.online and not submitted:
+            submitted = True
+            for _ in range(3):
+                talk.submits(read(GAIN), now)
+        now += 0.0001
+    places = [place for place, number in enumerate(order) if number == 40]
+    assert len(places) == 3
+    assert all(b - a <= len(many) + 1 for a, b in zip(places, places[1:]))
+
+
+def test_mapping_parameters_are_left_alone_here_too() -> None:
+    talk = online()
+    assert talk.session.write_refusal(parameter('map', 124)) == (
+        'mapping parameter: not written while the bridge is active')
+    assert talk.session.write_refusal(ORDER) == ''
+
+
+# -- stopping -------------------------------------------------------------------------------------
+
+
+def test_the_stop_writes_neutral_three_times_and_is_silent_then() -> None:
+    talk = online(rearm_immediate=True)
+    talk.commands(0, 150.0, 10.01)
+    round_of(talk, 10.02)
+    assert talk.deactivate(10.03) == []
+    sent = talk.until(11.0)
+    assert [text for _, text in sent] == [SPEED_ZERO, LIMIT_ZERO] * 3
+    assert [when for when, _ in sent[::2]] == pytest.approx([10.03, 10.05, 10.07])
+    assert talk.session.stopped
+    assert talk.session.next_timer() == math.inf
+
+
+def test_a_long_period_does_not_make_a_long_stop() -> None:
+    talk = online(period=1.0)
+    talk.deactivate(10.5)
+    assert [when for when, _ in talk.until(12.0)][::2] == pytest.approx([10.5, 10.6, 10.7])
+
+
+def test_a_drive_that_never_answered_gets_nothing_at_the_stop() -> None:
+    talk = polling()
+    assert talk.deactivate(10.05) == []
+    assert talk.session.stopped
+    assert talk.until(11.0) == []
+
+
+def test_a_process_that_stood_still_sends_nothing_stale() -> None:
+    talk = online(rearm_immediate=True)
+    talk.commands(0, 150.0, 10.01)
+    assert talk.until(10.0225)[-1] == (10.021, ASK)
+    assert talk.time_lost(15.0) == []
+    # the answer to the last read lay in a buffer all the while
+    talk.hears(ANSWER, 15.0)
+    assert talk.events(ProcessDataReceived) == []
+    sent = [text for _, text in talk.until(15.1)]
+    assert '3F1#063200DC05000000' not in sent
+    assert sent.count(SPEED_ZERO) == 3
+
+
+# -- control --------------------------------------------------------------------------------------
+
+READY, ENABLED, FAULT = ('7F1#E803FA0001000000', '7F1#E803FA0003000000', '7F1#E803FA0009000000')
+DISABLE_WORD, ENABLE_WORD = '3F1#0634000000000000', '3F1#0634000100000000'
+
+
+def controlled(**options: object) -> Conversation:
+    talk = polling(request=(SPEED, WORD), control=CONTROL, **options)
+    talk.hears(READY, 10.002)
+    assert talk.until(10.01) == [(10.003, DISABLE_WORD), (10.004, SPEED_ZERO)]
+    return talk
+
+
+def test_enable_with_the_word_among_the_setpoints() -> None:
+    talk = controlled()
+    talk.asks(ControlAction.ENABLE, 10.01)
+    assert talk.control_outcomes() == []
+    round_of(talk, 10.02, READY)
+    assert talk.until(10.03) == [(10.025, ENABLE_WORD)], 'not before the next period'
+    assert talk.control_outcomes() == []
+    round_of(talk, 10.04, ENABLED)
+    assert talk.control_outcomes() == [('enable', True, 'enabled')]
+
+
+def test_a_status_asked_for_before_the_word_left_confirms_nothing() -> None:
+    talk = controlled()
+    talk.asks(ControlAction.ENABLE, 10.01)
+    round_of(talk, 10.02, READY)
+    assert talk.until(10.03) == [(10.025, ENABLE_WORD)]
+    round_of(talk, 10.04, ENABLED)
+    talk.control_outcomes()
+    assert talk.until(10.0605) == [(10.06, ASK)]
+    assert talk.asks(ControlAction.DISABLE, 10.061) == [DISABLE_WORD]
+    talk.hears(READY, 10.062)
+    assert talk.control_outcomes() == []
+    round_of(talk, 10.08, READY)
+    assert talk.control_outcomes() == [('disable', True, 'ready')]
+
+
+def test_a_fault_puts_the_word_back() -> None:
+    talk = controlled()
+    talk.asks(ControlAction.ENABLE, 10.01)
+    round_of(talk, 10.02, READY)
+    talk.until(10.03)
+    round_of(talk, 10.04, ENABLED)
+    talk.until(10.0605)
+    talk.hears(FAULT, 10.062)
+    assert talk.session.state is DriveState.FAULT
+    assert talk.until(10.07) == [(10.063, DISABLE_WORD)]
+
+
+def test_enable_with_the_word_by_hand() -> None:
+    talk = polling(request=(SPEED,), control=CONTROL)
+    assert talk.hears(READY, 10.002) == []
+    assert talk.until(10.01) == [(10.003, SPEED_ZERO), (10.004, DISABLE_WORD)]
+    talk.asks(ControlAction.ENABLE, 10.01)
+    round_of(talk, 10.02, READY)
+    assert ENABLE_WORD in [text for _, text in talk.until(10.03)]
+    round_of(talk, 10.04, ENABLED)
+    assert talk.control_outcomes() == [('enable', True, 'enabled')]
+
+
+def test_the_stop_disables() -> None:
+    talk = controlled()
+    talk.asks(ControlAction.ENABLE, 10.01)
+    round_of(talk, 10.02, READY)
+    talk.until(10.03)
+    round_of(talk, 10.04, ENABLED)
+    talk.deactivate(10.05)
+    sent = [text for _, text in talk.until(11.0)]
+    assert sent == [SPEED_ZERO, DISABLE_WORD] * 3
+    assert talk.session.stopped
+
+
+# -- configuration --------------------------------------------------------------------------------
+
+
+def test_the_shortest_period_is_the_time_of_all_frames() -> None:
+    # one read, two writes: 4 frames of 135 bits, 3 requests of 1 ms
+    assert FAMILY.shortest_period(drive('datamodel_standard'), 125_000) == pytest.approx(
+        4 * 135 / 125_000 + 0.003)
+    # 10 numbers in a row are three reads
+    many = tuple(parameter(f'x_{number}', number) for number in range(300, 310))
+    assert FAMILY.shortest_period(
+        drive('datamodel_standard', table=many, response=many, request=()), 250_000,
+    ) == pytest.approx(6 * 135 / 250_000 + 0.003)
+
+
+def test_the_load_is_that_of_all_frames() -> None:
+    assert FAMILY.bits_per_second(drive('datamodel_standard', period=0.01)) == pytest.approx(
+        4 * 135 / 0.01)
+
+
+@pytest.mark.parametrize(('options', 'key'), [
+    ({'station': 0}, 'station'), ({'station': 16}, 'station'),
+    ({'request_id_base': 0x7FF - 3, 'station': 4}, 'station'),
+    ({'request_id_base': 0x7F0}, 'response_id_base'),
+    ({'period': 0.004}, 'period'),
+])
+def test_what_is_refused(options: dict[str, object], key: str) -> None:
+    assert [complaint.key for complaint in FAMILY.check(
+        drive('datamodel_standard', **options))] == [key]
+
+
+@pytest.mark.parametrize('options', [
+    {'station': 1}, {'station': 15}, {'period': 0.004, 'allow_fast_cycle': True},
+    {'station': 20, 'request_id_base': 0x300, 'response_id_base': 0x380},
+    {'station': 0x7FE, 'request_id_base': 0, 'response_id_base': 1},
+])
+def test_what_is_allowed(options: dict[str, object]) -> None:
+    assert list(FAMILY.check(drive('datamodel_standard', **options))) == []
+
+
+def test_more_than_four_setpoints_and_responses_are_fine() -> None:
+    many = tuple(parameter(f'x_{number}', number) for number in range(300, 320))
+    assert list(FAMILY.check(drive('datamodel_standard', table=many, request=many[:6],
+                                   response=many))) == []
+
+
+def test_addresses_with_other_bases() -> None:
+    talk = Conversation(drive(
+        'datamodel_standard', station=20, request_id_base=0x300, response_id_base=0x380))
+    talk.bus_up(9.0)
+    talk.activate(10.0)
+    assert talk.at(10.0) == ['314#03D1000300000000']
+    talk.hears('394#E803FA0001000000', 10.002)
+    assert talk.samples() == [(1000, 250, 1)]
+
+
+def test_an_offset_moves_every_number() -> None:
+    talk = Conversation(drive('datamodel_standard', parameter_offset=-1))
+    talk.bus_up(9.0)
+    talk.activate(10.0)
+    assert talk.at(10.0) == ['3F1#03D0000300000000']
+    talk.hears(ANSWER, 10.002)
+    assert [text for _, text in talk.until(10.01)] == [
+        '3F1#0631000000000000', '3F1#0632000000000000']
