@@ -289,6 +289,7 @@ class AcyclicChannel:
                 self._finish(None)
                 return True
             self._outstanding = False
+            self._change_turns()
         if self._first is not None:
             return self._advance_first(now)
         step = self._choose()
@@ -360,12 +361,16 @@ class AcyclicChannel:
         queue = self._serving
         self._outstanding = False
         self._deadline = math.inf
-        if queue is self._users:
-            self._users_next = False
-        elif not self._polled:
-            self._users_next = True
+        self._change_turns()
         queue.resume(result, self.attempts)
         if queue is self._own and queue.step is None:
+            self._users_next = True
+
+    def _change_turns(self) -> None:
+        """Let the other lane go next, after a step or an attempt at one."""
+        if self._serving is self._users:
+            self._users_next = False
+        elif not self._polled:
             self._users_next = True
 
     def _ready_at(self, step: Step) -> float:

@@ -85,6 +85,19 @@ def test_lanes_take_turns_after_every_step() -> None:
     assert line.results == [[(0,), (0,)], [(0,), (0,), (0,)]]
 
 
+def test_lanes_take_turns_between_attempts() -> None:
+    line = Line(attempts=3)
+    line.reads(1, lane=Lane.USERS)
+    line.reads(11, now=1.05)
+    assert line.at(1.1) == ['11?']
+    assert line.answer(0, 1.11) == ['1?']
+    line.reads(12, now=1.12)
+    assert line.at(1.2101) == ['12?']
+    assert line.answer(0, 1.22) == ['1?']
+    assert line.at(1.33) == []
+    assert line.results == [[(0,)], [(0,)], [None]]
+
+
 def test_attempts_of_one_read_may_differ() -> None:
     line = Line(attempts=3)
 
@@ -229,6 +242,14 @@ def test_writes_that_go_first_do_not_wait_for_answers() -> None:
     assert line.at(1.011) == ['52!']
     assert line.channel.outstanding is not None
     assert line.channel.next_timer() == pytest.approx(1.1)
+
+
+def test_a_round_waits_for_one_attempt_and_its_silence_at_most() -> None:
+    line = Line(quarantine=0.1, attempts=3)
+    line.reads(11, lane=Lane.USERS)
+    line.reads(1, now=1.01)
+    assert line.at(1.1) == []
+    assert line.at(1.2001) == ['1?']
 
 
 def test_silence_after_a_read_that_nobody_answered() -> None:
