@@ -8,7 +8,7 @@ import sys
 import pytest
 
 #: tells when it is ready, stops for a second after the first signal, and reports its exit code
-PROGRAM = '''
+PROGRAM = """
 import sys, time
 from drive_can_bridge.process.signals import SignalWatcher
 with SignalWatcher() as watcher:
@@ -17,7 +17,7 @@ with SignalWatcher() as watcher:
     print('stopping', flush=True)
     time.sleep(1.0)
     sys.exit(watcher.exit_code(0))
-'''
+"""
 
 
 def run(*numbers: int, line: str = 'ready') -> int:

@@ -65,8 +65,6 @@ def test_several_reads_are_one_sample() -> None:
 
 
 def test_a_gap_is_bridged_over_listed_parameters() -> None:
-    talk = online(table=(*TABLE, parameter('hidden', 212), GAP), response=(ACTUAL, CURRENT, STATUS))
-    assert talk.session.online
     first = polling_of(table=(*TABLE, parameter('hidden', 212, access=RO), GAP),
                        response=(CURRENT, GAP))
     assert first == ['3F1#03D2000400000000']

@@ -92,7 +92,7 @@ def test_identifiers_of_two_stations_that_collide() -> None:
                for other in FAMILY.claims(second))
 
 
-# -- the manual's tables, "Lettura di parametri" and "Scrittura di un parametro" -------------------
+# -- the manual's tables, "Lettura di parametri" and "Scrittura di un parametro" ------------------
 
 
 def test_reading_byte_by_byte() -> None:
