@@ -8,7 +8,7 @@ from typing import Any
 from drive_can_bridge.configuration.bus_check import Adapters
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.configuration.model import BusConfiguration, DriveConfiguration
-from drive_can_bridge.configuration.traffic_check import bus_share
+from drive_can_bridge.configuration.traffic_check import bus_shares
 from drive_can_bridge.core.parameters import Parameter
 
 
@@ -33,18 +33,26 @@ def run(args: Namespace) -> int:
     configuration = configuration_from_file(args.file, adapters=_adapters())
     for warning in configuration.warnings:
         print(f'warning: {warning}', file=sys.stderr)
+    shares: dict[str, float] = {}
+    for bus in configuration.buses.values():
+        shares.update(bus_shares(
+            bus, [drive for drive in configuration.drives.values() if drive.bus == bus.name]))
     for drive in configuration.drives.values():
-        print(summary(drive, configuration.buses[drive.bus]))
+        print(summary(drive, configuration.buses[drive.bus], shares[drive.name]))
     return 0
 
 
-def summary(drive: DriveConfiguration, bus: BusConfiguration) -> str:
-    """Write everything that matters about a drive in one line."""
+def summary(drive: DriveConfiguration, bus: BusConfiguration, share: float) -> str:
+    """
+    Write everything that matters about a drive in one line.
+
+    :param share: of the bus that its exchange takes at worst.
+    """
     return (f'{drive.name}: bus {drive.bus} ({bus.interface} {bus.channel}), {drive.protocol}, '
             f'station {drive.station}, profile {drive.profile.name}, '
             f'period {1000 * drive.period:g} ms, '
             f'request {_names(drive.cyclic_request)}, response {_names(drive.cyclic_response)}, '
-            f'load {100 * bus_share(drive, bus):.1f} %')
+            f'load {100 * share:.1f} %')
 
 
 def _names(parameters: tuple[Parameter, ...]) -> str:

@@ -103,7 +103,7 @@ class BusExchange:
         # a send may hold up every drive of the bus: never for more than half a cycle
         shortest = min((session.drive.period for session in sessions), default=0.1)
         self.link = Link(bus, [route for entries in routes for route in entries], self,
-                         send_timeout=min(0.5 * shortest, 0.05))
+                         send_timeout=min(0.5 * shortest, 0.05), stations=len(self._sessions))
         self._wake = threading.Event()
         self._wake_at = 0.0
         self._last_pass = 0.0

@@ -18,18 +18,13 @@ import threading
 from typing import Any
 
 from lifecycle_msgs.msg import State
-from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
 from rclpy.executors import Executor
-from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
-from rclpy.parameter import Parameter as NodeParameter
 from rclpy.timer import Timer
 
-from drive_can_bridge.configuration.load import (
-    check_dynamic, configuration_from_overrides, declared_parameters,
-)
+from drive_can_bridge.configuration.load import configuration_from_overrides
 from drive_can_bridge.configuration.model import BridgeConfiguration
 from drive_can_bridge.core.errors import ConfigurationError
 from drive_can_bridge.exchange.exchange import BusExchange
@@ -37,10 +32,10 @@ from drive_can_bridge.protocols.families import FAMILIES, make_sessions
 from drive_can_bridge.ros.diagnostics import Diagnostics
 from drive_can_bridge.ros.drive_node import DriveNode
 from drive_can_bridge.ros.mailbox import Mailbox
+from drive_can_bridge.ros.node_parameters import NodeParameters
+from drive_can_bridge.ros.transition_guard import guard_transitions
 from drive_can_bridge.transport import adapters
 from drive_can_bridge.transport.link import steady_now
-
-RCLError = rclpy_implementation.RCLError
 
 NODE_NAME = 'drive_can_bridge'
 #: s that configure waits for the first attempt to open the buses, to report what can never work
@@ -70,15 +65,14 @@ class BridgeNode(LifecycleNode):
         self._diagnostics_timer: Timer | None = None
         self._configuring = False
         self._ending = False
-        self._dynamic: list[str] = []
         self._misconfigured: list[str] = []
         self._leaving: list[DriveNode] = []
         self.configuration: BridgeConfiguration | None = None
         self.exchanges: dict[str, BusExchange] = {}
         self.drives: dict[str, DriveNode] = {}
-        self._guard_transitions()
-        self.add_on_set_parameters_callback(self._check_parameters)
-        self.add_post_set_parameters_callback(self._apply_parameters)
+        self._node_parameters = NodeParameters(self, self._parameter_changed)
+        guard_transitions(self, self._transition_lock,
+                          lambda: 'the bridge is being stopped' if self._ending else '')
         executor.add_node(self)
 
     # -- parameters -------------------------------------------------------------------------------
@@ -86,7 +80,7 @@ class BridgeNode(LifecycleNode):
     @property
     def overrides(self) -> dict[str, Any]:
         """What parameter files and command line say, by dotted name."""
-        return {name: parameter.value for name, parameter in self._parameter_overrides.items()}
+        return self._node_parameters.overrides
 
     @property
     def autostart(self) -> bool:
@@ -98,40 +92,18 @@ class BridgeNode(LifecycleNode):
         """No parameter file reached this node: neither buses nor drives."""
         return not any(name.startswith(('buses.', 'drives.')) for name in self.overrides)
 
-    def _declare(self, configuration: BridgeConfiguration) -> None:
-        for name, value, description, dynamic in declared_parameters(configuration):
-            if self.has_parameter(name):
-                continue
-            if dynamic:
-                self._dynamic.append(name)
-            self.declare_parameter(
-                name, value, ParameterDescriptor(
-                    description=description, read_only=not dynamic, dynamic_typing=True),
-                ignore_override=True)
-
-    def _check_parameters(self, parameters: list[NodeParameter]) -> SetParametersResult:
-        for parameter in parameters:
-            if parameter.name.startswith(('drives.', 'buses.')) or (
-                    parameter.name in ('diagnostics_period', 'autostart')):
-                problem = check_dynamic(parameter.name, parameter.value)
-                if problem and self.has_parameter(parameter.name):
-                    return SetParametersResult(successful=False, reason=problem)
-        return SetParametersResult(successful=True)
-
-    def _apply_parameters(self, parameters: list[NodeParameter]) -> None:
-        for parameter in parameters:
-            if parameter.name == 'diagnostics_period' and self._diagnostics_timer is not None:
-                self._start_diagnostics_timer(float(parameter.value))
-                continue
-            prefix, _, key = parameter.name.rpartition('.')
-            drive = self.drives.get(prefix.removeprefix('drives.'))
-            if drive is None:
-                continue
-            if key == 'rearm':
-                drive.exchange.reconfigure(drive.session,
-                                           rearm_immediate=parameter.value == 'immediate')
-            elif key in ('command_timeout', 'parameter_timeout'):
-                drive.exchange.reconfigure(drive.session, **{key: float(parameter.value)})
+    def _parameter_changed(self, name: str, value: Any) -> None:
+        if name == 'diagnostics_period' and self._diagnostics_timer is not None:
+            self._start_diagnostics_timer(float(value))
+            return
+        prefix, _, key = name.rpartition('.')
+        drive = self.drives.get(prefix.removeprefix('drives.'))
+        if drive is None:
+            return
+        if key == 'rearm':
+            drive.exchange.reconfigure(drive.session, rearm_immediate=value == 'immediate')
+        elif key in ('command_timeout', 'parameter_timeout'):
+            drive.exchange.reconfigure(drive.session, **{key: float(value)})
 
     # -- transitions ------------------------------------------------------------------------------
 
@@ -176,16 +148,14 @@ class BridgeNode(LifecycleNode):
         return SUCCESS
 
     def _configure(self) -> None:
-        overrides = self.overrides
-        for name in self._dynamic:  # changed with ros2 param set since
-            overrides[name] = self.get_parameter(name).value
-        configuration = configuration_from_overrides(overrides, adapters=adapters)
+        configuration = configuration_from_overrides(self._node_parameters.current,
+                                                     adapters=adapters)
         if self.get_name() in configuration.drives:
             raise ConfigurationError([f'drives.{self.get_name()}: the name of the bridge itself '
                                       f'(remapped), allowed is another one'])
         for warning in configuration.warnings:
             self.get_logger().warning(warning)
-        self._declare(configuration)
+        self._node_parameters.declare(configuration)
         self.configuration = configuration
         self._misconfigured = []
         self._configuring = True
@@ -279,11 +249,16 @@ class BridgeNode(LifecycleNode):
 
     # -- from the outside -------------------------------------------------------------------------
 
-    def start(self) -> bool:
-        """Configure and activate; False when the configuration is wrong (it was logged)."""
+    def start(self, unwanted: Callable[[], bool] = lambda: False) -> bool:
+        """
+        Configure and activate; False when the configuration is wrong (it was logged).
+
+        :param unwanted: nobody wants it any more: nothing is begun that would have to be stopped.
+        """
         with self._transition_lock:
-            return (self.trigger_configure() is SUCCESS
-                    and self.trigger_activate() is SUCCESS)
+            if self.trigger_configure() is not SUCCESS:
+                return False
+            return unwanted() or self.trigger_activate() is SUCCESS
 
     def stop(self) -> None:
         """Stop the drives and publish a last diagnostic message; for the end of the process."""
@@ -291,7 +266,8 @@ class BridgeNode(LifecycleNode):
         if self._transition_lock.acquire(timeout=2.0):
             try:
                 self._stop_drives()
-                self._publish_diagnostics()
+                if self._diagnostics is not None:
+                    self._diagnostics.conclude(steady_now())
             finally:
                 self._transition_lock.release()
 
@@ -305,30 +281,6 @@ class BridgeNode(LifecycleNode):
     def is_active(self) -> bool:
         """In lifecycle state active."""
         return bool(self._state_machine.current_state[0] == State.PRIMARY_STATE_ACTIVE)
-
-    def _guard_transitions(self) -> None:
-        """Keep an illegal transition from bringing the executor down (rclpy lets it escape)."""
-        service = self._service_change_state
-        change_state = service.callback
-
-        def guarded(request: Any, response: Any) -> Any:
-            with self._transition_lock:
-                try:
-                    if self._ending:
-                        raise RuntimeError('the bridge is being stopped')
-                    if request.transition.label:  # an unknown one is answered without a word
-                        self._state_machine.get_transition_by_label(request.transition.label)
-                    return change_state(request, response)
-                except (RCLError, RuntimeError) as error:
-                    label = request.transition.label or f'number {request.transition.id}'
-                    state = self._state_machine.current_state[1]
-                    self.get_logger().warning(
-                        f'transition {label} is not possible in state {state}'
-                        f' ({" ".join(str(error).split())})')
-                    response.success = False
-                    return response
-
-        service.callback = guarded
 
     # -- diagnostics ------------------------------------------------------------------------------
 

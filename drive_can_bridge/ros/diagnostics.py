@@ -14,6 +14,7 @@ from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.ros.drive_node import DriveNode
 from drive_can_bridge.ros.quality import overriding
 from drive_can_bridge.ros.values import value_text
+from drive_can_bridge.transport.error_frames import ADVICE_DISTURBED, BUS_OFF, BusError
 
 #: bus load above which a bus is never OK
 LOAD_WARNING = 70.0
@@ -47,6 +48,7 @@ class BusReporter:
         self._bits = 0
         self._failures = 0
         self._error_frames = 0
+        self._overflowed = 0
         self._reported_at = math.nan
         self.load_percent = 0.0
 
@@ -59,19 +61,28 @@ class BusReporter:
             self.load_percent = (100.0 * STUFFING * (bits - self._bits)
                                  / (elapsed * exchange.bus.bitrate))
         failures, error_frames = link.send_failures, link.error_frames
+        overflowed = link.overflowed_frames
         new_failures = failures - self._failures
         new_errors = error_frames - self._error_frames
+        new_overflowed = overflowed - self._overflowed
         self._bits, self._reported_at = bits, now
         self._failures, self._error_frames = failures, error_frames
+        self._overflowed = overflowed
         level, message = DiagnosticStatus.OK, f'{exchange.bus.interface} {exchange.bus.channel}'
+        state = exchange.bus_state
+        if state == 'up' and link.controller or state == 'down' and link.controller == BUS_OFF:
+            state = link.controller
         if exchange.bus_state != 'up':
             level = DiagnosticStatus.ERROR
             message = (f'{exchange.bus_state}: {exchange.bus_reason or "not open yet"}; '
                        f'tried again every {exchange.bus.reconnect_period:g} s')
-        elif new_errors:
+        elif link.controller or new_errors and link.last_bus_error is not None:
             level = DiagnosticStatus.WARN
-            message = (f'{new_errors} error frames ({link.last_bus_error}): check cable, '
-                       f'termination and bit rate, and that another node is switched on')
+            message = _bus_error(link.last_bus_error, link.controller, new_errors)
+        elif new_overflowed > 0:
+            level = DiagnosticStatus.WARN
+            message = (f'{new_overflowed} received frames lost: this machine is too slow for the '
+                       f'traffic, see what else it does')
         elif new_failures:
             level = DiagnosticStatus.WARN
             message = f'{new_failures} frames not sent: {link.last_error}'
@@ -80,7 +91,7 @@ class BusReporter:
             message = (f'bus load {self.load_percent:.0f} %: raise the period of some drives or '
                        f'the bit rate')
         return Report(f'bus {exchange.bus.name}', level, message, {
-            'state': exchange.bus_state,
+            'state': state,
             'load_percent': f'{self.load_percent:.1f}',
             'frames_sent': str(link.frames_sent),
             'frames_received': str(link.frames_received),
@@ -93,11 +104,16 @@ class BusReporter:
 
 
 class DriveReporter:
-    """Reports on one drive; remembers the counts of the last report."""
+    """
+    Reports on one drive; remembers the counts of the last report.
+
+    :ivar inactive: the message while the bridge is inactive.
+    """
 
     def __init__(self, drive: DriveNode) -> None:
         self._drive = drive
         self._rejected = 0
+        self.inactive = 'bridge inactive: activate it'
 
     def report(self, now: float) -> Report:
         """Return the report of this moment."""
@@ -123,12 +139,13 @@ class DriveReporter:
         }
         if session.control is not None:
             facts['control_state'] = session.control.state
+        facts.update(session.facts())
         return Report(f'drive {drive.name}', level, message, facts)
 
     def _judge(self, state: DriveState, rejected: int) -> tuple[bytes, str]:
         drive, session = self._drive, self._drive.session
         if not session.active:
-            return DiagnosticStatus.STALE, 'bridge inactive: activate it'
+            return DiagnosticStatus.STALE, self.inactive
         if state is DriveState.MAPPING_DIFFERS:
             return (DiagnosticStatus.ERROR,
                     f'{session.offline_advice}; correct the drive or the configuration, or set '
@@ -141,18 +158,29 @@ class DriveReporter:
                 return DiagnosticStatus.STALE, f'not seen since start: {what}'
             return DiagnosticStatus.ERROR, f'offline: {what}'
         if state is DriveState.FAULT:
-            return (DiagnosticStatus.ERROR,
-                    'fault: remove its cause, then call ~/reset_fault and ~/enable')
-        if drive.foreign_text:
-            text, drive.foreign_text = drive.foreign_text, ''
-            return DiagnosticStatus.WARN, f'{text}: there must be one master only'
-        if rejected:
-            return (DiagnosticStatus.WARN,
-                    f'{rejected} frames rejected, the last: {drive.rejected_text}; check for a '
-                    f'second station with the same number')
+            told = ['fault: remove its cause, then call ~/reset_fault and ~/enable',
+                    *self._warnings(rejected)]
+            return DiagnosticStatus.ERROR, '; '.join(told)
+        told = self._warnings(rejected)
         if state is DriveState.NOT_ARMED:
-            return DiagnosticStatus.WARN, self._how_to_arm()
+            told.append(self._how_to_arm())
+        if told:
+            return DiagnosticStatus.WARN, '; '.join(told)
         return DiagnosticStatus.OK, 'online'
+
+    def _warnings(self, rejected: int) -> list[str]:
+        """Return everything that is not well although the drive answers."""
+        drive, session = self._drive, self._drive.session
+        told = []
+        if session.warning:
+            told.append(session.warning)
+        if drive.foreign_text:
+            told.append(f'{drive.foreign_text}: there must be one master only')
+            drive.foreign_text = ''
+        if rejected:
+            told.append(f'{rejected} frames rejected, the last: {drive.rejected_text}; check for '
+                        f'a second station with the same number')
+        return told
 
     def _how_to_arm(self) -> str:
         drive, session = self._drive, self._drive.session
@@ -192,6 +220,12 @@ class Diagnostics:
                 values=[KeyValue(key=key, value=value) for key, value in report.facts.items()]))
         self._publisher.publish(message)
 
+    def conclude(self, now: float) -> None:
+        """Publish for the last time: the drives have been stopped, and the process ends."""
+        for drive in self.drives:
+            drive.inactive = 'bridge ended: start it again'
+        self.publish(now)
+
     def reports(self, now: float) -> list[Report]:
         """Return all reports, buses first."""
         reporters: list[BusReporter | DriveReporter] = [*self.buses, *self.drives]
@@ -200,6 +234,14 @@ class Diagnostics:
     def destroy(self) -> None:
         """Take the publisher out of the graph."""
         self._node.destroy_publisher(self._publisher)
+
+
+def _bus_error(error: BusError | None, controller: str, count: int) -> str:
+    """Say what error frames of a bus that is up mean, and what to do."""
+    told = [f'controller {controller}'] if controller else []
+    if count:
+        told.append(f'{count} error frames' + (f' (the last: {error.text})' if error else ''))
+    return f'{", ".join(told)}: {error.advice if error else ADVICE_DISTURBED}'
 
 
 def _times(name: str, statistic: Statistic) -> dict[str, str]:

@@ -80,7 +80,8 @@ class DriveNode:
     def _populate(self, clock: Clock, family: Family) -> None:
         """Make the topics and services."""
         drive, session = self.drive, self.session
-        self.samples = SamplePublisher(self.node, drive, Stamps(clock).at)
+        self.samples = SamplePublisher(self.node, drive, session.sample_parameters,
+                                       Stamps(clock).at)
         self._online = self.node.create_publisher(
             Bool, '~/online', latched_quality(),
             qos_overriding_options=overriding(self.node, '~/online'))
@@ -100,7 +101,7 @@ class DriveNode:
         return self.drive.name
 
     def values(self) -> dict[str, Value]:
-        """Return the newest value of each mapped response parameter; empty while offline."""
+        """Return the newest value of everything that a sample carries; empty while offline."""
         return self.samples.latest() if self.session.online else {}
 
     def answer_all(self) -> bool:

@@ -72,7 +72,7 @@ def _run(watcher: SignalWatcher, arguments: Sequence[str]) -> int:
 
     from drive_can_bridge.ros.bridge_node import BridgeNode
     from drive_can_bridge.ros.executor_thread import ExecutorThread
-    from drive_can_bridge.transport.port import in_words
+    from drive_can_bridge.transport.failures import in_words
 
     spinner = ExecutorThread('services', lambda text: bridge.get_logger().error(text),
                              rclpy.get_default_context())
@@ -89,7 +89,7 @@ def _run(watcher: SignalWatcher, arguments: Sequence[str]) -> int:
     code = 0
     try:
         if not watcher.signalled:  # else nothing is begun that had to be stopped
-            if bridge.autostart and not bridge.start():
+            if bridge.autostart and not bridge.start(lambda: watcher.signalled):
                 code = 1
             elif watcher.wait():
                 code = 1
@@ -124,7 +124,7 @@ def _parameter_files(arguments: Sequence[str]) -> list[str]:
 
 def _parse_error(error: Exception) -> str:
     """Return what rcl says without the file positions of its C sources."""
-    from drive_can_bridge.transport.port import in_words
+    from drive_can_bridge.transport.failures import in_words
 
     text = in_words(error)
     for noise in ('failed to initialize rcl: ',):

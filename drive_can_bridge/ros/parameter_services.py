@@ -27,12 +27,15 @@ from drive_can_bridge.core.directory import ParameterDirectory
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.requests import (
-    BRIDGE_INACTIVE, Failure, Outcome, ReadRequest, ReadValue, Request, WriteRequest, Written,
+    BRIDGE_INACTIVE, BUS_DOWN, BUSY, Failure, NO_ANSWER_OFFLINE, Outcome, ReadRequest, ReadValue,
+    Request, WriteRequest, Written,
 )
 from drive_can_bridge.ros.values import (
     descriptor, PARAMETER_TYPES, parameter_value, value_of,
 )
 
+#: why a read may fail that says nothing about the parameter
+_NOT_ITS_FAULT = frozenset([BRIDGE_INACTIVE, BUS_DOWN, BUSY, NO_ANSWER_OFFLINE])
 #: separates the levels of a parameter name (rcl_interfaces/srv/ListParameters)
 SEPARATOR = '.'
 
@@ -61,6 +64,7 @@ class ParameterServices:
         self._write_refusal = write_refusal
         self._active = active
         self._failed = failed
+        self._unreadable: set[str] = set()  # what the drive did not give when last asked
         # reentrant: a request that waits for its drive must not keep the next one from being taken
         group = ReentrantCallbackGroup()
         for service_type, name, callback in (
@@ -93,7 +97,10 @@ class ParameterServices:
                     if isinstance(outcome, ReadValue):
                         values[place] = parameter_value(
                             parameter, parameter.value_from_raw(outcome.raw))
+                        self._unreadable.discard(parameter.name)
                     elif isinstance(outcome, Failure):
+                        if parameter.listed and outcome.reason not in _NOT_ITS_FAULT:
+                            self._unreadable.add(parameter.name)
                         self._failed(f'read {_title(parameter)}', outcome.reason, 0)
         elif request.names:
             self._failed('read parameters', BRIDGE_INACTIVE,
@@ -110,7 +117,8 @@ class ParameterServices:
         # rcl_interfaces/srv/DescribeParameters: as many descriptors as names, in the same order
         found = [(name, self._directory.find(name)) for name in request.names]
         response.descriptors = [
-            ParameterDescriptor(name=name) if parameter is None else descriptor(name, parameter)
+            ParameterDescriptor(name=name) if parameter is None
+            else descriptor(name, parameter, unreadable=name in self._unreadable)
             for name, parameter in found]
         return response
 

@@ -3,13 +3,15 @@
 Publish samples: the fast path from a decoded frame to the ROS graph.
 
 Runs in the thread that received the frame, up to thousands of times a second. So messages are
-prebuilt and only their fields are set, and what nobody subscribes to is not built at all: the
-subscription counts are looked up every ``COUNT_PERIOD``, not for every message.
+prepared as bytes in which only the numbers change (:mod:`.prepared`), and what nobody subscribes
+to is not built at all: the subscription counts are looked up every ``COUNT_PERIOD``, not for every
+message.
 """
 
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Sequence
+from functools import partial
 
+from builtin_interfaces.msg import Time
 from rcl_interfaces.msg import Parameter as ParameterMessage, ParameterEvent
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -17,12 +19,16 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 
 from drive_can_bridge.configuration.model import DriveConfiguration, JointConfiguration
-from drive_can_bridge.core.parameters import Parameter, Value
+from drive_can_bridge.core.parameters import Parameter, Value, ValueKind
+from drive_can_bridge.ros.prepared import PreparedMessage
 from drive_can_bridge.ros.quality import latched_quality, overriding, state_quality
+from drive_can_bridge.ros.stamps import Stamp
 from drive_can_bridge.ros.values import parameter_value, TOPIC_TYPES, VALUE_FIELDS
 
 #: s between two looks at who subscribes
 COUNT_PERIOD = 0.1
+#: how a number of each kind stands in a message; a bool is no number
+_CODES = {ValueKind.DOUBLE: 'd', ValueKind.INTEGER: 'q'}
 
 
 class ValueTopic:
@@ -34,18 +40,29 @@ class ValueTopic:
         self.publisher: Publisher = node.create_publisher(
             message_type, topic, state_quality(),
             qos_overriding_options=overriding(node, topic))
-        self.message = message_type()
         self.slot = slot
+        self._message = message_type()
+        code = _CODES.get(parameter.kind)
+        self._prepared = None if code is None else PreparedMessage.find(
+            self.publisher, self._message, [(code, partial(setattr, self._message, 'data'))])
 
-    def publish(self, values: list[Value], _: Any) -> None:
-        self.message.data = values[self.slot]
-        self.publisher.publish(self.message)
+    def publish(self, value: Value) -> None:
+        """Publish one value."""
+        if self._prepared is not None:
+            self._prepared.publish((value,))
+            return
+        self._message.data = value
+        self.publisher.publish(self._message)
 
 
 class ResponseTopic:
-    """``~/response``: all mapped response parameters of one exchange, stamped."""
+    """
+    ``~/response``: all mapped response parameters of one exchange, stamped.
 
-    def __init__(self, node: Node, parameters: tuple[Parameter, ...]) -> None:
+    :param first: slot of the first of them; what is built in stands before.
+    """
+
+    def __init__(self, node: Node, parameters: tuple[Parameter, ...], first: int) -> None:
         self.publisher: Publisher = node.create_publisher(
             ParameterEvent, '~/response', state_quality(),
             qos_overriding_options=overriding(node, '~/response'))
@@ -56,22 +73,36 @@ class ResponseTopic:
                         for entry, parameter in zip(self._entries, parameters)]
         self._message = ParameterEvent(node=node.get_fully_qualified_name(),
                                        changed_parameters=self._entries)
+        self._first = first
+        self._prepared: PreparedMessage | None = None
+        if all(parameter.kind in _CODES for parameter in parameters):
+            stamp = self._message.stamp
+            self._prepared = PreparedMessage.find(self.publisher, self._message, [
+                ('i', partial(setattr, stamp, 'sec')), ('I', partial(setattr, stamp, 'nanosec')),
+                *((_CODES[parameter.kind], partial(setattr, entry, field))
+                  for parameter, (entry, field) in zip(parameters, self._fields))])
 
-    def publish(self, values: list[Value], stamp: Any) -> None:
+    def publish(self, values: Sequence[Value], stamp: Stamp) -> None:
+        """Publish one sample; only what arrived."""
+        values = values[self._first:]
+        entries = self._entries
+        if self._prepared is not None and len(values) == len(entries):
+            self._prepared.publish((*stamp, *values))
+            return
         message = self._message
-        message.stamp = stamp
+        message.stamp = Time(sec=stamp[0], nanosec=stamp[1])
         for (entry, field), value in zip(self._fields, values):
             setattr(entry, field, value)
-        if len(values) == len(self._entries):
-            self.publisher.publish(message)
-            return
-        message.changed_parameters = self._entries[:len(values)]  # only what arrived
+        message.changed_parameters = entries[:len(values)]
         self.publisher.publish(message)
-        message.changed_parameters = self._entries
 
 
 class JointTopic:
-    """``~/joint_state``: SI units, stamped with the receive time."""
+    """
+    ``~/joint_state``: SI units, stamped with the receive time.
+
+    :param parameters: of a sample, by slot.
+    """
 
     def __init__(self, node: Node, joint: JointConfiguration,
                  parameters: tuple[Parameter, ...]) -> None:
@@ -84,14 +115,27 @@ class JointTopic:
             (quantity, slots[name], joint.factors[name])
             for quantity, name in (('position', joint.position), ('velocity', joint.velocity),
                                    ('effort', joint.effort)) if name is not None]
-        self._first = min((slot for _, slot, _ in self._quantities), default=0)
+        self._slots = [slot for _, slot, _ in self._quantities]
+        self._factors = [factor for _, _, factor in self._quantities]
+        for quantity, _, _ in self._quantities:
+            setattr(self._message, quantity, [0.0])
+        stamp = self._message.header.stamp
+        self._prepared = PreparedMessage.find(self.publisher, self._message, [
+            ('i', partial(setattr, stamp, 'sec')), ('I', partial(setattr, stamp, 'nanosec')),
+            *(('d', partial(getattr(self._message, quantity).__setitem__, 0))
+              for quantity, _, _ in self._quantities)])
 
-    def publish(self, values: list[Value], stamp: Any) -> None:
+    def publish(self, values: Sequence[Value], stamp: Stamp) -> None:
+        """Publish one sample; only what arrived, and nothing if no part of it did."""
         present = len(values)
-        if present <= self._first:
+        if self._prepared is not None and present > max(self._slots):
+            self._prepared.publish((*stamp, *(
+                values[slot] * factor for slot, factor in zip(self._slots, self._factors))))
             return
-        self._message.header.stamp = stamp
-        for quantity, slot, factor in self._quantities:  # only what arrived
+        if present <= min(self._slots):
+            return
+        self._message.header.stamp = Time(sec=stamp[0], nanosec=stamp[1])
+        for quantity, slot, factor in self._quantities:
             setattr(self._message, quantity, [values[slot] * factor] if slot < present else [])
         self.publisher.publish(self._message)
 
@@ -128,12 +172,14 @@ class SamplePublisher:
     """
     Everything that is published once per exchange of one drive.
 
-    :param stamp: (receive time of the steady clock) -> builtin_interfaces/Time.
+    :param parameters: of a sample, in the order of its raw integers: those that the family has
+        built in, which have topics of their own but no part in ``~/response``, and then
+        ``cyclic_response``.
+    :param stamp: (receive time of the steady clock) -> seconds and nanoseconds.
     """
 
-    def __init__(self, node: Node, drive: DriveConfiguration,
-                 stamp: Callable[[float], Any]) -> None:
-        parameters = drive.cyclic_response
+    def __init__(self, node: Node, drive: DriveConfiguration, parameters: tuple[Parameter, ...],
+                 stamp: Callable[[float], Stamp]) -> None:
         self._parameters = parameters
         self._stamp = stamp
         self._converters = [
@@ -141,7 +187,9 @@ class SamplePublisher:
             else _scaler(parameter.scale, parameter.offset) for parameter in parameters]
         self._values = [ValueTopic(node, parameter, slot)
                         for slot, parameter in enumerate(parameters)]
-        self._samples: list[ResponseTopic | JointTopic] = [ResponseTopic(node, parameters)]
+        mapped = drive.cyclic_response
+        self._samples: list[ResponseTopic | JointTopic] = [
+            ResponseTopic(node, mapped, len(parameters) - len(mapped))]
         joint = drive.joint
         if joint is not None and (joint.position or joint.velocity or joint.effort):
             self._samples.append(JointTopic(node, joint, parameters))
@@ -166,7 +214,7 @@ class SamplePublisher:
                     sample.publish(values, stamp)
             for topic in self._wanted_values:
                 if topic.slot < present:
-                    topic.publish(values, None)
+                    topic.publish(values[topic.slot])
         for bits in self._bits:
             if bits.slot < len(raws):
                 bits.update(raws[bits.slot])

@@ -3,8 +3,11 @@
 
 import time
 
-from builtin_interfaces.msg import Time
 from rclpy.clock import Clock, ROSClock
+
+
+#: seconds and nanoseconds, as ``builtin_interfaces/Time`` has them
+Stamp = tuple[int, int]
 
 
 class Stamps:
@@ -12,18 +15,11 @@ class Stamps:
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
-        self._stamp = Time()
 
-    def at(self, received_at: float) -> Time:
-        """
-        Return the stamp of a moment of the steady clock.
-
-        The message is reused: it is overwritten by the next call. Simulated time only knows
-        "now".
-        """
+    def at(self, received_at: float) -> Stamp:
+        """Return the stamp of a moment of the steady clock. Simulated time only knows "now"."""
         if isinstance(self._clock, ROSClock) and self._clock.ros_time_is_active:
-            return self._clock.now().to_msg()
-        nanoseconds = time.time_ns() - int((time.monotonic() - received_at) * 1e9)
-        stamp = self._stamp
-        stamp.sec, stamp.nanosec = divmod(nanoseconds, 1_000_000_000)
-        return stamp
+            nanoseconds = self._clock.now().nanoseconds
+        else:
+            nanoseconds = time.time_ns() - int((time.monotonic() - received_at) * 1e9)
+        return divmod(nanoseconds, 1_000_000_000)

@@ -23,6 +23,8 @@ VALUE_FIELDS: dict[ValueKind, str] = {
     ValueKind.DOUBLE: 'double_value', ValueKind.INTEGER: 'integer_value',
     ValueKind.BOOL: 'bool_value',
 }
+#: largest end of an integer range: Qt's sliders have 32 bits, and an OverflowError beyond
+SLIDER_MAX = 2 ** 31 - 1
 _FIELDS_BY_TYPE = {
     ParameterType.PARAMETER_BOOL: 'bool_value',
     ParameterType.PARAMETER_INTEGER: 'integer_value',
@@ -56,31 +58,50 @@ def value_text(value: Value) -> str:
     return str(value).lower() if isinstance(value, bool) else f'{value:g}'
 
 
-def descriptor(name: str, parameter: Parameter) -> ParameterDescriptor:
-    """Describe a parameter: type, unit, number, storage, access, range with step = scale."""
+def descriptor(name: str, parameter: Parameter, *, unreadable: bool = False,
+               ) -> ParameterDescriptor:
+    """
+    Describe a parameter: type, unit, number, storage, access, range with step = scale.
+
+    Editors such as rqt_reconfigure take the type from here and the value from
+    ``get_parameters``, and give up on the whole node where a typed parameter has no value. So what
+    has no value to show has no type here either; the description names it.
+
+    :param unreadable: there is no value to be had.
+    """
     facts = [parameter.address]
     if parameter.unit:
         facts.append(f'unit {parameter.unit}')
     if parameter.storage is not None:
         facts.append(f'storage {parameter.storage.value}')
+    kind = parameter.kind
+    untyped = unreadable or not parameter.readable
+    if untyped:
+        facts.append(kind.value)
     if not parameter.readable:
         facts.append('write-only')
+    elif unreadable:
+        facts.append('could not be read')
     text = parameter.description or ('raw access' if not parameter.listed else '')
     message = ParameterDescriptor(
-        name=name, type=PARAMETER_TYPES[parameter.kind],
-        description=f'{text} ({", ".join(facts)})' if text else ', '.join(facts),
-        read_only=not parameter.writable)
-    low_raw, high_raw = parameter.type.raw_range
-    if parameter.kind is ValueKind.DOUBLE:
-        ends = sorted((low_raw * parameter.scale + parameter.offset,
-                       high_raw * parameter.scale + parameter.offset))
+        name=name, read_only=not parameter.writable,
+        type=ParameterType.PARAMETER_NOT_SET if untyped else PARAMETER_TYPES[kind],
+        description=f'{text} ({", ".join(facts)})' if text else ', '.join(facts))
+    low, high = _range(parameter)
+    if low >= high:  # one value only: a slider of no length
+        return message
+    if kind is ValueKind.DOUBLE:
         message.floating_point_range = [FloatingPointRange(
-            from_value=float(parameter.minimum if parameter.minimum is not None else ends[0]),
-            to_value=float(parameter.maximum if parameter.maximum is not None else ends[1]),
-            step=abs(parameter.scale))]
-    elif parameter.kind is ValueKind.INTEGER:
-        message.integer_range = [IntegerRange(
-            from_value=int(parameter.minimum if parameter.minimum is not None else low_raw),
-            to_value=int(parameter.maximum if parameter.maximum is not None else high_raw),
-            step=1)]
+            from_value=float(low), to_value=float(high), step=abs(parameter.scale))]
+    elif kind is ValueKind.INTEGER and high <= SLIDER_MAX:
+        message.integer_range = [IntegerRange(from_value=int(low), to_value=int(high), step=1)]
     return message
+
+
+def _range(parameter: Parameter) -> tuple[float, float]:
+    """Return the smallest and the largest physical value."""
+    low_raw, high_raw = parameter.type.raw_range
+    low, high = sorted((low_raw * parameter.scale + parameter.offset,
+                        high_raw * parameter.scale + parameter.offset))
+    return (low if parameter.minimum is None else parameter.minimum,
+            high if parameter.maximum is None else parameter.maximum)

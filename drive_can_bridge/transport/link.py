@@ -4,6 +4,13 @@ The link to one bus: opened, read by a thread of its own, reopened when lost.
 
 The reader thread is the only one that opens, reads and closes the port, so that none of it ever
 happens with a lock held. Sending is done by whoever holds the exchange's lock.
+
+A bus on which nothing leaves any more (no other node acknowledges, the transmit queue is full) is
+*blocked*: the exchange is told that it is down, and nothing more is put into the queue. Where the
+queue can be looked at, the port stays open, so that what waits in it goes on counting, and the bus
+is back when there is room again; other adapters are closed and opened anew, which empties them.
+Both happen every ``reconnect_period``. While it is not known yet that somebody is there again, the
+first frame without room blocks the bus at once.
 """
 
 from collections.abc import Sequence
@@ -14,10 +21,15 @@ from typing import Protocol
 from drive_can_bridge.configuration.model import BusConfiguration
 from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, TransportError
 from drive_can_bridge.core.frame import Frame, Route
-from drive_can_bridge.transport.port import in_words, open_port, Port
+from drive_can_bridge.transport.error_frames import ADVICE_ALONE, BUS_OFF, BusError
+from drive_can_bridge.transport.failures import in_words
+from drive_can_bridge.transport.port import open_port, Port
 
 #: s that a receive may block: how soon a stop, or a loss seen by a sender, is noticed
 RECEIVE_TIMEOUT = 0.02
+#: send time-outs, and s, that nothing may leave until the bus counts as blocked
+BLOCKED_TIMEOUTS = 4
+BLOCKED_AFTER = 0.05
 
 
 class LinkListener(Protocol):
@@ -51,16 +63,21 @@ class Link:
 
     :param routes: acceptance filters.
     :param send_timeout: s that one send may take.
+    :param stations: how many drives are on the bus, for each of which a frame may wait.
     """
 
     def __init__(self, bus: BusConfiguration, routes: Sequence[Route], listener: LinkListener, *,
-                 send_timeout: float) -> None:
+                 send_timeout: float, stations: int = 0) -> None:
         self.bus = bus
         self._routes = routes
         self._listener = listener
         self._send_timeout = send_timeout
+        self._stations = stations
         self._port: Port | None = None
         self._loss: str | None = None
+        self._blocked: str | None = None
+        self._no_room_since: float | None = None
+        self._heard = False
         self._closing = threading.Event()
         self._first_attempt = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f'bus {bus.name}', daemon=True)
@@ -70,8 +87,10 @@ class Link:
         self.reconnections = 0
         self._closed_error_frames = 0
         self._closed_bus_off_count = 0
+        self._closed_overflowed_frames = 0
+        self._closed_controller = ''
+        self._closed_bus_error: BusError | None = None
         self.last_error = ''
-        self._closed_bus_error = ''
 
     # -- used by the exchange ---------------------------------------------------------------------
 
@@ -96,11 +115,12 @@ class Link:
         :return: False when it was not sent; counted, and the reader thread looks after the bus.
         """
         port = self._port
-        if port is None or self._loss is not None:
+        if port is None or self._loss is not None or self._blocked is not None:
             self.send_failures += 1
             return False
         try:
-            port.send(frame, self._send_timeout)
+            # one frame waits for room; the others of the bus need not wait for the same
+            port.send(frame, self._send_timeout if self._no_room_since is None else 0.0)
         except BusUnavailable as error:
             self.send_failures += 1
             self.last_error = in_words(error)
@@ -110,19 +130,42 @@ class Link:
         except TransportError as error:
             self.send_failures += 1
             self.last_error = in_words(error)
+            self._no_room()
             return False
+        self._no_room_since = None
         self.frames_sent += 1
         return True
+
+    def _no_room(self) -> None:
+        now = steady_now()
+        if self._no_room_since is None:
+            self._no_room_since = now
+        limit = max(BLOCKED_TIMEOUTS * self._send_timeout, BLOCKED_AFTER)
+        if not self._heard or now - self._no_room_since >= limit:
+            self._blocked = f'{self.last_error}; {ADVICE_ALONE}'
 
     @property
     def is_open(self) -> bool:
         """The bus is there."""
-        return self._port is not None and self._loss is None
+        return self._port is not None and self._loss is None and self._blocked is None
 
     @property
-    def last_bus_error(self) -> str:
-        """The last error frame in words."""
-        return (self._port.last_error if self._port else '') or self._closed_bus_error
+    def last_bus_error(self) -> BusError | None:
+        """The last error frame that asks for something to be done."""
+        port = self._port
+        return (port.last_error if port is not None else None) or self._closed_bus_error
+
+    @property
+    def controller(self) -> str:
+        """``error-warning``, ``error-passive`` or ``bus-off``; '' otherwise, or not known."""
+        port = self._port
+        return port.controller if port is not None else self._closed_controller
+
+    @property
+    def overflowed_frames(self) -> int:
+        """Received frames that were lost because they were not fetched in time."""
+        port = self._port
+        return self._closed_overflowed_frames + (port.overflowed_frames if port else 0)
 
     @property
     def error_frames(self) -> int:
@@ -152,8 +195,10 @@ class Link:
         opened = False
         while not self._closing.is_set():
             try:
-                self._port = open_port(self.bus, self._routes)
-                self._loss = None
+                self._port = open_port(self.bus, self._routes, stations=self._stations)
+                self._loss = self._blocked = self._no_room_since = None
+                # after a loss nobody knows whether anybody is there before somebody was heard
+                self._heard = not opened
                 if opened:
                     self.reconnections += 1
                 opened = True
@@ -182,12 +227,39 @@ class Link:
             frame = receive(RECEIVE_TIMEOUT)
             if self._loss is not None:
                 raise BusUnavailable(self._loss)
-            if frame is not None:
+            if self._blocked is not None:
+                self._sit_out(port, self._blocked)
+            elif frame is not None:
+                self._heard = True
                 self.frames_received += 1
                 listener(frame, port.age)
             elif port.malformed_frames != malformed:
                 self._listener.frames_rejected += port.malformed_frames - malformed
                 malformed = port.malformed_frames
+
+    def _sit_out(self, port: Port, reason: str) -> None:
+        """
+        Wait until something leaves again. Frames of that time are nobody's: all drives are lost.
+
+        :raises BusUnavailable: the bus is lost, or has to be opened anew to find out.
+        """
+        if port.has_room is None:
+            raise BusUnavailable(reason)
+        self._listener.bus_lost(reason)
+        look_at = steady_now() + self.bus.reconnect_period
+        while not self._closing.is_set():
+            port.receive(RECEIVE_TIMEOUT)
+            now = steady_now()
+            if now >= look_at:
+                if port.has_room:
+                    break
+                look_at = now + self.bus.reconnect_period
+        else:
+            return
+        self._heard = False
+        self._blocked = self._no_room_since = None
+        self.reconnections += 1
+        self._listener.bus_opened()
 
     def _close_port(self) -> None:
         port, self._port = self._port, None
@@ -195,6 +267,9 @@ class Link:
             self._closed_bus_error = port.last_error
             self._closed_error_frames += port.error_frames
             self._closed_bus_off_count += port.bus_off_count
+            self._closed_overflowed_frames += port.overflowed_frames
+            # a controller that is being tried again is in no other state that anybody knows
+            self._closed_controller = BUS_OFF if port.controller == BUS_OFF else ''
             port.close()
 
 

@@ -2,16 +2,14 @@
 """
 An open CAN bus, and the way to open one.
 
-python-can's adapters fail in many ways: NameError, NotImplementedError, OSError, ValueError,
-CanError and its children, whatever a vendor's library throws. Here they become two errors:
+Whatever python-can's adapters throw becomes one of two errors here:
 :class:`~drive_can_bridge.core.errors.BusMisconfigured` (never going to work) and
 :class:`~drive_can_bridge.core.errors.BusUnavailable` (worth another attempt).
 """
 
 from collections.abc import Callable, Sequence
 import inspect
-import os
-import select
+from pathlib import Path
 import time
 from typing import Any
 
@@ -22,6 +20,14 @@ from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, Trans
 from drive_can_bridge.core.frame import (
     EXTENDED_IDENTIFIER_MAX, Frame, Route, STANDARD_IDENTIFIER_MAX,
 )
+from drive_can_bridge.transport.error_frames import (
+    ADVICE_DISTURBED, BUS_OFF, BusError, decode_error_frame, ERROR_ACTIVE,
+)
+from drive_can_bridge.transport.failures import (
+    in_words, is_full_queue, is_malformed, is_misconfiguration, with_cause,
+)
+from drive_can_bridge.transport.raw_socket import RawSocket
+from drive_can_bridge.transport.serial_writer import SerialWriter, watched
 
 # A frame's own time stamp is believed only if it is that much older than now at most: adapters
 # that count from power-up, and clocks that were set, fall out.
@@ -34,13 +40,10 @@ _CLOSE_TIMEOUT = 0.1
 _MALFORMED_MAX = 1000
 # Bytes of an unfinished line of a serial adapter that are kept.
 _LINE_MAX = 4096
-
-#: linux/can/error.h: error class bits of an error frame's identifier, in words
-_ERROR_CLASSES = (
-    (0x001, 'transmit time-out'), (0x002, 'lost arbitration'), (0x004, 'controller problem'),
-    (0x008, 'protocol violation'), (0x010, 'transceiver fault'), (0x020, 'no acknowledgement'),
-    (0x040, 'bus off'), (0x080, 'bus error'), (0x100, 'controller restarted'),
-)
+# Interfaces whose error frames are those of the Linux kernel; others have layouts of their own.
+_KERNEL_ERRORS = ('socketcan', 'socketcand')
+# Interfaces on a serial port that python-can keeps in ``serialPortOrig``.
+_SERIAL = ('slcan', 'robotell')
 
 
 class Port:
@@ -49,22 +52,31 @@ class Port:
 
     :ivar age: s between the reception of the last received frame and the return of ``receive``.
     :ivar error_frames: error frames seen.
+    :ivar last_error: the last of them that asks for something to be done; None: there was none.
+    :ivar controller: state of the controller as far as it tells, '' while all is well.
     :ivar ignored_frames: remote and CAN FD frames seen; no protocol here has a use for them.
     :ivar malformed_frames: what arrived and was no frame: a serial adapter's line with bytes lost.
     """
 
-    def __init__(self, bus: can.BusABC) -> None:
+    def __init__(self, bus: can.BusABC, *, kernel_errors: bool = False) -> None:
         self._bus = bus
+        # what python-can documents for adapters to implement; the ``recv`` around it looks at the
+        # system clock, and waits for hours when that is set back
+        self._receive = bus._recv_internal
+        self._matches = bus._matches_filters
+        self._kernel_errors = kernel_errors
         # the serial port below python-can's text protocols
         self._serial = getattr(bus, 'serialPortOrig', None)
-        self._writer = _SerialWriter.take_over(self._serial)
+        self._writer: SerialWriter | None = getattr(bus, 'drive_can_writer', None)
+        self._socket = RawSocket.below(bus)
         self._lost = False
         self._malformed_in_row = 0
         self.age = 0.0
         self.error_frames = 0
         self.ignored_frames = 0
         self.malformed_frames = 0
-        self.last_error = ''
+        self.last_error: BusError | None = None
+        self.controller = ERROR_ACTIVE
         self.bus_off_count = 0
 
     def receive(self, timeout: float) -> Frame | None:
@@ -73,21 +85,23 @@ class Port:
 
         :param timeout: s.
         :return: a data frame, or None after the time-out or when something else came.
-        :raises BusUnavailable: the bus is lost.
+        :raises BusUnavailable: the bus is lost, or its controller went bus-off.
         """
         try:
-            message = self._bus.recv(timeout)
+            message, filtered = self._receive(timeout)
         except Exception as error:  # whatever an adapter throws: the bus is lost
-            if self._serial is not None and _is_malformed(error):
+            if self._serial is not None and is_malformed(error):
                 self._malformed()
                 return None
             self._lost = True
-            raise BusUnavailable(f'receive: {_with_cause(error)}') from error
+            raise BusUnavailable(f'receive: {with_cause(error)}') from error
         if message is None:
             self._limit_line()
             return None
         if message.is_error_frame:
             self._error_frame(message)
+            return None
+        if not (filtered or self._matches(message)):
             return None
         if message.is_remote_frame or message.is_fd:
             self.ignored_frames += 1
@@ -114,18 +128,37 @@ class Port:
         message = can.Message(arbitration_id=frame.identifier, data=frame.data,
                               is_extended_id=frame.extended)
         try:
+            if self._socket is not None and not self._socket.has_room(timeout):
+                raise TransportError('send: transmit queue full')
             if self._writer is None:
                 self._bus.send(message, timeout)
             else:
                 self._writer.timeout = timeout
                 self._bus.send(message)
+        except TransportError:
+            raise
         except can.CanTimeoutError as error:
             raise TransportError(f'send: {in_words(error)}') from error
         except Exception as error:  # whatever an adapter throws: the bus is lost
-            if _is_full_queue(error):
+            if is_full_queue(error):
                 raise TransportError('send: transmit queue full') from error
             self._lost = True
-            raise BusUnavailable(f'send: {_with_cause(error)}') from error
+            raise BusUnavailable(f'send: {with_cause(error)}') from error
+
+    def shorten_queue(self, frames: int) -> None:
+        """Let about so many frames wait in the kernel at most, where that can be set."""
+        if self._socket is not None:
+            self._socket.shorten_queue(frames)
+
+    @property
+    def has_room(self) -> bool | None:
+        """A frame could be sent now; None: this adapter does not tell."""
+        return None if self._socket is None else self._socket.has_room(0.0)
+
+    @property
+    def overflowed_frames(self) -> int:
+        """Received frames that were lost because nobody took them in time, where it is known."""
+        return 0 if self._socket is None else self._socket.overflowed_frames
 
     def close(self) -> None:
         """
@@ -174,64 +207,26 @@ class Port:
 
     def _error_frame(self, message: can.Message) -> None:
         self.error_frames += 1
-        classes = [text for bit, text in _ERROR_CLASSES if message.arbitration_id & bit]
-        self.last_error = ', '.join(classes) or 'unknown error'
-        if message.arbitration_id & 0x040:
+        if not self._kernel_errors:
+            self.last_error = BusError('error frame', None, ADVICE_DISTURBED)
+            return
+        error = decode_error_frame(message.arbitration_id, bytes(message.data))
+        if error.advice:
+            self.last_error = error
+        if error.state is not None:
+            self.controller = error.state
+        if error.state == BUS_OFF:
             self.bus_off_count += 1
+            raise BusUnavailable(f'{error.text}; {error.advice}')
 
 
-class _SerialWriter:
-    """
-    Writes to a serial port in a limited time: everything, or it raises.
-
-    Takes the place of pyserial's ``write`` and ``flush``. The one looks at the clock even after
-    everything was written, and so takes a busy machine for a dead adapter; the other waits without
-    a limit, with the bus lock held, for an adapter that has stopped to read. Nothing old piles up
-    instead: a terminal with more than 256 bytes waiting does not count as writable.
-    """
-
-    def __init__(self, descriptor: int) -> None:
-        self._descriptor = descriptor
-        self.timeout = 0.0
-
-    @classmethod
-    def take_over(cls, port: Any) -> '_SerialWriter | None':
-        """Write for this port from now on; None: it is not one of a POSIX system."""
-        descriptor = getattr(port, 'fd', None)
-        if not isinstance(descriptor, int):
-            return None
-        writer = cls(descriptor)
-        port.write = writer.write
-        port.flush = writer.flush
-        return writer
-
-    def write(self, data: bytes) -> int:
-        """
-        Write everything.
-
-        :raises TimeoutError: there is no room for it.
-        """
-        rest = memoryview(data)
-        deadline = time.monotonic() + self.timeout
-        while rest:
-            left = max(deadline - time.monotonic(), 0.0)
-            if not select.select([], [self._descriptor], [], left)[1]:
-                raise TimeoutError('the adapter takes no more data')
-            try:
-                rest = rest[os.write(self._descriptor, rest):]
-            except BlockingIOError:
-                pass
-        return len(data)
-
-    def flush(self) -> None:
-        """Do not wait for the adapter."""
-
-
-def open_port(bus: BusConfiguration, routes: Sequence[Route] = ()) -> Port:
+def open_port(bus: BusConfiguration, routes: Sequence[Route] = (), *, stations: int = 0) -> Port:
     """
     Open a bus. May block for as long as its adapter does: never call it with a lock held.
 
     :param routes: acceptance filters; none means all frames.
+    :param stations: for so many drives there should be room in the transmit queue of the kernel,
+        one frame for each; 0 leaves the queue as long as it is.
     :raises BusMisconfigured: unknown interface, missing driver, impossible bit rate or option.
     :raises BusUnavailable: device absent, busy, or refusing for now.
     """
@@ -247,21 +242,43 @@ def open_port(bus: BusConfiguration, routes: Sequence[Route] = ()) -> Port:
         adapter = can.interface._get_class_for_interface(bus.interface)
         if _takes(adapter, 'bitrate'):
             options['bitrate'] = bus.bitrate
-        port = Port(can.Bus(interface=bus.interface, channel=bus.channel, ignore_config=True,
-                            **options))
+        opened = (watched(adapter)(bus.channel, **options) if bus.interface in _SERIAL else
+                  can.Bus(interface=bus.interface, channel=bus.channel, ignore_config=True,
+                          **options))
+        port = Port(opened, kernel_errors=bus.interface in _KERNEL_ERRORS)
     except Exception as error:  # the one place where adapters may throw anything
         _abandon(error)
         text = f'{bus.interface} {bus.channel}: {in_words(error)}'
-        if _is_misconfiguration(error):
+        if is_misconfiguration(error):
             raise BusMisconfigured(text) from error
         raise BusUnavailable(text) from error
     try:
         # SocketCAN opens an interface that is down; the first look tells
         port.receive(0.0)
+        if bus.interface == 'socketcan':
+            _check_carrier(str(bus.channel))
     except BusUnavailable as error:
         port.close()
         raise BusUnavailable(f'{bus.interface} {bus.channel}: {in_words(error)}') from error
+    if stations:
+        port.shorten_queue(stations)
     return port
+
+
+def _check_carrier(channel: str) -> None:
+    """
+    See whether a controller takes part in the bus.
+
+    :raises BusUnavailable: it is bus-off. Its driver takes frames all the same, and drops them.
+    """
+    try:
+        carrier = Path('/sys/class/net', channel, 'carrier').read_text(encoding='ascii')
+    except (OSError, ValueError):
+        return  # not known: the interface is down, or has another name in this place
+    if carrier.strip() == '0':
+        raise BusUnavailable(
+            f'bus-off; {ADVICE_DISTURBED}; "ip link set {channel} down" and "up" start the '
+            f'controller again, "type can restart-ms 100" lets it do so by itself')
 
 
 def _abandon(error: BaseException) -> None:
@@ -281,44 +298,7 @@ def _abandon(error: BaseException) -> None:
         traceback = traceback.tb_next
 
 
-def in_words(error: BaseException) -> str:
-    """Return one readable line for any exception."""
-    text = ' '.join(str(error).split())
-    return text or type(error).__name__
-
-
-def _with_cause(error: BaseException) -> str:
-    """Return what an adapter says, with the reason that it may keep to itself."""
-    text, cause = in_words(error), error.__cause__
-    reason = in_words(cause) if cause is not None else ''
-    return text if reason in text else f'{text}: {reason}'
-
-
-def _is_malformed(error: BaseException) -> bool:
-    """Tell whether a line was no frame: python-can reads them without looking."""
-    return isinstance(error, (ValueError, IndexError)) or isinstance(
-        error.__cause__, UnicodeDecodeError)
-
-
 def _takes(adapter: type, keyword: str) -> bool:
     parameters = inspect.signature(adapter.__init__).parameters  # type: ignore[misc]
     return keyword in parameters or any(
         parameter.kind is inspect.Parameter.VAR_KEYWORD for parameter in parameters.values())
-
-
-def _is_misconfiguration(error: BaseException) -> bool:
-    # python-can wraps errors; the reason is at the end of the chain
-    cause: BaseException | None = error
-    while cause is not None:
-        if isinstance(cause, OSError):
-            return False
-        if isinstance(cause, (NotImplementedError, ImportError, NameError, ValueError,
-                              TypeError)):
-            return True
-        cause = cause.__cause__
-    return False
-
-
-def _is_full_queue(error: BaseException) -> bool:
-    # ENOBUFS of the socket: the kernel's transmit queue is full because nobody acknowledges
-    return getattr(error, 'error_code', None) == 105 or getattr(error, 'errno', None) == 105

@@ -2,11 +2,12 @@
 """What ``/diagnostics`` says, and that it says what to do."""
 
 import math
+from pathlib import Path
 from typing import Any
 
 from bridges import CONVEYOR, HASTY, parameters, StartBridge
 from clients import Client, ERROR, wait_until
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 import pytest
 from std_msgs.msg import Float64
 
@@ -21,7 +22,7 @@ DRIVE_KEYS = {
     'state', 'exchanges', 'missed_exchanges', 'latency_mean_ms', 'latency_p99_ms',
     'latency_max_ms', 'period_error_mean_ms', 'period_error_p99_ms', 'period_error_max_ms',
     'command_age_s', 'commands_refused', 'frames_rejected', 'parameter_requests_ok',
-    'parameter_requests_failed', 'last_parameter_error'}
+    'parameter_requests_failed', 'last_parameter_error', 'short_frames'}
 
 
 def test_names_and_keys(bridge: StartBridge, client: Client) -> None:
@@ -32,8 +33,8 @@ def test_names_and_keys(bridge: StartBridge, client: Client) -> None:
         BUS, DRIVE, 'drive_can_bridge: drive other']
     assert message.header.stamp.sec > 0
     for status, keys in zip(message.status, (BUS_KEYS, DRIVE_KEYS, DRIVE_KEYS)):
-        assert keys <= {pair.key for pair in status.values}
-        assert status.message
+        assert keys == {pair.key for pair in status.values}
+        assert status.message and status.hardware_id == status.name.rsplit(' ', 1)[1]
 
 
 def test_a_drive_that_works(bridge: StartBridge, client: Client) -> None:
@@ -98,10 +99,10 @@ def test_a_bus_that_is_not_there_yet(bridge: StartBridge, client: Client,
     there = False
     original = link.open_port
 
-    def open_port(*arguments: Any) -> Any:
+    def open_port(*arguments: Any, **options: Any) -> Any:
         if not there:
             raise BusUnavailable('virtual: no such device')
-        return original(*arguments)
+        return original(*arguments, **options)
     monkeypatch.setattr(link, 'open_port', open_port)
     one = bridge()
     assert client.wait_logged('virtual: no such device', ERROR) == (
@@ -173,3 +174,41 @@ def test_mapping_configure_rewrites(bridge: StartBridge, client: Client) -> None
     assert [drive.value(f'p{number}') for number in range(122, 130)] == [
         50, 51, 0, 0, 209, 210, 211, 0]
     assert not drive.violations
+
+
+def test_the_last_message_says_that_it_is_the_last(bridge: StartBridge, client: Client) -> None:
+    one = bridge(parameters(conveyor={**CONVEYOR, 'cyclic_request': []}))
+    one.online()
+    topic = client.topic('/diagnostics', DiagnosticArray)
+    topic.wait()
+    one.node.stop()
+    message = topic.wait(lambda array: array.status[1].level == DiagnosticStatus.STALE)
+    assert message.status[1].message == 'bridge ended: start it again'
+
+
+REFUSING = """
+protocols: [canopen_pkw]
+parameters:
+  speed: {number: 100, type: uint16, access: ro}
+  missing: {number: 200, type: uint16, access: ro}
+"""
+
+
+def test_what_is_refused_is_never_ok(bridge: StartBridge, client: Client, tmp_path: Path) -> None:
+    profile = tmp_path / 'refusing.yaml'
+    profile.write_text(REFUSING, encoding='utf-8')
+    one = bridge(parameters(conveyor={
+        'bus': 'main', 'protocol': 'canopen_pkw', 'station': 1, 'profile': str(profile),
+        'period': 0.1, 'cyclic_response': ['speed', 'missing'], 'missed_limit': 100,
+        'parameter_timeout': 2.0}))
+    one.online()
+    status = client.diagnostics(DRIVE, lambda drive: drive['state'] == 'online')
+    assert (status['level'], status['message']) == ('OK', 'online')
+    table: Any = one.played['conveyor'].drive
+    for address in [entry for entry, cell in table.table._cells.items()
+                    if cell.parameter.name == 'missing']:
+        del table.table._cells[address]
+    status = client.diagnostics(DRIVE, lambda drive: drive['level'] != 'OK')
+    assert (status['state'], status['level']) == ('online', 'WARN')
+    assert 'missing' in status['message'] and 'correct cyclic_response' in status['message']
+    assert status['missed_exchanges'] == '0'

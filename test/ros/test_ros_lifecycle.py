@@ -1,17 +1,21 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The bridge as a managed node."""
 
+from collections import Counter
 import gc
 from pathlib import Path
+import random
+import threading
 from typing import Any
 
 from bridges import Bridge, CONVEYOR, LIFT, parameters, StartBridge
-from clients import Client, ERROR, wait_until
+from clients import Client, ERROR, to_messages, wait_until
 from leaks import drive_nodes, open_channels, threads
 from lifecycle_msgs.msg import Transition
 import pytest
-from rcl_interfaces.srv import GetParameters
+from rcl_interfaces.srv import GetParameters, SetParameters
 from std_msgs.msg import Bool, Float64
+from std_srvs.srv import SetBool
 
 CONFIGURE, ACTIVATE = Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE
 DEACTIVATE, CLEANUP = Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP
@@ -223,6 +227,61 @@ def test_ten_rounds_leak_nothing(bridge: StartBridge, client: Client) -> None:
         return drive_nodes() == 0
     wait_until(forgotten, what='drive nodes to be forgotten')
     gc.collect()
+
+
+def test_any_order_during_traffic(bridge: StartBridge, client: Client) -> None:
+    """Sixty transitions by chance, legal and illegal, while everybody uses the drives."""
+    waiting(bridge, parameters(conveyor=CONVEYOR, lift=LIFT))
+    commands = [client.node.create_publisher(Float64, f'/{drive}/command/speed_setpoint', 10)
+                for drive in ('conveyor', 'lift')]
+    reads = [client.node.create_client(GetParameters, f'/{drive}/get_parameters')
+             for drive in ('conveyor', 'lift')]
+    writes = client.node.create_client(SetParameters, '/conveyor/set_parameters')
+    enable = client.node.create_client(SetBool, '/lift/enable')
+    futures: list[Any] = []
+    ending = threading.Event()
+
+    def traffic() -> None:
+        value = 0
+        while not ending.wait(0.01):
+            value += 1
+            for publisher in commands:
+                publisher.publish(Float64(data=float(value % 3)))
+            futures.extend(
+                entry.call_async(GetParameters.Request(names=['ramp_time', 'actual_speed']))
+                for entry in reads if entry.service_is_ready())
+            if writes.service_is_ready():
+                futures.append(writes.call_async(SetParameters.Request(
+                    parameters=to_messages({'jog_speed': float(value % 100)}))))
+            if enable.service_is_ready() and value % 10 == 0:
+                futures.append(enable.call_async(SetBool.Request(data=value % 20 == 0)))
+    thread = threading.Thread(target=traffic, name='traffic')
+    thread.start()
+    try:
+        state, chance = 'unconfigured', random.Random(6)
+        everything = (CONFIGURE, ACTIVATE, DEACTIVATE, CLEANUP)
+        taken = Counter[str]()
+        for _ in range(60):
+            transition = chance.choice(everything)
+            target = LEGAL[state].get(transition)
+            assert client.transition(transition) is (target is not None)
+            state = target or state
+            taken[state] += 1
+            assert client.state() == state
+        assert set(taken) == {'unconfigured', 'inactive', 'active'}
+        for transition in {'unconfigured': (CONFIGURE, ACTIVATE), 'inactive': (ACTIVATE,),
+                           'active': ()}[state]:
+            assert client.transition(transition)
+        # and it still works
+        wait_until(lambda: client.get('/conveyor', 'actual_speed') != [None])
+    finally:
+        ending.set()
+        thread.join()
+    wait_until(lambda: client.get('/lift', 'actual_speed') != [None])
+    answers = [future.result() for future in futures if future.done()]
+    assert any(getattr(answer, 'success', False) for answer in answers)  # ~/enable
+    assert any(values and values[0].type for values in (
+        getattr(answer, 'values', None) for answer in answers))
 
 
 def test_dynamic_parameters_survive_a_new_configuration(bridge: StartBridge,

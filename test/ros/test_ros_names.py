@@ -2,10 +2,11 @@
 """Names: namespaces, remaps, two bridges, qualities."""
 
 from bridges import Bridge, CONVEYOR, LIFT, parameters, StartBridge
-from clients import Client, wait_until
+from clients import Client, ERROR, wait_until
 import pytest
-from rcl_interfaces.msg import ParameterEvent
-from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rcl_interfaces.msg import LoggerLevel, ParameterEvent
+from rcl_interfaces.srv import SetLoggerLevels
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Bool, Float64
 from std_srvs.srv import SetBool
 
@@ -88,6 +89,41 @@ def test_two_bridges_in_one_graph(bridge: StartBridge, client: Client) -> None:
     wait_until(lambda: online.values[-1:] == [True])
 
 
+EVERYTHING = {
+    'publisher': ['actual_speed', 'motor_current', 'status_word', 'status_word/ready', 'response',
+                  'joint_state', 'online'],
+    'subscription': ['command/speed_setpoint', 'command/torque_limit', 'joint_command']}
+
+
+def test_every_quality_can_be_overridden(bridge: StartBridge, client: Client) -> None:
+    joint = {'name': 'belt', 'velocity': 'actual_speed', 'velocity_command': 'speed_setpoint'}
+    changes = {'publisher': {'reliability': 'best_effort', 'durability': 'volatile', 'depth': 2},
+               'subscription': {'reliability': 'best_effort'}}
+    overrides = {f'/conveyor/{topic}': {kind: changes[kind]}
+                 for kind, topics in EVERYTHING.items() for topic in topics}
+    overrides['/diagnostics'] = {'publisher': changes['publisher']}
+    one = bridge({**parameters(conveyor={**CONVEYOR, 'joint': joint}),
+                  'qos_overrides': overrides})
+    one.online()
+    node = client.node
+    for topic in (*(f'/conveyor/{name}' for name in EVERYTHING['publisher']), '/diagnostics'):
+        [info] = node.get_publishers_info_by_topic(topic)
+        assert info.qos_profile.reliability is ReliabilityPolicy.BEST_EFFORT, topic
+        assert info.qos_profile.durability is DurabilityPolicy.VOLATILE, topic
+    for name in EVERYTHING['subscription']:
+        [info] = node.get_subscriptions_info_by_topic(f'/conveyor/{name}')
+        assert info.qos_profile.reliability is ReliabilityPolicy.BEST_EFFORT, name
+
+
+def test_a_quality_that_does_not_exist(bridge: StartBridge, client: Client) -> None:
+    bridge({**parameters(), 'qos_overrides': {
+        '/conveyor/actual_speed': {'publisher': {'reliability': 'perhaps'}}}}, autostart=False)
+    assert not client.transition(1)
+    client.wait_logged('perhaps', ERROR)
+    assert client.state() == 'unconfigured'
+    assert '/conveyor' not in client.nodes()
+
+
 OVERRIDES = {
     '/conveyor/actual_speed': {'publisher': {'reliability': 'best_effort', 'depth': 3}},
     '/conveyor/command/speed_setpoint': {'subscription': {'reliability': 'best_effort'}},
@@ -111,3 +147,27 @@ def test_quality_can_be_overridden(bridge: StartBridge, client: Client, key: str
         for value in (0.0, 3.0):
             publisher.publish(Float64(data=value))
         wait_until(lambda: recorder.words()[:1] == (30,))
+
+
+@pytest.mark.parametrize('way', ['argument', 'service'])
+def test_log_level(bridge: StartBridge, client: Client, way: str) -> None:
+    # levels belong to the process: a logger of its own for each
+    name = f'{way}.drive_can_bridge'
+    arguments = ('--log-level', f'{name}:=warn') if way == 'argument' else ()
+    client.listen()
+    bridge(autostart=False, arguments=('-r', f'__ns:=/{way}', *arguments))
+    node = f'/{way}/drive_can_bridge'
+
+    def level(number: int) -> None:
+        answer = client.call(f'{node}/set_logger_levels', SetLoggerLevels, SetLoggerLevels.Request(
+            levels=[LoggerLevel(name=name, level=number)]))
+        assert [result.successful for result in answer.results] == [True]
+    if way == 'service':
+        level(LoggerLevel.LOG_LEVEL_WARN)
+    assert client.transition(1, node=node)
+    assert not client.transition(1, node=node)
+    client.wait_logged('transition number 1 is not possible')
+    assert 'bus main: open' not in client.logged(0, name)
+    level(LoggerLevel.LOG_LEVEL_INFO)
+    assert client.transition(3, node=node)
+    client.wait_logged('active: 1 drives on 1 buses')

@@ -262,6 +262,15 @@ class Client:
         """Wait until the drive's latched topic says online, or offline."""
         self.ask('latched', topic=f'{drive}/online', wanted=wanted)
 
+    def bit(self, topic: str, wanted: bool) -> None:
+        """Wait until a latched topic of a named bit has this value."""
+        self.ask('latched', topic=topic, wanted=wanted)
+
+    def control(self, service: str, wanted: bool | None = None) -> tuple[bool, str]:
+        """Call ~/enable, or ~/quick_stop and ~/reset_fault (None); return what they answer."""
+        success, message = self.ask('control', service=service, wanted=wanted)
+        return bool(success), str(message)
+
     def get(self, drive: str, *names: str) -> list[Any]:
         """Call GetParameters; None is NOT_SET."""
         values: list[Any] = self.ask('get', drive=drive, names=names)

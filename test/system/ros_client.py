@@ -22,6 +22,7 @@ import rclpy
 from rclpy.executors import ExternalShutdownException
 from rclpy.qos import DurabilityPolicy, qos_profile_parameters, QoSProfile
 from std_msgs.msg import Bool, Float64, Int64
+from std_srvs.srv import SetBool, Trigger
 
 TYPES = {'Float64': Float64, 'Int64': Int64}
 #: s after which a request that found a dying server is sent again
@@ -147,6 +148,13 @@ class Client:
         answer = self.call(SetParametersAtomically, f'{drive}/set_parameters_atomically', request,
                            timeout, qos_profile=qos_profile_parameters)
         return [(answer.result.successful, answer.result.reason)]
+
+    def control(self, service, wanted, timeout):
+        if wanted is None:
+            answer = self.call(Trigger, service, Trigger.Request(), timeout)
+        else:
+            answer = self.call(SetBool, service, SetBool.Request(data=wanted), timeout)
+        return answer.success, answer.message
 
     def transition(self, node, number, timeout):
         request = ChangeState.Request()

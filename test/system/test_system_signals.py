@@ -4,7 +4,6 @@
 from collections.abc import Iterator
 import os
 from pathlib import Path
-import select
 import signal
 import tty
 
@@ -104,25 +103,19 @@ def test_during_start_up(processes: Processes, namespace: str, tmp_path: Path, n
 
 
 @pytest.fixture
-def full_terminal() -> Iterator[str]:
-    """Return a pseudo-terminal that takes nothing more: nobody reads, and its buffer is full."""
-    reading, writing = os.openpty()
-    tty.setraw(writing)
-    os.set_blocking(writing, False)
-    # the kernel moves what it took from one buffer to the next, and has room again
-    while select.select([], [writing], [], 0.3)[1]:
-        try:
-            os.write(writing, bytes(100))
-        except BlockingIOError:
-            pass
-    yield os.ttyname(writing)
-    os.close(reading)
-    os.close(writing)
+def terminal() -> Iterator[str]:
+    """Return a pseudo-terminal."""
+    master, slave = os.openpty()
+    tty.setraw(slave)
+    yield os.ttyname(slave)
+    os.close(master)
+    os.close(slave)
 
 
 def test_second_signal_ends_at_once(processes: Processes, client: Client, namespace: str,
-                                    tmp_path: Path, full_terminal: str) -> None:
-    bridge = processes.bridge(bridge_file(tmp_path, channel=full_terminal), namespace)
+                                    tmp_path: Path, terminal: str) -> None:
+    bridge = processes.bridge(
+        bridge_file(tmp_path, channel=terminal, bus={'sleep_after_open': 600.0}), namespace)
     # its reader hangs in an open that never ends; the node is there all the same
     bridge.error('active: 1 drives on 1 buses')
     facts = client.diagnostics(f'{namespace}/drive_can_bridge: bus main', state='opening')

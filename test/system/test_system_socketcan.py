@@ -11,11 +11,16 @@ import os
 from pathlib import Path
 import re
 import shutil
+import signal
+import socket
+import struct
 import subprocess
 
+from kernel_adapter import ip
 from parameter_files import bridge_file, CONVEYOR
 from processes import Client, Processes, SLOWNESS, wait_for
 import pytest
+from repeating import again_and_again
 from test_system_reconnection import rearm_and_move, start_moving
 
 CHANNEL = os.environ.get('DRIVE_CAN_SOCKETCAN', 'vcan0')
@@ -31,11 +36,6 @@ pytestmark = [
                        reason=f'no SocketCAN interface {CHANNEL}; name one by '
                               f'DRIVE_CAN_SOCKETCAN'),
 ]
-
-
-def ip(*arguments: str) -> None:
-    """Run ``ip``."""
-    subprocess.run(['ip', *arguments], check=True, capture_output=True, timeout=60)
 
 
 def make_own() -> None:
@@ -148,3 +148,56 @@ def test_interface_deleted_and_created(processes: Processes, client: Client, nam
     rearm_and_move(client, drive, bridge, simulator, count)
     assert bridge.end() == 0
     assert simulator.end() == 0
+
+
+def stranger(channel: str) -> socket.socket:
+    """Return a raw socket on the bus."""
+    raw = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
+    raw.bind((channel,))
+    return raw
+
+
+def packed(identifier: int, data: str) -> bytes:
+    """Return a frame as the kernel wants it: linux/can.h, struct can_frame."""
+    return struct.pack('=IB3x8s', identifier, len(data) // 2, bytes.fromhex(data))
+
+
+def test_error_frames_and_lost_frames(processes: Processes, client: Client, namespace: str,
+                                      tmp_path: Path) -> None:
+    file = bridge_file(tmp_path, interface='socketcan', channel=CHANNEL, drives=DRIVES)
+    simulator = processes.simulator(file, link=False)
+    bridge = processes.bridge(file, namespace)
+    drive = f'/{namespace}/conveyor'
+    bus = f'{namespace}/drive_can_bridge: bus main'
+    start_moving(client, drive)
+    with stranger(CHANNEL) as raw:
+        # CAN_ERR_FLAG with CAN_ERR_PROT: stuff error in the data; then CAN_ERR_CRTL: warning
+        with again_and_again(lambda: raw.send(packed(0x20000008, '0000040A00000000'))):
+            facts = client.diagnostics(bus, message='stuff error in the data')
+        assert facts['level'] == '1'
+        assert facts['message'].endswith('check cable, shield, termination and bit rate')
+        raw.send(packed(0x20000004, '0008000000000000'))
+        client.diagnostics(bus, state='^error-warning$', level='^1$')
+        raw.send(packed(0x20000004, '0040000000000000'))
+        client.diagnostics(bus, state='^up$', level='^0$')
+
+        # bus-off, and the controller is restarted (this one never left): re-armed, not resumed
+        count = len(simulator.frames())
+        raw.send(packed(0x20000040, '0000000000000000'))
+        client.online(drive, wanted=False)
+        bridge.error('conveyor: offline: bus down: bus-off')
+        client.online(drive)
+        rearm_and_move(client, drive, bridge, simulator, count + 8)
+        facts = client.diagnostics(bus, state='^up$')
+        assert (facts['bus_off_count'], facts['reconnections']) == ('1', '1')
+
+        # a process that does not read loses frames, and says so when it can again
+        def fall_asleep() -> None:
+            bridge.send(signal.SIGSTOP)
+            for _ in range(2000):
+                raw.send(packed(0x903FFFF0, '0000000000000000'))
+            bridge.send(signal.SIGCONT)
+        with again_and_again(fall_asleep, 0.5 * SLOWNESS):
+            facts = client.diagnostics(bus, message='[0-9]+ received frames lost')
+        assert facts['level'] == '1'
+    assert bridge.end() == 0

@@ -29,8 +29,8 @@ from drive_can_bridge.ros.demo.observer import Observer
 from drive_can_bridge.ros.executor_thread import ExecutorThread
 from drive_can_bridge.simulation.faults import Fault
 from drive_can_bridge.simulation.simulation import Simulation
+from drive_can_bridge.transport.failures import in_words
 from drive_can_bridge.transport.link import steady_now
-from drive_can_bridge.transport.port import in_words
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from drive_can_bridge.configuration.model import BridgeConfiguration, DriveConfiguration
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import Access, Parameter, Value, ValueKind
+from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.simulation.names import Quantity, quantity_of
 
 #: values tried for a parameter; the first that it takes is shown
@@ -48,7 +49,8 @@ def hints(configuration: BridgeConfiguration, *, bridge: str, namespace: str,
 
 
 def _commands(drives: list[DriveConfiguration], prefix: str, bridge: str) -> Iterator[Hint]:
-    controlled = next((drive for drive in drives if drive.profile.control is not None), None)
+    controlled = next((drive for drive in drives if drive.profile.control is not None
+                       or FAMILIES[drive.protocol].control_built_in), None)
     drive = next((drive for drive in drives if _setpoint(drive) is not None), None)
     setpoint = _setpoint(drive) if drive is not None else None
     if drive is not None and setpoint is not None:

@@ -70,15 +70,16 @@ class _DriveObserver:
         control = session.control.state if session and session.control is not None else ''
         state = session.state if session else DriveState.OFFLINE
         answering = session is not None and session.online
+        parameters = _shown(self._drive, session)
         return DriveSnapshot(
             name=self._drive.name, state=state, answering=answering,
             place=f'{self._drive.bus}, station {self._drive.station}',
             control=control if answering else '', advice=_advice(session),
             setpoints=self._setpoints(session),
             values=tuple(show(parameter, values.get(parameter.name))
-                         for parameter in self._drive.cyclic_response),
+                         for parameter in parameters),
             bits=tuple(_bits(parameter, values.get(parameter.name))
-                       for parameter in self._drive.cyclic_response if parameter.bits),
+                       for parameter in parameters if parameter.bits),
             rate=self._rate.update(session.statistics.exchanges if session else 0, now),
             exchanges=session.statistics.exchanges if session else 0,
             missed=session.statistics.missed if session else 0,
@@ -169,9 +170,15 @@ class Observer:
             values = node.values() if node is not None else {}
             online = node is not None and node.session.online
             assignments = [as_assignment(parameter, values[parameter.name])
-                           for parameter in drive.cyclic_response if parameter.name in values]
+                           for parameter in _shown(drive, node.session if node else None)
+                           if parameter.name in values]
             lines.append(' '.join([name, 'online' if online else 'offline', *assignments]))
         return lines
+
+
+def _shown(drive: DriveConfiguration, session: Session | None) -> tuple[Parameter, ...]:
+    """Return everything of which a drive has values: what is built in, too."""
+    return drive.cyclic_response if session is None else session.sample_parameters
 
 
 def _advice(session: Session | None) -> str:

@@ -1,0 +1,74 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The parameters of the bridge's own node.
+
+Parameter files say what they are (``overrides``); once that has been checked, every key is
+declared with its value in effect, so that ``ros2 param get`` tells it. Four of them may be changed
+while the bridge runs; all others are read-only and say so.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from drive_can_bridge.configuration.load import check_dynamic, declared_parameters
+from drive_can_bridge.configuration.model import BridgeConfiguration
+
+_OURS = ('drives.', 'buses.')
+_OURS_ALONE = ('diagnostics_period', 'autostart')
+
+
+class NodeParameters:
+    """
+    Declares, checks and passes on.
+
+    :param changed: takes (name, value) of each parameter that was changed.
+    """
+
+    def __init__(self, node: Node, changed: Callable[[str, Any], None]) -> None:
+        self._node = node
+        self._changed = changed
+        self._dynamic: list[str] = []
+        node.add_on_set_parameters_callback(self._check)
+        node.add_post_set_parameters_callback(self._apply)
+
+    @property
+    def overrides(self) -> dict[str, Any]:
+        """What parameter files and command line say, by dotted name."""
+        return {name: parameter.value
+                for name, parameter in self._node._parameter_overrides.items()}
+
+    @property
+    def current(self) -> dict[str, Any]:
+        """The same with what has been changed since."""
+        current = self.overrides
+        for name in self._dynamic:
+            current[name] = self._node.get_parameter(name).value
+        return current
+
+    def declare(self, configuration: BridgeConfiguration) -> None:
+        """Declare every key of a configuration that is not declared yet."""
+        for name, value, description, dynamic in declared_parameters(configuration):
+            if self._node.has_parameter(name):
+                continue
+            if dynamic:
+                self._dynamic.append(name)
+            self._node.declare_parameter(
+                name, value, ParameterDescriptor(
+                    description=description, read_only=not dynamic, dynamic_typing=True),
+                ignore_override=True)
+
+    def _check(self, parameters: list[Parameter]) -> SetParametersResult:
+        for parameter in parameters:
+            if parameter.name.startswith(_OURS) or parameter.name in _OURS_ALONE:
+                problem = check_dynamic(parameter.name, parameter.value)
+                if problem and self._node.has_parameter(parameter.name):
+                    return SetParametersResult(successful=False, reason=problem)
+        return SetParametersResult(successful=True)
+
+    def _apply(self, parameters: list[Parameter]) -> None:
+        for parameter in parameters:
+            self._changed(parameter.name, parameter.value)

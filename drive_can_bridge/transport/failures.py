@@ -1,0 +1,47 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+What python-can's adapters throw, and what it means.
+
+They fail in many ways: NameError, NotImplementedError, OSError, ValueError, CanError and its
+children, whatever a vendor's library throws.
+"""
+
+import errno
+
+
+def in_words(error: BaseException) -> str:
+    """Return one readable line for any exception."""
+    text = ' '.join(str(error).split())
+    return text or type(error).__name__
+
+
+def with_cause(error: BaseException) -> str:
+    """Return what an adapter says, with the reason that it may keep to itself."""
+    text, cause = in_words(error), error.__cause__
+    reason = in_words(cause) if cause is not None else ''
+    return text if reason in text else f'{text}: {reason}'
+
+
+def is_malformed(error: BaseException) -> bool:
+    """Tell whether a line was no frame: python-can reads them without looking."""
+    return isinstance(error, (ValueError, IndexError)) or isinstance(
+        error.__cause__, UnicodeDecodeError)
+
+
+def is_misconfiguration(error: BaseException) -> bool:
+    """Tell whether another attempt to open a bus would fail for the same reason."""
+    # python-can wraps errors; the reason is at the end of the chain
+    cause: BaseException | None = error
+    while cause is not None:
+        if isinstance(cause, OSError):
+            return False
+        if isinstance(cause, (NotImplementedError, ImportError, NameError, ValueError,
+                              TypeError)):
+            return True
+        cause = cause.__cause__
+    return False
+
+
+def is_full_queue(error: BaseException) -> bool:
+    """Tell whether the kernel's transmit queue is full: ENOBUFS of a socket."""
+    return errno.ENOBUFS in (getattr(error, 'error_code', None), getattr(error, 'errno', None))

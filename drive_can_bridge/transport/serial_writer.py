@@ -1,0 +1,99 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+Serial ports below python-can's text protocols: written to in a limited time, from the first byte.
+
+pyserial's ``write`` looks at the clock even after everything was written, and so takes a busy
+machine for a dead adapter; its ``flush`` waits without a limit for an adapter that has stopped to
+read. Both are replaced as soon as the port is there, because python-can's constructors write, too.
+"""
+
+from collections.abc import Callable
+import os
+import select
+import time
+from typing import Any
+
+#: s that each command to a serial adapter may take while it is opened
+OPEN_TIMEOUT = 0.5
+
+
+class SerialWriter:
+    """
+    Writes to a serial port in a limited time: everything, or it raises.
+
+    Nothing old piles up: a terminal with more than 256 bytes waiting does not count as writable.
+
+    :ivar timeout: s.
+    """
+
+    def __init__(self, descriptor: int, timeout: float = 0.0) -> None:
+        self._descriptor = descriptor
+        self.timeout = timeout
+
+    @classmethod
+    def take_over(cls, port: Any) -> 'SerialWriter | None':
+        """Write for this port from now on; None: it is not one of a POSIX system."""
+        descriptor = getattr(port, 'fd', None)
+        if not isinstance(descriptor, int):
+            return None
+        writer = cls(descriptor, OPEN_TIMEOUT)
+        port.write = writer.write
+        port.flush = writer.flush
+        return writer
+
+    def write(self, data: bytes) -> int:
+        """
+        Write everything.
+
+        :raises TimeoutError: there is no room for it.
+        """
+        rest = memoryview(data)
+        deadline = time.monotonic() + self.timeout
+        while rest:
+            left = max(deadline - time.monotonic(), 0.0)
+            if not select.select([], [self._descriptor], [], left)[1]:
+                raise TimeoutError('the adapter takes no more data')
+            try:
+                rest = rest[os.write(self._descriptor, rest):]
+            except BlockingIOError:
+                pass
+        return len(data)
+
+    def flush(self) -> None:
+        """Do not wait for the adapter."""
+
+
+class _WatchedPort:
+    """
+    Mix-in for python-can's serial adapters: takes the port over the moment that it is opened.
+
+    ``serialPortOrig`` is the attribute into which they put it.
+    """
+
+    _serial_port: Any = None
+    drive_can_writer: SerialWriter | None = None
+
+    @property
+    def serialPortOrig(self) -> Any:  # noqa: N802  python-can's name
+        return self._serial_port
+
+    @serialPortOrig.setter
+    def serialPortOrig(self, port: Any) -> None:  # noqa: N802  python-can's name
+        self._serial_port = port
+        self.drive_can_writer = SerialWriter.take_over(port)
+        if self.drive_can_writer is not None:
+            # what whoever had the adapter before has left may not even leave room for a command
+            port.reset_output_buffer()
+            # of text protocols: what was cut off is no beginning of the first command
+            port.write(getattr(self, 'LINE_TERMINATOR', b''))
+
+
+#: interface -> its class with the mix-in
+_WATCHED: dict[type, type] = {}
+
+
+def watched(adapter: type[Any]) -> Callable[..., Any]:
+    """Return a serial adapter's class, made so that opening it cannot hang."""
+    if adapter not in _WATCHED:
+        _WATCHED[adapter] = type(adapter.__name__, (_WatchedPort, adapter), {})
+    return _WATCHED[adapter]

@@ -1,0 +1,147 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+Controllers of the kernel that report errors, go bus-off, and get nothing onto the bus.
+
+Needs root and the kernel's slcan driver, as the emulated kernel has them (.ci/socketcan/run); what
+is on emulated controllers with a bit rate runs where DRIVE_CAN_CONTROLLERS names two of them.
+"""
+
+from collections.abc import Iterator
+import os
+from pathlib import Path
+
+from kernel_adapter import ip, KernelAdapter
+from parameter_files import bridge_file, CONVEYOR
+from processes import Client, Processes, SLOWNESS, wait_for
+import pytest
+from repeating import again_and_again
+from slcan_peer import ZEROS
+from test_system_reconnection import rearm_and_move, start_moving, status_of
+
+CYCLIC_REQUEST = 'T003FFFF08'
+MOVING = f'{CYCLIC_REQUEST}05DC{ZEROS[4:]}'
+NEUTRAL = CYCLIC_REQUEST + ZEROS
+#: what the smallest send buffer of the kernel holds, and one frame in the controller
+UNDER_WAY = 3 + 1
+PERIOD = 0.1
+DRIVES = {'conveyor': {**CONVEYOR, 'period': PERIOD, 'mapping': 'assume',
+                       'parameter_timeout': 0.3 * SLOWNESS,
+                       'command_timeout': 5.0 * SLOWNESS}}
+CONTROLLERS = os.environ.get('DRIVE_CAN_CONTROLLERS', '').split()
+
+pytestmark = pytest.mark.socketcan
+
+
+@pytest.fixture
+def adapter(tmp_path: Path) -> Iterator[KernelAdapter]:
+    started = KernelAdapter(tmp_path, {CYCLIC_REQUEST: f'T103FFFF08{ZEROS}'})
+    yield started
+    started.close()
+
+
+def start_feeding(client: Client, drive: str, adapter: KernelAdapter) -> None:
+    """Arm the speed setpoint, and see that it arrives; the adapter's drive never moves."""
+    client.online(drive)
+    since = len(adapter.lines)
+    client.publish(f'{drive}/command/speed_setpoint', 0.0)
+    client.diagnostics(status_of(drive), message='not armed: publish 0 to [^ ]*/torque_limit$')
+    client.publish(f'{drive}/command/speed_setpoint', 150.0)
+    adapter.wait_for(MOVING, since)
+
+
+def neutral_until_armed(client: Client, drive: str, adapter: KernelAdapter, since: int) -> None:
+    """See that nothing moves although the publisher goes on, and arm again."""
+    client.online(drive)
+    client.diagnostics(status_of(drive), message='not armed: .*/speed_setpoint')
+    adapter.wait_for(NEUTRAL, since, 3)
+    assert MOVING not in adapter.lines[since:]
+    start_feeding(client, drive, adapter)
+
+
+def test_controller_in_trouble(processes: Processes, client: Client, namespace: str,
+                               tmp_path: Path, adapter: KernelAdapter) -> None:
+    file = bridge_file(tmp_path, interface='socketcan', channel=adapter.name, drives=DRIVES)
+    bridge = processes.bridge(file, namespace)
+    drive = f'/{namespace}/conveyor'
+    bus = f'{namespace}/drive_can_bridge: bus main'
+    start_feeding(client, drive, adapter)
+
+    # error-passive while sending: nobody acknowledges; it is told, and the exchange goes on
+    adapter.report('p', sent=128)
+    facts = client.diagnostics(bus, state='^error-passive$')
+    assert facts['level'] == '1'
+    assert 'controller error-passive' in facts['message']
+    assert 'no other node acknowledges: check that one is switched on, cable' in facts['message']
+    with again_and_again(lambda: adapter.send(b'e1a\r')):
+        facts = client.diagnostics(bus, message='no acknowledgement')
+    assert 'no other node acknowledges' in facts['message']
+    assert int(facts['error_frames']) >= 2
+    adapter.report('a', sent=1)
+    facts = client.diagnostics(bus, state='^up$', level='^0$')
+    assert facts['bus_off_count'] == facts['reconnections'] == '0'
+    assert [line for line in bridge.errors if 'bus main: ' in line and 'open' not in line] == []
+
+    # bus-off: the drive is lost at once, and told why; the driver takes frames and drops them
+    adapter.report('b', sent=255)
+    client.online(drive, wanted=False)
+    assert 'check cable, shield, termination' in bridge.error('bus main: bus-off')
+    for _ in range(3):  # at every attempt
+        facts = client.diagnostics(bus)
+        assert (facts['state'], facts['level'], facts['bus_off_count']) == ('bus-off', '2', '1')
+    assert f'"ip link set {adapter.name} down"' in facts['message']
+    assert 'restart-ms' in facts['message']
+    assert client.set(drive, ramp_time=1.0) == [(False, 'bus down')]
+    since = len(adapter.lines)
+    adapter.switch('down')
+    adapter.switch('up')
+    neutral_until_armed(client, drive, adapter, since)
+    facts = client.diagnostics(bus, state='^up$')
+    assert facts['reconnections'] == '1'
+
+    # nothing leaves: the transmit queue fills, and no more is put into it than it holds at once
+    adapter.stop_reading()
+    client.online(drive, wanted=False)
+    line = bridge.error('bus main: send: transmit queue full')
+    assert 'no other node acknowledges: check that one is switched on, cable' in line
+    facts = client.diagnostics(bus, state='^down$', level='^2$')
+    assert 'no other node acknowledges' in facts['message']
+    failures = int(facts['send_failures'])
+    for _ in range(5):
+        facts = client.diagnostics(bus)
+    # not even tried while nothing can leave
+    assert int(facts['send_failures']) == failures
+    assert client.set(drive, ramp_time=1.0) == [(False, 'bus down')]
+    # somebody acknowledges again: what was under way comes first, nobody can take that back
+    since = adapter.read_again()
+    wait_for(lambda: len(adapter.lines) > since + UNDER_WAY, 'frames')
+    stale = [line for line in adapter.lines[since:since + UNDER_WAY] if line == MOVING]
+    assert len(stale) <= UNDER_WAY
+    neutral_until_armed(client, drive, adapter, since + len(stale))
+    assert client.diagnostics(bus, state='^up$')['reconnections'] == '2'
+    assert bridge.end() == 0
+    frames = [line for line in adapter.lines if line.startswith('T')]
+    assert frames[-3:] == [NEUTRAL] * 3
+
+
+@pytest.mark.skipif(len(CONTROLLERS) != 2, reason='DRIVE_CAN_CONTROLLERS names no two controllers')
+def test_two_controllers_on_a_wire(processes: Processes, client: Client, namespace: str,
+                                   tmp_path: Path) -> None:
+    # the bridge at one, the drive at the other; each is an SJA1000 with a bit rate
+    drives = {'conveyor': {**DRIVES['conveyor'], 'mapping': 'verify'}}
+    here, there = CONTROLLERS
+    file = bridge_file(tmp_path, interface='socketcan', channel=here, drives=drives)
+    simulator = processes.simulator(file, '--channel', there, link=False)
+    bridge = processes.bridge(file, namespace)
+    drive = f'/{namespace}/conveyor'
+    bus = f'{namespace}/drive_can_bridge: bus main'
+    start_moving(client, drive)
+    # its own controller is switched off; the drive's is not, and hears nothing any more
+    ip('link', 'set', here, 'down')
+    client.online(drive, wanted=False)
+    assert 'Network is down' in bridge.error(r'bus main: .*tried again every 0\.2 s')
+    assert client.diagnostics(bus, state='^down$')['level'] == '2'
+    count = len(simulator.frames())
+    ip('link', 'set', here, 'up')
+    rearm_and_move(client, drive, bridge, simulator, count)
+    assert client.diagnostics(bus, state='^up$')['error_frames'] == '0'
+    assert bridge.end() == 0

@@ -1,0 +1,389 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""The link to a bus: kept open, given up for a while, and what it does when nothing leaves."""
+
+from collections import deque
+from collections.abc import Callable, Iterator
+import errno
+from pathlib import Path
+import threading
+import time
+from typing import Any
+
+import pytest
+
+from drive_can_bridge.configuration.model import BusConfiguration
+from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, TransportError
+from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.transport import link as link_module
+from drive_can_bridge.transport.error_frames import BusError
+from drive_can_bridge.transport.link import Link
+
+FRAME = Frame(0x003FFFF0, bytes(8), True)
+ANSWER = Frame(0x103FFFF0, bytes(8), True)
+FULL = 'send: transmit queue full'
+ALONE = ('no other node acknowledges: check that one is switched on, cable, termination and bit '
+         'rate')
+BUS = BusConfiguration('main', 'fake', 'x', reconnect_period=0.02)
+
+
+def wait_for(condition: Callable[[], Any]) -> None:
+    """Wait until a condition holds; much longer than ever needed."""
+    deadline = time.monotonic() + 20.0
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.002)
+
+
+class FakePort:
+    """An open bus on which anything may happen."""
+
+    def __init__(self) -> None:
+        self.coming: deque[Frame | BaseException] = deque()
+        self.sent: list[Frame] = []
+        self.timeouts: list[float] = []
+        self.full = False
+        self.failure: TransportError | None = None
+        #: None: the adapter does not tell
+        self.has_room: bool | None = None
+        self.looks = 0
+        self.closed = False
+        self.age = 0.0
+        self.error_frames = self.bus_off_count = self.overflowed_frames = 0
+        self.malformed_frames = 0
+        self.last_error: BusError | None = None
+        self.controller = ''
+
+    def receive(self, timeout: float) -> Frame | None:
+        if not self.coming:
+            time.sleep(0.001)
+            return None
+        found = self.coming.popleft()
+        if isinstance(found, BaseException):
+            raise found
+        return found
+
+    def send(self, frame: Frame, timeout: float) -> None:
+        self.timeouts.append(timeout)
+        if self.failure is not None:
+            raise self.failure
+        if self.full:
+            raise TransportError(FULL)
+        self.sent.append(frame)
+
+    def close(self) -> None:
+        self.closed = True
+
+
+class QueuedPort(FakePort):
+    """One whose transmit queue can be looked at, as SocketCAN's."""
+
+    @property
+    def has_room(self) -> bool:  # type: ignore[override]
+        self.looks += 1
+        return not self.full
+
+    @has_room.setter
+    def has_room(self, value: object) -> None:
+        pass
+
+
+class Listener:
+    """Keeps what it is told."""
+
+    def __init__(self) -> None:
+        self.frames_rejected = 0
+        self.told: list[str] = []
+        self.frames: list[Frame] = []
+
+    def frame_received(self, frame: Frame, age: float) -> None:
+        self.frames.append(frame)
+
+    def bus_opened(self) -> None:
+        self.told.append('opened')
+
+    def bus_lost(self, reason: str) -> None:
+        self.told.append(f'lost: {reason}')
+
+    def bus_misconfigured(self, reason: str) -> None:
+        self.told.append(f'misconfigured: {reason}')
+
+    def link_failed(self, reason: str) -> None:
+        self.told.append(f'failed: {reason}')
+
+
+class Bench:
+    """A link on ports of ours; ``ports`` are those that it got."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, kind: type[FakePort] = FakePort, *,
+                 send_timeout: float = 0.01) -> None:
+        self.kind = kind
+        self.ports: list[FakePort] = []
+        self.refusals: deque[Exception] = deque()
+        self.attempts = 0
+        self.stations: set[int] = set()
+        self.listener = Listener()
+        monkeypatch.setattr(link_module, 'open_port', self._open)
+        self.link = Link(BUS, [], self.listener, send_timeout=send_timeout, stations=3)
+        self.link.start()
+
+    def _open(self, bus: BusConfiguration, routes: object, *, stations: int) -> FakePort:
+        self.attempts += 1
+        self.stations.add(stations)
+        if self.refusals:
+            raise self.refusals.popleft()
+        self.ports.append(self.kind())
+        return self.ports[-1]
+
+    @property
+    def port(self) -> FakePort:
+        return self.ports[-1]
+
+    def opened(self, times: int = 1) -> None:
+        """Wait until the bus was opened so often."""
+        wait_for(lambda: self.listener.told.count('opened') == times)
+
+    def send_until_blocked(self) -> None:
+        """Send as a timer would, until nothing is handed to the adapter any more."""
+        def send() -> bool:
+            self.link.send(FRAME)
+            return not self.link.is_open
+        wait_for(send)
+
+
+@pytest.fixture
+def make(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Bench]]:
+    made: list[Bench] = []
+
+    def start(*arguments: Any, **options: Any) -> Bench:
+        made.append(Bench(monkeypatch, *arguments, **options))
+        return made[-1]
+    yield start
+    for bench in made:
+        bench.link.stop()
+        assert not bench.link._thread.is_alive()
+
+
+def test_open_read_send_close(make: Callable[..., Bench]) -> None:
+    bench = make()
+    assert bench.link.wait_first_attempt(20.0)
+    bench.opened()
+    assert bench.stations == {3}
+    bench.port.coming.append(ANSWER)
+    wait_for(lambda: bench.listener.frames == [ANSWER])
+    assert bench.link.send(FRAME)
+    assert bench.port.timeouts == [0.01]
+    assert (bench.link.frames_sent, bench.link.frames_received) == (1, 1)
+    bench.link.stop()
+    assert bench.port.closed
+    assert not bench.link.send(FRAME)
+    assert bench.listener.told == ['opened']
+
+
+def test_loss_seen_by_the_reader(make: Callable[..., Bench]) -> None:
+    bench = make()
+    bench.opened()
+    bench.refusals += [BusUnavailable('gone'), BusUnavailable('gone'), BusUnavailable('busy')]
+    bench.port.coming.append(BusUnavailable('receive: Network is down'))
+    bench.opened(2)
+    # told once each, not at every attempt
+    assert bench.listener.told == ['opened', 'lost: receive: Network is down', 'lost: gone',
+                                   'lost: busy', 'opened']
+    assert bench.ports[0].closed
+    assert bench.link.reconnections == 1
+
+
+def test_loss_seen_by_a_sender(make: Callable[..., Bench]) -> None:
+    bench = make()
+    bench.opened()
+    bench.port.failure = BusUnavailable('send: no such device')
+    assert not bench.link.send(FRAME)
+    assert not bench.link.send(FRAME)  # nothing is tried any more until it is open again
+    assert len(bench.ports[0].timeouts) == 1
+    bench.opened(2)
+    assert bench.listener.told == ['opened', 'lost: send: no such device', 'opened']
+    assert bench.link.send(FRAME)
+
+
+def test_out_of_file_descriptors_at_reconnection(make: Callable[..., Bench]) -> None:
+    bench = make()
+    bench.opened()
+    bench.refusals += [BusUnavailable(OSError(errno.EMFILE, 'Too many open files'))] * 3
+    bench.port.coming.append(BusUnavailable('receive: unplugged'))
+    bench.opened(2)
+    assert bench.attempts == 5
+
+
+def test_configuration_that_can_never_work(make: Callable[..., Bench]) -> None:
+    bench = make()
+    bench.opened()
+    bench.refusals.append(BusMisconfigured('no such interface'))
+    bench.port.coming.append(BusUnavailable('gone'))
+    wait_for(lambda: len(bench.listener.told) == 3)
+    assert bench.listener.told[2] == 'misconfigured: no such interface'
+
+
+def test_defect_is_told(make: Callable[..., Bench]) -> None:
+    bench = make()
+    bench.opened()
+    bench.port.coming.append(ZeroDivisionError('a defect'))
+    wait_for(lambda: len(bench.listener.told) == 2)
+    assert bench.listener.told[1] == 'failed: ZeroDivisionError: a defect'
+
+
+# -- nothing leaves any more ----------------------------------------------------------------------
+
+
+def test_queue_that_is_full_for_a_moment(make: Callable[..., Bench]) -> None:
+    bench = make(QueuedPort, send_timeout=5.0)
+    bench.opened()
+    bench.port.full = True
+    assert not bench.link.send(FRAME)
+    assert not bench.link.send(FRAME)
+    # the first waited for room; the others need not wait for the same
+    assert bench.port.timeouts == [5.0, 0.0]
+    bench.port.full = False
+    assert bench.link.send(FRAME)
+    assert bench.link.send(FRAME)
+    assert bench.port.timeouts == [5.0, 0.0, 0.0, 5.0]
+    # nothing of what was refused was kept for later
+    assert len(bench.port.sent) == 2
+    assert bench.link.send_failures == 2
+    assert bench.listener.told == ['opened']
+
+
+def test_blocked_bus_is_down_but_its_queue_is_watched(make: Callable[..., Bench]) -> None:
+    bench = make(QueuedPort)
+    bench.opened()
+    bench.port.full = True
+    bench.send_until_blocked()
+    wait_for(lambda: len(bench.listener.told) == 2)
+    assert bench.listener.told[1] == f'lost: {FULL}; {ALONE}'
+    tried = len(bench.port.timeouts)
+    assert not bench.link.send(FRAME)
+    wait_for(lambda: bench.port.looks >= 5)  # every reconnect_period
+    assert len(bench.port.timeouts) == tried
+    # a frame of that time is nobody's: the drives count as lost
+    bench.port.coming.append(ANSWER)
+    wait_for(lambda: not bench.port.coming)
+    bench.port.full = False
+    bench.opened(2)
+    assert bench.listener.frames == []
+    assert len(bench.ports) == 1
+    assert not bench.port.closed
+    assert bench.link.reconnections == 1
+    assert bench.link.send(FRAME)
+
+
+def test_one_frame_per_attempt_until_somebody_is_heard(make: Callable[..., Bench]) -> None:
+    bench = make(QueuedPort)
+    bench.opened()
+    bench.port.full = True
+    bench.send_until_blocked()
+    bench.port.full = False
+    bench.opened(2)
+    # it filled up again, and nobody was heard in between
+    bench.port.full = True
+    assert not bench.link.send(FRAME)
+    assert not bench.link.is_open
+    bench.port.full = False
+    bench.opened(3)
+    # now somebody is there: a full queue is given time again
+    bench.port.coming.append(ANSWER)
+    wait_for(lambda: bench.listener.frames == [ANSWER])
+    bench.port.full = True
+    assert not bench.link.send(FRAME)
+    assert bench.link.is_open
+
+
+def test_adapter_that_does_not_tell_is_opened_anew(make: Callable[..., Bench]) -> None:
+    bench = make()
+    bench.opened()
+    bench.port.full = True
+    bench.send_until_blocked()
+    bench.opened(2)
+    assert bench.listener.told == ['opened', f'lost: {FULL}; {ALONE}', 'opened']
+    assert bench.ports[0].closed
+    assert bench.link.send(FRAME)
+
+
+def test_blocked_bus_that_goes_down(make: Callable[..., Bench]) -> None:
+    bench = make(QueuedPort)
+    bench.opened()
+    bench.port.full = True
+    bench.send_until_blocked()
+    wait_for(lambda: len(bench.listener.told) == 2)
+    bench.port.coming.append(BusUnavailable('receive: Network is down'))
+    bench.opened(2)
+    assert bench.listener.told[2] == 'lost: receive: Network is down'
+    assert bench.ports[0].closed
+
+
+def test_stop_while_blocked(make: Callable[..., Bench]) -> None:
+    bench = make(QueuedPort)
+    bench.opened()
+    bench.port.full = True
+    bench.send_until_blocked()
+    wait_for(lambda: len(bench.listener.told) == 2)
+    bench.link.stop()
+    assert bench.port.closed
+    assert bench.listener.told[-1].startswith('lost')
+
+
+# -- what diagnostics show ------------------------------------------------------------------------
+
+
+def test_figures_outlive_a_port(make: Callable[..., Bench]) -> None:
+    bench = make()
+    bench.opened()
+    first = bench.port
+    first.error_frames, first.overflowed_frames, first.bus_off_count = 5, 7, 1
+    first.last_error = BusError('bus-off', 'bus-off', 'check the cable')
+    first.controller = 'bus-off'
+    assert bench.link.controller == 'bus-off'
+    bench.refusals += [BusUnavailable('bus-off')] * 3
+    first.coming.append(BusUnavailable('bus-off'))
+    seen: list[str] = []
+    wait_for(lambda: seen.append(bench.link.controller) or len(bench.ports) == 2)
+    bench.opened(2)
+    assert set(seen) <= {'bus-off', ''}
+    assert seen[0] == 'bus-off'
+    assert bench.link.controller == ''
+    bench.port.error_frames = 1
+    assert (bench.link.error_frames, bench.link.overflowed_frames,
+            bench.link.bus_off_count) == (6, 7, 1)
+    assert bench.link.last_bus_error == BusError('bus-off', 'bus-off', 'check the cable')
+
+
+def test_malformed_frames_count_as_rejected(make: Callable[..., Bench]) -> None:
+    bench = make()
+    bench.opened()
+    bench.port.malformed_frames = 3
+    wait_for(lambda: bench.listener.frames_rejected == 3)
+
+
+def test_no_thread_is_left(make: Callable[..., Bench]) -> None:
+    before = threading.active_count()
+    bench = make()
+    bench.opened()
+    bench.link.stop()
+    assert threading.active_count() == before
+
+
+def test_reconnections_leave_no_descriptors(monkeypatch: pytest.MonkeyPatch,
+                                            tmp_path: Path) -> None:
+    # a device that cannot be opened, a hundred times over
+    listener = Listener()
+    bus = BusConfiguration('main', 'slcan', str(tmp_path / 'nothing'), reconnect_period=0.001)
+    link = Link(bus, [], listener, send_timeout=0.01)
+    attempts = []
+    real = link_module.open_port
+    monkeypatch.setattr(link_module, 'open_port',
+                        lambda *a, **o: attempts.append(1) or real(*a, **o))
+    link.start()
+    wait_for(lambda: len(attempts) > 5)
+    before = len(list(Path('/proc/self/fd').iterdir()))
+    wait_for(lambda: len(attempts) > 100)
+    after = len(list(Path('/proc/self/fd').iterdir()))
+    link.stop()
+    assert after <= before + 1
+    assert len(listener.told) == 1

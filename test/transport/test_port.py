@@ -1,0 +1,288 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""An open bus: what becomes of what an adapter delivers, refuses and throws."""
+
+from collections import deque
+import errno
+import os
+from pathlib import Path
+import time
+import tty
+from typing import Any
+
+import can
+import pytest
+
+from drive_can_bridge.configuration.model import BusConfiguration
+from drive_can_bridge.core.errors import BusUnavailable, TransportError
+from drive_can_bridge.core.frame import Frame, Route
+from drive_can_bridge.transport import port as port_module
+from drive_can_bridge.transport.port import open_port, Port
+
+FRAME = Frame(0x003FFFF0, bytes(8), True)
+
+
+class FakeBus(can.BusABC):
+    """Delivers what it was given; an exception is thrown."""
+
+    def __init__(self) -> None:
+        super().__init__(channel='fake')
+        self.coming: deque[Any] = deque()
+        self.sent: list[can.Message] = []
+        self.failure: Exception | None = None
+        self.waited: list[float | None] = []
+
+    def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
+        self.waited.append(timeout)
+        if not self.coming:
+            return None, False
+        found = self.coming.popleft()
+        if isinstance(found, Exception):
+            raise found
+        return found, False
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        if self.failure is not None:
+            raise self.failure
+        self.sent.append(msg)
+
+
+@pytest.fixture
+def bus() -> FakeBus:
+    return FakeBus()
+
+
+def error_frame(classes: int, data: str = '') -> can.Message:
+    """Make an error frame as python-can delivers SocketCAN's."""
+    return can.Message(arbitration_id=classes, data=bytes.fromhex(data), is_error_frame=True,
+                       is_extended_id=False)
+
+
+def test_frame(bus: FakeBus) -> None:
+    port = Port(bus)
+    bus.coming.append(can.Message(arbitration_id=0x103FFFF0, data=b'\x12\x34', timestamp=0.0))
+    assert port.receive(0.02) == Frame(0x103FFFF0, b'\x12\x34', True)
+    assert port.receive(0.02) is None
+    port.send(FRAME, 0.01)
+    assert bus.sent[0].arbitration_id == 0x003FFFF0
+    assert bus.sent[0].is_extended_id
+
+
+def test_filters_of_adapters_that_have_none(bus: FakeBus) -> None:
+    bus.set_filters([{'can_id': 0x123, 'can_mask': 0x7FF, 'extended': False}])
+    port = Port(bus)
+    bus.coming += [can.Message(arbitration_id=0x124, is_extended_id=False),
+                   error_frame(0x020),
+                   can.Message(arbitration_id=0x123, is_extended_id=False)]
+    assert port.receive(0.0) is None
+    assert port.receive(0.0) is None
+    assert port.error_frames == 1
+    assert port.receive(0.0) == Frame(0x123, b'', False)
+
+
+@pytest.mark.parametrize('step', [-3600.0, 3600.0], ids=['back', 'forward'])
+def test_clock_that_is_set_while_waiting(bus: FakeBus, monkeypatch: pytest.MonkeyPatch,
+                                         step: float) -> None:
+    # python-can's own recv works with the system clock: set back by an hour, it waits for an hour
+    # as long as nothing comes; set forward, it waits no more
+    clock = [1e9]
+
+    def jumping() -> float:
+        clock[0] += step
+        return clock[0]
+    monkeypatch.setattr(time, 'time', jumping)
+    monkeypatch.setattr('can.bus.time', jumping)
+    port = Port(bus)
+    assert port.receive(0.02) is None
+    assert bus.waited == [0.02]
+    bus.coming.append(can.Message(arbitration_id=1, timestamp=1e9))
+    assert port.receive(0.02) == Frame(1, b'', True)
+    assert port.age == 0.0
+
+
+@pytest.mark.parametrize(('stamp', 'age'), [
+    (1000.0 - 0.03, 0.03), (1000.0 + 5.0, 0.0), (1000.0 - 0.2, 0.0), (0.0, 0.0)],
+    ids=['late', 'from the future', 'clock was set', 'adapter without a clock'])
+def test_age(bus: FakeBus, monkeypatch: pytest.MonkeyPatch, stamp: float, age: float) -> None:
+    monkeypatch.setattr(time, 'time', lambda: 1000.0)
+    port = Port(bus)
+    bus.coming.append(can.Message(arbitration_id=1, timestamp=stamp))
+    port.receive(0.0)
+    assert port.age == pytest.approx(age)
+
+
+def test_error_frames_change_the_state(bus: FakeBus) -> None:
+    port = Port(bus, kernel_errors=True)
+    bus.coming += [error_frame(0x004, '0008'), error_frame(0x004, '0020'), error_frame(0x020),
+                   error_frame(0x002), error_frame(0x004, '0040')]
+    states = []
+    for _ in range(5):
+        assert port.receive(0.0) is None
+        states.append(port.controller)
+    assert states == ['error-warning', 'error-passive', 'error-passive', 'error-passive', '']
+    assert port.error_frames == 5
+    # what asks for nothing to be done does not hide what does
+    assert port.last_error is not None
+    assert port.last_error.text == 'no acknowledgement'
+
+
+def test_bus_off_is_a_lost_bus(bus: FakeBus) -> None:
+    port = Port(bus, kernel_errors=True)
+    bus.coming.append(error_frame(0x040))
+    with pytest.raises(BusUnavailable, match='^bus-off; check cable, shield, termination and'):
+        port.receive(0.0)
+    assert (port.controller, port.bus_off_count) == ('bus-off', 1)
+
+
+def test_error_frames_of_other_adapters_are_counted_only(bus: FakeBus) -> None:
+    # 040h would be bus-off with SocketCAN; elsewhere it is anything
+    port = Port(bus)
+    bus.coming.append(error_frame(0x040))
+    assert port.receive(0.0) is None
+    assert (port.error_frames, port.controller, port.bus_off_count) == (1, '', 0)
+    assert port.last_error is not None
+    assert port.last_error.text == 'error frame'
+
+
+@pytest.mark.parametrize('failure', [
+    can.CanOperationError('Failed to transmit: No buffer space available', errno.ENOBUFS),
+    OSError(errno.ENOBUFS, 'No buffer space available'),
+    can.CanTimeoutError('no room'),
+], ids=['python-can', 'socket', 'time-out'])
+def test_full_queue_is_no_lost_bus(bus: FakeBus, failure: Exception) -> None:
+    port = Port(bus)
+    bus.failure = failure
+    with pytest.raises(TransportError) as caught:
+        port.send(FRAME, 0.01)
+    assert not isinstance(caught.value, BusUnavailable)
+
+
+@pytest.mark.parametrize('failure', [
+    can.CanOperationError('Failed to transmit: Network is down', errno.ENETDOWN),
+    OSError(errno.ENXIO, 'No such device or address'), RuntimeError('anything'),
+], ids=['python-can', 'socket', 'anything'])
+def test_anything_else_is(bus: FakeBus, failure: Exception) -> None:
+    port = Port(bus)
+    bus.failure = failure
+    with pytest.raises(BusUnavailable, match='^send: '):
+        port.send(FRAME, 0.01)
+    bus.coming.append(failure)
+    with pytest.raises(BusUnavailable, match='^receive: '):
+        port.receive(0.0)
+
+
+class FakeSocket:
+    """A socket below the bus that is full, or not."""
+
+    def __init__(self) -> None:
+        self.room = True
+        self.overflowed_frames = 0
+        self.waited: list[float] = []
+
+    def has_room(self, timeout: float) -> bool:
+        self.waited.append(timeout)
+        return self.room
+
+
+def test_socket_without_room_gets_nothing(bus: FakeBus) -> None:
+    port = Port(bus)
+    assert port.has_room is None
+    port._socket = socket = FakeSocket()  # type: ignore[assignment]
+    assert port.has_room
+    socket.room = False
+    with pytest.raises(TransportError, match='^send: transmit queue full$'):
+        port.send(FRAME, 0.0125)
+    assert bus.sent == []
+    assert socket.waited[-1] == 0.0125
+    socket.overflowed_frames = 7
+    assert port.overflowed_frames == 7
+
+
+def test_controller_that_is_bus_off_is_not_opened(tmp_path: Path,
+                                                  monkeypatch: pytest.MonkeyPatch) -> None:
+    carrier = tmp_path / 'carrier'
+    asked: list[tuple[str, ...]] = []
+
+    def path(*parts: str) -> Path:
+        asked.append(parts)
+        return carrier
+    monkeypatch.setattr(port_module, 'Path', path)
+    port_module._check_carrier('can7')  # no such file: nothing can be said
+    carrier.write_text('1\n', encoding='ascii')
+    port_module._check_carrier('can7')
+    carrier.write_text('0\n', encoding='ascii')
+    with pytest.raises(BusUnavailable, match='^bus-off; .*"ip link set can7 down"'):
+        port_module._check_carrier('can7')
+    assert set(asked) == {('/sys/class/net', 'can7', 'carrier')}
+
+
+# -- serial adapters ------------------------------------------------------------------------------
+
+
+class FullTerminal:
+    """A pseudo-terminal whose buffers are full: nobody reads."""
+
+    def __init__(self) -> None:
+        self.master, self.slave = os.openpty()
+        tty.setraw(self.slave)
+        os.set_blocking(self.slave, False)
+        self.path = os.ttyname(self.slave)
+
+    def fill(self, data: bytes = b'T003FFFF0805DC000000000000\r') -> None:
+        """Write until nothing more is taken."""
+        quiet = 0
+        while quiet < 20:
+            try:
+                os.write(self.slave, data)
+                quiet = 0
+            except BlockingIOError:
+                quiet += 1
+                time.sleep(0.005)  # the kernel moves what it took from one buffer to the next
+
+    def close(self) -> None:
+        os.close(self.master)
+        os.close(self.slave)
+
+
+def slcan(path: str) -> BusConfiguration:
+    """Return the configuration of an SLCAN adapter."""
+    return BusConfiguration('main', 'slcan', path, bitrate=125_000)
+
+
+def test_opening_an_adapter_that_takes_nothing_does_not_hang(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    terminal = FullTerminal()
+    # an adapter whose buffer the kernel cannot empty
+    monkeypatch.setattr('serial.Serial.reset_output_buffer', lambda port: None)
+    try:
+        terminal.fill()
+        with pytest.raises(BusUnavailable, match='the adapter takes no more data'):
+            open_port(slcan(terminal.path))
+    finally:
+        terminal.close()
+
+
+def test_what_an_earlier_client_left_is_thrown_away() -> None:
+    terminal = FullTerminal()
+    try:
+        terminal.fill()
+        port = open_port(slcan(terminal.path), [Route(0x103FFFF0, 0x1FFFFFFF, True)])
+        os.set_blocking(terminal.master, False)
+        text = b''
+        deadline = time.monotonic() + 10.0
+        while not text.endswith(b'O\rO\r') and time.monotonic() < deadline:
+            try:
+                text += os.read(terminal.master, 65536)
+            except BlockingIOError:
+                time.sleep(0.005)
+        port.close()
+        # at most what had reached the far end already; the commands are lines of their own
+        assert len(text) < 8192
+        lines = [line for line in text.split(b'\r') if line]
+        assert lines[-4:] == [b'C', b'S4', b'O', b'O']
+    finally:
+        terminal.close()
+
+
+def test_absent_adapter(tmp_path: Path) -> None:
+    with pytest.raises(BusUnavailable, match='No such file or directory'):
+        open_port(slcan(str(tmp_path / 'nothing')))
