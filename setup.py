@@ -72,6 +72,8 @@ setup(
             'ros-common-interfaces==5.3.6',
         ],
         'test': [
+            # A CANopen stack to test against. No rosdep key: tests that need it skip without it.
+            'canopen>=2.2',
             'hypothesis',
             'mypy',
             'pytest',

@@ -7,6 +7,7 @@ that everything else about it can be checked in the same run.
 """
 
 from collections.abc import Container, Iterator
+from dataclasses import replace
 from typing import Any
 
 from drive_can_bridge.configuration.joint_check import JointChecker
@@ -58,6 +59,7 @@ class DriveChecker:
         if family is None:
             return None
         drive = self._build(family, lists)
+        self._check_control(family)
         self._check_setpoints(drive)
         self._check_status(drive)
         if not family.cyclic and not drive.cyclic_response and not self._is_damaged(_LISTS[1]):
@@ -135,6 +137,8 @@ class DriveChecker:
             if option.get('type') == 'number' and key in options:
                 options[key] = float(options[key])
         profile = _NO_PROFILE if self._loaded is None else self._loaded.profile
+        if family.control_built_in:  # a section for the other protocols of the profile
+            profile = replace(profile, control=None)
         return DriveConfiguration(
             name=self._name, bus=values.get('bus', ''), protocol=family.name,
             station=values.get('station', 1), profile=profile,
@@ -148,6 +152,16 @@ class DriveChecker:
             verify_writes=values['verify_writes'],
             control_timeout=float(values['control_timeout']),
             family_options=options, profile_key=values.get('profile', ''))
+
+    def _check_control(self, family: Family) -> None:
+        """Check that a control section is not for a family that has its control built in."""
+        if not family.control_built_in or self._loaded is None:
+            return
+        others = [name for name in self._loaded.profile.protocols if name != family.name]
+        if self._loaded.profile.control is not None and not others:
+            self.problems.append(self._loaded.tree.problem(
+                ('control',), f'control is built in for {family.name}, allowed is to leave it '
+                              'out'))
 
     def _check_setpoints(self, drive: DriveConfiguration) -> None:
         """Check that what is sent without a command lies in the limits."""

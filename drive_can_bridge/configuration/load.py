@@ -104,7 +104,9 @@ def _configuration(tree: Tree, problems: list[Problem], adapters: Adapters | Non
         problems.extend(wrong)
         warnings.extend(suspicious)
         problems.extend(too_fast(tree, bus, [d for d in paced if d.bus == bus.name]))
-    problems.extend(misfits(tree, paced))
+    for name in buses:
+        problems.extend(misfits(tree, [drive for drive in placed if drive.bus == name
+                                       and drive in paced]))
     if not drive_count and not tree.is_damaged(('drives',)):
         warnings.append(tree.problem(('drives',), 'no drive is configured'))
     if problems:

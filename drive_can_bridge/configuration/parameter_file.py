@@ -56,6 +56,8 @@ class FileReader:
                     events.take()
         except BrokenYaml as error:
             self.broken = True
+            # what was noted on the way here may only follow from what is broken
+            self.problems.clear()
             self._note(error.line, (), str(error))
 
     def _note(self, line: int, path: Path, message: str) -> None:
@@ -133,12 +135,12 @@ def read_parameter_file(path: FilePath) -> tuple[Tree | None, list[Problem]]:
     reader = FileReader(file)
     reader.read(path.read_bytes())
     problems = reader.problems
+    if reader.broken:
+        return None, problems
     ours = [section for section in reader.sections
             if any(str(place[0]).split('.')[0] == MARK for place in section.tree.lines if place)]
     for section in ours:
         problems.extend(section.garbled)
-    if reader.broken:
-        return None, problems
     if len(ours) == 1:
         return ours[0].tree, problems
     if ours:

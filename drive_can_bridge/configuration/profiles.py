@@ -107,7 +107,8 @@ def read_profile(path: FilePath) -> LoadedProfile:
             problems.append(Problem(file, 1, 'yaml', 'no mapping, allowed are protocols, '
                                                      'parameters, control, description'))
     except BrokenYaml as error:
-        problems.append(Problem(file, error.line, 'yaml', str(error)))
+        # what was noted on the way here may only follow from what is broken
+        problems = [Problem(file, error.line, 'yaml', str(error))]
         broken = True
     if broken:
         tree.damaged.add(())

@@ -7,16 +7,30 @@ import math
 from drive_can_bridge.configuration.model import BusConfiguration, DriveConfiguration
 from drive_can_bridge.configuration.problems import Problem, Tree
 from drive_can_bridge.protocols.families import FAMILIES
-from drive_can_bridge.protocols.family import Claim
+from drive_can_bridge.protocols.family import Claim, Family
 
 #: share of the bus above which a configuration is refused, and warned about
 LOAD_MAX = 1.0
 LOAD_WARNING = 0.7
 
 
-def bus_share(drive: DriveConfiguration, bus: BusConfiguration) -> float:
-    """Return the worst-case share of the bus that the exchange of a drive takes."""
-    return FAMILIES[drive.protocol].bits_per_second(drive) / bus.bitrate
+def bus_shares(bus: BusConfiguration, drives: Iterable[DriveConfiguration]) -> dict[str, float]:
+    """Return the worst-case share of the bus that the exchange of each of its drives takes."""
+    shares: dict[str, float] = {}
+    for family, together in _by_family(drives):
+        for drive, load in zip(together, family.loads(together)):
+            shares[drive.name] = load / bus.bitrate
+    return shares
+
+
+def _by_family(drives: Iterable[DriveConfiguration],
+               ) -> Iterator[tuple[Family, list[DriveConfiguration]]]:
+    """Yield the drives of one bus, family by family."""
+    together: dict[str, list[DriveConfiguration]] = {}
+    for drive in drives:
+        together.setdefault(drive.protocol, []).append(drive)
+    for protocol, members in together.items():
+        yield FAMILIES[protocol], members
 
 
 def collisions(tree: Tree, drives: Iterable[DriveConfiguration]) -> Iterator[Problem]:
@@ -43,7 +57,7 @@ def overloads(tree: Tree, bus: BusConfiguration, drives: Iterable[DriveConfigura
 
     :return: problems and warnings.
     """
-    shares = {drive.name: bus_share(drive, bus) for drive in drives}
+    shares = bus_shares(bus, drives)
     total = sum(shares.values())
     if total <= LOAD_WARNING:
         return [], []
@@ -71,11 +85,9 @@ def too_fast(tree: Tree, bus: BusConfiguration, drives: Iterable[DriveConfigurat
 
 
 def misfits(tree: Tree, drives: Iterable[DriveConfiguration]) -> Iterator[Problem]:
-    """Yield what drives of one family on one bus cannot do together."""
-    groups: dict[tuple[str, str], list[DriveConfiguration]] = {}
-    for drive in drives:
-        groups.setdefault((drive.bus, drive.protocol), []).append(drive)
-    for (_, protocol), together in groups.items():
-        for drive, (key, message) in FAMILIES[protocol].check_together(together):
-            parts = tuple(key.split('.')) if key else ()
-            yield tree.problem(('drives', drive.name, *parts), message)
+    """Yield what drives of one bus cannot do together, family by family."""
+    for family, together in _by_family(drives):
+        for drive, (key, message) in family.check_together(together):
+            path = ('drives', drive.name, *(key.split('.') if key else ()))
+            if not tree.is_damaged(path):
+                yield tree.problem(path, message)

@@ -341,18 +341,18 @@ class ProfileControl(ControlMachine):
         table = self._table
         if under_way.action is ControlAction.ENABLE:
             if self._sending is ControlAction.DISABLE:
-                if (self._confirmed(table.fault, False) and self._confirmed(table.enabled, False)
+                if (self._confirmed(table.fault, False) and self._confirmed_off()
                         and self._confirmed(table.ready, True)):
                     self._send(ControlAction.ENABLE)
             elif self._confirmed(table.enabled, True):
                 self._reached = True
                 self._end(True, self._success_text(table.enabled, 'its state'))
         elif under_way.action is ControlAction.RESET_FAULT:
-            if self._sending is ControlAction.DISABLE and self._confirmed(table.fault, True):
+            if self._sending is ControlAction.DISABLE and self._confirmed_resettable():
                 self._send(ControlAction.RESET_FAULT)
             elif self._confirmed(table.fault, False):
                 self._end(True, self._success_text(table.fault, 'faults'))
-        elif self._confirmed(table.enabled, False):
+        elif self._confirmed_off():
             message = self._success_text(table.enabled, 'its state')
             if table.enabled is None and self._sending is ControlAction.QUICK_STOP:
                 self._answer_tickets(under_way, True, message)      # keeps braking
@@ -389,7 +389,7 @@ class ProfileControl(ControlMachine):
     def _may_run(self) -> bool:
         """Whether a stop has anything to do, as far as is known."""
         return (self._sending in (ControlAction.ENABLE, ControlAction.QUICK_STOP)
-                or not self._confirmed(self._table.enabled, False))
+                or not self._confirmed_off())
 
     def _says(self, pattern: StatusPattern | None) -> bool:
         """Tell whether the last status word fulfils a condition."""
@@ -400,6 +400,14 @@ class ProfileControl(ControlMachine):
         if pattern is None:
             return self._sent
         return self._answer is not None and pattern.matches(self._answer) is wanted
+
+    def _confirmed_off(self) -> bool:
+        """Tell whether the drive, knowing the current word, reports that it does not run."""
+        return self._confirmed(self._table.enabled, False)
+
+    def _confirmed_resettable(self) -> bool:
+        """Tell whether the drive, knowing ``disable``, reports a fault that can be reset."""
+        return self._confirmed(self._table.fault, True)
 
     # -- effects ----------------------------------------------------------------------------------
 

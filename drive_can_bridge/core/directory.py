@@ -11,7 +11,9 @@ from dataclasses import replace
 import difflib
 
 from drive_can_bridge.core.errors import ValueRefused
-from drive_can_bridge.core.parameters import Access, Parameter, Storage, ValueKind
+from drive_can_bridge.core.parameters import (
+    Access, Parameter, ParameterType, Storage, ValueKind,
+)
 
 
 # Strictest first: where several listed parameters have one address, a raw name obeys them all.
@@ -45,6 +47,10 @@ class ParameterDirectory:
             storage = {twin.storage for twin in twins}
             raw = replace(raw, access=next(entry for entry in _ACCESS if entry in access),
                           storage=next(entry for entry in _STORAGE if entry in storage))
+            if not raw.width_known:
+                wide = any(twin.type.bits == 32 for twin in twins)
+                raw = replace(raw, width_known=True,
+                              type=ParameterType.UINT32 if wide else ParameterType.UINT16)
         return raw
 
     def twins(self, parameter: Parameter) -> list[Parameter]:
@@ -86,6 +92,8 @@ class ParameterDirectory:
         if not -(high + 1) // 2 <= value <= high:
             raise ValueRefused(f'{value} is not representable in {parameter.type.bits} bits: '
                                f'{-(high + 1) // 2} to {high}')
+        if not parameter.width_known:
+            return value  # how many bits its two's complement has, the drive tells
         word = parameter.word_from_raw(value)
         for twin in self.twins(parameter):
             twin.check_limits(twin.value_from_raw(twin.raw_from_word(word)))

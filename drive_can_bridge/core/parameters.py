@@ -96,6 +96,8 @@ class Parameter:
     :param index: CANopen index.
     :param listed: stands in the profile; False for a parameter addressed by its raw name.
     :param word_order: 32-bit values: ``high_first`` or ``low_first``; None: as the drive says.
+    :param width_known: False for a raw name whose width only the drive knows; ``type`` is then the
+        widest possible.
     """
 
     name: str
@@ -116,6 +118,7 @@ class Parameter:
     word_order: str | None = None
     scaled: bool = False
     listed: bool = True
+    width_known: bool = True
 
     @property
     def kind(self) -> ValueKind:
@@ -140,7 +143,9 @@ class Parameter:
     def address(self) -> str:
         """Name the parameter as the drive's manual does: ``P30``, ``P613.5``, ``2004h.06h``."""
         if self.number is not None:
-            suffix = '' if self.subindex is None else f'.{self.subindex}'
+            # with an index, the sub-index belongs to that one
+            array = self.subindex is not None and self.index is None
+            suffix = f'.{self.subindex}' if array else ''
             return f'P{self.number}{suffix}'
         if self.index is not None:
             return f'{self.index:04X}h.{self.subindex or 0:02X}h'

@@ -85,8 +85,12 @@ class Session(ABC):
 
     @property
     def sample_parameters(self) -> tuple[Parameter, ...]:
-        """The parameters of a sample, in the order of ``ProcessDataReceived.raws``."""
-        return (*self.drive.cyclic_response, *self.builtin_parameters)
+        """
+        The parameters of a sample, in the order of ``ProcessDataReceived.raws``.
+
+        What is built in comes first: a short telegram lacks the last values, never the status.
+        """
+        return (*self.builtin_parameters, *self.drive.cyclic_response)
 
     # -- life cycle -------------------------------------------------------------------------------
 

@@ -5,11 +5,17 @@ from collections.abc import Sequence
 
 from drive_can_bridge.configuration.model import DriveConfiguration
 from drive_can_bridge.core.session import Session
+from drive_can_bridge.protocols.cannord.family import Cannord
+from drive_can_bridge.protocols.canopen_pkw.family import CanopenPkw
 from drive_can_bridge.protocols.datamodel.extended_family import DataModelExtended
+from drive_can_bridge.protocols.datamodel.standard_family import DataModelStandard
 from drive_can_bridge.protocols.family import Family
 
 FAMILIES: dict[str, Family] = {family.name: family for family in (
     DataModelExtended(),
+    DataModelStandard(),
+    Cannord(),
+    CanopenPkw(),
 )}
 
 

@@ -89,6 +89,14 @@ class Family(ABC):
     def bits_per_second(self, drive: DriveConfiguration) -> float:
         """Return the worst-case bus load of the drive's exchange (maximal bit stuffing)."""
 
+    def loads(self, drives: Sequence[DriveConfiguration]) -> list[float]:
+        """
+        Return ``bits_per_second`` of all drives of this family on one bus, in the same order.
+
+        Families whose drives share frames say here how little that costs.
+        """
+        return [self.bits_per_second(drive) for drive in drives]
+
     @abstractmethod
     def raw_parameter(self, drive: DriveConfiguration, name: str) -> Parameter | None:
         """

@@ -68,12 +68,18 @@ class SimulatedDataModelStandardDrive(DataModelDrive):
         self._foreign_turn += 1
         turn = self._foreign_turn % 3
         if turn == 1:
-            made = Frame(answer.identifier, junk, True)
+            made = [Frame(answer.identifier, junk, True)]
         elif turn == 2:
-            made = Frame(answer.identifier ^ 0x8, junk, False)
+            made = [Frame(answer.identifier ^ bit, junk, False) for bit in (8, 4, 2, 1)]
         else:
-            made = Frame(0x701, b'\x05', False)
-        return [] if self._belongs_to_neighbour(made) else [made]
+            made = [Frame(0x701, b'\x05', False)]
+        return [frame for frame in made if self._is_nobodys(frame)][:1]
+
+    def _is_nobodys(self, frame: Frame) -> bool:
+        """Tell whether a frame is neither a neighbour's nor this drive's own."""
+        own = (self._request_identifier, self._response_identifier)
+        return ((frame.extended or frame.identifier not in own)
+                and not self._belongs_to_neighbour(frame))
 
 
 def _identifiers(configuration: DriveConfiguration) -> tuple[int, int]:

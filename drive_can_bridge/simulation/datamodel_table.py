@@ -49,6 +49,8 @@ class DataModelTable:
         response_base = options.get('response_map_base', RESPONSE_MAP_BASE) + self._offset
         self._request_numbers = range(request_base, request_base + SLOTS)
         self._response_numbers = range(response_base, response_base + SLOTS)
+        # what is sent again and again is volatile, unless the profile says otherwise
+        self._volatile = {p.name for p in configuration.cyclic_request if p.storage is None}
         self._map = dict.fromkeys((*self._request_numbers, *self._response_numbers), 0)
         if options.get('mapping') != 'configure':
             self._preset(self._request_numbers, configuration.cyclic_request)
@@ -156,7 +158,8 @@ class DataModelTable:
     # -- inside -----------------------------------------------------------------------------------
 
     def _preset(self, numbers: Sequence[int], parameters: Sequence[Parameter]) -> None:
-        entries = padded([(p.number or 0) + self._offset for p in parameters])
+        # with 11-bit identifiers there may be more of them than a map holds
+        entries = padded([(p.number or 0) + self._offset for p in parameters[:SLOTS]])
         self._map.update(zip(numbers, entries, strict=True))
 
     def _busy(self, now: float) -> bool:
@@ -167,7 +170,8 @@ class DataModelTable:
         if number in self._map:
             return True
         parameter = self._parameters[number]
-        return parameter.writable and parameter.storage is not Storage.RAM
+        return (parameter.writable and parameter.storage is not Storage.RAM
+                and parameter.name not in self._volatile)
 
     def _store(self, number: int, word: int) -> None:
         if number in self._map:

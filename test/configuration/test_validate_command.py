@@ -54,6 +54,27 @@ def test_problems(tmp_path: Path) -> None:
     assert (done.returncode, done.stdout) == (1, '')
 
 
+@pytest.mark.parametrize(('text', 'line', 'what'), [
+    ('/**:\n  ros__parameters:\n    buses: {main: [\n    drives: x\n', 3,
+     "did not find expected ',' or ']'"),
+    ('a: [', 2, 'did not find expected node content'),
+    ('a: 1\nb: [[1]]\nc: {', 4, 'did not find expected node content')])
+def test_broken_yaml_is_one_problem(tmp_path: Path, text: str, line: int, what: str) -> None:
+    path = write(tmp_path, text)
+    done = run('validate', str(path))
+    assert done.stderr == f'{path}:{line}: yaml: not valid YAML: {what}\n'
+    assert (done.returncode, done.stdout) == (1, '')
+
+
+def test_broken_yaml_of_a_profile_is_one_problem(tmp_path: Path) -> None:
+    table = tmp_path / 'table.yaml'
+    path = write(tmp_path)
+    table.write_text('protocols: [[1]]\nparameters: {a: {number: [2}}\n', encoding='utf-8')
+    done = run('validate', str(path))
+    assert done.stderr == f"{table}:2: yaml: not valid YAML: did not find expected ',' or ']'\n"
+    assert (done.returncode, done.stdout) == (1, '')
+
+
 @pytest.mark.parametrize(('name', 'line'), [
     ('nothing.yaml', 'drive_can: nothing.yaml: No such file or directory\n'),
     ('/', 'drive_can: /: Is a directory\n')])

@@ -11,7 +11,7 @@ import pytest
 
 from drive_can_bridge.core.directory import ParameterDirectory
 from drive_can_bridge.core.errors import ValueRefused
-from drive_can_bridge.core.parameters import Access, Parameter, Storage
+from drive_can_bridge.core.parameters import Access, Parameter, ParameterType, Storage
 from drive_can_bridge.protocols.families import FAMILIES
 
 
@@ -130,3 +130,24 @@ def test_raw_name_of_a_signed_parameter() -> None:
     assert names.raw_from_user(flag, 1) == 1
     with pytest.raises(ValueRefused, match='-5.1 is out of range'):
         names.raw_from_user(raw, -51)
+
+
+def test_raw_names_whose_width_the_drive_tells() -> None:
+    wide = parameter('wide', 80, type=ParameterType.INT32, access=RO)
+    narrow = parameter('narrow', 81, type=INT16)
+    names = ParameterDirectory({'wide': wide, 'narrow': narrow}, lambda name: Parameter(
+        name, ParameterType.UINT32, int(name[1:]), listed=False, width_known=False))
+    unknown, known, short = names.find('p82'), names.find('p80'), names.find('p81')
+    assert unknown is not None
+    assert known is not None
+    assert short is not None
+    # two's complement of as many bits as the drive will say
+    assert names.raw_from_user(unknown, -5) == -5
+    assert names.raw_from_user(unknown, 0xFFFFFFFF) == 0xFFFFFFFF
+    with pytest.raises(ValueRefused, match='-2147483649 is not representable in 32 bits'):
+        names.raw_from_user(unknown, -0x80000001)
+    assert (known.type, known.width_known) == (ParameterType.UINT32, True)
+    assert (short.type, short.width_known) == (ParameterType.UINT16, True)
+    assert names.raw_from_user(short, -5) == 0xFFFB
+    with pytest.raises(ValueRefused, match='not representable in 16 bits'):
+        names.raw_from_user(short, 0x10000)

@@ -112,6 +112,7 @@ def test_addresses() -> None:
     assert RAMP.address == 'P30'
     assert parameter('n', 613, subindex=5).address == 'P613.5'
     assert parameter('n', None, index=0x2004, subindex=6).address == '2004h.06h'
+    assert parameter('n', 455, index=0x2004, subindex=6).address == 'P455'
     assert parameter('n', None, index=0x2004).address == '2004h.00h'
     assert parameter('n', None).address == 'process data'
 

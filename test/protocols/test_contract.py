@@ -33,7 +33,15 @@ DELAY = 0.0005
 
 
 class Partner(ABC):
-    """The drive at the other end of the bus: registers, and the family's telegrams."""
+    """
+    The drive at the other end of the bus: registers, and the family's telegrams.
+
+    :cvar sample: the raw integers of every sample.
+    :cvar unknown: what is said of a parameter that the drive does not have.
+    """
+
+    sample: tuple[int, ...] = (1000, 250, 1)
+    unknown = 'no answer'
 
     def __init__(self, **options: Any) -> None:
         self.configuration = self.configure(**options)
@@ -128,8 +136,116 @@ class ExtendedPartner(Partner):
         return [int(sent[9:13], 16)] if sent.startswith('003FFFF0') else []
 
 
+class StandardPartner(Partner):
+    """DataModel with 11-bit identifiers."""
+
+    def configure(self, **options: Any) -> DriveConfiguration:
+        options.setdefault('request', (SPEED,))
+        return drive('datamodel_standard', response=(ACTUAL, CURRENT, STATUS), **options)
+
+    def answers(self, sent: str) -> list[str]:
+        identifier, _, text = sent.partition('#')
+        data = bytes.fromhex(text)
+        assert identifier == '3F1'
+        number = int.from_bytes(data[1:3], 'little')
+        if data[0] == 6:
+            self.registers[number] = int.from_bytes(data[3:5], 'little')
+            return []
+        numbers = range(number, number + data[3])
+        if any(entry not in self.registers for entry in numbers):
+            return []
+        words = ''.join(self.registers[entry].to_bytes(2, 'little').hex() for entry in numbers)
+        return [f'7F1#{words:0<16}'.upper()]
+
+    def setpoints(self, sent: str) -> list[int]:
+        if not sent.startswith('3F1#063200'):
+            return []
+        return [int.from_bytes(bytes.fromhex(sent[10:14]), 'little')]
+
+
+class CannordPartner(Partner):
+    """CANnord, station 1; actual values are in parameters 209 and 210."""
+
+    sample = (0x0B31, 1000, 250)
+
+    def configure(self, **options: Any) -> DriveConfiguration:
+        options.setdefault('request', (SPEED,))
+        return drive('cannord', response=(ACTUAL, CURRENT), **options)
+
+    def answers(self, sent: str) -> list[str]:
+        identifier, _, text = sent.partition('#')
+        data = bytes.fromhex(text)
+        if identifier == '002':
+            words = (self.sample[0], self.registers[209], self.registers[210], 0)
+            return ['003#' + b''.join(word.to_bytes(2, 'little') for word in words).hex()]
+        assert identifier == '202'
+        key = int.from_bytes(data[:2], 'little')
+        task, number = key >> 12, key & 0x7FF
+        if number not in self.registers:
+            return []
+        if task != 1:
+            assert task in (2, 14)
+            self.registers[number] = int.from_bytes(data[6:], 'little')
+        value = self.registers[number].to_bytes(2, 'little')
+        return ['203#' + ((1 << 12 | number).to_bytes(2, 'little') + bytes(4) + value).hex()]
+
+    def setpoints(self, sent: str) -> list[int]:
+        if not sent.startswith('002#'):
+            return []
+        return [int.from_bytes(bytes.fromhex(sent[8:12]), 'little')]
+
+
+class PkwPartner(Partner):
+    """PKW, node 1; obeys the rule that only a change of the function byte counts."""
+
+    unknown = 'refused by the drive: 06020000h (no such register or object)'
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
+        self.function = 0
+
+    def configure(self, **options: Any) -> DriveConfiguration:
+        options.setdefault('request', (SPEED,))
+        return drive('canopen_pkw', response=(ACTUAL, CURRENT, STATUS), **options)
+
+    def answers(self, sent: str) -> list[str]:
+        identifier, _, text = sent.partition('#')
+        if identifier == '000':
+            assert text == '0101'
+            return []
+        assert identifier == '501'
+        data = bytes.fromhex(text)
+        if data[3] == self.function:
+            return []
+        self.function = data[3]
+        code = data[3] & 0x7F
+        if not code:
+            return [f'481#{text}']
+        assert code in (0x25, 0x26, 0x2A, 0x2B)
+        count = 2 if code in (0x26, 0x2B) else 1
+        number = int.from_bytes(data[:2], 'little')
+        numbers = range(number, number + count)
+        if any(entry not in self.registers for entry in numbers):
+            return [f'481#{text[:6]}{data[3] & 0x80 | 0x4E:02X}00000206']
+        if code in (0x2A, 0x2B):
+            for place, entry in enumerate(numbers):
+                self.registers[entry] = int.from_bytes(
+                    data[4 + 2 * place:6 + 2 * place], 'little')
+            return [f'481#{text[:8]}00000000']
+        words = ''.join(self.registers[entry].to_bytes(2, 'little').hex() for entry in numbers)
+        return [f'481#{text[:8]}{words:0<8}']
+
+    def setpoints(self, sent: str) -> list[int]:
+        if not sent.startswith(('501#3200002A', '501#320000AA')):
+            return []
+        return [int.from_bytes(bytes.fromhex(sent[12:16]), 'little')]
+
+
 PARTNERS: dict[str, type[Partner]] = {
+    'cannord': CannordPartner,
+    'canopen_pkw': PkwPartner,
     'datamodel_extended': ExtendedPartner,
+    'datamodel_standard': StandardPartner,
 }
 
 
@@ -180,7 +296,7 @@ def test_online_is_told_before_the_first_sample(make: type[Partner]) -> None:
     partner.start()
     events = partner.talk.events(StationFound, StationLost, ProcessDataReceived)
     assert events[0] == StationFound()
-    assert {event.raws for event in events[1:]} == {(1000, 250, 1)}
+    assert {event.raws for event in events[1:]} == {partner.sample}
     assert partner.talk.session.ever_online
     assert partner.talk.session.offline_advice == ''
 
@@ -352,7 +468,7 @@ def test_missing_parameter_takes_no_other_along(partner: Partner) -> None:
     partner.live(3.0)
     (gain, damping, ramp), = outcomes(partner)
     assert (gain, ramp) == (0, 0)
-    assert 'no answer' in str(damping)
+    assert partner.unknown in str(damping)
     assert partner.talk.session.online
 
 

@@ -24,7 +24,8 @@ cyclic request is under way, because nothing is known about how many requests a 
 
 Quarantine: where an answer does not say what it answers (11-bit identifiers), a read that nobody
 answered is followed by a silence. What arrives in it belongs to the past, is thrown away, and
-begins the silence anew.
+begins the silence anew. A silence counts only if somebody listened: where the process stood still
+at its end, what arrived meanwhile may still lie in a buffer, and gets time to come out of it.
 """
 
 from collections import deque
@@ -40,6 +41,10 @@ from drive_can_bridge.core.frame import Frame
 #: receive buffer has fetched the first; and, where answers carry no address, between an answer and
 #: the next read
 SPACING = 0.001
+#: s by which the read after a silence may be late, and the silence still was listened to
+PUNCTUAL = 0.0005
+#: s for the reader to fetch what a process that stood still finds in its buffers
+CATCHING_UP = 0.01
 
 
 @dataclass(frozen=True)
@@ -169,6 +174,7 @@ class AcyclicChannel:
         self._deadline = math.inf
         self._not_before = -math.inf
         self._quiet_until = -math.inf
+        self._listened = True  # to the silence before, or there was none
         self._eeprom_free_at = -math.inf
         self._eeprom_leaving = False
         self._held_until = -math.inf
@@ -212,7 +218,7 @@ class AcyclicChannel:
         An answer may still be on its way. It must not meet the next read.
         """
         if self._outstanding and self._polled:
-            self._quiet_until = self._deadline + self._quarantine
+            self._be_quiet(self._deadline + self._quarantine)
         for queue in self._queues.values():
             queue.clear()
         self._first = None
@@ -265,7 +271,7 @@ class AcyclicChannel:
 
     def disturbed(self, now: float) -> None:
         """Take note of an answer that nobody asked for: more may follow."""
-        self._quiet_until = max(self._quiet_until, now + self._quarantine)
+        self._be_quiet(now + self._quarantine)
 
     def advance(self, now: float) -> None:
         """Do all that is possible now."""
@@ -284,7 +290,7 @@ class AcyclicChannel:
         if self._outstanding:
             if now < self._deadline:
                 return self._polled and self._advance_first(now)
-            self._quiet_until = max(self._quiet_until, now + self._quarantine)
+            self._be_quiet(now + self._quarantine)
             if self._serving.attempts_left <= 0:
                 self._finish(None)
                 return True
@@ -296,9 +302,26 @@ class AcyclicChannel:
         if step is None:
             self._busy = self._first is not None
             return True
-        if now < self._ready_at(step):
+        ready_at = self._ready_at(step)
+        if now < ready_at or isinstance(step, Read) and self._has_to_listen(now, now - ready_at):
             return False
         self._send(step, now)
+        return True
+
+    def _be_quiet(self, until: float) -> None:
+        """Ask for nothing before ``until``."""
+        if self._polled:
+            self._quiet_until = max(self._quiet_until, until)
+            self._listened = False
+
+    def _has_to_listen(self, now: float, late: float) -> bool:
+        """Prolong a silence, once, when the read after it comes late: nobody was there."""
+        if self._listened:
+            return False
+        self._listened = True
+        if late <= PUNCTUAL:
+            return False
+        self._quiet_until = now + CATCHING_UP
         return True
 
     def _advance_first(self, now: float) -> bool:

@@ -306,7 +306,7 @@ class StandardSession(DataModelSession):
                 f'another master sends requests to station {self.drive.station}: {frame}'))
             return
         step = self._channel.outstanding
-        if step is None:
+        if step is None or now - age < self._channel.asked_at:  # it came before the question
             self._channel.disturbed(now)
             if self._expected:
                 self._expected = False

@@ -1,0 +1,248 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""The row of the family table for CANnord, the protocol of NORD inverters."""
+
+from collections.abc import Iterator, Sequence
+import re
+from typing import Any
+
+from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.parameters import Parameter, ParameterType
+from drive_can_bridge.core.session import Session
+from drive_can_bridge.protocols.cannord.broadcast import broadcast_identifier, groups
+from drive_can_bridge.protocols.cannord.identifiers import (
+    ADDRESS_MAX, identifier, MessageObject, route,
+)
+from drive_can_bridge.protocols.cannord.parameter_frame import INDEX_MAX, NUMBER_MAX
+from drive_can_bridge.protocols.cannord.process_data import (
+    EXTRA_LENGTH, EXTRA_VALUES, main_length, MAIN_VALUES,
+)
+from drive_can_bridge.protocols.cannord.states import PARAMETER_SETS, STATUS_WORD
+from drive_can_bridge.protocols.family import Claim, Complaint, Family
+
+#: s that an inverter takes at most to answer process data (BU 0060 page 50)
+ANSWER_TIME = 0.003
+
+_RAW_NAME = re.compile(r'p([0-9]{1,4})(?:\.([0-9]{1,3}))?', re.ASCII)
+_PURPOSES = {
+    MessageObject.PROCESS_REQUEST: 'process data to station',
+    MessageObject.PROCESS_RESPONSE: 'process data from station',
+    MessageObject.PARAMETER_TASK: 'parameter tasks to station',
+    MessageObject.PARAMETER_RESPONSE: 'parameter responses from station',
+}
+#: keys that decide what the common frames of a broadcast group look like, and how often they come
+_COMMON_OPTIONS = ('swap_setpoints_2_3', 'extra_setpoints', 'parameter_set')
+#: of a setpoint, what makes the same word mean the same
+_COMMON_SCALES = ('type', 'scale', 'offset', 'unit')
+_COMMANDS = ('position_command', 'velocity_command', 'effort_command')
+
+
+def frame_bits(length: int, *, extended: bool) -> int:
+    """Return the longest that a frame can get by bit stuffing, interframe space included."""
+    header, stuffed = (67, 54) if extended else (47, 34)
+    return header + 8 * length + (stuffed + 8 * length - 1) // 4
+
+
+def _placeable(drives: Sequence[DriveConfiguration]) -> list[DriveConfiguration]:
+    """Return the drives whose station exists; for the others there are no identifiers."""
+    return [drive for drive in drives if 0 <= drive.station <= ADDRESS_MAX]
+
+
+class Cannord(Family):
+    """CANnord: control and status word built in, up to five values each way, parameter tasks."""
+
+    name = 'cannord'
+    cyclic = True
+    control_built_in = True
+    options_schema: dict[str, Any] = {
+        'extended_identifiers': {
+            'description': 'Use 29-bit identifiers: the 11-bit ones followed by 18 zero bits.',
+            'type': 'boolean', 'default': False,
+        },
+        'broadcast': {
+            'description': 'Send control word and setpoints in one frame for several drives: '
+                           'to the group of 32 addresses, or to all. The drive with the lowest '
+                           'station takes the commands.',
+            'enum': ['none', 'group', 'all'], 'default': 'none',
+        },
+        'value_order': {
+            'description': 'Which half of a parameter value comes first in the parameter frame.',
+            'enum': ['high_first', 'low_first'], 'default': 'high_first',
+        },
+        'index_byte': {
+            'description': 'Which byte of IND carries the sub-index: low is byte 2, high byte 3.',
+            'enum': ['low', 'high'], 'default': 'low',
+        },
+        'swap_setpoints_2_3': {
+            'description': 'Words 3 and 4 of the 8-byte process frames change places '
+                           '(SK 300E, SK 700E, SK 750E).',
+            'type': 'boolean', 'default': False,
+        },
+        'extra_setpoints': {
+            'description': 'SK 540E, SK 545E: setpoints and actual values 4 and 5 travel in a '
+                           'frame of 5 bytes after the main one.',
+            'type': 'boolean', 'default': False,
+        },
+        'parameter_set': {
+            'description': 'Parameter set that the control word chooses.',
+            'type': 'integer', 'minimum': 1, 'maximum': PARAMETER_SETS, 'default': 1,
+        },
+        'persist_writes': {
+            'description': 'Write parameters without storage in the profile to EEPROM (true) or '
+                           'to RAM only (false).',
+            'type': 'boolean', 'default': False,
+        },
+    }
+
+    def check(self, drive: DriveConfiguration) -> Iterator[Complaint]:
+        """Yield everything that this family cannot do with the drive as configured."""
+        if not 0 <= drive.station <= ADDRESS_MAX:
+            yield Complaint('station', f'{drive.station} is out of range, '
+                                       f'allowed is 0 to {ADDRESS_MAX} ({self.name})')
+        yield from self._check_lists(drive)
+        yield from self._check_profile(drive)
+
+    def check_together(self, drives: Sequence[DriveConfiguration],
+                       ) -> Iterator[tuple[DriveConfiguration, Complaint]]:
+        """Yield in what drives of a broadcast group differ from the one that leads them."""
+        for leader, *members in groups(_placeable(drives)):
+            for member in members:
+                for complaint in self._differences(leader, member):
+                    yield member, complaint
+
+    def warnings(self, drive: DriveConfiguration) -> Iterator[Complaint]:
+        """Yield what is allowed but suspicious."""
+        if drive.period < ANSWER_TIME:
+            yield Complaint('period', f'{drive.period:g} s is short: inverters take 1 to '
+                                      f'{1e3 * ANSWER_TIME:g} ms to answer; recommended is at '
+                                      f'least {ANSWER_TIME:g} s')
+
+    def claims(self, drive: DriveConfiguration) -> list[Claim]:
+        """Return all identifiers of the drive on its bus; a broadcast one is shared."""
+        extended = drive.family_options['extended_identifiers']
+        found = [Claim(route(identifier(kind, drive.station, extended=extended),
+                             extended=extended), f'{purpose} {drive.station}')
+                 for kind, purpose in _PURPOSES.items()]
+        broadcast = broadcast_identifier(drive)
+        if broadcast is not None:
+            found.append(Claim(route(broadcast, extended=extended), 'broadcast process data',
+                               shared='cannord broadcast'))
+        return found
+
+    def bits_per_second(self, drive: DriveConfiguration) -> float:
+        """Return the worst-case load of an exchange of its own every period."""
+        return 2 * self._telegram_bits(drive) / drive.period
+
+    def loads(self, drives: Sequence[DriveConfiguration]) -> list[float]:
+        """Return the load of each drive; those of a group share one exchange a period."""
+        found = {drive.name: self.bits_per_second(drive) for drive in drives}
+        for group in groups(_placeable(drives)):
+            for drive in group:
+                # a broadcast and one exchange for all of them
+                found[drive.name] *= 1.5 / len(group)
+        return [found[drive.name] for drive in drives]
+
+    def raw_parameter(self, drive: DriveConfiguration, name: str) -> Parameter | None:
+        """Resolve ``p<number>`` and ``p<number>.<sub-index>``; the drive tells the width."""
+        match = _RAW_NAME.fullmatch(name)
+        if match is None:
+            return None
+        number = int(match.group(1))
+        subindex = None if match.group(2) is None else int(match.group(2))
+        if number > NUMBER_MAX or (subindex or 0) > INDEX_MAX:
+            return None
+        return Parameter(name=name, type=ParameterType.UINT32, number=number, subindex=subindex,
+                         listed=False, width_known=False)
+
+    def make_session(self, drive: DriveConfiguration) -> Session:
+        """Make the session of a drive that is alone, or alone in its broadcast group."""
+        return self.make_sessions([drive])[0]
+
+    def make_sessions(self, drives: Sequence[DriveConfiguration]) -> list[Session]:
+        """Make the sessions of all drives of this family on one bus, in the same order."""
+        # Imported late: configuration checks read this table without any need of sessions.
+        from drive_can_bridge.protocols.cannord.group import make_group
+        from drive_can_bridge.protocols.cannord.session import CannordSession
+        made: dict[str, Session] = {
+            session.drive.name: session for group in groups(drives)
+            for session in make_group(group)}
+        return [made[drive.name] if drive.name in made else CannordSession(drive)
+                for drive in drives]
+
+    # -- parts ------------------------------------------------------------------------------------
+
+    def _telegram_bits(self, drive: DriveConfiguration) -> int:
+        """Return the worst-case length of the process frames in one direction."""
+        extended = drive.family_options['extended_identifiers']
+        values = max(len(drive.cyclic_request), len(drive.cyclic_response))
+        bits = frame_bits(main_length(min(values, MAIN_VALUES)), extended=extended)
+        if values > MAIN_VALUES:
+            bits += frame_bits(EXTRA_LENGTH, extended=extended)
+        return bits
+
+    def _check_lists(self, drive: DriveConfiguration) -> Iterator[Complaint]:
+        extra = drive.family_options['extra_setpoints']
+        largest = MAIN_VALUES + EXTRA_VALUES if extra else MAIN_VALUES
+        more = '' if extra else f' ({MAIN_VALUES + EXTRA_VALUES} with extra_setpoints: true)'
+        for key in ('cyclic_request', 'cyclic_response'):
+            listed: tuple[Parameter, ...] = getattr(drive, key)
+            if len(listed) > largest:
+                yield Complaint(key, f'{len(listed)} parameters are too many, allowed are at most '
+                                     f'{largest}{more}')
+            for parameter in listed:
+                if parameter.type.bits == 32:
+                    yield Complaint(key, f"'{parameter.name}' is {parameter.type.value}, process "
+                                         'words carry bool, int16 or uint16')
+
+    def _check_profile(self, drive: DriveConfiguration) -> Iterator[Complaint]:
+        foreign = any(protocol != self.name for protocol in drive.profile.protocols)
+        for name, parameter in drive.profile.parameters.items():
+            place = f'profile.parameters.{name}'
+            if name == STATUS_WORD:
+                yield Complaint(place, f"'{name}' is built in for {self.name}, allowed is any "
+                                       'other name')
+            if parameter.number is not None and not 0 <= parameter.number <= NUMBER_MAX:
+                yield Complaint(f'{place}.number', f'{parameter.number} is out of range, '
+                                                   f'allowed is 0 to {NUMBER_MAX}')
+            if parameter.subindex is not None and not 0 <= parameter.subindex <= INDEX_MAX:
+                yield Complaint(f'{place}.subindex', f'{parameter.subindex} is out of range, '
+                                                     f'allowed is 0 to {INDEX_MAX}')
+            if parameter.number is None and not foreign:
+                yield from self._check_unnumbered(place, parameter)
+
+    def _check_unnumbered(self, place: str, parameter: Parameter) -> Iterator[Complaint]:
+        """Check an entry that exists in process data only."""
+        if parameter.subindex is not None:
+            yield Complaint(f'{place}.subindex', 'a sub-index without a number, allowed is '
+                                                 'number with subindex, or neither')
+        if parameter.storage is not None:
+            yield Complaint(f'{place}.storage', 'process data are not stored, allowed without a '
+                                                'number is to leave it out')
+        if parameter.type.bits == 32:
+            yield Complaint(f'{place}.type', f'{parameter.type.value} does not fit a process '
+                                             'word, allowed without a number are bool, int16, '
+                                             'uint16')
+
+    def _differences(self, leader: DriveConfiguration, member: DriveConfiguration,
+                     ) -> Iterator[Complaint]:
+        led = f'drive {leader.name}, which leads its broadcast group'
+        if [parameter.name for parameter in member.cyclic_request] != [
+                parameter.name for parameter in leader.cyclic_request]:
+            yield Complaint('cyclic_request', f'differs from that of {led}, allowed is the same')
+        else:
+            for mine, other in zip(member.cyclic_request, leader.cyclic_request):
+                if any(getattr(mine, key) != getattr(other, key) for key in _COMMON_SCALES):
+                    yield Complaint('cyclic_request', f"'{mine.name}' has another type, scale, "
+                                                      f'offset or unit than for {led}, allowed '
+                                                      'is the same')
+        if member.period != leader.period:
+            yield Complaint('period', f'{member.period:g} s differs from {leader.period:g} s of '
+                                      f'{led}, allowed is the same')
+        for key in _COMMON_OPTIONS:
+            mine, other = member.family_options[key], leader.family_options[key]
+            if mine != other:
+                yield Complaint(key, f'{str(mine).lower()} differs from {str(other).lower()} of '
+                                     f'{led}, allowed is the same')
+        for key in _COMMANDS:
+            if member.joint is not None and getattr(member.joint, key) is not None:
+                yield Complaint(f'joint.{key}', f'commands go to {led}, allowed is to leave it '
+                                                'out')

@@ -1,0 +1,119 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The identifiers of the CANnord message objects.
+
+Source: BU 0060, section 4.2.2 "Identifier" (table 8, page 49); the groups from pages 50 and 51.
+``A`` is the CANnord address of the inverter (P515, 0 to 255):
+
+================================ ==================== ==================
+object                           direction            11-bit identifier
+================================ ==================== ==================
+process data                     master to inverter   2·A
+process data                     inverter to master   2·A + 1
+parameter task                   master to inverter   2·A + 512
+parameter response               inverter to master   2·A + 513
+process data, broadcast to 32    master to inverters  1024 + A div 32
+process data, broadcast to all   master to inverters  1032
+================================ ==================== ==================
+
+The 29-bit form is the 11-bit identifier followed by 18 zero bits.
+"""
+
+from enum import Enum
+from typing import NamedTuple
+
+from drive_can_bridge.core.errors import LocalProtocolError, RemoteProtocolError
+from drive_can_bridge.core.frame import EXTENDED_IDENTIFIER_MAX, Route, STANDARD_IDENTIFIER_MAX
+
+ADDRESS_MAX = 255
+PARAMETER_BASE = 512
+BROADCAST_BASE = 1024
+BROADCAST_ALL = 1032
+#: addresses that share one group identifier
+GROUP_SIZE = 32
+#: bits that the 29-bit form appends
+EXTENDED_SHIFT = 18
+
+
+class MessageObject(Enum):
+    """The message objects of one inverter; the value is (added to 2·A)."""
+
+    PROCESS_REQUEST = 0
+    PROCESS_RESPONSE = 1
+    PARAMETER_TASK = PARAMETER_BASE
+    PARAMETER_RESPONSE = PARAMETER_BASE + 1
+
+
+class Addressed(NamedTuple):
+    """
+    What an identifier says.
+
+    :param kind: None for a broadcast of process data.
+    :param addresses: the inverters meant: one, 32, or all 256.
+    """
+
+    kind: MessageObject | None
+    addresses: range
+
+
+def identifier(kind: MessageObject, address: int, *, extended: bool = False) -> int:
+    """
+    Return the identifier of a message object of one inverter.
+
+    :raises LocalProtocolError: the address is not 0 to 255.
+    """
+    _check_address(address)
+    return _formed(2 * address + kind.value, extended)
+
+
+def group_identifier(address: int, *, extended: bool = False) -> int:
+    """Return the broadcast identifier of the 32 addresses that ``address`` belongs to."""
+    _check_address(address)
+    return _formed(BROADCAST_BASE + address // GROUP_SIZE, extended)
+
+
+def all_identifier(*, extended: bool = False) -> int:
+    """Return the broadcast identifier of all inverters."""
+    return _formed(BROADCAST_ALL, extended)
+
+
+def decode_identifier(value: int, *, extended: bool = False) -> Addressed:
+    """
+    Tell what an identifier of either form means.
+
+    :raises RemoteProtocolError: no identifier of CANnord; in the 29-bit form also when one of the
+        18 appended bits is set.
+    """
+    largest = EXTENDED_IDENTIFIER_MAX if extended else STANDARD_IDENTIFIER_MAX
+    if not 0 <= value <= largest:
+        raise RemoteProtocolError(f'identifier {value:X}h is out of range')
+    short = value
+    if extended:
+        short = value >> EXTENDED_SHIFT
+        if short << EXTENDED_SHIFT != value:
+            raise RemoteProtocolError(f'identifier {value:08X}h does not end in '
+                                      f'{EXTENDED_SHIFT} zero bits')
+    if short == BROADCAST_ALL:
+        return Addressed(None, range(ADDRESS_MAX + 1))
+    if short > BROADCAST_ALL:
+        raise RemoteProtocolError(f'identifier {value:X}h does not exist in CANnord')
+    if short >= BROADCAST_BASE:
+        first = GROUP_SIZE * (short - BROADCAST_BASE)
+        return Addressed(None, range(first, first + GROUP_SIZE))
+    address = short % PARAMETER_BASE // 2
+    kind = MessageObject(short - 2 * address)
+    return Addressed(kind, range(address, address + 1))
+
+
+def route(value: int, *, extended: bool = False) -> Route:
+    """Return the route that matches exactly this identifier."""
+    return Route(value, EXTENDED_IDENTIFIER_MAX if extended else STANDARD_IDENTIFIER_MAX, extended)
+
+
+def _formed(short: int, extended: bool) -> int:
+    return short << EXTENDED_SHIFT if extended else short
+
+
+def _check_address(address: int) -> None:
+    if not 0 <= address <= ADDRESS_MAX:
+        raise LocalProtocolError(f'address {address} is out of range: 0 to {ADDRESS_MAX}')

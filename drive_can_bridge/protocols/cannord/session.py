@@ -1,0 +1,528 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The conversation with one CANnord inverter.
+
+.. code-block:: text
+
+    IDLE ──activate, bus up──► CYCLING: control word and setpoints every period; the inverter
+      ▲                           │     answers each frame with status word and actual values
+      └─3 neutral cycles──deactivate
+
+An inverter that does not answer is offline after ``missed_limit`` frames; it goes on being sent
+047Eh ("ready") with neutral setpoints, which is how it is found again.
+
+Beyond answers, an inverter sends its process data once by itself when a fault occurs. Such a frame
+is a sample like any other. Tasks of the parameter channel go out whenever there is one, process
+data beside them: lower identifiers win on the bus.
+"""
+
+from collections.abc import Generator
+import math
+
+from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.errors import RemoteProtocolError
+from drive_can_bridge.core.events import (
+    ForeignMasterSeen, FrameRejected, Noted, ProcessDataReceived, SetpointsExpired, StationFound,
+    StationLost,
+)
+from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.parameters import Access, Parameter
+from drive_can_bridge.core.requests import (
+    BRIDGE_INACTIVE, BUS_DOWN, Failure, Outcome, ReadRequest, ReadValue, Request, WriteRequest,
+    Written,
+)
+from drive_can_bridge.core.session import Session, STOP_CYCLES
+from drive_can_bridge.protocols.cannord import procedures
+from drive_can_bridge.protocols.cannord.channel import Ask, Reply, TaskChannel
+from drive_can_bridge.protocols.cannord.control import CannordControl
+from drive_can_bridge.protocols.cannord.identifiers import identifier, MessageObject
+from drive_can_bridge.protocols.cannord.monitoring import (
+    TIMEOUT_NUMBER, timeout_parameter, timeout_warning,
+)
+from drive_can_bridge.protocols.cannord.parameter_frame import ParameterLayout
+from drive_can_bridge.protocols.cannord.process_data import (
+    decode_extra, decode_main, encode_extra, encode_main, EXTRA_LENGTH, main_length, MAIN_VALUES,
+)
+from drive_can_bridge.protocols.cannord.states import is_faulted, STATUS_BITS, STATUS_WORD
+
+#: longest pause between the neutral cycles of a stop, however long the period is
+STOP_SPACING_MAX = 0.1
+LOOKING = 'being looked for'
+NO_ANSWER = 'no answer to process data'
+
+STATUS_PARAMETER = Parameter(
+    name=STATUS_WORD, access=Access.READ_ONLY, bits=tuple(STATUS_BITS.items()),
+    description='Status word of the inverter')
+
+
+def values_needed(drive: DriveConfiguration) -> int:
+    """Return how many values travel: the longer of both lists decides."""
+    return max(len(drive.cyclic_request), len(drive.cyclic_response))
+
+
+class CannordSession(Session):
+    """
+    Process data, parameter tasks, and the state of one inverter that is addressed by itself.
+
+    :param control: the machine to be used; None: one for this inverter alone.
+    :param places: how many values the frames to and from the inverter hold at least.
+    """
+
+    def __init__(self, drive: DriveConfiguration, control: CannordControl | None = None, *,
+                 places: int = 0) -> None:
+        options = drive.family_options
+        self._machine = control or CannordControl(
+            parameter_set=options['parameter_set'], timeout=drive.control_timeout)
+        super().__init__(drive, self._machine)
+        self._extended: bool = options['extended_identifiers']
+        self.request_identifier, self._response_identifier, self._task_identifier, \
+            self._task_response_identifier = (
+                identifier(kind, drive.station, extended=self._extended)
+                for kind in MessageObject)
+        places = max(places, values_needed(drive))
+        self._swap: bool = options['swap_setpoints_2_3']
+        self._length = main_length(min(places, MAIN_VALUES))
+        self._extra = places > MAIN_VALUES
+        self._main_response = drive.cyclic_response[:MAIN_VALUES]
+        self._extra_response = drive.cyclic_response[MAIN_VALUES:]
+        self._channel = TaskChannel(
+            ParameterLayout(options['value_order'], options['index_byte']), self._send_task,
+            timeout=drive.parameter_timeout, attempts=drive.parameter_retries + 1)
+        self._conditions = self._make_conditions()
+        self._open: list[Request] = []
+        self._cycling = False
+        self._stopping = False
+        self._cycles_left = 0               # before a stop is complete
+        self._payloads: list[bytes] = []    # of the frames of a cycle, main frame first
+        self._sent_word: int | None = None
+        self._awaiting = False
+        self._awaiting_extra = False
+        self._forgiven = 0                  # answers to frames that were given up
+        self._held: ProcessDataReceived | None = None   # until values 4 and 5 arrive
+        self._extra_missing = False
+        self._last_sample: tuple[int, ...] = ()
+        self._sent_at = -math.inf
+        self._answer_due = math.inf
+        self._in_pace = False  # the last cycle was a period ago: its distance says something
+        self._next_cycle = math.inf
+        self._missed_in_row = 0
+        self._advice = 'not activated'
+        self._timeout_warning = ''
+
+    @property
+    def builtin_parameters(self) -> tuple[Parameter, ...]:
+        return (STATUS_PARAMETER,)
+
+    # -- life cycle -------------------------------------------------------------------------------
+
+    def activate(self, now: float) -> None:
+        self.active = True
+        self.ever_online = False
+        if self.bus_available:
+            self._advice = LOOKING
+            self._begin(now)
+
+    def deactivate(self, now: float) -> None:
+        self.active = False
+        self._fail_requests(BRIDGE_INACTIVE)
+        self._withdraw(BRIDGE_INACTIVE, now)
+        if not self._cycling:
+            self._go_idle('deactivated')
+            return
+        self._stopping = True
+        self._in_pace = False
+        self._cycles_left = STOP_CYCLES
+        spacing = min(self.drive.period, STOP_SPACING_MAX)
+        self._next_cycle = min(self._next_cycle, max(now, self._sent_at + spacing))
+
+    @property
+    def stopped(self) -> bool:
+        return not self._cycling
+
+    def bus_up(self, now: float) -> None:
+        self.bus_available = True
+        if self.active:
+            self._advice = LOOKING
+            self._begin(now)
+
+    def bus_down(self, now: float, reason: str) -> None:
+        self.bus_available = False
+        self._fail_requests(BUS_DOWN)
+        self._lose(f'bus down: {reason}', now)
+        self._go_idle(f'bus down: {reason}')
+        self._frames.clear()
+
+    def time_lost(self, now: float) -> None:
+        if not self._cycling or self._stopping:
+            return
+        self._lose('the bridge stood still', now)
+        self._begin(now)
+
+    def _begin(self, now: float) -> None:
+        """Start over: nothing is known of the inverter."""
+        (self._lose if self.online else self._withdraw)('the drive is being reconnected', now)
+        self._stopping = False
+        self._stop_awaiting()
+        self._missed_in_row = 0
+        self._cycling = True
+        self._in_pace = False
+        self._next_cycle = self._first_cycle(now)
+
+    def _first_cycle(self, now: float) -> float:
+        return max(now, self._sent_at + self.drive.period)
+
+    def _go_idle(self, advice: str) -> None:
+        self._cycling = self._stopping = False
+        self.setpoints.enabled = False
+        self._next_cycle = math.inf
+        self._stop_awaiting()
+        self._advice = advice
+        self._be_offline(advice)
+
+    def _lose(self, reason: str, now: float) -> None:
+        """Make the drive offline, if it is not."""
+        self._withdraw(reason, now)
+        self._advice = reason
+        self._be_offline(reason)
+
+    def _be_offline(self, reason: str) -> None:
+        self._held = None
+        self._last_sample = ()
+        self._extra_missing = False
+        self._timeout_warning = ''
+        if self.online:
+            self.online = False
+            self._events.append(StationLost(reason))
+
+    def _withdraw(self, reason: str, now: float) -> None:
+        """Go neutral, and back to ``disable``."""
+        self.setpoints.disarm()
+        self.setpoints.enabled = False
+        self._machine.withdraw(reason, now)
+        self._control_changed(now)
+
+    # -- process data, sending --------------------------------------------------------------------
+
+    def _cycle(self, now: float) -> None:
+        """Send what is due once a period. The fast path of the timer."""
+        self._settle(now)
+        setpoints = self.setpoints
+        expired = setpoints.expire(now)
+        if expired:
+            self._events.append(SetpointsExpired(
+                tuple(setpoint.parameter.name for setpoint in expired)))
+        if setpoints.changed or self._machine.word != self._sent_word:
+            self._payloads = self._encode()
+        period = self.drive.period
+        if self._in_pace:
+            self.statistics.period_error.add(abs(now - self._sent_at - period))
+        self._in_pace = not self._stopping
+        self._sent_at = now
+        self._transmit(now)
+        self._machine.word_sent(now)
+        if self._stopping:
+            self._count_down(now)
+            return
+        soonest = now + 0.5 * period
+        self._next_cycle += period
+        if self._next_cycle < soonest:  # late: leave cycles out, keep the beat, never in a burst
+            self._next_cycle += math.ceil((soonest - self._next_cycle) / period) * period
+
+    def _transmit(self, now: float) -> None:
+        """Hand out the frames of this cycle."""
+        self._frames += self._framed(self.request_identifier)
+        self.expect_answer(now)
+
+    def _framed(self, addressed: int) -> list[Frame]:
+        return [Frame(addressed, payload, self._extended) for payload in self._payloads]
+
+    def _encode(self) -> list[bytes]:
+        self._sent_word = self._machine.word
+        words = [setpoint.parameter.word_from_raw(setpoint.raw)
+                 for setpoint in self.setpoints.items]
+        self.setpoints.changed = False
+        payloads = [encode_main(self._sent_word, words[:MAIN_VALUES], length=self._length,
+                                swap=self._swap)]
+        if self._extra:
+            payloads.append(encode_extra(words[MAIN_VALUES:]))
+        return payloads
+
+    def _count_down(self, now: float) -> None:
+        """Handle the last cycles before silence."""
+        self._next_cycle = now + min(self.drive.period, STOP_SPACING_MAX)
+        self._cycles_left -= 1
+        if self._cycles_left == 0:
+            self._go_idle('deactivated')
+
+    # -- process data, receiving ------------------------------------------------------------------
+
+    def expect_answer(self, now: float, until: float = math.inf) -> None:
+        """
+        Take note that the inverter was sent its process frames.
+
+        :param until: when the answer counts as missed; infinity: with the next cycle.
+        """
+        if not self._cycling:
+            self._forgiven = 1 + self._extra
+            return
+        self._settle(now)
+        self._awaiting = True
+        self._awaiting_extra = self._extra
+        self._sent_at = now
+        self._answer_due = until
+
+    def _settle(self, now: float) -> None:
+        """End an exchange: what has not arrived by now does not count for it any more."""
+        self._answer_due = math.inf
+        self._awaiting_extra = False
+        if self._held is not None:
+            self._extra_missing = True
+            self._publish_held()
+        if not self._awaiting:
+            return
+        self._awaiting = False
+        self.statistics.missed += 1
+        self._missed_in_row += 1
+        if self._missed_in_row >= self.drive.missed_limit and not self._stopping:
+            self._missed_in_row = 0
+            if self.online:
+                self._lose(f'{NO_ANSWER} for {self.drive.missed_limit} cycles', now)
+            self._advice = (f'{NO_ANSWER}: drive silent, wrong station, bit rate or identifier '
+                            'format, or P509 not set to CAN')
+
+    def _stop_awaiting(self) -> None:
+        """Expect no answer any more; one that is on its way is no surprise, though."""
+        self._forgiven = self._awaiting + self._awaiting_extra
+        self._awaiting = self._awaiting_extra = False
+        self._answer_due = math.inf
+        self._held = None
+
+    def receive_frame(self, frame: Frame, now: float, age: float = 0.0) -> None:
+        received, data, extended = frame
+        if extended != self._extended:
+            self._reject(f'{frame}: not of this drive')
+        elif received == self._response_identifier:
+            if len(data) == EXTRA_LENGTH:
+                self._receive_extra(data)
+            else:
+                self._receive_main(data, now, now - age)
+        elif received == self._task_response_identifier:
+            try:
+                self._channel.receive(data, now)
+            except RemoteProtocolError as error:
+                self._reject(str(error))
+        elif received in (self.request_identifier, self._task_identifier):
+            self._see_foreign_master(frame)
+        else:
+            self._reject(f'{frame}: not of this drive')
+
+    def _receive_main(self, data: bytes, now: float, received_at: float) -> None:
+        """Take status word and actual values. The fast path of the reader."""
+        try:
+            word, values = decode_main(data, swap=self._swap)
+        except RemoteProtocolError as error:
+            self._reject(str(error))
+            return
+        asked = self._awaiting
+        if asked:
+            self._awaiting = False
+            self._missed_in_row = 0
+            self.statistics.exchanges += 1
+            latency = received_at - self._sent_at
+            self.statistics.latency.add(latency if latency > 0.0 else 0.0)
+        elif not (is_faulted(word) and self.online):
+            if self._forgiven:
+                self._forgiven -= 1
+            elif not is_faulted(word):  # while offline: the first exchange tells it again
+                self._reject('process data that nobody asked for')
+            return
+        if not self.online and not self._stopping:
+            self._found(now)
+        if asked and is_faulted(word) and not self._machine.fault:
+            self._forgiven = 1      # it may have been told unasked: then the answer follows
+        self._take_status(word, now)
+        if not self.online:         # found again by a stop
+            return
+        wanted = self._main_response
+        raws = (word, *(parameter.raw_from_word(value)
+                        for parameter, value in zip(wanted, values)))
+        if len(values) < len(wanted):
+            self._reject(f'process data with {len(values)} values, {len(wanted)} needed')
+        elif asked and len(data) < self._length:
+            self.statistics.short += 1
+        if self._held is not None:      # its values 4 and 5 would come after these
+            self._publish_held()
+        sample = ProcessDataReceived(raws, received_at)
+        if asked and self._awaiting_extra and self._extra_response and len(
+                raws) > len(wanted):
+            self._held = sample
+        else:
+            self._publish(sample)
+
+    def _receive_extra(self, data: bytes) -> None:
+        """Take actual values 4 and 5."""
+        if not self._awaiting_extra:
+            if self._forgiven:
+                self._forgiven -= 1
+            else:
+                self._reject('additional process data that nobody asked for')
+            return
+        self._awaiting_extra = False
+        held, self._held = self._held, None
+        if held is not None:    # else: nobody wants them, or what they belong to did not come
+            self._extra_missing = False
+            values = (parameter.raw_from_word(value) for parameter, value
+                      in zip(self._extra_response, decode_extra(data)))
+            self._publish(ProcessDataReceived((*held.raws, *values), held.received_at))
+
+    def _publish_held(self) -> None:
+        held, self._held = self._held, None
+        if held is not None:
+            self._publish(held)
+
+    def _publish(self, sample: ProcessDataReceived) -> None:
+        self._last_sample = (*sample.raws, *self._last_sample[len(sample.raws):])
+        self._events.append(sample)
+
+    def _found(self, now: float) -> None:
+        self.online = True
+        self.ever_online = True
+        self._advice = ''
+        self.setpoints.enabled = True
+        self._events.append(StationFound())
+        self._look_at_timeout(now)
+
+    def _take_status(self, word: int, now: float) -> None:
+        self._machine.status_received(word, now)
+        self._control_changed(now)
+
+    def _see_foreign_master(self, frame: Frame) -> None:
+        self._events.append(ForeignMasterSeen(
+            f'another master sends to station {self.drive.station}: {frame}'))
+
+    def _reject(self, text: str) -> None:
+        self.statistics.rejected += 1
+        self._events.append(FrameRejected(text))
+
+    def _control_changed(self, now: float) -> None:
+        self._tell_notes()
+
+    def _tell_notes(self) -> None:
+        """Tell what the control machine noted."""
+        for note in self._machine.take_notes():
+            self._events.append(Noted(note))
+
+    # -- parameters -------------------------------------------------------------------------------
+
+    def _send_task(self, payload: bytes) -> None:
+        self._frames.append(Frame(self._task_identifier, payload, self._extended))
+
+    def _make_conditions(self) -> procedures.Conditions:
+        drive = self.drive
+        return procedures.Conditions(
+            offline=lambda: not self.online, last_value=self._last_value,
+            timeout=drive.parameter_timeout, attempts=drive.parameter_retries + 1,
+            persist=drive.family_options['persist_writes'])
+
+    def _last_value(self, name: str) -> int | None:
+        """Return the raw integer of a parameter that was received last."""
+        for parameter, raw in zip(self.sample_parameters, self._last_sample):
+            if parameter.name == name:
+                return raw
+        return None
+
+    def _enqueue(self, request: Request, now: float) -> None:
+        procedure: Generator[Ask, Reply, tuple[Outcome, ...]]
+        if isinstance(request, ReadRequest):
+            procedure = procedures.read_parameters(request.parameters, self._conditions)
+        elif request.atomic:
+            procedure = procedures.write_together(request.items, self._conditions)
+        else:
+            procedure = procedures.write_parameters(request.items, self._conditions)
+        self._open.append(request)
+
+        def done(outcomes: tuple[Outcome, ...]) -> None:
+            self._open.remove(request)
+            self._complete(request, outcomes)
+            if isinstance(request, WriteRequest) and any(
+                    parameter.number == TIMEOUT_NUMBER and isinstance(outcome, Written)
+                    for (parameter, _), outcome in zip(request.items, outcomes)):
+                self._look_at_timeout(self._channel.now)
+
+        self._channel.run(procedure, done, now)
+
+    def _waiting_requests(self) -> int:
+        return self._channel.waiting_users
+
+    def _fail_requests(self, reason: str) -> None:
+        self._channel.clear()
+        requests, self._open = self._open, []
+        for request in requests:
+            self._complete(request, (Failure(reason),) * len(request))
+
+    def write_refusal(self, parameter: Parameter) -> str:
+        refusal = super().write_refusal(parameter)
+        if not refusal and parameter.number is None:
+            return procedures.PROCESS_DATA_ONLY
+        return refusal
+
+    def reconfigure(self, *, command_timeout: float | None = None,
+                    rearm_immediate: bool | None = None,
+                    parameter_timeout: float | None = None) -> None:
+        super().reconfigure(command_timeout=command_timeout, rearm_immediate=rearm_immediate,
+                            parameter_timeout=parameter_timeout)
+        self._channel.timeout = self.drive.parameter_timeout
+        self._conditions = self._make_conditions()
+
+    # -- the inverter's own time-out --------------------------------------------------------------
+
+    def _look_at_timeout(self, now: float) -> None:
+        """Read the telegram time-out, where the profile lists it."""
+        parameter = timeout_parameter(self.drive.profile)
+        if parameter is None:
+            return
+
+        def done(outcome: Outcome) -> None:
+            if isinstance(outcome, ReadValue):
+                self._timeout_warning = timeout_warning(
+                    parameter, float(parameter.value_from_raw(outcome.raw)), self.drive.period)
+                if self._timeout_warning:
+                    self._events.append(Noted(self._timeout_warning))
+            elif isinstance(outcome, Failure):
+                self._events.append(Noted(f'telegram time-out ({parameter.address}) unknown: '
+                                          f'{outcome.reason}'))
+
+        self._channel.run(procedures.read_parameter(parameter, self._conditions), done, now,
+                          own=True)
+
+    # -- timer ------------------------------------------------------------------------------------
+
+    def handle_timer(self, now: float) -> None:
+        if now >= self._answer_due:
+            self._settle(now)
+        if now >= self._next_cycle:
+            self._cycle(now)
+        if now >= self._machine.next_timer():
+            self._machine.handle_timer(now)
+            self._control_changed(now)
+        if now >= self._channel.next_timer():
+            self._channel.handle_timer(now)
+
+    def next_timer(self) -> float:
+        return min(self._next_cycle, self._answer_due, self._machine.next_timer(),
+                   self._channel.next_timer())
+
+    # -- state ------------------------------------------------------------------------------------
+
+    @property
+    def offline_advice(self) -> str:
+        return self._advice
+
+    @property
+    def warning(self) -> str:
+        if self._timeout_warning:
+            return self._timeout_warning
+        if self._extra_missing:
+            return ('values 4 and 5 do not arrive: the drive does not answer the additional '
+                    'frame; extra_setpoints is for SK 540E and SK 545E')
+        return ''

@@ -1,0 +1,122 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+Control word, status word, and the states that NORD inverters tell with it.
+
+Sources: BU 0060 page 41 (status word); control word and state table as the other bus manuals of
+the same inverters print them alike (BU 0050 pages 30 and 38, BU 0590 page 21, BU 0220 page 66).
+
+================== ============ ==========================================================
+control word       value        what it does
+================== ============ ==========================================================
+``READY``          047Eh        leaves "switch-on disabled"; ramps a running drive down
+``RUN``            047Fh        switches on and enables operation
+``QUICK_STOP``     047Ah        bit 2 clear: stops on the quick stop ramp, then disables
+``ACKNOWLEDGE``    04FEh        rising edge of bit 7: resets faults whose cause is gone
+================== ============ ==========================================================
+
+Bit 10 ("process data valid") is set in all of them: without it an inverter ignores the frame.
+Bits 14 and 15 choose the parameter set (:func:`parameter_set_bits`).
+"""
+
+from enum import Enum
+
+from drive_can_bridge.core.errors import LocalProtocolError
+
+READY = 0x047E
+RUN = 0x047F
+QUICK_STOP = 0x047A
+ACKNOWLEDGE = 0x04FE
+
+#: bits of the control word
+SWITCH_ON = 0x0001
+NO_DISABLE_VOLTAGE = 0x0002
+NO_QUICK_STOP = 0x0004
+ENABLE_OPERATION = 0x0008
+ENABLE_RAMP = 0x0010
+RELEASE_RAMP = 0x0020
+ENABLE_SETPOINT = 0x0040
+FAULT_RESET = 0x0080
+DATA_VALID = 0x0400
+ROTATE_RIGHT = 0x0800
+ROTATE_LEFT = 0x1000
+PARAMETER_SET_SHIFT = 14
+PARAMETER_SETS = 4
+
+#: names of the bits of the status word, as they are published
+STATUS_BITS = {
+    'ready_to_switch_on': 0,
+    'ready': 1,
+    'enabled': 2,
+    'fault': 3,
+    'voltage_enabled': 4,
+    'no_quick_stop': 5,
+    'switch_on_disabled': 6,
+    'warning': 7,
+    'setpoint_reached': 8,
+    'bus_control': 9,
+    'bit_10': 10,
+    'rotating_right': 11,
+    'rotating_left': 12,
+    'bit_13': 13,
+}
+#: name of the status word among the parameters of a drive
+STATUS_WORD = 'status_word'
+FAULT_BIT = 0x0008
+
+
+class State(Enum):
+    """The states of the inverter, by the names that users see."""
+
+    NOT_READY = 'not ready'
+    SWITCH_ON_DISABLED = 'switch-on disabled'
+    READY_TO_SWITCH_ON = 'ready to switch on'
+    SWITCHED_ON = 'switched on'
+    OPERATION_ENABLED = 'operation enabled'
+    FAULT = 'fault'
+    FAULT_REACTION = 'fault reaction'
+    QUICK_STOP = 'quick stop'
+    #: a combination of bits that the table does not have
+    UNKNOWN = 'unknown state'
+
+
+#: (mask, value, state), as the manuals print the table
+_TABLE = (
+    (0x004F, 0x0000, State.NOT_READY),
+    (0x004F, 0x0040, State.SWITCH_ON_DISABLED),
+    (0x007F, 0x0031, State.READY_TO_SWITCH_ON),
+    (0x007F, 0x0033, State.SWITCHED_ON),
+    (0x007F, 0x0037, State.OPERATION_ENABLED),
+    (0x004F, 0x0008, State.FAULT),
+    (0x004F, 0x000F, State.FAULT_REACTION),
+    (0x007F, 0x0017, State.QUICK_STOP),
+)
+
+
+def state_of(status: int) -> State:
+    """Return the state that a status word tells."""
+    for mask, value, state in _TABLE:
+        if status & mask == value:
+            return state
+    return State.UNKNOWN
+
+
+def is_faulted(status: int) -> bool:
+    """Tell whether the fault bit is set, whatever the other bits say."""
+    return bool(status & FAULT_BIT)
+
+
+def parameter_set_bits(parameter_set: int) -> int:
+    """
+    Return bits 14 and 15 of a control word that chooses a parameter set.
+
+    :param parameter_set: 1 to 4.
+    """
+    if not 1 <= parameter_set <= PARAMETER_SETS:
+        raise LocalProtocolError(f'parameter set {parameter_set} is out of range: '
+                                 f'1 to {PARAMETER_SETS}')
+    return parameter_set - 1 << PARAMETER_SET_SHIFT
+
+
+def parameter_set_of(word: int) -> int:
+    """Return the parameter set, 1 to 4, that bits 14 and 15 of a word name."""
+    return (word >> PARAMETER_SET_SHIFT & PARAMETER_SETS - 1) + 1

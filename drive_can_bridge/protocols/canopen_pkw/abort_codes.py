@@ -1,0 +1,120 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The codes with which a device refuses a request, and what they mean.
+
+Source: "PKW objects" of the TeSys T LTMR CANopen guide: words 3 and 4 of a response with function
+4Eh hold a code, and the codes are the SDO abort codes of CiA 301. Which word holds the high half
+is not documented. No two halves of a listed code are another listed code when they change places,
+so that ``auto`` finds out by itself.
+
+The PROFIBUS variants of the same devices refuse with small numbers instead; should one of them
+turn up here, its meaning is named as a hint.
+"""
+
+from drive_can_bridge.protocols.canopen_pkw.pkw import value_from_words, Words, words_from_value
+
+TOGGLE_NOT_ALTERNATED = 0x05030000
+UNKNOWN_COMMAND = 0x05040001
+READ_OF_WRITE_ONLY = 0x06010001
+WRITE_OF_READ_ONLY = 0x06010002
+NO_SUCH_OBJECT = 0x06020000
+NO_SUCH_SUBINDEX = 0x06090011
+VALUE_OUT_OF_RANGE = 0x06090030
+GENERAL_ERROR = 0x08000000
+LOCAL_CONTROL = 0x08000021
+DEVICE_STATE = 0x08000022
+
+TEXTS = {
+    0x05030000: 'toggle bit not alternated',
+    0x05040000: 'SDO protocol timed out',
+    0x05040001: 'unknown command or function code',
+    0x05040002: 'invalid block size',
+    0x05040003: 'invalid sequence number',
+    0x05040004: 'CRC error',
+    0x05040005: 'out of memory',
+    0x06010000: 'access not supported',
+    0x06010001: 'read of a write-only object',
+    0x06010002: 'write to a read-only object',
+    0x06020000: 'no such register or object',
+    0x06040041: 'object cannot be mapped to a PDO',
+    0x06040042: 'mapping exceeds the length of the PDO',
+    0x06040043: 'parameters are incompatible',
+    0x06040047: 'internal incompatibility in the device',
+    0x06060000: 'hardware error',
+    0x06070010: 'data type or length does not match',
+    0x06070012: 'data type does not match, too long',
+    0x06070013: 'data type does not match, too short',
+    0x06090011: 'no such sub-index',
+    0x06090030: 'value out of range',
+    0x06090031: 'value too high',
+    0x06090032: 'value too low',
+    0x06090036: 'maximum is less than minimum',
+    0x060A0023: 'resource not available',
+    0x08000000: 'general error',
+    0x08000020: 'data cannot be transferred or stored',
+    0x08000021: 'data cannot be stored because of local control',
+    0x08000022: 'data cannot be stored in the present state of the device',
+    0x08000023: 'no object dictionary',
+    0x08000024: 'no data available',
+}
+
+#: the PROFIBUS variants' own numbers
+SMALL_TEXTS = {
+    1: 'stack full',
+    3: 'register not found',
+    4: 'answer delayed',
+    7: 'not all registers found',
+    8: 'register is read-only',
+    10: 'word value too high',
+    11: 'word value too low',
+    12: 'byte value too high',
+    13: 'byte value too low',
+    16: 'invalid value',
+    20: 'bad answer',
+}
+SMALL_MAX = 0xFF
+
+_HIGH_HALVES = {code >> 16 for code in TEXTS}
+
+
+def code_from_words(words: Words, order: str) -> int:
+    """
+    Return the abort code of a refusal.
+
+    :param words: words 3 and 4.
+    :param order: ``low_first`` (word 3 is the low half), ``high_first``, or ``auto``: the order
+        that gives a code of the table, else one of its groups, else a small number, else low half
+        first, as CANopen sends integers.
+    """
+    low_first, high_first = value_from_words(words, False), value_from_words(words, True)
+    if order == 'low_first':
+        return low_first
+    if order == 'high_first':
+        return high_first
+    for plausible in (
+            lambda code: code in TEXTS,
+            lambda code: code >> 16 in _HIGH_HALVES,
+            lambda code: code <= SMALL_MAX):
+        for code in (low_first, high_first):
+            if plausible(code):
+                return code
+    return low_first
+
+
+def words_from_code(code: int, order: str = 'low_first') -> Words:
+    """Return words 3 and 4 of a refusal (the device's side); ``auto`` is ``low_first``."""
+    return words_from_value(code, order == 'high_first')
+
+
+def describe(code: int) -> str:
+    """
+    Return code and meaning for a user.
+
+    >>> describe(0x06090030)
+    '06090030h (value out of range)'
+    """
+    text = TEXTS.get(code)
+    if text is None and code <= SMALL_MAX:
+        hint = SMALL_TEXTS.get(code, 'unknown there, too')
+        text = f'no SDO abort code; as a PROFIBUS device would mean it: {hint}'
+    return f'{code:08X}h ({text or "unknown code"})'

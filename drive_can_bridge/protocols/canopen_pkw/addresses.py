@@ -1,0 +1,171 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Where the parameters of a profile stand in the device, and which requests fetch them."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+import re
+from typing import Union
+
+from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.protocols.canopen_pkw import object_map, pkw
+from drive_can_bridge.protocols.canopen_pkw.pkw import Address
+from drive_can_bridge.protocols.polling import Place, plan_reads
+
+#: registers that one request can read or write
+REGISTERS_MAX = 2
+
+_RAW_REGISTER = re.compile(r'p([0-9]{1,5})', re.ASCII)
+_RAW_OBJECT = re.compile(r'x([0-9a-fA-F]{1,4})\.([0-9a-fA-F]{1,2})', re.ASCII)
+#: sub-indices of one index, and a gap: the last one has no next
+_OBJECT_STEP = 2 * (pkw.SUBINDEX_MAX + 1)
+
+Key = Union[int, tuple[int, int]]
+
+
+@dataclass(frozen=True, order=True)
+class Span:
+    """One register, or two adjacent ones; what a parameter takes, and what a request is about."""
+
+    address: Address
+    count: int = 1
+
+    @property
+    def addresses(self) -> tuple[Address, ...]:
+        """The address of each register."""
+        return (self.address,) if self.count == 1 else (self.address, self.address.next)
+
+
+def raw_address(name: str) -> Address | None:
+    """
+    Read a raw parameter name; None: it is none.
+
+    >>> str(raw_address('p465')), str(raw_address('x2004.10'))
+    ('register 465', '2004h.10h')
+    """
+    match = _RAW_REGISTER.fullmatch(name)
+    if match is not None:
+        number = int(match.group(1))
+        return Address(number) if number <= pkw.WORD_MAX else None
+    match = _RAW_OBJECT.fullmatch(name)
+    return None if match is None else Address(int(match.group(1), 16), int(match.group(2), 16))
+
+
+def address_of(parameter: Parameter, addressing: str) -> Address | None:
+    """
+    Return the address that requests for a parameter have; None: the profile does not give it.
+
+    :param addressing: the drive key, for listed parameters; a raw name says itself what it is.
+    """
+    if not parameter.listed:
+        return raw_address(parameter.name)
+    if addressing == 'register':
+        return None if parameter.number is None else Address(parameter.number)
+    if parameter.index is None or parameter.subindex is None:
+        return None
+    return Address(parameter.index, parameter.subindex)
+
+
+def span_of(parameter: Parameter, addressing: str) -> Span:
+    """
+    Return what a parameter takes.
+
+    :raises ValueError: the profile does not give its address (a checked configuration does).
+    """
+    address = address_of(parameter, addressing)
+    if address is None:
+        raise ValueError(f'{parameter.name} has no address to be reached by {addressing}')
+    return Span(address, parameter.type.bits // 16)
+
+
+def plan(spans: Iterable[Span]) -> list[Span]:
+    """Cover registers by as few requests as possible: two adjacent registers share one."""
+    found: list[Span] = []
+    spans = list(spans)
+    for by_object in (False, True):
+        places = [Place(_linear(span.address), span.count) for span in spans
+                  if span.address.by_object is by_object]
+        found += [Span(_address(chunk.address, by_object), chunk.size)
+                  for chunk in plan_reads(places, REGISTERS_MAX)]
+    return found
+
+
+def round_spans(drive: DriveConfiguration) -> list[Span]:
+    """
+    Return what a round brings: ``cyclic_response``, and the status word.
+
+    What a damaged configuration does not give an address for is left out.
+    """
+    wanted = list(drive.cyclic_response)
+    table = drive.profile.control
+    status = drive.profile.parameters.get(table.status_parameter or '') if table else None
+    if status is not None and status not in wanted:
+        wanted.append(status)
+    addressing = drive.family_options['addressing']
+    return [span_of(parameter, addressing) for parameter in wanted
+            if address_of(parameter, addressing) is not None]
+
+
+def round_plan(drive: DriveConfiguration) -> list[Span]:
+    """Return the reads of a round."""
+    return plan(round_spans(drive))
+
+
+def _linear(address: Address) -> int:
+    if address.subindex is None:
+        return address.word
+    return address.word * _OBJECT_STEP + address.subindex
+
+
+def _address(linear: int, by_object: bool) -> Address:
+    return Address(*divmod(linear, _OBJECT_STEP)) if by_object else Address(linear)
+
+
+# -- values ---------------------------------------------------------------------------------------
+
+
+def raw_from_words(parameter: Parameter, words: Sequence[int], word_order: str) -> int:
+    """
+    Return the raw integer of a parameter.
+
+    :param words: of its registers, that of the lower number first.
+    :param word_order: of the drive; the parameter's own order wins.
+    """
+    if len(words) == 1:
+        return parameter.raw_from_word(words[0])
+    high_first = (parameter.word_order or word_order) == 'high_first'
+    return parameter.raw_from_word(pkw.value_from_words((words[0], words[1]), high_first))
+
+
+def words_from_raw(parameter: Parameter, raw: int, word_order: str) -> tuple[int, ...]:
+    """Return the words of a parameter's registers, that of the lower number first."""
+    value = parameter.word_from_raw(raw)
+    if parameter.type.bits == 16:
+        return (value,)
+    return pkw.words_from_value(value, (parameter.word_order or word_order) == 'high_first')
+
+
+# -- the same register under two names ------------------------------------------------------------
+
+
+def keys(parameter: Parameter) -> frozenset[Key]:
+    """
+    Return every way to name the registers of a parameter; equal keys are equal registers.
+
+    Registers and objects are two names of one thing; where the profile gives only one of them,
+    the object dictionary's known layout gives the other.
+    """
+    found: set[Key] = set()
+    addresses = [address for way in ('register', 'canopen')
+                 if (address := address_of(parameter, way)) is not None]
+    for address in addresses:
+        for entry in Span(address, parameter.type.bits // 16).addresses:
+            if entry.subindex is None:
+                found.add(entry.word)
+                other: Key | None = object_map.object_of(entry.word)
+            else:
+                found.add((entry.word, entry.subindex))
+                other = object_map.register_of(entry.word, entry.subindex)
+            if other is not None and len(addresses) == 1:
+                found.add(other)
+    return frozenset(found)

@@ -1,0 +1,202 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""The row of the family table for the CANopen PKW mailbox."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.frame import Route, STANDARD_IDENTIFIER_MAX
+from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.session import Session
+from drive_can_bridge.protocols.canopen_pkw import addresses, network, pkw
+from drive_can_bridge.protocols.canopen_pkw.addresses import Span
+from drive_can_bridge.protocols.canopen_pkw.identifiers import Identifiers
+from drive_can_bridge.protocols.family import Claim, Complaint, Family
+from drive_can_bridge.protocols.polling import round_time
+
+#: worst-case stuffing, eight bytes, 11-bit identifier, with the interframe space
+FRAME_BITS = 135
+
+
+class CanopenPkw(Family):
+    """PKW over PDO4: acknowledged access to registers, one request at a time."""
+
+    name = 'canopen_pkw'
+    cyclic = False
+    #: a device may take its time: nothing is documented
+    drive_defaults = {'parameter_timeout': 0.5}
+    options_schema: dict[str, Any] = {
+        'layout': {
+            'description': 'Place of the bytes in the PDO: word_le (every word low byte first), '
+                           'dword_swapped (words of each pair change places), word_be (every '
+                           'word high byte first).',
+            'enum': [layout.value for layout in pkw.Layout],
+            'default': 'word_le',
+        },
+        'word_order': {
+            'description': 'Which word of a 32-bit value comes first (lower register); a '
+                           'parameter of the profile may override it.',
+            'enum': ['high_first', 'low_first'],
+            'default': 'high_first',
+        },
+        'abort_code_order': {
+            'description': 'Which half of an abort code word 3 holds; auto finds out.',
+            'enum': ['auto', 'low_first', 'high_first'],
+            'default': 'auto',
+        },
+        'addressing': {
+            'description': 'register: parameters are reached by number; canopen: by index and '
+                           'subindex.',
+            'enum': ['register', 'canopen'],
+            'default': 'register',
+        },
+        'nmt_start': {
+            'description': 'Send NMT start to the node at start, after its boot-up frame, when '
+                           'its heartbeat says stopped or pre-operational, and once a second '
+                           'while it is offline.',
+            'type': 'boolean',
+            'default': True,
+        },
+        'heartbeat_timeout': {
+            'description': 's without heartbeat until the drive counts as offline; 0: not '
+                           'watched. The producer (1017h) is not configured by the bridge.',
+            'type': 'number', 'minimum': 0, 'maximum': 3600, 'default': 0.0,
+        },
+        'request_cob_id': {
+            'description': 'Identifier of requests to the device (receive PDO4); 0: the '
+                           'predefined one, 500h + node.',
+            'type': 'integer', 'minimum': 0, 'maximum': STANDARD_IDENTIFIER_MAX, 'default': 0,
+        },
+        'response_cob_id': {
+            'description': 'Identifier of responses (transmit PDO4); 0: the predefined one, '
+                           '480h + node.',
+            'type': 'integer', 'minimum': 0, 'maximum': STANDARD_IDENTIFIER_MAX, 'default': 0,
+        },
+        'refresh_interval': {
+            'description': 's: unchanged values of cyclic_request are written again this often; '
+                           '0: only on change.',
+            'type': 'number', 'minimum': 0, 'maximum': 3600, 'default': 1.0,
+        },
+    }
+
+    def check(self, drive: DriveConfiguration) -> Iterator[Complaint]:
+        """Yield everything that this family cannot do with the drive as configured."""
+        if not 1 <= drive.station <= network.NODE_MAX:
+            yield Complaint('station', f'{drive.station} is out of range, '
+                                       f'allowed is 1 to {network.NODE_MAX} ({self.name})')
+        else:
+            yield from self._check_identifiers(drive)
+        wrong = list(self._check_profile(drive))
+        yield from wrong
+        if not wrong:
+            yield from self._check_request(drive)
+
+    def claims(self, drive: DriveConfiguration) -> list[Claim]:
+        """Return all identifiers of the drive on its bus, both directions."""
+        node = drive.station
+        identifiers = Identifiers.of(drive)
+        purposes = {
+            identifiers.request: f'PKW requests to node {node}',
+            identifiers.response: f'PKW responses of node {node}',
+            identifiers.emergency: f'emergency messages of node {node}',
+            identifiers.heartbeat: f'heartbeats of node {node}',
+        }
+        claims = [Claim(_route(identifier), f'{identifier:03X}h ({purpose})')
+                  for identifier, purpose in purposes.items()]
+        # all CANopen nodes of a bus listen to the one NMT identifier
+        return [*claims, Claim(_route(network.NMT_IDENTIFIER), '000h (NMT)', shared='NMT')]
+
+    def bits_per_second(self, drive: DriveConfiguration) -> float:
+        """Return the worst-case load: each period one round, and every setpoint changes."""
+        return 2 * self._requests(drive) * FRAME_BITS / drive.period
+
+    def shortest_period(self, drive: DriveConfiguration, bitrate: int) -> float:
+        """Return the time of a round in which every setpoint changes, in s."""
+        requests = self._requests(drive)
+        return round_time([FRAME_BITS] * (2 * requests), requests, bitrate)
+
+    def raw_parameter(self, drive: DriveConfiguration, name: str) -> Parameter | None:
+        """
+        Resolve ``p<register>`` and ``x<index>.<sub-index>``: 16 bits, unsigned.
+
+        One that is the register of a listed parameter carries that one's numbers, by which its
+        rules are found. What goes over the wire is always what the raw name says.
+        """
+        address = addresses.raw_address(name)
+        if address is None:
+            return None
+        by_register = address.subindex is None
+        raw = Parameter(name=name, listed=False,
+                        number=address.word if by_register else None,
+                        index=None if by_register else address.word,
+                        subindex=address.subindex)
+        mine = addresses.keys(raw)
+        for other in drive.profile.parameters.values():
+            if other.type.bits == 16 and mine & addresses.keys(other):
+                return Parameter(name=name, listed=False, number=other.number,
+                                 index=other.index, subindex=other.subindex)
+        return raw
+
+    def make_session(self, drive: DriveConfiguration) -> Session:
+        """Make the drive's session. Nothing is sent before ``activate``."""
+        # Imported late: configuration checks read this table without any need of sessions.
+        from drive_can_bridge.protocols.canopen_pkw.session import PkwSession
+        return PkwSession(drive)
+
+    # -- parts ------------------------------------------------------------------------------------
+
+    def _requests(self, drive: DriveConfiguration) -> int:
+        """Return the requests of a period in which every setpoint changes."""
+        return len(addresses.round_plan(drive)) + len(drive.cyclic_request)
+
+    def _check_identifiers(self, drive: DriveConfiguration) -> Iterator[Complaint]:
+        identifiers = Identifiers.of(drive)
+        for key, identifier in (('request_cob_id', identifiers.request),
+                                ('response_cob_id', identifiers.response)):
+            for purpose, other in identifiers._asdict().items():
+                if identifier == other and f'{purpose}_cob_id' != key:
+                    yield Complaint(key, f'{identifier:03X}h is the identifier of the {purpose} '
+                                         'of this node, allowed is any other')
+                    break
+
+    def _check_profile(self, drive: DriveConfiguration) -> Iterator[Complaint]:
+        addressing = drive.family_options['addressing']
+        for name, parameter in drive.profile.parameters.items():
+            place = f'profile.parameters.{name}'
+            if parameter.index is not None and parameter.subindex is None:
+                yield Complaint(f'{place}.subindex', 'missing, allowed with index is 0 to '
+                                                     f'{pkw.SUBINDEX_MAX}')
+                continue
+            address = addresses.address_of(parameter, addressing)
+            if address is None:
+                key, what = ('number', 'a number') if addressing == 'register' \
+                    else ('index', 'an index with a subindex')
+                yield Complaint(f'{place}.{key}', f'missing, allowed in {self.name} with '
+                                                  f'addressing {addressing} is {what}')
+                continue
+            last = Span(address, parameter.type.bits // 16).addresses[-1]
+            if last.word > pkw.WORD_MAX or (last.subindex or 0) > pkw.SUBINDEX_MAX:
+                yield Complaint(f'{place}.type', f'{parameter.type.value} takes two registers '
+                                                 f'and {address} is the last one, allowed is a '
+                                                 '16-bit type')
+
+    def _check_request(self, drive: DriveConfiguration) -> Iterator[Complaint]:
+        """Look for setpoints that would overwrite each other, or the control word."""
+        control = drive.profile.control
+        taken: dict[addresses.Key, str] = {}
+        listed = list(drive.cyclic_request)
+        if control is not None:
+            word = drive.profile.parameters.get(control.parameter)
+            if word is not None and word not in listed:
+                listed.insert(0, word)
+        for parameter in listed:
+            mine = addresses.keys(parameter) if parameter.listed else frozenset()
+            other = next((taken[key] for key in mine if key in taken), None)
+            if other is not None:
+                yield Complaint('cyclic_request', f"'{parameter.name}' and '{other}' share a "
+                                                  'register, allowed is one of them')
+            taken.update(dict.fromkeys(mine, parameter.name))
+
+
+def _route(identifier: int) -> Route:
+    return Route(identifier, STANDARD_IDENTIFIER_MAX, False)

@@ -1,0 +1,191 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The mailbox as its user sees it: one request at a time, and what became of it.
+
+The device starts nothing when it gets the function byte that it had before (see :mod:`.pkw`). As
+long as every request is answered, inverting the toggle with each of them is all that is needed.
+After a start, a time-out or a restart of the device nobody knows its last function byte. Then
+function 00h goes first; once the device has answered that, any function byte is a change:
+
+.. code-block:: text
+
+    synchronised ──request, answered──► synchronised        (toggle inverted)
+         │ no answer, device restarted
+         ▼
+    unknown ──function 00h, answered──► request ──answered──► synchronised
+         └──────not answered in 0.1 s──► request (reads), or nothing (writes)
+
+A device that has just started has 00h as its last function byte already and need not answer
+function 00h. So a read is sent all the same: it does no harm, and its answer synchronises. A
+write that was sent like this might be executed although it seems lost; it is reported as *not
+sent*, unless whoever asks for it says that this does not matter (:attr:`Write.blind`).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+import math
+from typing import NamedTuple, Union
+
+from drive_can_bridge.protocols.canopen_pkw import abort_codes, pkw
+from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Function, Message
+
+#: s that an answer to function 00h is waited for at most
+SYNCHRONISATION_TIMEOUT = 0.1
+
+
+@dataclass(frozen=True)
+class Read:
+    """Read one register, or two adjacent ones."""
+
+    address: Address
+    count: int = 1
+
+
+@dataclass(frozen=True)
+class Write:
+    """
+    Write one register, or two adjacent ones.
+
+    :param blind: send it even though the device may take no notice; it may be executed twice.
+    :param timeout: s to wait for the answer; None: as configured.
+    """
+
+    address: Address
+    words: tuple[int, ...]
+    blind: bool = False
+    timeout: float | None = None
+
+
+Step = Union[Read, Write]
+
+
+class Answered(NamedTuple):
+    """The device did it; ``words`` are those read (of a write: nothing in particular)."""
+
+    words: pkw.Words
+
+
+class Refused(NamedTuple):
+    """The device refused it with an abort code. Nothing was changed."""
+
+    code: int
+
+    @property
+    def text(self) -> str:
+        """The refusal in words."""
+        return f'refused by the drive: {abort_codes.describe(self.code)}'
+
+
+class Silence(NamedTuple):
+    """
+    Nobody answered.
+
+    :param sent: False: it was not even sent, because the mailbox could not be synchronised.
+    """
+
+    sent: bool = True
+
+
+Reply = Union[Answered, Refused, Silence]
+
+
+class Mailbox:
+    """
+    One exchange at a time.
+
+    :param send: takes a request that leaves now.
+    :param order: of the halves of abort codes: ``auto``, ``low_first``, ``high_first``.
+    :param timeout: s to wait for an answer.
+    """
+
+    def __init__(self, send: Callable[[Message], None], *, order: str, timeout: float) -> None:
+        self.timeout = timeout
+        self._send = send
+        self._order = order
+        self._synchronised = False
+        self._toggle = False            # of the last request
+        self._step: Step | None = None
+        self._request: Message | None = None
+        self._deadline = math.inf
+
+    @property
+    def busy(self) -> bool:
+        """An exchange is under way."""
+        return self._step is not None
+
+    @property
+    def deadline(self) -> float:
+        """When ``handle_timer`` has something to do; infinity: never."""
+        return self._deadline
+
+    def begin(self, step: Step, now: float) -> None:
+        """Begin an exchange; none may be under way."""
+        if self._step is not None:
+            raise RuntimeError('an exchange is under way')
+        self._step = step
+        if self._synchronised or isinstance(step, Write) and step.blind:
+            self._send_step(step, now)
+            return
+        self._request = pkw.idle_request()
+        self._deadline = now + min(self.timeout, SYNCHRONISATION_TIMEOUT)
+        self._send(self._request)
+
+    def receive(self, message: Message, now: float) -> Reply | bool:
+        """
+        Take a response.
+
+        :return: the reply that ends the exchange; True where it goes on; False for a response
+            that nobody asked for.
+        """
+        request, step = self._request, self._step
+        if request is None or step is None:
+            return False
+        if request.code == Function.NONE:
+            if message.code != Function.NONE:
+                return False
+            self._synchronised = True
+            self._send_step(step, now)
+            return True
+        if not pkw.answers(message, request):
+            return False
+        self._synchronised = True
+        self._end()
+        if message.code == Function.ERROR:
+            return Refused(abort_codes.code_from_words(message.words, self._order))
+        return Answered(message.words)
+
+    def handle_timer(self, now: float) -> Reply | None:
+        """Return the reply that ends an overdue exchange; None: nothing ended."""
+        request, step = self._request, self._step
+        if now < self._deadline or request is None or step is None:
+            return None
+        if request.code != Function.NONE:
+            self.forget()
+            return Silence()
+        if isinstance(step, Write):
+            self.forget()
+            return Silence(sent=False)
+        self._send_step(step, now)
+        return None
+
+    def forget(self) -> None:
+        """Expect nothing any more; what the device's last function byte is, is unknown."""
+        self._end()
+        self._synchronised = False
+
+    def _end(self) -> None:
+        self._step = None
+        self._request = None
+        self._deadline = math.inf
+
+    def _send_step(self, step: Step, now: float) -> None:
+        # inverted after function 00h, too: a late answer to the request before never fits
+        self._toggle = not self._toggle
+        timeout = self.timeout
+        if isinstance(step, Read):
+            self._request = pkw.read_request(step.address, step.count, self._toggle)
+        else:
+            self._request = pkw.write_request(step.address, step.words, self._toggle)
+            timeout = timeout if step.timeout is None else step.timeout
+        self._deadline = now + timeout
+        self._send(self._request)

@@ -1,0 +1,213 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The device as a CANopen node: may PDOs be sent to it, has it restarted, what ails it.
+
+A node takes PDOs in the state *operational* only. What its state is, the bridge learns from the
+boot-up frame and from heartbeats; a node without heartbeats is taken to be operational a moment
+after it was started, because nobody will ever say so.
+
+=============================== ==================================================================
+heard                           PDOs
+=============================== ==================================================================
+nothing                         allowed; after our first *start* only when a moment has passed
+boot-up, no heartbeats known    allowed again after the same moment
+boot-up, or heartbeat that says none until a heartbeat says operational; but if heartbeats cease
+stopped or pre-operational      (for 1 s, or three of their intervals), nothing is known any more
+heartbeat: operational          allowed
+=============================== ==================================================================
+
+NMT *start* goes out when the bridge starts, after a boot-up frame, when a heartbeat says that the
+node is not operational, and once a second while the drive is offline.
+"""
+
+from enum import Enum
+import math
+
+from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.protocols.canopen_pkw import network
+from drive_can_bridge.protocols.canopen_pkw.network import Emergency, NmtCommand, NmtState
+
+#: s that a node is given to become operational
+START_PAUSE = 0.05
+#: s between two *start* commands to a node that is offline
+START_PERIOD = 1.0
+#: least s between two *start* commands, however often heartbeats ask for them
+START_SPACING = 0.1
+#: s for which a heartbeat is believed at least, and intervals for which it is
+BELIEF_TIME = 1.0
+BELIEF_INTERVALS = 3.0
+#: longest s between two heartbeats that a node can be configured for (16 bits of ms)
+INTERVAL_MAX = 65.535
+
+
+class Change(Enum):
+    """What a frame or the passage of time says of a node."""
+
+    NONE = 'nothing new'
+    RESTARTED = 'boot-up'
+    NOT_OPERATIONAL = 'heartbeat: not operational'
+    OPERATIONAL = 'heartbeat: operational'
+    HEARTBEAT_LOST = 'heartbeats ceased'
+
+
+class Node:
+    """
+    One node, watched.
+
+    :param nmt_start: send NMT *start*; False: that is somebody else's business.
+    :param heartbeat_timeout: s without heartbeat until it counts as lost; 0: never.
+    :ivar state: what the node last said of itself, or None.
+    :ivar emergency: what it last said of its errors; None: nothing, or no error any more.
+    :ivar free_at: when PDOs may be sent.
+    :ivar heartbeat_lost: a heartbeat is overdue.
+    :ivar heard_heartbeat: there was a heartbeat, or a boot-up frame, since ``begin``.
+    """
+
+    def __init__(self, number: int, *, nmt_start: bool, heartbeat_timeout: float) -> None:
+        self.number = number
+        self.heartbeat_timeout = heartbeat_timeout
+        self._nmt_start = nmt_start
+        self._frames: list[Frame] = []
+        self.forget()
+
+    def forget(self) -> None:
+        """Know nothing and send nothing."""
+        self.state: NmtState | None = None
+        self.emergency: Emergency | None = None
+        self.free_at = math.inf
+        self.heartbeat_lost = False
+        self.heard_heartbeat = False
+        self._beating = False           # there was a heartbeat, not only a boot-up frame
+        self._heartbeat_at = -math.inf
+        self._interval = 0.0
+        self._blocked_until = -math.inf     # a heartbeat is believed until then
+        self._started_at = -math.inf
+        self._start_due = math.inf
+        self._frames.clear()
+
+    def begin(self, now: float) -> None:
+        """Begin to use the node; what was heard of it before still counts."""
+        self._start(now)
+        if self._blocked(now):
+            self.free_at = self._blocked_until
+        else:
+            self.free_at = now + START_PAUSE if self._nmt_start else now
+        self._heartbeat_at = max(self._heartbeat_at, now)   # none was due while nobody listened
+
+    def offline(self, now: float) -> None:
+        """Take note that the drive is offline: it is started once a second."""
+        if self._nmt_start and self._start_due == math.inf:
+            self._start_due = max(now, self._started_at + START_PERIOD)
+
+    def online(self) -> None:
+        """Take note that the drive is online: it needs no more starting."""
+        self._start_due = math.inf
+
+    def stop(self) -> None:
+        """Send nothing any more, but go on listening."""
+        self._start_due = math.inf
+        self._frames.clear()
+
+    # -- input ------------------------------------------------------------------------------------
+
+    def receive_heartbeat(self, state: NmtState, now: float, active: bool) -> Change:
+        """
+        Take a boot-up frame or heartbeat.
+
+        :param active: the bridge uses the node: it may be sent something.
+        """
+        was_blocked = self._blocked(now)
+        interval = now - self._heartbeat_at
+        if self._beating and state is not NmtState.BOOT_UP and interval <= INTERVAL_MAX:
+            self._interval = interval
+        self._heartbeat_at = now
+        self.heard_heartbeat = True
+        recovered, self.heartbeat_lost = self.heartbeat_lost, False
+        if state is NmtState.BOOT_UP:
+            self.state = NmtState.PRE_OPERATIONAL
+            self.emergency = None
+            self.free_at = now + START_PAUSE
+            if self._beating:
+                self.free_at = self._blocked_until = now + self._belief
+            if active:
+                self._start(now)
+            return Change.RESTARTED
+        self._beating = True
+        self.state = state
+        if state is NmtState.OPERATIONAL:
+            waited, self.free_at = now < self.free_at, min(self.free_at, now)
+            self._blocked_until = -math.inf
+            return Change.OPERATIONAL if waited or recovered else Change.NONE
+        self.free_at = self._blocked_until = now + self._belief
+        if active and now >= self._started_at + START_SPACING:
+            self._start(now)
+        return Change.NONE if was_blocked else Change.NOT_OPERATIONAL
+
+    def receive_emergency(self, emergency: Emergency) -> str:
+        """
+        Take an emergency message.
+
+        :return: what is new about it, in words; '': nothing.
+        """
+        known = self.emergency
+        self.emergency = None if emergency.code == network.NO_ERROR else emergency
+        if self.emergency == known:
+            return ''
+        if self.emergency is None:
+            return 'emergency over: the node reports no error any more'
+        return f'emergency {self.emergency.text}'
+
+    def handle_timer(self, now: float) -> Change:
+        """Do what is due."""
+        if now >= self._start_due:
+            self._start(now)
+        if now >= self._heartbeat_due:
+            self.heartbeat_lost = True
+            return Change.HEARTBEAT_LOST
+        return Change.NONE
+
+    def next_timer(self) -> float:
+        """Return when ``handle_timer`` wants to be called."""
+        return min(self._start_due, self._heartbeat_due)
+
+    def take_frames(self) -> list[Frame]:
+        """Return the frames to be sent."""
+        frames, self._frames = self._frames, []
+        return frames
+
+    # -- state ------------------------------------------------------------------------------------
+
+    def refusal(self, now: float) -> str:
+        """Say why no PDO can be sent for a while; '' if it can."""
+        if not self._blocked(now) or self.state is None:
+            return ''
+        return f'node is {self.state.text}'
+
+    @property
+    def state_text(self) -> str:
+        """The NMT state in words; ``unknown`` for a node that never said anything of it."""
+        return 'unknown' if self.state is None else self.state.text
+
+    # -- inside -----------------------------------------------------------------------------------
+
+    def _blocked(self, now: float) -> bool:
+        """Tell whether a heartbeat that is still believed says that the node takes no PDOs."""
+        return now < self._blocked_until
+
+    @property
+    def _belief(self) -> float:
+        return max(BELIEF_TIME, BELIEF_INTERVALS * self._interval)
+
+    @property
+    def _heartbeat_due(self) -> float:
+        if not self.heard_heartbeat or self.heartbeat_lost or self.heartbeat_timeout <= 0.0:
+            return math.inf
+        return self._heartbeat_at + self.heartbeat_timeout
+
+    def _start(self, now: float) -> None:
+        if not self._nmt_start:
+            return
+        self._frames.append(network.encode_nmt(NmtCommand.START, self.number))
+        self._started_at = now
+        if self._start_due != math.inf:
+            self._start_due = now + START_PERIOD

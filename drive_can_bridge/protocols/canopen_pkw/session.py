@@ -1,0 +1,494 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The conversation with one device over the PKW mailbox.
+
+.. code-block:: text
+
+    IDLE ──activate, bus up──► RUNNING ──deactivate──► STOPPING ──► IDLE
+      ▲                           │ bus down
+      └───────────────────────────┘
+
+While running, a round of reads begins every period, as long as the node takes PDOs (see
+:mod:`.node`). A complete round is published as one sample and makes the drive online; three
+rounds (``missed_limit``) with a read that nobody answered make it offline, and so do a boot-up
+frame, a heartbeat that says that the node is not operational, and heartbeats that cease. Whatever
+the reason: the control word goes back to ``disable``, setpoints go neutral and want re-arming. A
+drive that is only silent may still be listening; so it is told to stand still before rounds go on.
+
+Setpoints and the control word are written while the drive is online: when they change, and
+setpoints again after ``refresh_interval``.
+"""
+
+from collections.abc import Sequence
+from enum import Enum
+import math
+
+from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.control import ControlMachine, ProfileControl
+from drive_can_bridge.core.errors import RemoteProtocolError
+from drive_can_bridge.core.events import (
+    ForeignMasterSeen, FrameRejected, Noted, ProcessDataReceived, SetpointsExpired, StationFound,
+    StationLost,
+)
+from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.requests import BRIDGE_INACTIVE, BUS_DOWN, Failure, Request
+from drive_can_bridge.core.session import Session
+from drive_can_bridge.protocols.canopen_pkw import addresses, network, pkw, procedures
+from drive_can_bridge.protocols.canopen_pkw.addresses import Span
+from drive_can_bridge.protocols.canopen_pkw.channel import Channel, Lane
+from drive_can_bridge.protocols.canopen_pkw.control_writer import ControlWriter
+from drive_can_bridge.protocols.canopen_pkw.identifiers import Identifiers
+from drive_can_bridge.protocols.canopen_pkw.mailbox import Mailbox, Refused
+from drive_can_bridge.protocols.canopen_pkw.node import Change, Node
+from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Layout, Message
+from drive_can_bridge.protocols.canopen_pkw.setpoint_writer import SetpointWriter
+from drive_can_bridge.protocols.canopen_pkw.user_requests import UserRequests
+from drive_can_bridge.protocols.polling import Beat
+
+#: how often, and for how long (s, all together), a drive is told to stand still
+STOP_ATTEMPTS = 3
+STOP_TIME = 0.4
+LOOKING = 'being looked for'
+SILENT = ('no complete round of reads: drive silent, not operational, or other COB-IDs than '
+          'configured')
+
+
+class Phase(Enum):
+    """What the session is doing."""
+
+    IDLE = 'idle'
+    RUNNING = 'running'
+    STOPPING = 'last writes'
+
+
+class PkwSession(Session):
+    """NMT supervision, the polled exchange, and the requests of users between its reads."""
+
+    def __init__(self, drive: DriveConfiguration) -> None:
+        table = drive.profile.control
+        control: ControlMachine | None = None
+        if table is not None:
+            control = ProfileControl(table, timeout=drive.control_timeout)
+        super().__init__(drive, control)
+        options = drive.family_options
+        self._identifiers = Identifiers.of(drive)
+        self._layout = Layout(options['layout'])
+        self._addressing: str = options['addressing']
+        self._word_order: str = options['word_order']
+        self._node = Node(drive.station, nmt_start=options['nmt_start'],
+                          heartbeat_timeout=options['heartbeat_timeout'])
+        self._channel = Channel(Mailbox(
+            self._send, order=options['abort_code_order'], timeout=drive.parameter_timeout))
+        self._users = UserRequests(
+            self._channel, drive, offline=lambda: not self.online, complete=self._complete)
+        self._setpoint_writer = SetpointWriter(
+            self._channel, self.setpoints, addressing=self._addressing,
+            word_order=self._word_order, refresh=options['refresh_interval'])
+        self._control_writer: ControlWriter | None = None
+        self._status: Parameter | None = None
+        if control is not None and table is not None:
+            word = drive.profile.parameters[table.parameter]
+            self._control_writer = ControlWriter(
+                self._channel, control, word, self._control_changed,
+                disable=table.disable, addressing=self._addressing,
+                word_order=self._word_order,
+                refresh=options['refresh_interval'] if word in drive.cyclic_request else 0.0)
+            self._status = drive.profile.parameters.get(table.status_parameter or '')
+        self._response_spans = [addresses.span_of(parameter, self._addressing)
+                                for parameter in drive.cyclic_response]
+        self._plan = addresses.round_plan(drive)
+        self._refusals: dict[Span, str] = {}
+        self._beat = Beat(drive.period)
+        self._phase = Phase.IDLE
+        self._missed_in_row = 0
+        self._round_began = -math.inf
+        self._received_at = -math.inf
+        self._advice = 'not activated'
+
+    # -- life cycle -------------------------------------------------------------------------------
+
+    def activate(self, now: float) -> None:
+        self.active = True
+        self.ever_online = False
+        if self.bus_available:
+            self._begin(now)
+
+    def deactivate(self, now: float) -> None:
+        was_running = self._phase is Phase.RUNNING and self.ever_online
+        self.active = False
+        self._users.fail(BRIDGE_INACTIVE)
+        self._withdraw(BRIDGE_INACTIVE, now)
+        self._node.stop()
+        self._beat.stop()
+        self._channel.clear()
+        if self._phase is Phase.STOPPING:
+            was_running = True
+        writes = self._neutral_writes()
+        if not was_running or not writes or now < self._node.free_at:
+            self._go_idle('deactivated')
+            return
+        self._phase = Phase.STOPPING
+        self._channel.run(Lane.CONTROL, self._farewell(writes),
+                          lambda _: self._go_idle('deactivated'), now)
+
+    @property
+    def stopped(self) -> bool:
+        return self._phase is Phase.IDLE
+
+    def bus_up(self, now: float) -> None:
+        self.bus_available = True
+        if self.active:
+            self._begin(now)
+
+    def bus_down(self, now: float, reason: str) -> None:
+        self.bus_available = False
+        self._users.fail(BUS_DOWN)
+        text = f'bus down: {reason}'
+        self._withdraw(text, now)
+        self._node.forget()
+        self._go_idle(text)
+        self._frames.clear()
+
+    def time_lost(self, now: float) -> None:
+        if self._phase is not Phase.RUNNING:
+            return
+        self._be_lost('the bridge stood still', now)
+        self._begin(now)
+
+    def _begin(self, now: float) -> None:
+        """Start over: nothing is known of the drive."""
+        self._be_lost('the drive is being reconnected', now)
+        self._advice = LOOKING
+        self._phase = Phase.RUNNING
+        self._channel.cancel(Lane.CONTROL)  # of a stop that was under way
+        self._missed_in_row = 0
+        self._refusals.clear()
+        self._plan = addresses.round_plan(self.drive)
+        self._node.begin(now)
+        self._follow_node(now)
+
+    def _go_idle(self, advice: str) -> None:
+        self._phase = Phase.IDLE
+        self._node.stop()
+        self._beat.stop()
+        self._channel.clear()
+        self._refusals.clear()
+        self._advice = advice
+        self._be_offline(advice)
+
+    # -- online and offline -----------------------------------------------------------------------
+
+    def _found(self, now: float) -> None:
+        self.online = True
+        self.ever_online = True
+        self._advice = ''
+        self._node.online()
+        self.setpoints.disarm()
+        self.setpoints.enabled = True
+        self._events.append(StationFound())
+        self._setpoint_writer.forget()
+        if self._control_writer is not None:
+            self._control_writer.forget()
+        self._control_changed(now)
+        self._setpoint_writer.look(now)
+
+    def _be_lost(self, reason: str, now: float) -> None:
+        """Make the drive offline, if it is not."""
+        self._withdraw(reason, now)
+        self._advice = reason
+        self._channel.cancel(Lane.ROUND)
+        self._channel.cancel(Lane.SETPOINTS)
+        self._channel.cancel(Lane.CONTROL)
+        self._missed_in_row = 0
+        self._be_offline(reason)
+
+    def _be_offline(self, reason: str) -> None:
+        if self.online:
+            self.online = False
+            self._events.append(StationLost(reason))
+
+    def _withdraw(self, reason: str, now: float) -> None:
+        """Go neutral, and back to ``disable``."""
+        self.setpoints.disarm()
+        self.setpoints.enabled = False
+        if self.control is not None:
+            self.control.withdraw(reason, now)
+            self._tell_notes()
+
+    def _lose(self, reason: str, now: float) -> None:
+        """Handle a drive that is silent, but may be listening: it has to stand still."""
+        was_online = self.online
+        self._be_lost(reason, now)
+        self._node.offline(now)
+        self._frames += self._node.take_frames()
+        writes = self._neutral_writes()
+        if was_online and writes:
+            self._channel.run(Lane.CONTROL, self._farewell(writes), lambda _: None, now)
+
+    def _cut_off(self, reason: str, answer: str, now: float) -> None:
+        """Handle a node that takes no PDOs: nothing that was sent is answered any more."""
+        self._be_lost(reason, now)
+        self._channel.clear()
+        self._users.fail(answer)
+
+    def _neutral_writes(self) -> list[tuple[Span, tuple[int, ...]]]:
+        """Return what makes a drive stand still."""
+        writes = [] if self._control_writer is None else [self._control_writer.disable_write()]
+        return writes + self._setpoint_writer.neutral_writes()
+
+    def _farewell(self, writes: Sequence[tuple[Span, tuple[int, ...]]],
+                  ) -> procedures.Farewell:
+        return procedures.write_until_answered(
+            writes, STOP_ATTEMPTS,
+            min(self.drive.parameter_timeout, STOP_TIME / (STOP_ATTEMPTS * len(writes))))
+
+    # -- the round --------------------------------------------------------------------------------
+
+    def _start_round(self, now: float) -> None:
+        self._expire(now)
+        error = self._beat.begun(now)
+        if not math.isnan(error):
+            self.statistics.period_error.add(error)
+        self._round_began = now
+        if self.online:
+            self._setpoint_writer.look(now)
+            if self._control_writer is not None:
+                self._control_writer.update(now)
+        self._channel.run(
+            Lane.ROUND, procedures.read_round(self._plan, self._read_answered,
+                                              self._read_refused), self._round_ended, now)
+
+    def _read_answered(self, span: Span, words: tuple[int, ...]) -> None:
+        """Take an answer of the round; the status counts from the moment it was read."""
+        self._refusals.pop(span, None)
+        if self.online:
+            self._take_status(dict(zip(span.addresses, words)))
+            self._control_changed(self._channel.now)
+
+    def _take_status(self, words: dict[Address, int]) -> None:
+        status = self._status
+        if status is None or self.control is None:
+            return
+        wanted = addresses.span_of(status, self._addressing)
+        if all(address in words for address in wanted.addresses):
+            now = self._channel.now
+            self.control.status_received(addresses.raw_from_words(
+                status, [words[address] for address in wanted.addresses], self._word_order), now)
+
+    def _read_refused(self, span: Span, refused: Refused) -> Sequence[Span]:
+        """Take a refusal; two parameters that share a read are read alone from now on."""
+        wanted = addresses.round_spans(self.drive)
+        if span not in wanted:
+            parts = sorted({part for part in wanted
+                            if set(part.addresses) <= set(span.addresses)})
+            place = self._plan.index(span)
+            self._plan[place:place + 1] = parts
+            return parts
+        names = ', '.join(parameter.name for parameter in self.drive.cyclic_response
+                          if addresses.span_of(parameter, self._addressing) == span)
+        if span not in self._refusals:
+            self._events.append(Noted(f'read {names or span.address}: {refused.text}'))
+        self._refusals[span] = f'{names or span.address} {refused.text}'
+        return ()
+
+    def _round_ended(self, words: procedures.RoundResult) -> None:
+        now = self._channel.now
+        if words is None:
+            self._miss(now)
+            return
+        self._missed_in_row = 0
+        if not self.online:
+            if self._node.heartbeat_lost:
+                return
+            self._found(now)
+            self._take_status(words)
+            self._control_changed(now)
+        if any(address not in words for span in self._response_spans
+               for address in span.addresses):
+            return  # something was refused: there is no complete sample
+        statistics = self.statistics
+        statistics.exchanges += 1
+        statistics.latency.add(max(0.0, self._received_at - self._round_began))
+        raws = tuple(
+            addresses.raw_from_words(parameter, [words[address] for address in span.addresses],
+                                     self._word_order)
+            for parameter, span in zip(self.drive.cyclic_response, self._response_spans))
+        self._events.append(ProcessDataReceived(raws, self._received_at))
+
+    def _miss(self, now: float) -> None:
+        self.statistics.missed += 1
+        self._missed_in_row += 1
+        if self._missed_in_row < self.drive.missed_limit:
+            return
+        if self.online:
+            self._lose(f'no complete round of reads for {self.drive.missed_limit} periods', now)
+        elif not self._node.heartbeat_lost:
+            self._advice = SILENT
+
+    def _expire(self, now: float) -> None:
+        expired = self.setpoints.expire(now)
+        if expired:
+            self._events.append(SetpointsExpired(
+                tuple(setpoint.parameter.name for setpoint in expired)))
+            self._setpoint_writer.look(now)
+
+    # -- frames -----------------------------------------------------------------------------------
+
+    def _send(self, message: Message) -> None:
+        self._frames.append(Frame(self._identifiers.request, pkw.encode(message, self._layout),
+                                  False))
+
+    def receive_frame(self, frame: Frame, now: float, age: float = 0.0) -> None:
+        identifier, data, extended = frame
+        identifiers = self._identifiers
+        if extended:
+            return
+        try:
+            if identifier == identifiers.response:
+                self._received_at = now - age
+                message = pkw.decode(data, self._layout)
+                if not self._channel.receive(message, now):
+                    self._reject(f'PKW response that nobody asked for: {message}')
+            elif identifier == identifiers.heartbeat:
+                self._heartbeat(network.decode_heartbeat(data), now)
+            elif identifier == identifiers.emergency:
+                text = self._node.receive_emergency(network.decode_emergency(data))
+                if text:
+                    self._events.append(Noted(text))
+            elif identifier == identifiers.request:
+                self._events.append(ForeignMasterSeen(
+                    f'another master sends PKW requests to node {self.drive.station}: {frame}'))
+        except RemoteProtocolError as error:
+            self._reject(str(error))
+
+    def _heartbeat(self, state: network.NmtState, now: float) -> None:
+        running = self._phase is Phase.RUNNING
+        change = self._node.receive_heartbeat(state, now, running)
+        if self._phase is Phase.STOPPING and now < self._node.free_at:
+            self._go_idle('deactivated')
+        if not running:
+            return
+        if change is Change.RESTARTED:
+            self._events.append(Noted('boot-up: the device has started'))
+            self._cut_off('the device restarted', 'no answer: the device restarted', now)
+            self._advice = 'the device restarted: waiting for it to answer'
+        elif change is Change.NOT_OPERATIONAL:
+            text = self._node.refusal(now)
+            self._cut_off(text, f'drive offline: {text}', now)
+        self._follow_node(now, fresh=change is not Change.NONE)
+
+    def _follow_node(self, now: float, *, fresh: bool = True) -> None:
+        """
+        Begin rounds when the node takes PDOs; while offline, see to it that it does.
+
+        :param fresh: something is new; otherwise rounds keep their beat.
+        """
+        if not self.online:
+            self._node.offline(now)
+        self._frames += self._node.take_frames()
+        free_at = self._node.free_at
+        self._channel.hold(free_at)
+        if not self.online and (fresh or now < free_at):
+            self._beat.start(max(now, free_at))
+        self._channel.advance(now)
+
+    def _reject(self, text: str) -> None:
+        self.statistics.rejected += 1
+        self._events.append(FrameRejected(text))
+
+    # -- timer ------------------------------------------------------------------------------------
+
+    def handle_timer(self, now: float) -> None:
+        if self._phase is Phase.RUNNING:
+            if now >= self._node.next_timer():
+                if self._node.handle_timer(now) is Change.HEARTBEAT_LOST:
+                    self._lose(f'no heartbeat for {self._node.heartbeat_timeout:g} s', now)
+                self._frames += self._node.take_frames()
+            if self.control is not None and now >= self.control.next_timer():
+                self.control.handle_timer(now)
+                self._control_changed(now)
+            self._expire(now)
+        self._channel.advance(now)
+        if now >= self._beat.due and self._channel.is_idle(Lane.ROUND):
+            self._start_round(now)
+
+    def next_timer(self) -> float:
+        soonest = self._channel.next_timer()
+        if self._phase is not Phase.RUNNING:
+            return soonest
+        if self._channel.is_idle(Lane.ROUND):
+            soonest = min(soonest, self._beat.due)
+        soonest = min(soonest, self._node.next_timer())
+        return soonest if self.control is None else min(soonest, self.control.next_timer())
+
+    # -- control ----------------------------------------------------------------------------------
+
+    def _control_changed(self, now: float) -> None:
+        """Tell what the control machine noted; then see to its word."""
+        self._tell_notes()
+        if self._control_writer is not None and self.online:
+            self._control_writer.update(now)
+
+    def _tell_notes(self) -> None:
+        if self.control is not None:
+            self._events += [Noted(note) for note in self.control.take_notes()]
+
+    # -- users ------------------------------------------------------------------------------------
+
+    def submit(self, request: Request, now: float) -> None:
+        blocked = self._node.refusal(now) if self._phase is Phase.RUNNING else ''
+        if blocked and len(request):
+            self._complete(request, (Failure(f'drive offline: {blocked}'),) * len(request))
+        else:
+            super().submit(request, now)
+
+    def _enqueue(self, request: Request, now: float) -> None:
+        self._users.add(request, now)
+
+    def _waiting_requests(self) -> int:
+        return self._users.waiting
+
+    def write_refusal(self, parameter: Parameter) -> str:
+        if not parameter.listed:
+            mine = addresses.keys(parameter)
+            for other in self.drive.profile.parameters.values():
+                if mine & addresses.keys(other):
+                    if other.type.bits != parameter.type.bits:
+                        return f'one half of {other.name}: set that'
+                    return super().write_refusal(other)
+        return super().write_refusal(parameter)
+
+    def reconfigure(self, *, command_timeout: float | None = None,
+                    rearm_immediate: bool | None = None,
+                    parameter_timeout: float | None = None) -> None:
+        super().reconfigure(command_timeout=command_timeout, rearm_immediate=rearm_immediate,
+                            parameter_timeout=parameter_timeout)
+        self._users.reconfigure(self.drive)
+
+    # -- state ------------------------------------------------------------------------------------
+
+    @property
+    def warning(self) -> str:
+        texts = []
+        if self._node.emergency is not None:
+            texts.append(f'emergency {self._node.emergency.text}: remove its cause')
+        texts += [f'poll of {text}: correct cyclic_response or the profile'
+                  for text in self._refusals.values()]
+        texts += [f'write of {text}: correct cyclic_request, the command or the profile'
+                  for text in self._setpoint_writer.refusals.values()]
+        if self._control_writer is not None and self._control_writer.refusal:
+            texts.append(f'write of {self._control_writer.refusal}: look at the device')
+        if (self._node.heartbeat_timeout > 0.0 and not self._node.heard_heartbeat):
+            texts.append('no heartbeat although heartbeat_timeout is set: configure the '
+                         "device's heartbeat producer (1017h)")
+        return '; '.join(texts)
+
+    def facts(self) -> dict[str, str]:
+        emergency = self._node.emergency
+        return {'nmt_state': self._node.state_text,
+                'emergency': 'none' if emergency is None else emergency.text}
+
+    @property
+    def offline_advice(self) -> str:
+        return self._advice

@@ -1,0 +1,67 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Setpoints on their way through the mailbox: on change, and again after a while."""
+
+from collections.abc import Generator
+
+from drive_can_bridge.core.setpoints import Setpoints
+from drive_can_bridge.protocols.canopen_pkw import addresses
+from drive_can_bridge.protocols.canopen_pkw.addresses import Span
+from drive_can_bridge.protocols.canopen_pkw.channel import Channel, Lane
+from drive_can_bridge.protocols.canopen_pkw.mailbox import (
+    Answered, Reply, Silence, Step, Write,
+)
+from drive_can_bridge.protocols.polling import WriteSchedule
+
+
+class SetpointWriter:
+    """
+    Writes setpoints; each at most once for every look.
+
+    :param refresh: s after which an unchanged one is written again; 0: never.
+    :ivar refusals: what the drive says to setpoints that it refused, by name.
+    """
+
+    def __init__(self, channel: Channel, setpoints: Setpoints, *, addressing: str,
+                 word_order: str, refresh: float) -> None:
+        self.refusals: dict[str, str] = {}
+        self._channel = channel
+        self._setpoints = setpoints
+        self._word_order = word_order
+        self._spans = [addresses.span_of(setpoint.parameter, addressing)
+                       for setpoint in setpoints.items]
+        self._schedule = WriteSchedule(len(setpoints.items), refresh)
+
+    def forget(self) -> None:
+        """Take note that nothing is known of the drive."""
+        self._schedule.forget()
+        self.refusals.clear()
+
+    def look(self, now: float) -> None:
+        """Write what is due."""
+        if not self._setpoints.items:
+            return
+        self._schedule.look([setpoint.raw for setpoint in self._setpoints.items], now)
+        if self._schedule.waiting and self._channel.is_idle(Lane.SETPOINTS):
+            self._channel.run(Lane.SETPOINTS, self._write(), lambda _: None, now)
+
+    def neutral_writes(self) -> list[tuple[Span, tuple[int, ...]]]:
+        """Return what writes the neutral value of every setpoint."""
+        return [(span, addresses.words_from_raw(setpoint.parameter, setpoint.neutral,
+                                                self._word_order))
+                for setpoint, span in zip(self._setpoints.items, self._spans)]
+
+    def _write(self) -> Generator[Step, Reply, None]:
+        while self._schedule.waiting:
+            index = self._schedule.next()
+            setpoint = self._setpoints.items[index]
+            parameter, raw = setpoint.parameter, setpoint.raw
+            # at once: a look while the answer is awaited must not find it due again
+            self._schedule.written(index, raw, self._channel.now)
+            reply = yield Write(self._spans[index].address, addresses.words_from_raw(
+                parameter, raw, self._word_order))
+            if isinstance(reply, Silence):
+                self._schedule.failed(index)
+            elif isinstance(reply, Answered):
+                self.refusals.pop(parameter.name, None)
+            else:
+                self.refusals[parameter.name] = f'{parameter.name} {reply.text}'

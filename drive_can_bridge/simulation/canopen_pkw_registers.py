@@ -1,0 +1,182 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The 16-bit registers of a simulated controller, by register number and by CANopen address.
+
+A value of 32 bits takes two registers, the order of its words is that of the configuration. A
+refused access changes nothing and carries an SDO abort code.
+"""
+
+from typing import NamedTuple
+
+from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.errors import DriveCanError
+from drive_can_bridge.core.parameters import Parameter, Storage
+from drive_can_bridge.protocols.canopen_pkw import abort_codes
+from drive_can_bridge.protocols.canopen_pkw.object_map import BLOCKS, object_of, register_of
+from drive_can_bridge.protocols.canopen_pkw.pkw import (
+    Address, value_from_words, words_from_value,
+)
+from drive_can_bridge.simulation.canopen_pkw_starter import StarterPlant
+
+
+class Refused(DriveCanError):
+    """
+    An access that the controller does not carry out.
+
+    :param code: SDO abort code.
+    """
+
+    def __init__(self, code: int) -> None:
+        super().__init__(abort_codes.describe(code))
+        self.code = code
+
+
+class Cell(NamedTuple):
+    """One register: the parameter it belongs to, and which of its words it is."""
+
+    parameter: Parameter
+    place: int
+
+
+class RegisterTable:
+    """
+    Everything that can be addressed.
+
+    :ivar eeprom_writes: registers written that the profile says are kept in EEPROM.
+    """
+
+    def __init__(self, configuration: DriveConfiguration, plant: StarterPlant) -> None:
+        self._plant = plant
+        self._high_first = configuration.family_options.get('word_order') != 'low_first'
+        self.eeprom_writes = 0
+        self._cells: dict[Address, Cell] = {}
+        parameters = list(plant.parameters.values())
+        # what the profile says goes before what follows from the table of the vendor
+        for parameter in parameters:
+            self._enter(parameter, parameter.number, _object(parameter))
+        for parameter in parameters:
+            register, place = parameter.number, _object(parameter)
+            self._enter(parameter,
+                        register_of(*place) if place and register is None else None,
+                        object_of(register) if register is not None and not place else None)
+
+    def _enter(self, parameter: Parameter, register: int | None,
+               place: tuple[int, int] | None) -> None:
+        for step in range(parameter.type.bits // 16):
+            if register is not None:
+                self._cells.setdefault(Address(register + step), Cell(parameter, step))
+            if place is not None:
+                self._cells.setdefault(Address(place[0], place[1] + step), Cell(parameter, step))
+
+    # -- access -----------------------------------------------------------------------------------
+
+    def read(self, address: Address, count: int) -> tuple[int, ...]:
+        """
+        Read one register or two adjacent ones.
+
+        :raises Refused: there is none, or it cannot be read.
+        """
+        words = []
+        for cell in self._find(address, count):
+            if not cell.parameter.readable:
+                raise Refused(abort_codes.READ_OF_WRITE_ONLY)
+            words.append(self._word(cell))
+        return tuple(words)
+
+    def write(self, address: Address, words: tuple[int, ...]) -> None:
+        """
+        Write one register or two adjacent ones, or none of them.
+
+        :raises Refused: there is none, it is read-only, or it does not take the value.
+        """
+        values: dict[str, int] = {}
+        cells = self._find(address, len(words))
+        for cell, word in zip(cells, words, strict=True):
+            parameter = cell.parameter
+            if not parameter.writable:
+                raise Refused(abort_codes.WRITE_OF_READ_ONLY)
+            value = values.get(parameter.name, self._value(parameter))
+            values[parameter.name] = self._replaced(value, cell, word)
+        raws = {}
+        for name, value in values.items():
+            parameter = self._plant.parameters[name]
+            raw = parameter.raw_from_word(value)
+            if not self._plant.allows(parameter, raw):
+                raise Refused(abort_codes.VALUE_OUT_OF_RANGE)
+            raws[name] = raw
+        for name, raw in raws.items():
+            self._plant.write(name, raw)
+        self.eeprom_writes += sum(cell.parameter.storage is Storage.EEPROM for cell in cells)
+
+    def highest_subindex(self, index: int) -> int | None:
+        """Return the highest sub-index of an object; None: there is no such object."""
+        found = [address.subindex for address in self._cells
+                 if address.subindex is not None and address.word == index]
+        return max(found, default=None)
+
+    def name_of(self, raw_name: str) -> str | None:
+        """Return the profile's name for ``p455`` or ``x2004.6``; None: there is none."""
+        kind, rest = raw_name[:1], raw_name[1:]
+        first, dot, second = rest.partition('.')
+        try:
+            if kind == 'p' and not dot:
+                address = Address(int(first))
+            elif kind == 'x' and dot:
+                address = Address(int(first, 16), int(second, 16))
+            else:
+                return None
+        except ValueError:
+            return None
+        return self.name_at(address)
+
+    def name_at(self, address: Address) -> str | None:
+        """Return the name of the parameter that a register belongs to; None: there is none."""
+        cell = self._cells.get(address)
+        return None if cell is None else cell.parameter.name
+
+    # -- inside -----------------------------------------------------------------------------------
+
+    def _find(self, address: Address, count: int) -> list[Cell]:
+        cells = []
+        for _ in range(count):
+            cell = self._cells.get(address)
+            if cell is None:
+                raise Refused(self._absence(address))
+            cells.append(cell)
+            address = address.next
+        return cells
+
+    def _absence(self, address: Address) -> int:
+        """Return why there is no register: no such number or index, or no such sub-index."""
+        known = (any(block.index == address.word for block in BLOCKS)
+                 or self.highest_subindex(address.word) is not None)
+        if address.by_object and known:
+            return abort_codes.NO_SUCH_SUBINDEX
+        return abort_codes.NO_SUCH_OBJECT
+
+    def _value(self, parameter: Parameter) -> int:
+        return parameter.word_from_raw(self._plant.raw(parameter.name))
+
+    def _word(self, cell: Cell) -> int:
+        value = self._value(cell.parameter)
+        if cell.parameter.type.bits == 16:
+            return value
+        return words_from_value(value, self._is_high_first(cell.parameter))[cell.place]
+
+    def _replaced(self, value: int, cell: Cell, word: int) -> int:
+        """Return a value with one of its words replaced."""
+        if cell.parameter.type.bits == 16:
+            return word
+        high_first = self._is_high_first(cell.parameter)
+        first, second = words_from_value(value, high_first)
+        return value_from_words((word, second) if cell.place == 0 else (first, word), high_first)
+
+    def _is_high_first(self, parameter: Parameter) -> bool:
+        if parameter.word_order is None:
+            return self._high_first
+        return parameter.word_order == 'high_first'
+
+
+def _object(parameter: Parameter) -> tuple[int, int] | None:
+    """Return the CANopen address of a parameter, as the profile has it."""
+    return None if parameter.index is None else (parameter.index, parameter.subindex or 0)

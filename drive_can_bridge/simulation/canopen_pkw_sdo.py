@@ -1,0 +1,125 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+An SDO server (CiA 301): reads of any length, expedited writes.
+
+Block transfer is refused, and so are segmented writes: no object here is longer than four bytes
+and may be written.
+"""
+
+from abc import ABC, abstractmethod
+
+from drive_can_bridge.protocols.canopen_pkw import abort_codes
+from drive_can_bridge.simulation.canopen_pkw_registers import Refused
+
+LENGTH = 8
+EXPEDITED_MAX = 4
+SEGMENT_MAX = 7
+
+#: command specifiers, bits 7 to 5 of the first byte
+DOWNLOAD, UPLOAD, UPLOAD_SEGMENT, ABORT = 1, 2, 3, 4
+#: bits of the first byte
+EXPEDITED, SIZE_GIVEN, TOGGLE = 0x02, 0x01, 0x10
+RESPONSE_UPLOAD, RESPONSE_DOWNLOAD, RESPONSE_ABORT = 0x40, 0x60, 0x80
+TYPE_TOO_LONG, TYPE_TOO_SHORT = 0x06070012, 0x06070013
+
+
+class Objects(ABC):
+    """The object dictionary behind a server."""
+
+    @abstractmethod
+    def read(self, index: int, subindex: int) -> bytes:
+        """
+        Return the content of an object.
+
+        :raises Refused: there is none, or it cannot be read.
+        """
+
+    @abstractmethod
+    def write(self, index: int, subindex: int, data: bytes) -> None:
+        """
+        Write an object.
+
+        :raises Refused: there is none, or it does not take the data.
+        """
+
+
+class SdoServer:
+    """Answers the requests of one client."""
+
+    def __init__(self, objects: Objects) -> None:
+        self._objects = objects
+        self._address = b'\0\0\0'
+        self._rest: bytes | None = None
+        self._toggle = 0
+
+    def reset(self) -> None:
+        """Forget a transfer under way."""
+        self._rest = None
+
+    def answer(self, request: bytes) -> bytes | None:
+        """Return the response to a request; None: there is none."""
+        if len(request) != LENGTH:
+            return None
+        command = request[0] >> 5
+        if command == ABORT:
+            self.reset()
+            return None
+        if command != UPLOAD_SEGMENT:
+            self._address = request[1:4]
+            self.reset()
+        try:
+            if command == UPLOAD:
+                return self._upload()
+            if command == UPLOAD_SEGMENT:
+                return self._upload_segment(request[0])
+            if command == DOWNLOAD and request[0] & EXPEDITED:
+                return self._download(request)
+            raise Refused(abort_codes.UNKNOWN_COMMAND)
+        except Refused as error:
+            self.reset()
+            return (bytes((RESPONSE_ABORT,)) + self._address
+                    + error.code.to_bytes(4, 'little'))
+
+    def _place(self) -> tuple[int, int]:
+        return int.from_bytes(self._address[:2], 'little'), self._address[2]
+
+    def _upload(self) -> bytes:
+        data = self._objects.read(*self._place())
+        if len(data) <= EXPEDITED_MAX:
+            unused = EXPEDITED_MAX - len(data)
+            head = RESPONSE_UPLOAD | unused << 2 | EXPEDITED | SIZE_GIVEN
+            return bytes((head,)) + self._address + data + bytes(unused)
+        self._rest, self._toggle = data, 0
+        return (bytes((RESPONSE_UPLOAD | SIZE_GIVEN,)) + self._address
+                + len(data).to_bytes(4, 'little'))
+
+    def _upload_segment(self, head: int) -> bytes:
+        if self._rest is None:
+            raise Refused(abort_codes.UNKNOWN_COMMAND)
+        if head & TOGGLE != self._toggle:
+            raise Refused(abort_codes.TOGGLE_NOT_ALTERNATED)
+        segment, rest = self._rest[:SEGMENT_MAX], self._rest[SEGMENT_MAX:]
+        unused = SEGMENT_MAX - len(segment)
+        response = bytes((self._toggle | unused << 1 | (not rest),)) + segment + bytes(unused)
+        self._rest, self._toggle = rest or None, self._toggle ^ TOGGLE
+        return response
+
+    def _download(self, request: bytes) -> bytes:
+        size = EXPEDITED_MAX
+        if request[0] & SIZE_GIVEN:
+            size -= request[0] >> 2 & 0x03
+        self._objects.write(*self._place(), request[4:4 + size])
+        return bytes((RESPONSE_DOWNLOAD,)) + self._address + bytes(4)
+
+
+def checked_length(data: bytes, length: int) -> bytes:
+    """
+    Return the data if they have the length of their object.
+
+    :raises Refused: too long or too short.
+    """
+    if len(data) > length:
+        raise Refused(TYPE_TOO_LONG)
+    if len(data) < length:
+        raise Refused(TYPE_TOO_SHORT)
+    return data

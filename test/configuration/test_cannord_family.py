@@ -1,0 +1,270 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""The family table's row of CANnord, and parameter files with such drives."""
+
+from pathlib import Path
+
+from configuration_builders import changed, load, problems, warnings
+import pytest
+
+from drive_can_bridge.cli.main import main
+from drive_can_bridge.core.frame import Frame, Route
+from drive_can_bridge.core.parameters import ParameterType, ValueKind
+from drive_can_bridge.protocols.cannord.family import Cannord, frame_bits
+
+FAMILY = Cannord()
+
+#: the line numbers in tests count from here
+FILE = """\
+/**/drive_can_bridge:
+  ros__parameters:
+    autostart: true
+    buses:
+      main:
+        interface: virtual
+        channel: demo
+        bitrate: 125000
+    drives:
+      lift:
+        bus: main
+        protocol: cannord
+        station: 1
+        profile: table
+        period: 0.02
+        cyclic_request: [speed]
+        cyclic_response: [actual]
+        broadcast: none
+      hoist:
+        bus: main
+        protocol: cannord
+        station: 2
+        profile: table
+        period: 0.02
+        cyclic_request: [speed]
+        cyclic_response: [actual]
+        broadcast: none
+"""
+
+PROFILE = """\
+description: for tests
+protocols: [cannord]
+parameters:
+  speed: {type: int16, scale: 0.0030517578125, unit: Hz, minimum: -50, maximum: 50}
+  second: {type: int16}
+  third: {type: int16}
+  fourth: {type: int16}
+  fifth: {type: int16}
+  sixth: {type: int16}
+  actual: {type: int16, scale: 0.0030517578125, unit: Hz, access: ro}
+  position: {number: 613, subindex: 21, type: int32}
+  ramp: {number: 102, scale: 0.01, unit: s, storage: eeprom, minimum: 0.01, maximum: 60}
+"""
+
+CANOPEN = """\
+  word: {index: 0x2000, subindex: 1}
+control:
+  parameter: word
+  words: {disable: 0, enable: 1}
+"""
+
+
+def together(text: str = FILE) -> str:
+    return text.replace('broadcast: none', 'broadcast: group')
+
+
+def second(text: str, old: str, new: str) -> str:
+    """Change the last place of a text where ``old`` stands."""
+    before, found, after = text.rpartition(old)
+    assert found
+    return before + new + after
+
+
+def test_a_good_file(tmp_path: Path) -> None:
+    assert problems(tmp_path, FILE, PROFILE) == []
+    assert warnings(tmp_path, FILE, PROFILE) == []
+    lift = load(tmp_path, FILE, PROFILE).drives['lift']
+    assert lift.family_options == {
+        'extended_identifiers': False, 'broadcast': 'none', 'value_order': 'high_first',
+        'index_byte': 'low', 'swap_setpoints_2_3': False, 'extra_setpoints': False,
+        'parameter_set': 1, 'persist_writes': False}
+    assert problems(tmp_path, together(), PROFILE) == []
+
+
+@pytest.mark.parametrize(('old', 'new', 'found'), [
+    ('station: 1', 'station: 256', '13: drives.lift.station: 256 is out of range, '
+                                   'allowed is 0 to 255 (cannord)'),
+    ('station: 1', 'station: 2', '22: drives.hoist.station: 2 collides with drive lift (station '
+                                 '2) on bus main: both use process data to station 2; allowed is '
+                                 'a station of its own'),
+    ('broadcast: none', 'parameter_set: 5', '18: drives.lift.parameter_set: 5 is out of range, '
+                                            'allowed is an integer of 1 to 4'),
+    ('broadcast: none', 'value_order: middle', "18: drives.lift.value_order: 'middle' is "
+                                               'unknown, allowed is high_first or low_first'),
+    ('[speed]', '[speed, second, third, fourth]',
+     '16: drives.lift.cyclic_request: 4 parameters are too many, allowed are at most 3 (5 with '
+     'extra_setpoints: true)'),
+    ('[speed]', '[speed, position]',
+     "16: drives.lift.cyclic_request: 'position' is int32, process words carry bool, int16 or "
+     'uint16'),
+    ('[speed]', '[ramp]', "16: drives.lift.cyclic_request: 'ramp' is kept in EEPROM, which cyclic "
+                          'writing would wear out; allowed are parameters with storage ram'),
+    ('[speed]', '[speed]\n        extra_setpoints: true\n'
+                '        mapping: verify',
+     '18: drives.lift.mapping: a key of datamodel_extended, allowed with cannord is to leave it '
+     'out'),
+])
+def test_problems(tmp_path: Path, old: str, new: str, found: str) -> None:
+    assert problems(tmp_path, changed(FILE, old, new), PROFILE) == [f'f.yaml:{found}']
+
+
+def test_five_entries_with_extra_setpoints(tmp_path: Path) -> None:
+    text = changed(FILE, '[speed]', '[speed, second, third, fourth, fifth]\n'
+                                    '        extra_setpoints: true')
+    assert problems(tmp_path, text, PROFILE) == []
+    assert problems(tmp_path, changed(text, 'fifth]', 'fifth, sixth]'), PROFILE) == [
+        'f.yaml:16: drives.lift.cyclic_request: 6 parameters are too many, allowed are at most 5']
+
+
+def test_stations_at_the_ends(tmp_path: Path) -> None:
+    text = changed(changed(FILE, 'station: 1', 'station: 0'), 'station: 2', 'station: 255')
+    assert problems(tmp_path, text, PROFILE) == []
+
+
+@pytest.mark.parametrize(('entry', 'found'), [
+    ('status_word: {number: 5}', "parameters.status_word: 'status_word' is built in for cannord, "
+                                 'allowed is any other name'),
+    ('far: {number: 2048}', 'parameters.far.number: 2048 is out of range, allowed is 0 to 2047'),
+    ('far: {number: 5, subindex: 256}', 'parameters.far.subindex: 256 is out of range, allowed '
+                                        'is an integer of 0 to 255'),
+    ('wide: {type: uint32}', 'parameters.wide.type: uint32 does not fit a process word, allowed '
+                             'without a number are bool, int16, uint16'),
+    ('part: {subindex: 1}', 'parameters.part.subindex: a sub-index without a number, allowed is '
+                            'number with subindex, or neither'),
+    ('kept: {storage: eeprom}', 'parameters.kept.storage: process data are not stored, allowed '
+                                'without a number is to leave it out'),
+])
+def test_problems_of_a_profile(tmp_path: Path, entry: str, found: str) -> None:
+    assert problems(tmp_path, FILE, f'{PROFILE}  {entry}\n') == [f'table.yaml:13: {found}']
+
+
+def test_control_is_built_in(tmp_path: Path) -> None:
+    with_control = PROFILE + CANOPEN.replace('index: 0x2000, subindex: 1', 'number: 5')
+    assert problems(tmp_path, FILE, with_control) == [
+        'table.yaml:14: control: control is built in for cannord, allowed is to leave it out']
+
+
+def test_a_profile_for_several_protocols(tmp_path: Path) -> None:
+    profile = PROFILE.replace('[cannord]', '[cannord, canopen_pkw]') + CANOPEN
+    configuration = load(tmp_path, FILE, profile)
+    assert configuration.drives['lift'].profile.control is None
+    assert configuration.warnings == ()
+
+
+def test_short_periods_are_suspicious(tmp_path: Path) -> None:
+    text = changed(changed(FILE, 'bitrate: 125000', 'bitrate: 1000000'), 'period: 0.02',
+                   'period: 0.002')
+    assert warnings(tmp_path, text, PROFILE) == [
+        'f.yaml:15: drives.lift.period: 0.002 s is short: inverters take 1 to 3 ms to answer; '
+        'recommended is at least 0.003 s']
+
+
+# -- identifiers ----------------------------------------------------------------------------------
+
+
+def test_claims(tmp_path: Path) -> None:
+    lift = load(tmp_path, changed(FILE, 'station: 1', 'station: 100'), PROFILE).drives['lift']
+    assert [claim.route for claim in FAMILY.claims(lift)] == [
+        Route(identifier, 0x7FF, False) for identifier in (0x0C8, 0x0C9, 0x2C8, 0x2C9)]
+    assert not FAMILY.claims(lift)[0].route.matches(Frame(0x0C8, b'', True))
+
+
+@pytest.mark.parametrize(('broadcast', 'extended', 'identifier'), [
+    ('group', 'false', 0x400), ('all', 'false', 0x408), ('group', 'true', 0x10000000),
+    ('all', 'true', 0x10200000)])
+def test_broadcast_identifiers_are_shared(tmp_path: Path, broadcast: str, extended: str,
+                                          identifier: int) -> None:
+    text = FILE.replace('broadcast: none', f'broadcast: {broadcast}\n'
+                                           f'        extended_identifiers: {extended}')
+    drives = load(tmp_path, text, PROFILE).drives
+    claims = [FAMILY.claims(drives[name])[-1] for name in ('lift', 'hoist')]
+    assert [claim.route.identifier for claim in claims] == [identifier] * 2
+    assert not claims[0].overlaps(claims[1])
+
+
+def test_members_that_differ(tmp_path: Path) -> None:
+    assert problems(tmp_path, second(together(), '[speed]', '[second]'), PROFILE) == [
+        'f.yaml:25: drives.hoist.cyclic_request: differs from that of drive lift, which leads its '
+        'broadcast group, allowed is the same']
+    assert problems(tmp_path, second(together(), 'period: 0.02', 'period: 0.05'), PROFILE) == [
+        'f.yaml:24: drives.hoist.period: 0.05 s differs from 0.02 s of drive lift, which leads '
+        'its broadcast group, allowed is the same']
+    joint = ('broadcast: group\n        joint: {name: j, velocity: actual, '
+             'velocity_command: speed}')
+    assert problems(tmp_path, second(together(), 'broadcast: group', joint), PROFILE) == [
+        'f.yaml:28: drives.hoist.joint.velocity_command: commands go to drive lift, which leads '
+        'its broadcast group, allowed is to leave it out']
+    assert problems(tmp_path, changed(together(), 'broadcast: group', joint), PROFILE) == []
+
+
+def test_a_wrong_station_makes_no_further_problems(tmp_path: Path) -> None:
+    text = second(second(together(), 'station: 2', 'station: 300'), 'period: 0.02', 'period: 0.5')
+    assert problems(tmp_path, text, PROFILE) == [
+        'f.yaml:22: drives.hoist.station: 300 is out of range, allowed is 0 to 255 (cannord)']
+
+
+def test_members_on_another_bus_are_strangers(tmp_path: Path) -> None:
+    text = changed(second(second(together(), 'bus: main', 'bus: other'), '[speed]', '[second]'),
+                   '    drives:\n', '      other: {interface: virtual, channel: b}\n    drives:\n')
+    assert problems(tmp_path, text, PROFILE) == []
+
+
+# -- load -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(('length', 'extended', 'bits'), [
+    (8, False, 135), (8, True, 160), (4, False, 95), (5, False, 105), (0, False, 55),
+    (4, True, 120)])
+def test_frame_bits(length: int, extended: bool, bits: int) -> None:
+    assert frame_bits(length, extended=extended) == bits
+
+
+def test_load(tmp_path: Path) -> None:
+    lift = load(tmp_path, FILE, PROFILE).drives['lift']
+    assert FAMILY.bits_per_second(lift) == pytest.approx(2 * 95 / 0.02)
+    longer = load(tmp_path, changed(
+        FILE, '[speed]', '[speed, second, third, fourth]\n        extra_setpoints: true'), PROFILE)
+    assert FAMILY.bits_per_second(longer.drives['lift']) == pytest.approx(2 * (135 + 105) / 0.02)
+
+
+def test_a_group_shares_its_load(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    # one broadcast, one request and one answer a period: 285 bits in 20 ms are 11.4 %
+    load(tmp_path, together(), PROFILE)
+    assert main(['validate', str(tmp_path / 'f.yaml')]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.rpartition(', ')[2] for line in lines] == ['load 5.7 %'] * 2
+    load(tmp_path, FILE, PROFILE)
+    assert main(['validate', str(tmp_path / 'f.yaml')]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.rpartition(', ')[2] for line in lines] == ['load 7.6 %'] * 2
+
+
+# -- raw names ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(('name', 'number', 'subindex'), [
+    ('p0', 0, None), ('p102', 102, None), ('p0102', 102, None), ('p2047', 2047, None),
+    ('p613.0', 613, 0), ('p613.21', 613, 21), ('p613.255', 613, 255)])
+def test_raw_names(tmp_path: Path, name: str, number: int, subindex: int | None) -> None:
+    lift = load(tmp_path, FILE, PROFILE).drives['lift']
+    found = FAMILY.raw_parameter(lift, name)
+    assert found is not None
+    assert (found.number, found.subindex, found.type, found.width_known, found.kind) == (
+        number, subindex, ParameterType.UINT32, False, ValueKind.INTEGER)
+    assert not found.listed
+
+
+@pytest.mark.parametrize('name', [
+    'p', 'p2048', 'p99999', 'p1.256', 'p1.', 'p.1', 'p1.2.3', 'P1', 'x2000.1', 'p-1', 'p1 ',
+    'ramp'])
+def test_no_raw_names(tmp_path: Path, name: str) -> None:
+    lift = load(tmp_path, FILE, PROFILE).drives['lift']
+    assert FAMILY.raw_parameter(lift, name) is None

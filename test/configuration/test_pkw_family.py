@@ -1,0 +1,218 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""The family table's row of CANopen PKW, and what it makes of parameter files."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from configuration_builders import changed, load, problems
+import pytest
+
+from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.parameters import ParameterType
+from drive_can_bridge.protocols.canopen_pkw.family import CanopenPkw
+
+FAMILY = CanopenPkw()
+
+FILE = """\
+/**/drive_can_bridge:
+  ros__parameters:
+    autostart: true
+    buses:
+      main:
+        interface: virtual
+        channel: demo
+        bitrate: 250000
+    drives:
+      pump:
+        bus: main
+        protocol: canopen_pkw
+        station: 5
+        profile: table
+        period: 0.1
+        cyclic_request: [speed]
+        cyclic_response: [status, status_2, current]
+"""
+PROFILE = """\
+protocols: [canopen_pkw]
+parameters:
+  status: {number: 455, index: 0x2004, subindex: 6, access: ro}
+  status_2: {number: 456, index: 0x2004, subindex: 7, access: ro}
+  current: {number: 500, index: 0x2004, subindex: 0x33, type: uint32, scale: 0.01, access: ro}
+  word: {number: 704, index: 0x2008, subindex: 5}
+  speed: {number: 710, index: 0x2008, subindex: 11}
+  position: {number: 720, index: 0x2008, subindex: 21, type: int32}
+  position_high: {number: 721, index: 0x2008, subindex: 22}
+control:
+  parameter: word
+  words: {disable: 0, enable: 1, reset_fault: 8}
+  status: {parameter: status, ready: [1, 1], enabled: [0x80, 0x80], fault: [4, 4]}
+"""
+
+
+@pytest.fixture
+def drive(tmp_path: Path) -> DriveConfiguration:
+    return load(tmp_path, FILE, PROFILE).drives['pump']
+
+
+def with_options(drive: DriveConfiguration, **options: object) -> DriveConfiguration:
+    return replace(drive, family_options={**drive.family_options, **options})
+
+
+def test_defaults(drive: DriveConfiguration) -> None:
+    assert drive.parameter_timeout == 0.5, 'longer than that of the other families'
+    assert drive.family_options == {
+        'layout': 'word_le', 'word_order': 'high_first', 'abort_code_order': 'auto',
+        'addressing': 'register', 'nmt_start': True, 'heartbeat_timeout': 0.0,
+        'request_cob_id': 0, 'response_cob_id': 0, 'refresh_interval': 1.0}
+
+
+def test_claims(drive: DriveConfiguration) -> None:
+    routes = [claim.route for claim in FAMILY.claims(drive)]
+    assert routes == [(0x505, 0x7FF, False), (0x485, 0x7FF, False), (0x085, 0x7FF, False),
+                      (0x705, 0x7FF, False), (0x000, 0x7FF, False)]
+    moved = with_options(drive, request_cob_id=0x201, response_cob_id=0x181)
+    assert [claim.route.identifier for claim in FAMILY.claims(moved)] == [
+        0x201, 0x181, 0x085, 0x705, 0x000]
+
+
+def test_claims_collide_with_the_same_node_only(drive: DriveConfiguration) -> None:
+    own = FAMILY.claims(drive)
+    for station in range(1, 128):
+        others = FAMILY.claims(replace(drive, station=station))
+        assert any(mine.overlaps(other) for mine in own for other in others) == (station == 5)
+
+
+def test_shortest_period(drive: DriveConfiguration) -> None:
+    # 455 with 456, 500 with 501, and the write of 710: six frames of 135 bits
+    assert FAMILY.shortest_period(drive, 250_000) == pytest.approx(6 * 135 / 250_000 + 0.003)
+    assert FAMILY.shortest_period(drive, 10_000) == pytest.approx(6 * 135 / 10_000 + 0.003)
+    assert FAMILY.bits_per_second(drive) == pytest.approx(8100.0)
+
+
+def test_shortest_period_with_a_status_that_is_no_response(drive: DriveConfiguration) -> None:
+    alone = replace(drive, cyclic_response=drive.cyclic_response[2:], cyclic_request=())
+    assert FAMILY.shortest_period(alone, 250_000) == pytest.approx(4 * 135 / 250_000 + 0.002)
+
+
+def test_round_that_does_not_fit(tmp_path: Path) -> None:
+    assert problems(tmp_path, changed(FILE, 'period: 0.1', 'period: 0.00624'), PROFILE) == []
+    assert problems(tmp_path, changed(FILE, 'period: 0.1', 'period: 0.006'), PROFILE) == [
+        'f.yaml:15: drives.pump.period: 0.006 s is too short for a round of polling at 250000 '
+        'bit/s, allowed is at least 0.00624 s']
+
+
+@pytest.mark.parametrize(('old', 'new', 'problem'), [
+    ('station: 5', 'station: 0', '13: drives.pump.station: 0 is out of range, allowed is 1 to '
+                                 '127 (canopen_pkw)'),
+    ('station: 5', 'station: 128', '13: drives.pump.station: 128 is out of range, allowed is 1 '
+                                   'to 127 (canopen_pkw)'),
+    ('period: 0.1', 'period: 0.1\n        request_cob_id: 0x485',
+     '16: drives.pump.request_cob_id: 485h is the identifier of the response of this node, '
+     'allowed is any other'),
+    ('period: 0.1', 'period: 0.1\n        response_cob_id: 0x705',
+     '16: drives.pump.response_cob_id: 705h is the identifier of the heartbeat of this node, '
+     'allowed is any other'),
+])
+def test_drive_keys(tmp_path: Path, old: str, new: str, problem: str) -> None:
+    found = problems(tmp_path, changed(FILE, old, new), PROFILE)
+    assert f'f.yaml:{problem}' in found
+
+
+@pytest.mark.parametrize('line', [
+    'request_cob_id: 0x800', 'response_cob_id: -1', 'layout: big', 'word_order: high',
+    'abort_code_order: none', 'addressing: sdo', 'heartbeat_timeout: -1', 'nmt_start: 1',
+    'refresh_interval: -0.1', 'mapping: verify'])
+def test_values_out_of_range(tmp_path: Path, line: str) -> None:
+    text = changed(FILE, 'period: 0.1', f'period: 0.1\n        {line}')
+    found, = problems(tmp_path, text, PROFILE)
+    assert found.startswith(f'f.yaml:16: drives.pump.{line.split(":")[0]}: ')
+
+
+@pytest.mark.parametrize(('addressing', 'old', 'new', 'problem'), [
+    ('register', 'number: 455, ', '',
+     'table.yaml:3: parameters.status.number: missing, allowed in canopen_pkw with addressing '
+     'register is a number'),
+    ('canopen', 'index: 0x2004, subindex: 6, ', '',
+     'table.yaml:3: parameters.status.index: missing, allowed in canopen_pkw with addressing '
+     'canopen is an index with a subindex'),
+    ('canopen', 'index: 0x2004, subindex: 6, ', 'index: 0x2004, ',
+     'table.yaml:3: parameters.status.subindex: missing, allowed with index is 0 to 255'),
+    ('register', 'index: 0x2004, subindex: 6, ', 'index: 0x2004, ',
+     'table.yaml:3: parameters.status.subindex: missing, allowed with index is 0 to 255'),
+    ('register', 'number: 500', 'number: 65535',
+     'table.yaml:5: parameters.current.type: uint32 takes two registers and register 65535 is '
+     'the last one, allowed is a 16-bit type'),
+    ('canopen', 'subindex: 0x33', 'subindex: 0xFF',
+     'table.yaml:5: parameters.current.type: uint32 takes two registers and 2004h.FFh is the '
+     'last one, allowed is a 16-bit type'),
+])
+def test_addresses(tmp_path: Path, addressing: str, old: str, new: str, problem: str) -> None:
+    text = changed(FILE, 'period: 0.1', f'period: 0.1\n        addressing: {addressing}')
+    assert problem in problems(tmp_path, text, changed(PROFILE, old, new))
+
+
+def test_address_that_is_not_needed_may_be_missing(tmp_path: Path) -> None:
+    bare = PROFILE.replace('number: 455, ', '')
+    text = changed(FILE, 'period: 0.1', 'period: 0.1\n        addressing: canopen')
+    assert problems(tmp_path, text, bare) == []
+    assert problems(tmp_path, FILE, PROFILE.replace('index: 0x2004, subindex: 6, ', '')) == []
+
+
+@pytest.mark.parametrize(('request_', 'problem'), [
+    ('[position, position_high]',
+     "cyclic_request: 'position_high' and 'position' share a register, allowed is one of them"),
+    ('[position_high, position]',
+     "cyclic_request: 'position' and 'position_high' share a register, allowed is one of them"),
+    ('[word, position]', ''), ('[speed, position]', ''),
+])
+def test_setpoints_that_overwrite_each_other(tmp_path: Path, request_: str, problem: str) -> None:
+    text = changed(FILE, '[speed]', request_)
+    expected = [f'f.yaml:16: drives.pump.{problem}'] if problem else []
+    assert problems(tmp_path, text, PROFILE) == expected
+
+
+def test_setpoint_that_overwrites_the_control_word(tmp_path: Path) -> None:
+    profile = changed(PROFILE, 'number: 710, index: 0x2008, subindex: 11', 'number: 704')
+    assert problems(tmp_path, FILE, profile) == [
+        "f.yaml:16: drives.pump.cyclic_request: 'speed' and 'word' share a register, allowed is "
+        'one of them']
+
+
+def test_empty_round_is_refused(tmp_path: Path) -> None:
+    found = problems(tmp_path, changed(FILE, '[status, status_2, current]', '[]'), PROFILE)
+    assert found == ['f.yaml:17: drives.pump.cyclic_response: empty, allowed in canopen_pkw is '
+                     'at least one parameter']
+
+
+# -- raw names ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(('name', 'address'), [
+    ('p0', (0, None, None)), ('p9999', (9999, None, None)), ('p65535', (65535, None, None)),
+    ('x3000.1', (None, 0x3000, 1)), ('x0.0', (None, 0, 0)), ('xffff.FF', (None, 0xFFFF, 255)),
+    # the register of a listed parameter has that one's numbers
+    ('p455', (455, 0x2004, 6)), ('x2004.06', (455, 0x2004, 6)),
+    # 32 bits are no register
+    ('p500', (500, None, None)), ('p720', (720, None, None)),
+])
+def test_raw_names(drive: DriveConfiguration, name: str,
+                   address: tuple[int | None, int | None, int | None]) -> None:
+    parameter = FAMILY.raw_parameter(drive, name)
+    assert parameter is not None
+    assert (parameter.number, parameter.index, parameter.subindex) == address
+    assert (parameter.name, parameter.type) == (name, ParameterType.UINT16)
+    assert (parameter.scaled, parameter.listed) == (False, False)
+
+
+@pytest.mark.parametrize('name', [
+    '', 'p', 'p65536', 'p-1', 'P30', 'p30.1', 'x', 'x2004', 'x2004.', 'x.1', 'x20040.1',
+    'x2004.100', 'x2004.1.1', 'xg.1', 'speed', 'p1 ', 'p٣'])
+def test_names_that_are_not_raw(drive: DriveConfiguration, name: str) -> None:
+    assert FAMILY.raw_parameter(drive, name) is None
+
+
+def test_station_names_the_frames(drive: DriveConfiguration) -> None:
+    purposes = [claim.purpose for claim in FAMILY.claims(drive)]
+    assert purposes == [
+        '505h (PKW requests to node 5)', '485h (PKW responses of node 5)',
+        '085h (emergency messages of node 5)', '705h (heartbeats of node 5)', '000h (NMT)']

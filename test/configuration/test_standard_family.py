@@ -1,0 +1,371 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Drives with 11-bit DataModel identifiers in a parameter file, alone and beside others."""
+
+from dataclasses import replace
+from pathlib import Path
+import re
+
+from configuration_builders import changed, FILE, load, problems, PROFILE, warnings
+import pytest
+
+from drive_can_bridge.configuration.model import BridgeConfiguration, DriveConfiguration
+from drive_can_bridge.configuration.traffic_check import bus_shares
+from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.parameters import Access, ParameterType
+from drive_can_bridge.protocols.datamodel.standard_family import DataModelStandard
+
+FAMILY = DataModelStandard()
+TABLE = changed(PROFILE, 'protocols: [datamodel_extended]',
+                'protocols: [datamodel_extended, datamodel_standard]')
+#: conveyor and lift, both with 11-bit identifiers
+BOTH = FILE.replace('protocol: datamodel_extended', 'protocol: datamodel_standard')
+#: conveyor with 11 bits, lift with 29
+MIXED = changed(FILE, 'protocol: datamodel_extended', 'protocol: datamodel_standard')
+STATION = 'f.yaml:13: drives.conveyor.station: '
+
+
+def with_keys(*lines: str, text: str = MIXED) -> str:
+    """Add keys to the conveyor; the first of them stands in line 18."""
+    added = ''.join(f'        {line}\n' for line in lines)
+    return changed(text, '        rearm: neutral\n', added)
+
+
+def loaded(folder: Path, text: str = MIXED) -> BridgeConfiguration:
+    return load(folder, text, TABLE)
+
+
+def found(folder: Path, text: str) -> list[str]:
+    return problems(folder, text, TABLE)
+
+
+@pytest.fixture
+def drive(tmp_path: Path) -> DriveConfiguration:
+    return loaded(tmp_path).drives['conveyor']
+
+
+# -- keys -----------------------------------------------------------------------------------------
+
+
+def test_defaults(drive: DriveConfiguration) -> None:
+    assert drive.family_options == {
+        'request_map_base': 122, 'response_map_base': 126, 'parameter_offset': 0,
+        'request_id_base': 0x3F0, 'response_id_base': 0x7F0, 'eeprom_write_gap': 0.02,
+        'quarantine': 0.1, 'length_policy': 'lenient', 'refresh_interval': 0.5,
+        'allow_fast_cycle': False}
+
+
+def test_all_keys(tmp_path: Path) -> None:
+    drive = loaded(tmp_path, with_keys(
+        'request_id_base: 0x300', 'response_id_base: 896', 'quarantine: 1',
+        'refresh_interval: 0', 'length_policy: strict', 'eeprom_write_gap: 0.05',
+        'parameter_offset: -1', 'request_map_base: 200', 'response_map_base: 300',
+        'allow_fast_cycle: true')).drives['conveyor']
+    assert drive.family_options == {
+        'request_map_base': 200, 'response_map_base': 300, 'parameter_offset': -1,
+        'request_id_base': 0x300, 'response_id_base': 0x380, 'eeprom_write_gap': 0.05,
+        'quarantine': 1.0, 'length_policy': 'strict', 'refresh_interval': 0.0,
+        'allow_fast_cycle': True}
+    assert isinstance(drive.family_options['quarantine'], float)
+    assert isinstance(drive.family_options['refresh_interval'], float)
+
+
+def test_mapping_is_of_another_family(tmp_path: Path) -> None:
+    line, = found(tmp_path, with_keys('mapping: verify'))
+    assert line.startswith('f.yaml:18: drives.conveyor.mapping: ')
+    assert 'datamodel_extended' in line
+    assert 'datamodel_standard' in line
+
+
+@pytest.mark.parametrize('key', ['request_id_base: 0x3F0', 'response_id_base: 0x7F0',
+                                 'quarantine: 0.1', 'refresh_interval: 0.5'])
+def test_keys_of_this_family_are_not_for_29_bits(tmp_path: Path, key: str) -> None:
+    line, = found(tmp_path, with_keys(key, text=FILE))
+    assert line.startswith(f'f.yaml:18: drives.conveyor.{key.split(":")[0]}: ')
+    assert 'datamodel_standard' in line
+
+
+@pytest.mark.parametrize(('key', 'allowed'), [
+    ('quarantine: -0.1', '-0.1 is out of range, allowed is a number of 0 to 60'),
+    ('quarantine: long', "'long' is a string, allowed is a number of 0 to 60"),
+    ('refresh_interval: -1', '-1 is out of range, allowed is a number of 0 to 3600'),
+    ('eeprom_write_gap: 0.019', '0.019 is out of range, allowed is a number of 0.02 to 60'),
+    ('request_id_base: 0x7FF', '2047 is out of range, allowed is an integer of 0 to 2046'),
+    ('response_id_base: -1', '-1 is out of range, allowed is an integer of 0 to 2046'),
+    ('response_id_base: 7F0h', "'7F0h' is a string, allowed is an integer of 0 to 2046"),
+    ('length_policy: lax', "'lax' is unknown, allowed is lenient or strict"),
+])
+def test_values_out_of_range(tmp_path: Path, key: str, allowed: str) -> None:
+    assert found(tmp_path, with_keys(key)) == [
+        f'f.yaml:18: drives.conveyor.{key.split(":")[0]}: {allowed}']
+
+
+def test_a_profile_of_the_other_protocol_is_refused(tmp_path: Path) -> None:
+    assert problems(tmp_path, MIXED) == [
+        "f.yaml:14: drives.conveyor.profile: 'table' is for datamodel_extended, allowed is a "
+        'profile for datamodel_standard']
+
+
+# -- stations and identifiers ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('station', [1, 15])
+def test_stations_with_the_default_bases(tmp_path: Path, station: int) -> None:
+    assert found(tmp_path, changed(MIXED, 'station: 1', f'station: {station}')) == []
+
+
+@pytest.mark.parametrize(('station', 'total'), [(16, '800h'), (17, '801h'), (127, '86Fh')])
+def test_what_does_not_fit_11_bits_is_refused_with_the_sum(tmp_path: Path, station: int,
+                                                           total: str) -> None:
+    assert found(tmp_path, changed(MIXED, 'station: 1', f'station: {station}')) == [
+        f'{STATION}{station} is out of range: the identifier of responses, 7F0h + {station} = '
+        f'{total}, does not fit 11 bits; allowed is 1 to 15 with these bases']
+
+
+def test_station_0_is_refused(tmp_path: Path) -> None:
+    assert found(tmp_path, changed(MIXED, 'station: 1', 'station: 0')) == [
+        f'{STATION}0 is out of range, allowed is 1 to 15 (datamodel_standard)']
+
+
+def test_the_request_identifier_has_to_fit_too(tmp_path: Path) -> None:
+    text = changed(with_keys('request_id_base: 0x7F8', 'response_id_base: 0x100'),
+                   'station: 1', 'station: 8')
+    assert found(tmp_path, text) == [
+        f'{STATION}8 is out of range: the identifier of requests, 7F8h + 8 = 800h, does not fit '
+        '11 bits; allowed is 1 to 7 with these bases']
+
+
+def test_custom_bases(tmp_path: Path) -> None:
+    text = changed(with_keys('request_id_base: 0x300', 'response_id_base: 0x380'),
+                   'station: 1', 'station: 20')
+    request, response = FAMILY.claims(loaded(tmp_path, text).drives['conveyor'])
+    assert request.route == (0x314, 0x7FF, False)
+    assert response.route == (0x394, 0x7FF, False)
+
+
+def test_equal_bases_are_refused(tmp_path: Path) -> None:
+    line, = found(tmp_path, with_keys('response_id_base: 0x3F0'))
+    assert line.startswith('f.yaml:18: drives.conveyor.response_id_base: 1008 is request_id_base')
+
+
+def test_claims(drive: DriveConfiguration) -> None:
+    request, response = FAMILY.claims(drive)
+    assert request.route.matches(Frame(0x3F1, b'', False))
+    assert response.route.matches(Frame(0x7F1, b'', False))
+    for claim in (request, response):
+        # the same numbers in the other frame format, and the neighbours
+        for identifier in (0x3F1, 0x7F1):
+            assert not claim.route.matches(Frame(identifier, b'', True))
+        for identifier in (0x3F0, 0x3F2, 0x7F0, 0x7F2, 0x7FF, 0):
+            assert not claim.route.matches(Frame(identifier, b'', False))
+
+
+# -- collisions -----------------------------------------------------------------------------------
+
+
+def test_the_same_station_twice(tmp_path: Path) -> None:
+    assert found(tmp_path, changed(BOTH, 'station: 2', 'station: 1')) == [
+        'f.yaml:22: drives.lift.station: 1 collides with drive conveyor (station 1) on bus main: '
+        'both use 11-bit identifier 3F1h; allowed is a station of its own']
+
+
+def test_the_request_of_one_is_the_response_of_another(tmp_path: Path) -> None:
+    # answers of station 1 on 3F8h + 1 = 3F9h, requests to station 9 on 3F0h + 9 = 3F9h
+    text = changed(with_keys('response_id_base: 0x3F8', text=BOTH), 'station: 2', 'station: 9')
+    assert found(tmp_path, text) == [
+        'f.yaml:22: drives.lift.station: 9 collides with drive conveyor (station 1) on bus main: '
+        'both use 11-bit identifier 3F9h; allowed is a station of its own']
+    # and the other way round: the later drive answers where the earlier one is asked
+    text = changed(changed(BOTH, 'station: 1', 'station: 9'), 'station: 2',
+                   'station: 1\n        response_id_base: 0x3F8')
+    assert found(tmp_path, text) == [
+        'f.yaml:22: drives.lift.station: 1 collides with drive conveyor (station 9) on bus main: '
+        'both use 11-bit identifier 3F9h; allowed is a station of its own']
+
+
+def test_the_same_station_with_other_bases_is_another_drive(tmp_path: Path) -> None:
+    text = changed(with_keys('request_id_base: 0x300', 'response_id_base: 0x380', text=BOTH),
+                   'station: 2', 'station: 1')
+    assert found(tmp_path, text) == []
+
+
+def test_the_same_station_on_another_bus(tmp_path: Path) -> None:
+    text = changed(BOTH, '    drives:\n', '      other: {interface: virtual, channel: b}\n'
+                                          '    drives:\n')
+    text = changed(text, '        station: 2', '        station: 1').replace(
+        'lift:\n        bus: main', 'lift:\n        bus: other')
+    assert found(tmp_path, text) == []
+
+
+@pytest.mark.parametrize(('first', 'second'), [('1', '1'), ('15', '15'), ('1', '127')])
+def test_equal_numbers_with_29_and_11_bits_do_not_collide(tmp_path: Path, first: str,
+                                                          second: str) -> None:
+    text = changed(changed(MIXED, 'station: 1', f'station: {first}'), 'station: 2',
+                   f'station: {second}')
+    assert found(tmp_path, text) == []
+    assert warnings(tmp_path, text, TABLE) == []
+
+
+def test_a_station_that_does_not_fit_is_not_somebody_elses(tmp_path: Path,
+                                                           drive: DriveConfiguration) -> None:
+    # masked to 11 bits, 800h would be 000h
+    claim, = FAMILY.claims(replace(drive, station=16))
+    assert claim.route == (0x400, 0x7FF, False)
+    text = changed(BOTH, 'station: 1', 'station: 16')
+    text = changed(text, 'station: 2', 'station: 1\n        request_id_base: 0x010\n'
+                                       '        response_id_base: 0x020')
+    assert len(found(tmp_path, text)) == 1
+
+
+# -- period ---------------------------------------------------------------------------------------
+
+# conveyor: one read and two writes, 4 frames of 135 bits and 3 requests of 1 ms
+@pytest.mark.parametrize(('bitrate', 'period', 'shortest'), [
+    (125_000, '0.007', 0.00732), (125_000, '0.0073', 0.00732), (50_000, '0.0135', 0.0138),
+])
+def test_a_period_that_is_too_short(tmp_path: Path, bitrate: int, period: str,
+                                    shortest: float) -> None:
+    text = changed(changed(MIXED, 'period: 0.02', f'period: {period}'), 'bitrate: 125000',
+                   f'bitrate: {bitrate}')
+    assert f'f.yaml:15: drives.conveyor.period: {period} s is too short for a round of polling ' \
+        f'at {bitrate} bit/s, allowed is at least {shortest:g} s' in found(tmp_path, text)
+
+
+LISTS = {
+    'three reads': '[actual, ramp, position]',      # 209, 30, 214
+    'one read': '[actual]',
+    'out of order': '[status, actual]',             # 211 and 209, over 210
+    'bridged': '[speed, word]',                     # 50 and 52, over 51
+    'not bridged': '[status, position]',            # 211 and 214: nobody knows 212
+}
+
+
+@pytest.mark.parametrize('bitrate', [10_000, 20_000, 33_333, 125_000, 250_000, 1_000_000])
+@pytest.mark.parametrize('response', LISTS.values(), ids=LISTS.keys())
+def test_the_named_period_passes(tmp_path: Path, bitrate: int, response: str) -> None:
+    """What the message names as the shortest period has to be accepted, and 10 µs less not."""
+    text = changed(with_keys('allow_fast_cycle: true'), 'bitrate: 125000', f'bitrate: {bitrate}')
+    text = changed(text, 'cyclic_response: [actual, current, status]',
+                   f'cyclic_response: {response}')
+    text = text[:text.index('      lift:')]
+    line, = (line for line in found(tmp_path, changed(text, 'period: 0.02', 'period: 0.001'))
+             if '.period: ' in line)
+    named = re.search(r'at least ([0-9.e-]+) s$', line)
+    assert named is not None
+    lines = found(tmp_path, changed(text, 'period: 0.02', f'period: {named[1]}'))
+    assert not [line for line in lines if '.period: ' in line], 'the named period is refused'
+    shorter = f'{float(named[1]) - 1.1e-5:.6f}'
+    lines = found(tmp_path, changed(text, 'period: 0.02', f'period: {shorter}'))
+    assert [line for line in lines if '.period: ' in line], 'a shorter one is not'
+
+
+def test_the_manual_s_5_ms(tmp_path: Path) -> None:
+    text = changed(changed(MIXED, 'period: 0.02', 'period: 0.004'), 'bitrate: 125000',
+                   'bitrate: 1000000')
+    assert found(tmp_path, text) == [
+        'f.yaml:15: drives.conveyor.period: 0.004 s is too fast, allowed is at least 0.005 s '
+        'unless allow_fast_cycle is true']
+    text = changed(text, 'rearm: neutral', 'allow_fast_cycle: true')
+    assert found(tmp_path, text) == []
+
+
+@pytest.mark.parametrize(('response', 'frames'), [
+    ('[actual, current, status]', 4),          # 209 to 211: one read
+    ('[status, actual, current]', 4),          # the order does not matter
+    ('[actual, current, status, position]', 6),   # 209 to 211; 214 is out of reach
+    ('[position, frequency]', 4),              # 214 and 215
+    ('[speed, limit, word, flag]', 4),         # 50 to 53
+    ('[speed, limit, word, flag, angle]', 6),  # 50 to 54: two
+    ('[speed, flag]', 4),                      # 50 and 53, over 51 and 52
+    ('[angle, actual]', 6),
+])
+def test_reads_of_a_round(tmp_path: Path, response: str, frames: int) -> None:
+    drive = loaded(tmp_path, changed(MIXED, '[actual, current, status]', response)
+                   ).drives['conveyor']
+    assert FAMILY.bits_per_second(drive) == pytest.approx(135 * frames / 0.02)
+
+
+# -- lists ----------------------------------------------------------------------------------------
+
+
+def test_eeprom_parameters_are_no_setpoints(tmp_path: Path) -> None:
+    line, = found(tmp_path, changed(MIXED, 'cyclic_request: [speed, limit]',
+                                    'cyclic_request: [speed, ramp]'))
+    assert line.startswith("f.yaml:16: drives.conveyor.cyclic_request: 'ramp' is kept in EEPROM")
+
+
+def test_there_has_to_be_something_to_poll(tmp_path: Path) -> None:
+    assert found(tmp_path, changed(MIXED, '[actual, current, status]', '[]')) == [
+        'f.yaml:17: drives.conveyor.cyclic_response: empty, allowed in datamodel_standard is at '
+        'least one parameter']
+    assert found(tmp_path, changed(MIXED, '        cyclic_response: [actual, current, status]\n',
+                                   '')) == [
+        'f.yaml:10: drives.conveyor.cyclic_response: empty, allowed in datamodel_standard is at '
+        'least one parameter']
+
+
+def test_there_need_not_be_setpoints(tmp_path: Path) -> None:
+    assert found(tmp_path, changed(MIXED, 'cyclic_request: [speed, limit]',
+                                   'cyclic_request: []')) == []
+
+
+def test_more_than_four_of_each(tmp_path: Path) -> None:
+    text = changed(MIXED, 'cyclic_request: [speed, limit]',
+                   'cyclic_request: [speed, limit, flag, angle, order]')
+    text = changed(text, '[actual, current, status]',
+                   '[actual, current, status, position, frequency, ramp]')
+    assert found(tmp_path, text) == []
+    assert len(loaded(tmp_path, text).drives['conveyor'].cyclic_response) == 6
+
+
+def test_write_only_parameters_are_not_polled(tmp_path: Path) -> None:
+    line, = found(tmp_path, changed(MIXED, '[actual, current, status]', '[actual, order]'))
+    assert line.startswith("f.yaml:17: drives.conveyor.cyclic_response: 'order' is write-only")
+
+
+def test_32_bits_do_not_exist(tmp_path: Path) -> None:
+    table = changed(TABLE, 'position: {number: 214, type: int16', 'position: {number: 214, '
+                                                                  'type: int32')
+    lines = problems(tmp_path, BOTH, table)
+    assert lines
+    assert all('table.yaml:' in line and 'int32 does not exist in datamodel_standard' in line
+               for line in lines)
+
+
+# -- load -----------------------------------------------------------------------------------------
+
+
+def shares(configuration: BridgeConfiguration) -> dict[str, float]:
+    return bus_shares(configuration.buses['main'], configuration.drives.values())
+
+
+def test_load_of_mixed_drives(tmp_path: Path) -> None:
+    found_shares = shares(loaded(tmp_path))
+    assert found_shares['conveyor'] == pytest.approx(4 * 135 / 0.02 / 125_000)     # 21.6 %
+    assert found_shares['lift'] == pytest.approx((2 * 160 / 0.02 + 640) / 125_000)  # 13.3 %
+
+
+def test_overload_of_mixed_drives(tmp_path: Path) -> None:
+    text = changed(MIXED, 'bitrate: 125000', 'bitrate: 50000')
+    assert warnings(tmp_path, text, TABLE) == [
+        'f.yaml:5: buses.main: worst-case load 87.3 % at 50000 bit/s (conveyor 54.0 %, lift '
+        '33.3 %), recommended is at most 70 %']
+    text = changed(MIXED, 'bitrate: 125000', 'bitrate: 40000')
+    assert found(tmp_path, text) == [
+        'f.yaml:5: buses.main: worst-case load 109.1 % at 40000 bit/s (conveyor 67.5 %, lift '
+        '41.6 %), allowed is 100 %: use longer periods, fewer drives or a higher bit rate']
+
+
+# -- names ----------------------------------------------------------------------------------------
+
+
+def test_raw_names(drive: DriveConfiguration) -> None:
+    parameter = FAMILY.raw_parameter(drive, 'p30')
+    assert parameter is not None
+    assert (parameter.number, parameter.type, parameter.access) == (
+        30, ParameterType.UINT16, Access.READ_WRITE)
+    assert (parameter.storage, parameter.listed) == (None, False)
+    for name in ('p65536', 'p-1', 'p30.1', 'x1000.1', 'P30', 'speed', ''):
+        assert FAMILY.raw_parameter(drive, name) is None
+    moved = replace(drive, family_options={**drive.family_options, 'parameter_offset': -1})
+    assert FAMILY.raw_parameter(moved, 'p0') is None
+    assert FAMILY.raw_parameter(moved, 'p1') is not None

@@ -1,0 +1,103 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""The codecs of CANnord with anything that fits, and with anything at all."""
+
+from hypothesis import example, given, settings, strategies as st
+
+from drive_can_bridge.core.errors import RemoteProtocolError
+from drive_can_bridge.protocols.cannord import identifiers, process_data, states
+from drive_can_bridge.protocols.cannord.identifiers import MessageObject
+from drive_can_bridge.protocols.cannord.parameter_frame import ParameterFrame, ParameterLayout
+
+WORDS = st.integers(0, 0xFFFF)
+
+
+@settings(deadline=None)
+@given(st.sampled_from(MessageObject), st.integers(0, 255), st.booleans())
+def test_identifiers(kind: MessageObject, address: int, extended: bool) -> None:
+    value = identifiers.identifier(kind, address, extended=extended)
+    assert identifiers.decode_identifier(value, extended=extended) == (
+        kind, range(address, address + 1))
+    if extended:
+        assert value == identifiers.identifier(kind, address) * 262144
+
+
+@settings(deadline=None)
+@given(st.integers(0, 0x1FFFFFFF), st.booleans())
+@example(0x400, False)
+@example(0x408, False)
+@example(0x409, False)
+@example(0x10200000, True)
+@example(0x1FFC0000, True)
+def test_any_identifier(value: int, extended: bool) -> None:
+    try:
+        kind, addresses = identifiers.decode_identifier(value, extended=extended)
+    except RemoteProtocolError as error:
+        assert str(error)
+        short = value >> 18 if extended else value
+        assert short > 1032 or extended and value & 0x3FFFF
+        return
+    if kind is None:
+        assert len(addresses) in (32, 256)
+        if len(addresses) == 32:
+            assert all(identifiers.group_identifier(address, extended=extended) == value
+                       for address in addresses)
+    else:
+        assert identifiers.identifier(kind, addresses[0], extended=extended) == value
+
+
+@settings(deadline=None)
+@given(WORDS, st.lists(WORDS, max_size=3), st.booleans())
+def test_main_frames(word: int, values: list[int], swap: bool) -> None:
+    length = process_data.main_length(len(values))
+    data = process_data.encode_main(word, values, length=length, swap=swap)
+    assert len(data) == length
+    found = process_data.decode_main(data, swap=swap)
+    assert found.word == word
+    assert list(found.values[:len(values)]) == values
+    assert not any(found.values[len(values):])
+
+
+@settings(deadline=None)
+@given(st.lists(WORDS, max_size=2))
+def test_additional_frames(values: list[int]) -> None:
+    data = process_data.encode_extra(values)
+    assert len(data) == 5
+    assert data[4] == 0
+    assert list(process_data.decode_extra(data))[:len(values)] == values
+
+
+@settings(deadline=None)
+@given(st.integers(0, 15), st.integers(0, 2047), st.integers(0, 255),
+       st.integers(-0x80000000, 0xFFFFFFFF), st.sampled_from(['high_first', 'low_first']),
+       st.sampled_from(['low', 'high']))
+def test_parameter_frames(identifier: int, number: int, index: int, value: int, value_order: str,
+                          index_byte: str) -> None:
+    layout = ParameterLayout(value_order, index_byte)
+    data = layout.encode(identifier, number, index, value)
+    assert layout.decode(data) == ParameterFrame(identifier, number, index, value & 0xFFFFFFFF)
+    if value_order == 'low_first':
+        assert data[4:] == (value & 0xFFFFFFFF).to_bytes(4, 'little')
+    assert data[2:4].index(index) == (0 if index_byte == 'low' or not index else 1)
+
+
+@settings(deadline=None)
+@given(st.binary(max_size=8), st.sampled_from(['high_first', 'low_first']),
+       st.sampled_from(['low', 'high']), st.booleans())
+def test_any_bytes(data: bytes, value_order: str, index_byte: str, swap: bool) -> None:
+    for decode in (ParameterLayout(value_order, index_byte).decode, process_data.decode_extra,
+                   lambda entry: process_data.decode_main(entry, swap=swap)):
+        try:
+            decode(data)
+        except RemoteProtocolError as error:
+            assert str(error)
+
+
+@settings(deadline=None)
+@given(WORDS)
+def test_any_status_word(word: int) -> None:
+    state = states.state_of(word)
+    if state in (states.State.FAULT, states.State.FAULT_REACTION):
+        assert states.is_faulted(word)
+    elif state is not states.State.UNKNOWN:
+        assert not states.is_faulted(word)
+    assert (state is states.State.OPERATION_ENABLED) == (word & 0x7F == 0x37)

@@ -1,0 +1,214 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Control word and status word of one inverter: every way through the states."""
+
+from builders import Conversation
+from cannord_session_builders import exchange, FAULT, online, READY, RUNNING
+import pytest
+
+from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.events import Noted
+from drive_can_bridge.core.session import DriveState
+from drive_can_bridge.protocols.cannord.control import hint
+
+ENABLE, DISABLE = ControlAction.ENABLE, ControlAction.DISABLE
+QUICK_STOP, RESET_FAULT = ControlAction.QUICK_STOP, ControlAction.RESET_FAULT
+
+DISABLED = '003#700B0000'
+SWITCHED_ON = '003#330B0000'
+BRAKING = '003#170B0010'
+RAMPING_DOWN = '003#360F0010'
+REACTION = '003#3F0B0010'
+NOT_READY = '003#300B0000'
+
+
+def words(talk: Conversation, now: float, *answers: str) -> list[str]:
+    """Exchange every 20 ms; return the control words as they are sent."""
+    return [exchange(talk, now + 0.02 * place, answer)[4:8]
+            for place, answer in enumerate(answers)]
+
+
+def running() -> Conversation:
+    """Return a conversation with a drive that was enabled; the next cycle is due at 10.08 s."""
+    talk = online()
+    talk.asks(ENABLE, 10.003)
+    assert words(talk, 10.02, READY, SWITCHED_ON, RUNNING) == ['7F04', '7F04', '7F04']
+    assert talk.control_outcomes() == [('enable', True, 'operation enabled')]
+    assert talk.session.control is not None
+    assert talk.session.control.state == 'operation enabled'
+    talk.events()
+    return talk
+
+
+def test_control_begins_with_ready() -> None:
+    talk = online(DISABLED)
+    assert talk.session.control is not None
+    assert talk.session.control.state == 'switch-on disabled'
+    assert words(talk, 10.02, DISABLED, READY) == ['7E04', '7E04']
+    assert talk.session.control.state == 'ready to switch on'
+
+
+def test_walk_from_switch_on_disabled() -> None:
+    talk = online(DISABLED)
+    talk.asks(ENABLE, 10.003)
+    assert words(talk, 10.02, DISABLED, DISABLED, READY) == ['7E04'] * 3
+    assert talk.control_outcomes() == []
+    assert words(talk, 10.08, READY, SWITCHED_ON) == ['7F04', '7F04']
+    assert talk.control_outcomes() == []
+    assert words(talk, 10.12, RUNNING, RUNNING) == ['7F04', '7F04']
+    assert talk.control_outcomes() == [('enable', True, 'operation enabled')]
+
+
+def test_enable_sticks_and_says_where_and_why() -> None:
+    talk = online('003#700D0000')
+    talk.asks(ENABLE, 10.003)
+    for place in range(1, 100):
+        exchange(talk, 10.0 + 0.02 * place, '003#500D0000')
+    assert talk.control_outcomes() == []
+    talk.until(12.004)
+    assert talk.control_outcomes() == [(
+        'enable', False, 'no confirmation in 2 s: stuck in state switch-on disabled (status word '
+        '0D50h); a quick stop is active: look at the digital inputs with that function')]
+
+
+@pytest.mark.parametrize(('status', 'what'), [
+    (0x0B60, 'voltage is disabled'), (0x0B50, 'quick stop is active'), (0x0970, 'P509'),
+    (0x0B70, ''), (0x0B31, ''), (0x0000 | 8, '')])
+def test_hints(status: int, what: str) -> None:
+    assert (what in hint(status)) if what else hint(status) == ''
+
+
+def test_disable_waits_until_the_output_is_off() -> None:
+    talk = running()
+    talk.asks(DISABLE, 10.07)
+    assert words(talk, 10.08, RUNNING, RAMPING_DOWN) == ['7E04', '7E04']
+    assert talk.control_outcomes() == []
+    assert words(talk, 10.12, READY) == ['7E04']
+    assert talk.control_outcomes() == [('disable', True, 'ready to switch on')]
+
+
+def test_quick_stop_holds_its_word_until_the_drive_stands() -> None:
+    talk = running()
+    talk.asks(QUICK_STOP, 10.07)
+    assert words(talk, 10.08, RUNNING, BRAKING, BRAKING) == ['7A04'] * 3
+    assert talk.session.control is not None
+    assert talk.session.control.state == 'quick stop'
+    assert talk.control_outcomes() == []
+    assert words(talk, 10.14, '003#500B0000', DISABLED) == ['7A04', '7E04']
+    assert talk.control_outcomes() == [('quick_stop', True, 'switch-on disabled')]
+    talk.asks(ENABLE, 10.17)
+    assert words(talk, 10.18, READY, RUNNING) == ['7E04', '7F04']
+    assert talk.control_outcomes() == [('enable', True, 'operation enabled')]
+
+
+def test_quick_stop_while_disabled_succeeds() -> None:
+    talk = online()
+    exchange(talk, 10.02)
+    talk.asks(QUICK_STOP, 10.03)
+    assert talk.control_outcomes() == [('quick_stop', True, 'ready to switch on')]
+    assert words(talk, 10.04, READY) == ['7E04']
+
+
+def test_setpoints_go_along_whatever_the_control_word() -> None:
+    talk = running()
+    talk.commands(0, 0.0, 10.07)
+    talk.commands(0, 25.0, 10.071)
+    assert exchange(talk, 10.08, RUNNING) == '002#7F040020'
+
+
+def test_a_fault_told_unasked_disables_with_the_next_frame() -> None:
+    talk = running()
+    talk.hears(FAULT, 10.065)
+    assert talk.session.state is DriveState.FAULT
+    assert talk.events(Noted) == [
+        Noted('fault (status word 0B38h); only ~/enable starts the drive again')]
+    assert words(talk, 10.08, FAULT) == ['7E04']
+    talk.asks(ENABLE, 10.09)
+    assert talk.control_outcomes() == [('enable', False, 'fault: reset it first')]
+
+
+def test_a_fault_ends_an_enable() -> None:
+    talk = online()
+    talk.asks(ENABLE, 10.003)
+    assert words(talk, 10.02, READY, FAULT, FAULT) == ['7F04', '7F04', '7E04']
+    assert talk.control_outcomes() == [
+        ('enable', False, 'fault while enabling (status word 0B38h): reset it first')]
+
+
+def test_reset_is_a_rising_edge() -> None:
+    talk = online(FAULT)
+    talk.asks(RESET_FAULT, 10.003)
+    assert words(talk, 10.02, FAULT, DISABLED, READY) == ['FE04', 'FE04', '7E04']
+    assert talk.control_outcomes() == [('reset_fault', True, 'switch-on disabled')]
+    assert talk.session.state is not DriveState.FAULT
+
+
+def test_reset_while_the_cause_is_there() -> None:
+    talk = online(FAULT, control_timeout=0.1)
+    talk.asks(RESET_FAULT, 10.003)
+    assert words(talk, 10.02, FAULT, FAULT, FAULT, FAULT) == ['FE04', 'FE04', 'FE04', 'FE04']
+    assert talk.until(10.104)[0][1] == '002#FE040000'
+    assert talk.control_outcomes() == [
+        ('reset_fault', False, 'fault still present after 0.1 s (status word 0B38h)')]
+    assert words(talk, 10.12, FAULT) == ['7E04']
+    talk.asks(RESET_FAULT, 10.13)      # with an edge of its own
+    assert words(talk, 10.14, FAULT, DISABLED) == ['FE04', 'FE04']
+    assert talk.control_outcomes() == [('reset_fault', True, 'switch-on disabled')]
+
+
+def test_reset_waits_for_the_end_of_the_fault_reaction() -> None:
+    talk = online(REACTION)
+    assert talk.session.state is DriveState.FAULT
+    talk.asks(RESET_FAULT, 10.003)
+    assert words(talk, 10.02, REACTION, REACTION, FAULT, FAULT, DISABLED) == [
+        '7E04', '7E04', '7E04', 'FE04', 'FE04']
+    assert talk.control_outcomes() == [('reset_fault', True, 'switch-on disabled')]
+
+
+def test_reset_without_a_fault_succeeds() -> None:
+    talk = running()
+    talk.asks(RESET_FAULT, 10.07)
+    assert talk.control_outcomes() == [('reset_fault', True, 'operation enabled')]
+    assert words(talk, 10.08, RUNNING) == ['7F04']
+
+
+@pytest.mark.parametrize(('status', 'state'), [(BRAKING, 'quick stop'), (NOT_READY, 'not ready')])
+def test_a_drive_that_drops_out_by_itself_is_not_started_again(status: str, state: str) -> None:
+    talk = running()
+    assert words(talk, 10.08, status, RUNNING) == ['7F04', '7E04']
+    note, = talk.events(Noted)
+    assert 'no longer enabled, by itself' in note.text
+    assert words(talk, 10.12, status) == ['7E04']
+    assert talk.session.control is not None
+    assert talk.session.control.state == state
+
+
+def test_silence_withdraws_the_enable() -> None:
+    talk = running()
+    assert [text[4:8] for _, text in talk.until(10.121)] == ['7F04'] * 3
+    assert [text[4:8] for _, text in talk.until(10.161)] == ['7E04'] * 2
+    talk.hears(RUNNING, 10.162)
+    assert words(talk, 10.18, RUNNING) == ['7E04']
+
+
+def test_parameter_set_is_in_every_word() -> None:
+    talk = online(READY, parameter_set=3)
+    talk.asks(ENABLE, 10.003)
+    assert words(talk, 10.02, READY, RUNNING) == ['7F84', '7F84']
+    talk.asks(QUICK_STOP, 10.05)
+    assert words(talk, 10.06, FAULT, FAULT) == ['7A84', '7E84']
+    talk.asks(RESET_FAULT, 10.095)
+    assert words(talk, 10.1, FAULT, READY, READY) == ['FE84', 'FE84', '7E84']
+
+
+def test_stop_disables() -> None:
+    talk = running()
+    talk.deactivate(10.07)
+    assert [text for _, text in talk.until(11.0)] == ['002#7E040000'] * 3
+
+
+def test_refused_while_offline_or_inactive() -> None:
+    talk = online()
+    talk.until(10.2)
+    assert talk.session.request_control(ENABLE, 10.2) == 'drive offline'
+    talk.deactivate(10.2)
+    assert talk.session.request_control(ENABLE, 10.2) == 'bridge inactive'

@@ -1,0 +1,448 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""The exchange of process data with one inverter: literal bytes, literal times."""
+
+import math
+from typing import Any
+
+from builders import Conversation, frame
+from cannord_session_builders import (
+    ACTUAL, CURRENT, exchange, FAULT, FREQUENCY, INPUTS, inverter, online, READY, READY_FRAME,
+    RUNNING, SECOND, SETPOINTS, started, THIRD, VALUES,
+)
+import pytest
+
+from drive_can_bridge.core.events import (
+    ForeignMasterSeen, FrameRejected, Noted, ProcessDataReceived, SetpointsExpired, StationFound,
+    StationLost,
+)
+from drive_can_bridge.core.session import DriveState
+from drive_can_bridge.core.setpoints import CommandOutcome
+
+
+def test_first_exchange() -> None:
+    talk = started()
+    assert talk.at(10.0) == [READY_FRAME]
+    assert talk.session.offline_advice == 'being looked for'
+    assert talk.session.state is DriveState.OFFLINE
+    assert talk.hears(READY, 10.002) == []
+    assert talk.events() == [StationFound(), ProcessDataReceived((0x0B31, 0), 10.002)]
+    assert talk.session.offline_advice == ''
+    assert talk.session.state is DriveState.NOT_ARMED
+    assert talk.session.control is not None
+    assert talk.session.control.state == 'ready to switch on'
+    assert talk.session.next_timer() == pytest.approx(10.02)
+
+
+def test_sample_parameters() -> None:
+    talk = started(request=(), response=(ACTUAL, INPUTS))
+    status, *mapped = talk.session.sample_parameters
+    assert (status.name, status.kind.value, status.bits[3]) == (
+        'status_word', 'integer', ('fault', 3))
+    assert len(status.bits) == 14
+    assert mapped == [ACTUAL, INPUTS]
+
+
+@pytest.mark.parametrize(('hertz', 'data'), [
+    (0.0, '0000'), (25.0, '0020'), (50.0, '0040'), (-25.0, '00E0'), (-50.0, '00C0')])
+def test_setpoint(hertz: float, data: str) -> None:
+    talk = online()
+    assert talk.commands(0, 0.0, 10.003) is CommandOutcome.ARMED
+    assert talk.commands(0, hertz, 10.004) is CommandOutcome.ACCEPTED
+    assert talk.session.state is DriveState.ONLINE
+    assert exchange(talk, 10.02) == f'002#7E04{data}'
+
+
+@pytest.mark.parametrize(('requests', 'responses', 'sent'), [
+    (0, 0, '002#7E040000'), (1, 0, '002#7E040000'), (0, 1, '002#7E040000'),
+    (2, 1, '002#7E04000000000000'), (1, 2, '002#7E04000000000000'),
+    (3, 3, '002#7E04000000000000'), (0, 3, '002#7E04000000000000')])
+def test_the_longer_list_decides_the_length(requests: int, responses: int, sent: str) -> None:
+    talk = started(request=SETPOINTS[:requests], response=VALUES[:responses])
+    assert talk.at(10.0) == [sent]
+
+
+def test_three_values_each_way() -> None:
+    talk = online('003#310B000034120000', request=(FREQUENCY, SECOND, THIRD),
+                  response=(ACTUAL, CURRENT, INPUTS))
+    for index, value in enumerate((50.0, 50.0, -25.0)):
+        talk.commands(index, 0.0, 10.003)
+        talk.commands(index, value, 10.004)
+    assert talk.until(10.021) == [(10.02, '002#7E040040002000F0')]
+    talk.hears('003#370F00C0CEFF1F80', 10.022)
+    assert talk.samples() == [(0x0F37, -16384, -50, 0x801F)]
+
+
+def test_swapped_words() -> None:
+    talk = online('003#310B000000000000', request=(FREQUENCY, SECOND, THIRD),
+                  response=(ACTUAL, CURRENT, INPUTS), swap_setpoints_2_3=True)
+    for index, value in enumerate((50.0, 50.0, -25.0)):
+        talk.commands(index, 0.0, 10.003)
+        talk.commands(index, value, 10.004)
+    assert talk.until(10.021) == [(10.02, '002#7E04004000F00020')]
+    talk.hears('003#370F00C01F80CEFF', 10.022)
+    assert talk.samples() == [(0x0F37, -16384, -50, 0x801F)]
+
+
+def test_with_two_entries_the_swapped_second_is_in_the_last_word() -> None:
+    talk = online('003#310B000000000000', request=(FREQUENCY, SECOND), response=(ACTUAL, CURRENT),
+                  swap_setpoints_2_3=True)
+    talk.commands(1, 0.0, 10.003)
+    talk.commands(1, 50.0, 10.004)
+    assert talk.until(10.021) == [(10.02, '002#7E04000000000020')]
+    talk.hears('003#310B00000000CEFF', 10.022)
+    assert talk.samples() == [(0x0B31, 0, -50)]
+
+
+def test_29_bit_identifiers() -> None:
+    talk = Conversation(inverter(station=100, extended_identifiers=True))
+    talk.bus_up(9.0)
+    talk.activate(10.0)
+    assert talk.at(10.0) == ['03200000#7E040000']
+    assert talk.hears('0C9#310B0000', 10.001) == []
+    assert not talk.session.online
+    assert talk.session.statistics.rejected == 1
+    talk.hears('03240000#310B0020', 10.002)
+    assert talk.samples() == [(0x0B31, 8192)]
+    assert talk.session.online
+
+
+def test_11_bit_session_takes_no_29_bit_frames() -> None:
+    talk = started(station=100)
+    assert talk.at(10.0) == ['0C8#7E040000']
+    talk.hears('03240000#310B0020', 10.001)
+    talk.hears('000000C9#310B0020', 10.001)
+    assert not talk.session.online
+    talk.hears('0C9#310B0020', 10.002)
+    assert talk.session.online
+
+
+@pytest.mark.parametrize(('station', 'identifier'), [(0, '000'), (255, '1FE')])
+def test_ends_of_the_address_range(station: int, identifier: str) -> None:
+    talk = started(station=station)
+    assert talk.at(10.0) == [f'{identifier}#7E040000']
+    talk.hears(f'{int(identifier, 16) + 1:03X}#310B0000', 10.002)
+    assert talk.session.online
+
+
+@pytest.mark.parametrize(('chosen', 'word'), [(1, '7E04'), (2, '7E44'), (3, '7E84'), (4, '7EC4')])
+def test_parameter_set(chosen: int, word: str) -> None:
+    assert started(parameter_set=chosen).at(10.0) == [f'002#{word}0000']
+
+
+# -- the additional frame of SK 54xE --------------------------------------------------------------
+
+
+def five(**options: Any) -> Conversation:
+    talk = started(request=SETPOINTS, response=VALUES, extra_setpoints=True, **options)
+    assert talk.at(10.0) == ['002#7E04000000000000', '002#0000000000']
+    talk.hears('003#310B000000000000', 10.002)
+    assert talk.samples() == []
+    talk.hears('003#0000000000', 10.003)
+    assert talk.events(ProcessDataReceived) == [
+        ProcessDataReceived((0x0B31, 0, 0, 0, 0, 0), 10.002)]
+    return talk
+
+
+def test_five_values_each_way() -> None:
+    talk = five()
+    for index, value in enumerate((50.0, 25.0, 0.0, 50.0, -50.0)):
+        talk.commands(index, 0.0, 10.003)
+        talk.commands(index, value, 10.004)
+    assert talk.until(10.021) == [(10.02, '002#7E04004000100000'), (10.02, '002#002000E000')]
+    talk.hears('003#370F000400030002', 10.0215)
+    assert talk.samples() == []
+    talk.hears('003#3412FFFFA5', 10.022)
+    assert talk.events(ProcessDataReceived) == [
+        ProcessDataReceived((0x0F37, 0x400, 0x300, 0x200, 0x1234, -1), 10.0215)]
+    assert talk.session.statistics.exchanges == 2
+    assert talk.session.statistics.rejected == 0
+    assert talk.session.warning == ''
+
+
+def test_four_setpoints_fill_the_fifth_with_zero() -> None:
+    talk = started(request=SETPOINTS[:4], response=(ACTUAL,), extra_setpoints=True)
+    assert talk.at(10.0) == ['002#7E04000000000000', '002#0000000000']
+    talk.hears('003#310B000000000000', 10.002)
+    assert talk.samples() == [(0x0B31, 0)]
+    talk.hears('003#1111222200', 10.003)     # values that nobody wants
+    assert talk.samples() == []
+    assert talk.session.statistics.rejected == 0
+
+
+def test_extra_values_that_do_not_come() -> None:
+    talk = five()
+    talk.until(10.021)
+    talk.hears('003#370F000400030002', 10.022)
+    assert talk.samples() == []
+    talk.until(10.041)
+    assert talk.samples() == [(0x0F37, 0x400, 0x300, 0x200)]
+    assert 'values 4 and 5 do not arrive' in talk.session.warning
+    assert talk.session.statistics.missed == 0
+    talk.hears('003#370F000400030002', 10.042)
+    talk.hears('003#0100020000', 10.043)
+    assert talk.samples() == [(0x0F37, 0x400, 0x300, 0x200, 1, 2)]
+    assert talk.session.warning == ''
+
+
+def test_a_fault_does_not_wait_for_the_extra_values() -> None:
+    talk = five()
+    talk.hears('003#380B000000000000', 10.01)
+    assert talk.samples() == [(0x0B38, 0, 0, 0)]
+    assert talk.session.state is DriveState.FAULT
+    talk.until(10.021)
+    talk.hears('003#370F000400030002', 10.022)
+    talk.hears('003#380B000400030002', 10.0221)
+    assert talk.samples() == [(0x0F37, 0x400, 0x300, 0x200), (0x0B38, 0x400, 0x300, 0x200)]
+
+
+def test_extra_values_that_belong_to_nothing() -> None:
+    talk = five()
+    talk.hears('003#0100020000', 10.01)
+    assert talk.events(FrameRejected) == [
+        FrameRejected('additional process data that nobody asked for')]
+    talk.until(10.021)
+    talk.hears('003#0100020000', 10.022)     # the main answer was lost
+    assert talk.samples() == []
+    talk.until(10.041)
+    assert talk.session.statistics.missed == 1
+
+
+def test_five_bytes_without_the_option() -> None:
+    talk = online()
+    talk.until(10.021)
+    talk.hears('003#310B000000', 10.022)
+    assert talk.samples() == []
+    assert talk.session.statistics.rejected == 1
+
+
+# -- answers that are not as expected -------------------------------------------------------------
+
+
+def test_short_answer_publishes_what_arrived() -> None:
+    talk = online('003#310B000000000000', request=(FREQUENCY,), response=(ACTUAL, CURRENT, INPUTS))
+    talk.until(10.021)
+    talk.hears('003#310B0020', 10.022)
+    assert talk.events() == [
+        FrameRejected('process data with 1 values, 3 needed'),
+        ProcessDataReceived((0x0B31, 8192), 10.022)]
+    assert talk.session.statistics.exchanges == 2
+    assert talk.session.statistics.rejected == 1
+
+
+def test_short_answer_that_holds_what_is_needed() -> None:
+    talk = online('003#310B000000000000', request=(FREQUENCY, SECOND), response=(ACTUAL,))
+    talk.until(10.021)
+    talk.hears('003#310B0020', 10.022)
+    assert talk.samples() == [(0x0B31, 8192)]
+    assert (talk.session.statistics.short, talk.session.statistics.rejected) == (1, 0)
+
+
+def test_long_answer_to_a_short_request() -> None:
+    talk = online('003#310B002011112222')
+    assert talk.session.statistics.rejected == 0
+    talk.until(10.021)
+    talk.hears('003#310B002011112222', 10.022)
+    assert talk.samples() == [(0x0B31, 8192)]
+
+
+@pytest.mark.parametrize('size', [0, 1, 2, 3, 6, 7])
+def test_malformed_answers(size: int) -> None:
+    talk = online()
+    talk.until(10.021)
+    talk.hears('003#' + '31' * size, 10.022)
+    assert talk.events() == [
+        FrameRejected(f'{size} data bytes: process data have 4 or 8')]
+    talk.hears(READY, 10.023)
+    assert talk.samples() == [(0x0B31, 0)]
+
+
+def test_unasked_and_doubled_answers() -> None:
+    talk = online()
+    talk.hears(READY, 10.003)
+    assert talk.events() == [FrameRejected('process data that nobody asked for')]
+    assert talk.session.statistics.exchanges == 1
+
+
+def test_foreign_master() -> None:
+    talk = online()
+    talk.hears('002#7F040040', 10.003)
+    talk.hears('202#6610000000000000', 10.003)
+    assert talk.events() == [
+        ForeignMasterSeen('another master sends to station 1: 002#7F040040'),
+        ForeignMasterSeen('another master sends to station 1: 202#6610000000000000')]
+
+
+# -- faults told unasked --------------------------------------------------------------------------
+
+
+def test_a_fault_told_unasked_is_a_sample_at_once() -> None:
+    talk = online()
+    talk.hears('003#380B0010', 10.011)
+    assert talk.events() == [
+        Noted('fault (status word 0B38h)'), ProcessDataReceived((0x0B38, 0x1000), 10.011)]
+    assert talk.session.state is DriveState.FAULT
+    statistics = talk.session.statistics
+    assert (statistics.exchanges, statistics.rejected, statistics.missed) == (1, 0, 0)
+
+
+def test_a_fault_between_question_and_answer() -> None:
+    talk = online()
+    talk.until(10.021)
+    talk.hears(FAULT, 10.0211)
+    talk.hears('003#380B0001', 10.022)
+    assert talk.samples() == [(0x0B38, 0), (0x0B38, 256)]
+    assert talk.session.statistics.rejected == 0
+
+
+def test_an_answer_from_before_the_fault_is_no_surprise() -> None:
+    talk = online()
+    talk.until(10.021)
+    talk.hears(FAULT, 10.0211)
+    talk.hears(READY, 10.022)
+    assert talk.samples() == [(0x0B38, 0)]
+    assert talk.session.state is DriveState.FAULT
+    assert talk.session.statistics.rejected == 0
+    talk.hears(READY, 10.023)
+    assert talk.session.statistics.rejected == 1
+
+
+def test_a_short_fault_frame_lacks_values_only() -> None:
+    talk = online('003#310B000000000000', request=(FREQUENCY,), response=(ACTUAL, CURRENT))
+    talk.hears(FAULT, 10.01)
+    assert (0x0B38, 0) in talk.samples()
+    assert talk.session.state is DriveState.FAULT
+
+
+def test_a_fault_before_the_first_exchange_waits_for_it() -> None:
+    talk = started()
+    talk.hears(FAULT, 9.99)
+    assert talk.events() == []
+    talk.at(10.0)
+    talk.hears(FAULT, 10.002)
+    assert talk.events(StationFound, ProcessDataReceived) == [
+        StationFound(), ProcessDataReceived((0x0B38, 0), 10.002)]
+    assert talk.session.state is DriveState.FAULT
+
+
+# -- missing answers ------------------------------------------------------------------------------
+
+
+def test_silence_is_offline_and_cycling_goes_on() -> None:
+    talk = online()
+    talk.commands(0, 0.0, 10.003)
+    talk.commands(0, 50.0, 10.004)
+    assert talk.until(10.061) == [
+        (10.02, '002#7E040040'), (10.04, '002#7E040040'), (10.06, '002#7E040040')]
+    assert talk.events(StationLost) == []
+    assert talk.until(10.081) == [(10.08, '002#7E040000')]
+    lost, = talk.events(StationLost)
+    assert lost.reason == 'no answer to process data for 3 cycles'
+    assert 'P509' in talk.session.offline_advice
+    assert talk.session.statistics.missed == 3
+    assert talk.commands(0, 0.0, 10.09) is CommandOutcome.NOT_ARMED
+    assert talk.until(10.101) == [(10.1, '002#7E040000')]
+    talk.hears(RUNNING, 10.102)
+    assert talk.events(StationFound) == [StationFound()]
+    assert talk.session.state is DriveState.NOT_ARMED
+
+
+def test_one_lost_answer_does_no_harm() -> None:
+    talk = online()
+    talk.until(10.041)
+    talk.hears(READY, 10.042)
+    talk.until(10.081)
+    assert talk.session.online
+    assert talk.session.statistics.missed == 2
+
+
+def test_latency_counts_from_the_frame() -> None:
+    talk = online()
+    talk.until(10.021)
+    talk.session.receive_frame(frame(READY), 10.025, 0.002)
+    event, = talk.events(ProcessDataReceived)
+    assert event.received_at == pytest.approx(10.023)
+    assert talk.session.statistics.latency.maximum == pytest.approx(0.003)
+
+
+def test_beat_is_kept_without_bursts() -> None:
+    talk = online()
+    talk.at(10.075)
+    assert talk.session.next_timer() == pytest.approx(10.1)
+    assert talk.session.statistics.period_error.maximum == pytest.approx(0.055)
+
+
+def test_setpoints_expire() -> None:
+    talk = online(command_timeout=0.05)
+    talk.commands(0, 0.0, 10.003)
+    talk.commands(0, 50.0, 10.004)
+    assert exchange(talk, 10.02) == '002#7E040040'
+    assert exchange(talk, 10.04) == '002#7E040040'
+    assert exchange(talk, 10.06) == '002#7E040000'
+    assert talk.events(SetpointsExpired) == [SetpointsExpired(('frequency_setpoint',))]
+
+
+# -- the life of a session ------------------------------------------------------------------------
+
+
+def test_stop() -> None:
+    talk = online(RUNNING)
+    talk.commands(0, 0.0, 10.003)
+    talk.commands(0, 50.0, 10.004)
+    assert talk.deactivate(10.01) == []
+    assert talk.until(11.0) == [
+        (10.02, READY_FRAME), (10.04, READY_FRAME), (10.06, READY_FRAME)]
+    assert talk.session.stopped
+    assert talk.session.next_timer() == math.inf
+    assert talk.events(StationLost) == [StationLost('deactivated')]
+    talk.hears(READY, 10.062)    # the answer to the last frame
+    assert talk.events() == []
+    talk.hears(READY, 10.07)
+    assert talk.events() == [FrameRejected('process data that nobody asked for')]
+
+
+def test_stop_with_a_long_period_is_quicker() -> None:
+    talk = online(period=1.0)
+    talk.deactivate(10.2)
+    assert [when for when, _ in talk.until(12.0)] == [10.2, 10.3, 10.4]
+
+
+def test_stop_of_a_drive_that_is_not_there() -> None:
+    talk = started()
+    talk.until(11.0)
+    talk.deactivate(11.0)
+    assert talk.until(11.021) == [(11.02, READY_FRAME)]
+    talk.hears(READY, 11.022)       # now it is
+    assert talk.events(StationFound, ProcessDataReceived) == []
+    assert [text for _, text in talk.until(12.0)] == [READY_FRAME] * 2
+    assert talk.session.stopped
+
+
+def test_additional_frames_go_with_the_stop() -> None:
+    talk = five()
+    for index in range(5):
+        talk.commands(index, 0.0, 10.003)
+    talk.commands(4, 50.0, 10.004)
+    talk.deactivate(10.01)
+    assert [text for _, text in talk.until(11.0)] == [
+        '002#7E04000000000000', '002#0000000000'] * 3
+
+
+def test_lost_time() -> None:
+    talk = online()
+    talk.commands(0, 0.0, 10.003)
+    talk.commands(0, 50.0, 10.004)
+    talk.time_lost(15.0)
+    assert talk.events(StationLost) == [StationLost('the bridge stood still')]
+    assert talk.until(15.001) == [(15.0, READY_FRAME)]
+    talk.hears(READY, 15.002)
+    assert talk.session.state is DriveState.NOT_ARMED
+
+
+def test_bus_down_is_silence() -> None:
+    talk = online()
+    talk.until(10.021)
+    assert talk.bus_down(10.021) == []
+    assert talk.session.next_timer() == math.inf
+    assert talk.session.offline_advice == 'bus down: unplugged'
+    assert talk.bus_up(12.0) == []
+    assert talk.until(12.001) == [(12.0, READY_FRAME)]

@@ -1,0 +1,551 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Broadcast groups: stations 1, 2 and 3 are led by station 1 and share identifier 400h (408h)."""
+
+import math
+from typing import Any
+
+from builders import drive, frame, read
+from cannord_session_builders import (
+    ACTUAL, CURRENT, FREQUENCY, inverter, OFFSET, PARAMETERS, SETPOINTS, VALUES,
+)
+import pytest
+
+from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.events import (
+    Event, ForeignMasterSeen, Noted, ProcessDataReceived, RequestCompleted, StationFound,
+    StationLost,
+)
+from drive_can_bridge.core.session import DriveState, Session
+from drive_can_bridge.core.setpoints import CommandOutcome
+from drive_can_bridge.protocols.families import FAMILIES, make_sessions
+
+ENABLE, DISABLE = ControlAction.ENABLE, ControlAction.DISABLE
+QUICK_STOP, RESET_FAULT = ControlAction.QUICK_STOP, ControlAction.RESET_FAULT
+NAMES = ('lift', 'hoist', 'turn')
+READY, RUNNING, FAULT, DISABLED = '310B0000', '370F0020', '380B0000', '700B0000'
+
+
+class Bus:
+    """The sessions of a bus, served as the exchange serves them; and inverters that answer."""
+
+    def __init__(self, *drives: DriveConfiguration) -> None:
+        self.sessions = make_sessions(drives)
+        self.now = 10.0
+        self.log: list[tuple[str, Event]] = []
+        #: station -> what it answers to its process frame; a missing one is silent
+        self.answers: dict[int, str] = {drive.station: READY for drive in drives}
+        for session in self.sessions:
+            session.bus_up(9.0)
+        for session in self.sessions:
+            session.activate(10.0)
+
+    def session(self, name: str) -> Session:
+        return next(session for session in self.sessions if session.drive.name == name)
+
+    def pump(self) -> list[str]:
+        sent = []
+        for session in self.sessions:
+            sent += [str(entry) for entry in session.take_frames()]
+            self.log += [(session.drive.name, event) for event in session.take_events()]
+        return sent
+
+    def hears(self, text: str) -> list[str]:
+        heard = frame(text)
+        for session in self.sessions:
+            for claim in FAMILIES['cannord'].claims(session.drive):
+                if claim.route.matches(heard):
+                    session.receive_frame(heard, self.now)
+                    return self.pump()
+        raise AssertionError(text)
+
+    def live(self, duration: float) -> list[tuple[float, str]]:
+        """Let time pass; return what was sent, and when."""
+        end = self.now + duration + 1e-6
+        found: list[tuple[float, str]] = []
+        for _ in range(10_000):
+            due = min(session.next_timer() for session in self.sessions)
+            if due > end:
+                self.now = end - 1e-6
+                return found
+            self.now = max(self.now, due)
+            for session in self.sessions:
+                if session.next_timer() <= self.now:
+                    session.handle_timer(self.now)
+            sent = self.pump()
+            found += [(round(self.now, 6), text) for text in sent]
+            for text in sent:
+                identifier = int(text.split('#')[0], 16)
+                if identifier < 0x200 and identifier // 2 in self.answers:
+                    self.now += 0.0005
+                    self.hears(f'{identifier + 1:03X}#{self.answers[identifier // 2]}')
+        raise AssertionError('the timer spins')
+
+    def events(self, *kinds: type) -> list[tuple[str, Event]]:
+        found, self.log = self.log, []
+        return [(name, event) for name, event in found if isinstance(event, kinds)]
+
+    def asks(self, action: ControlAction, name: str = 'lift') -> None:
+        ticket = self.session(name).request_control(action, self.now)
+        assert not isinstance(ticket, str), ticket
+        self.pump()
+
+    def outcomes(self, name: str = 'lift') -> list[tuple[str, bool, str]]:
+        return [(done.ticket.action.value, done.success, done.message)
+                for done in self.session(name).take_control_outcomes()]
+
+
+def members(count: int = 3, **options: Any) -> list[DriveConfiguration]:
+    options.setdefault('broadcast', 'group')
+    return [inverter(name=name, station=place, **options)
+            for place, name in enumerate(NAMES[:count], 1)]
+
+
+def three(**options: Any) -> Bus:
+    """Return a bus whose three inverters are online; the next cycle is due at 10.06 s."""
+    bus = Bus(*members(**options))
+    bus.live(0.05)
+    assert all(session.online for session in bus.sessions)
+    bus.events()
+    return bus
+
+
+def words(sent: list[tuple[float, str]]) -> list[str]:
+    """Return the control words that were broadcast."""
+    return [text[4:8] for _, text in sent if text.startswith('400#')]
+
+
+# -- on the wire ----------------------------------------------------------------------------------
+
+
+def test_a_broadcast_and_one_inverter_in_turn() -> None:
+    bus = Bus(*members())
+    assert bus.live(0.07) == [
+        (10.0, '400#7E040000'), (10.0, '002#7E040000'),
+        (10.02, '400#7E040000'), (10.02, '004#7E040000'),
+        (10.04, '400#7E040000'), (10.04, '006#7E040000'),
+        (10.06, '400#7E040000'), (10.06, '002#7E040000')]
+    assert [name for name, _ in bus.events(StationFound)] == ['lift', 'hoist', 'turn']
+    assert [session.statistics.exchanges for session in bus.sessions] == [2, 1, 1]
+    assert [session.statistics.rejected for session in bus.sessions] == [0, 0, 0]
+
+
+def test_broadcast_to_all() -> None:
+    far = inverter(name='far', station=200, broadcast='all')
+    bus = Bus(far, *members(1, broadcast='all'))
+    assert bus.live(0.03) == [
+        (10.0, '408#7E040000'), (10.0, '002#7E040000'),
+        (10.02, '408#7E040000'), (10.02, '190#7E040000')]
+
+
+def test_29_bit_identifiers() -> None:
+    bus = Bus(*members(2, extended_identifiers=True))
+    assert bus.live(0.01) == [(10.0, '10000000#7E040000'), (10.0, '00080000#7E040000')]
+    bus = Bus(*members(2, extended_identifiers=True, broadcast='all'))
+    assert bus.live(0.01) == [(10.0, '10200000#7E040000'), (10.0, '00080000#7E040000')]
+
+
+def test_the_lowest_station_leads_whatever_the_order() -> None:
+    lift, hoist, turn = members()
+    bus = Bus(turn, lift, hoist)
+    assert [session.drive.name for session in bus.sessions] == ['turn', 'lift', 'hoist']
+    assert [len(session.setpoints.items) for session in bus.sessions] == [0, 1, 0]
+    bus.live(0.07)
+    assert bus.session('lift').facts() == {'broadcast': 'leads hoist, turn'}
+    assert bus.session('turn').facts() == {'broadcast': 'led by lift'}
+
+
+def test_groups_of_32_are_apart_and_others_are_alone() -> None:
+    bus = Bus(inverter(name='a', station=31, broadcast='group'),
+              inverter(name='b', station=32, broadcast='group'),
+              inverter(name='c', station=33))
+    sent = {text for _, text in bus.live(0.01)}
+    assert sent == {'400#7E040000', '03E#7E040000', '401#7E040000', '040#7E040000',
+                    '042#7E040000'}
+    assert all(session.setpoints.items for session in bus.sessions)
+
+
+def test_setpoints_and_extra_values_of_all() -> None:
+    bus = Bus(*members(2, request=SETPOINTS, response=VALUES, extra_setpoints=True))
+    bus.answers = {}
+    assert [text for _, text in bus.live(0.01)] == [
+        '400#7E04000000000000', '400#0000000000', '002#7E04000000000000', '002#0000000000']
+    bus.hears('003#310B000000000000')
+    bus.hears('003#0100020000')
+    assert bus.session('lift').online
+    lift = bus.session('lift')
+    for index in range(5):
+        lift.command(index, 0.0, bus.now)
+    lift.command(0, 50.0, bus.now)
+    lift.command(4, -50.0, bus.now)
+    assert [text for _, text in bus.live(0.015)] == [
+        '400#7E04004000000000', '400#000000E000', '004#7E04004000000000', '004#000000E000']
+    bus.hears('005#310B000100020003')
+    bus.hears('005#0400FFFF00')
+    assert bus.events(ProcessDataReceived)[-1][1].raws == (0x0B31, 256, 512, 768, 4, -1)
+
+
+def test_the_longest_lists_decide_for_all() -> None:
+    lift = inverter(name='lift', station=1, broadcast='group')
+    hoist = inverter(name='hoist', station=2, broadcast='group', response=(ACTUAL, CURRENT))
+    bus = Bus(lift, hoist)
+    assert [text for _, text in bus.live(0.03)] == [
+        '400#7E04000000000000', '002#7E04000000000000',
+        '400#7E04000000000000', '004#7E04000000000000']
+
+
+# -- who is there ---------------------------------------------------------------------------------
+
+
+def test_each_counts_its_own_answers() -> None:
+    bus = three()
+    del bus.answers[2]
+    bus.live(0.13)       # asked at 10.08 and 10.14
+    hoist = bus.session('hoist')
+    assert hoist.statistics.missed == 2
+    assert hoist.online
+    bus.live(0.05)       # asked at 10.2: missed 20 ms later
+    assert bus.events(StationLost) == [
+        ('hoist', StationLost('no answer to process data for 3 cycles'))]
+    assert [session.statistics.missed for session in bus.sessions] == [0, 3, 0]
+    assert [session.state for session in bus.sessions] == [
+        DriveState.NOT_ARMED, DriveState.OFFLINE, DriveState.ONLINE]
+    bus.answers[2] = READY
+    bus.live(0.06)
+    assert [name for name, _ in bus.events(StationFound)] == ['hoist']
+
+
+def test_an_answer_to_nothing_is_rejected_by_its_owner() -> None:
+    bus = three()
+    bus.hears(f'005#{READY}')
+    assert [session.statistics.rejected for session in bus.sessions] == [0, 1, 0]
+
+
+def test_foreign_master() -> None:
+    bus = three()
+    bus.hears('400#7F040040')
+    (_, event), = bus.events(ForeignMasterSeen)
+    assert '400#7F040040' in event.text
+
+
+# -- commands -------------------------------------------------------------------------------------
+
+
+def test_the_leader_commands_all() -> None:
+    bus = three()
+    lift = bus.session('lift')
+    assert lift.state is DriveState.NOT_ARMED
+    assert lift.command(0, 0.0, bus.now) is CommandOutcome.ARMED
+    assert lift.command(0, 25.0, bus.now) is CommandOutcome.ACCEPTED
+    assert [text for _, text in bus.live(0.03)] == [
+        '400#7E040020', '002#7E040020', '400#7E040020', '004#7E040020']
+    assert bus.session('hoist').write_refusal(FREQUENCY) == (
+        'sent cyclically by the broadcast group: publish lift/command/frequency_setpoint')
+    assert bus.session('hoist').write_refusal(OFFSET) == ''
+
+
+def test_a_member_that_comes_back_disarms_all() -> None:
+    bus = three()
+    lift = bus.session('lift')
+    del bus.answers[3]
+    bus.live(0.2)
+    assert not bus.session('turn').online
+    lift.command(0, 0.0, bus.now)
+    lift.command(0, 25.0, bus.now)
+    bus.answers[3] = READY
+    bus.live(0.07)
+    assert bus.session('turn').online
+    assert lift.state is DriveState.NOT_ARMED
+    assert words(bus.live(0.02)) == ['7E04']
+
+
+def test_parameters_are_everybodys_own() -> None:
+    bus = three()
+    bus.session('hoist').submit(read(OFFSET), bus.now)
+    assert bus.pump() == ['204#9B11000000000000']
+    bus.hears('205#9B11000000000700')
+    (name, event), = bus.events(RequestCompleted)
+    assert (name, event.outcomes[0].raw) == ('hoist', 7)
+
+
+# -- control --------------------------------------------------------------------------------------
+
+
+def test_enable_brings_all_up() -> None:
+    bus = three()
+    bus.asks(ENABLE)
+    assert words(bus.live(0.02)) == ['7F04']
+    bus.answers = {1: RUNNING, 2: RUNNING, 3: '330B0000'}
+    bus.live(0.06)
+    assert bus.outcomes() == []
+    bus.answers[3] = RUNNING
+    bus.live(0.06)
+    assert bus.outcomes() == [('enable', True, 'operation enabled')]
+    assert words(bus.live(0.1)) == ['7F04'] * 5
+    control = bus.session('lift').control
+    assert control is not None
+    assert control.state == 'operation enabled'
+
+
+def test_enable_waits_for_the_last_one_to_be_ready() -> None:
+    bus = three(control_timeout=0.2)
+    bus.answers[2] = DISABLED
+    bus.live(0.06)
+    bus.asks(ENABLE)
+    assert set(words(bus.live(0.19))) == {'7E04'}
+    control = bus.session('lift').control
+    assert control is not None
+    assert control.state == (
+        'lift: ready to switch on, hoist: switch-on disabled, turn: ready to switch on')
+    bus.live(0.02)
+    (action, success, message), = bus.outcomes()
+    assert (action, success) == ('enable', False)
+    assert 'stuck in state lift: ready to switch on, hoist: switch-on disabled' in message
+    assert 'status words: lift 0B31h, hoist 0B70h, turn 0B31h' in message
+
+
+def test_only_answers_since_the_last_word_count() -> None:
+    bus = three()
+    bus.asks(ENABLE)
+    assert words(bus.live(0.02)) == ['7F04']
+    bus.asks(DISABLE)
+    assert bus.outcomes() == [('enable', False, 'replaced by disable')]
+    assert words(bus.live(0.04)) == ['7E04'] * 2      # two of three have answered that
+    assert bus.outcomes() == []
+    bus.live(0.02)
+    assert bus.outcomes() == [('disable', True, 'ready to switch on')]
+
+
+def test_enable_needs_all_of_them() -> None:
+    bus = three()
+    del bus.answers[3]
+    bus.live(0.2)
+    bus.asks(ENABLE)
+    assert bus.outcomes() == [('enable', False, 'turn offline')]
+    bus.asks(DISABLE)
+    bus.live(0.06)
+    assert bus.outcomes() == [('disable', True, 'ready to switch on')]
+
+
+def enabled(**options: Any) -> Bus:
+    bus = three(**options)
+    bus.asks(ENABLE)
+    bus.live(0.02)
+    bus.answers = dict.fromkeys((1, 2, 3), RUNNING)
+    bus.live(0.1)
+    assert bus.outcomes() == [('enable', True, 'operation enabled')]
+    bus.events()
+    return bus
+
+
+@pytest.mark.parametrize('station', [1, 2, 3])
+def test_a_fault_of_one_stops_all(station: int) -> None:
+    bus = enabled()
+    bus.answers[station] = FAULT
+    bus.hears(f'{2 * station + 1:03X}#{FAULT}')      # told unasked
+    assert bus.session(NAMES[station - 1]).state is DriveState.FAULT
+    assert bus.session('lift').state is DriveState.FAULT
+    assert words(bus.live(0.04)) == ['7E04'] * 2
+    samples = bus.events(ProcessDataReceived)
+    assert samples[0] == (NAMES[station - 1], ProcessDataReceived((0x0B38, 0), samples[0][1][1]))
+    bus.asks(ENABLE)
+    assert bus.outcomes() == [('enable', False, 'fault: reset it first')]
+
+
+def test_reset_waits_for_all_and_ends_with_the_last() -> None:
+    bus = enabled()
+    bus.answers = {1: READY, 2: FAULT, 3: FAULT}
+    bus.live(0.06)
+    bus.asks(RESET_FAULT)
+    assert 'FE04' in words(bus.live(0.1))
+    bus.answers[2] = DISABLED
+    bus.live(0.06)
+    assert bus.outcomes() == []
+    assert bus.session('lift').state is DriveState.FAULT
+    bus.answers[3] = DISABLED
+    bus.live(0.06)
+    (action, success, _), = bus.outcomes()
+    assert (action, success) == ('reset_fault', True)
+    assert words(bus.live(0.02)) == ['7E04']
+    assert bus.session('lift').state is not DriveState.FAULT
+
+
+def test_reset_waits_for_the_last_fault_reaction() -> None:
+    bus = three()
+    bus.answers = {1: FAULT, 2: '3F0B0010', 3: READY}
+    bus.live(0.06)
+    bus.asks(RESET_FAULT)
+    assert set(words(bus.live(0.1))) == {'7E04'}
+    bus.answers[2] = FAULT
+    assert 'FE04' in words(bus.live(0.08))
+
+
+def test_a_lost_leader_makes_old_answers_worthless() -> None:
+    bus = three()
+    del bus.answers[1]      # asked at 10.06, 10.12 and 10.18
+    bus.live(0.15)
+    assert not bus.session('lift').online
+    bus.asks(DISABLE)       # hoist has answered since, turn has not
+    assert bus.outcomes() == []
+    bus.live(0.02)
+    assert bus.outcomes() == [('disable', True, 'ready to switch on')]
+
+
+def test_what_a_lost_member_said_explains_nothing() -> None:
+    bus = three(control_timeout=0.2)
+    bus.answers = {1: RUNNING, 2: '500B0000'}
+    bus.live(0.06)
+    del bus.answers[2]
+    bus.live(0.3)
+    bus.asks(DISABLE)
+    bus.live(0.22)
+    (_, success, message), = bus.outcomes()
+    assert not success
+    assert message.endswith('it does not follow control word 047Eh')
+
+
+def test_quick_stop_of_all() -> None:
+    bus = enabled()
+    bus.asks(QUICK_STOP)
+    bus.answers = {1: DISABLED, 2: '170B0010', 3: DISABLED}
+    assert words(bus.live(0.1)) == ['7A04'] * 5
+    assert bus.outcomes() == []
+    bus.answers[2] = DISABLED
+    bus.live(0.08)
+    assert bus.outcomes() == [('quick_stop', True, 'switch-on disabled')]
+    assert words(bus.live(0.02)) == ['7E04']
+
+
+def test_a_member_that_drops_out_by_itself_stops_all() -> None:
+    bus = enabled()
+    bus.answers[2] = '170B0010'
+    bus.live(0.06)
+    assert words(bus.live(0.02)) == ['7E04']
+    assert [name for name, event in bus.events(Noted)
+            if 'by itself' in event.text] == ['lift']
+
+
+@pytest.mark.parametrize('station', [1, 3])
+def test_a_member_that_is_lost_stops_all(station: int) -> None:
+    bus = enabled()
+    lift = bus.session('lift')
+    lift.command(0, 0.0, bus.now)
+    del bus.answers[station]
+    bus.live(0.22)
+    assert not bus.session(NAMES[station - 1]).online
+    assert words(bus.live(0.02)) == ['7E04']
+    if station == 1:        # who commands is not there: neutral, too
+        assert not lift.setpoints.enabled
+        assert lift.request_control(ENABLE, bus.now) != 'drive offline'
+        (_, success, message), = bus.outcomes()
+        assert (success, message) == (False, 'lift offline')
+        bus.answers = {2: READY, 3: READY}
+        bus.live(0.06)
+        bus.asks(QUICK_STOP)
+        bus.live(0.1)
+        assert bus.outcomes()[0][1]
+
+
+def test_members_name_their_leader() -> None:
+    bus = three()
+    texts = [bus.session('hoist').request_control(action, bus.now) for action in ControlAction]
+    assert texts == [f'lift leads the broadcast group: call ~/{name} of lift'
+                     for name in ('enable', 'enable', 'quick_stop', 'reset_fault')]
+    control = bus.session('hoist').control
+    assert control is not None
+    assert control.state == 'ready to switch on'
+    assert bus.session('hoist').state is DriveState.ONLINE
+
+
+def test_refused_when_nobody_is_there() -> None:
+    bus = Bus(*members())
+    bus.answers = {}
+    bus.live(0.5)
+    assert bus.session('lift').request_control(ENABLE, bus.now) == 'drive offline'
+
+
+# -- the life of a group --------------------------------------------------------------------------
+
+
+def test_stop_reaches_everybody() -> None:
+    bus = Bus(*[inverter(name=f'drive_{station}', station=station, broadcast='group')
+                for station in range(1, 8)])
+    bus.live(0.15)
+    for session in bus.sessions:
+        session.deactivate(bus.now)
+    assert [session.stopped for session in bus.sessions] == [False] + [True] * 6
+    sent = [text for _, text in bus.live(1.0)]
+    assert [text for text in sent if text.startswith('400')] == ['400#7E040000'] * 3
+    assert {text[:3] for text in sent} == {'400', '002', '004', '006', '008', '00A', '00C', '00E'}
+    assert all(session.stopped for session in bus.sessions)
+    assert all(session.next_timer() == math.inf for session in bus.sessions)
+    assert sum(session.statistics.rejected for session in bus.sessions) == 0
+    assert {event.reason for _, event in bus.events(StationLost)} == {'deactivated'}
+
+
+def test_enabled_group_is_disabled_by_the_stop() -> None:
+    bus = enabled()
+    lift = bus.session('lift')
+    lift.command(0, 0.0, bus.now)
+    lift.command(0, 50.0, bus.now)
+    for session in bus.sessions:
+        session.deactivate(bus.now)
+    assert {text.split('#')[1] for _, text in bus.live(1.0)} == {'7E040000'}
+
+
+def test_bus_down_and_lost_time() -> None:
+    bus = enabled()
+    for session in bus.sessions:
+        session.time_lost(bus.now + 5.0)
+    bus.now += 5.0
+    assert bus.pump() == []
+    assert len(bus.events(StationLost)) == 3
+    bus.answers = dict.fromkeys((1, 2, 3), READY)
+    assert set(words(bus.live(0.1))) == {'7E04'}
+    assert all(session.online for session in bus.sessions)
+    for session in bus.sessions:
+        session.bus_down(bus.now, 'unplugged')
+    assert bus.live(1.0) == []
+    for session in bus.sessions:
+        session.bus_up(bus.now)
+    assert set(words(bus.live(0.1))) == {'7E04'}
+    assert all(session.online for session in bus.sessions)
+
+
+# -- what may not differ --------------------------------------------------------------------------
+
+
+def complaints(*drives: DriveConfiguration) -> list[tuple[str, str]]:
+    return [(entry.name, f'{key}: {message}')
+            for entry, (key, message) in FAMILIES['cannord'].check_together(drives)]
+
+
+def test_a_group_that_fits() -> None:
+    assert complaints(*members()) == []
+    assert complaints(*members(2), inverter(
+        name='alone', station=9, period=1.0, request=(), parameter_set=2)) == []
+
+
+@pytest.mark.parametrize(('options', 'text'), [
+    ({'request': SETPOINTS[1:2]}, 'cyclic_request: differs from that of drive lift, which leads '
+                                  'its broadcast group, allowed is the same'),
+    ({'period': 0.1}, 'period: 0.1 s differs from 0.02 s of drive lift, which leads its broadcast '
+                      'group, allowed is the same'),
+    ({'parameter_set': 2}, 'parameter_set: 2 differs from 1 of drive lift'),
+    ({'swap_setpoints_2_3': True}, 'swap_setpoints_2_3: true differs from false of drive lift'),
+    ({'extra_setpoints': True}, 'extra_setpoints: true differs from false of drive lift')])
+def test_differences(options: dict[str, Any], text: str) -> None:
+    lift, hoist = members(2)
+    other = inverter(name='turn', station=3, broadcast='group', **options)
+    (name, found), = complaints(hoist, other, lift)
+    assert name == 'turn'
+    assert found.startswith(text)
+
+
+def test_the_same_word_means_the_same_everywhere() -> None:
+    faster = drive('cannord', name='turn', station=3, broadcast='group', response=(ACTUAL,),
+                   request=(FREQUENCY.__class__(**{**vars(FREQUENCY), 'scale': 100 / 16384}),),
+                   table=PARAMETERS)
+    (name, found), = complaints(*members(1), faster)
+    assert name == 'turn'
+    assert found.startswith("cyclic_request: 'frequency_setpoint' has another type, scale")

@@ -1,0 +1,298 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""The golden vectors of CANnord, both ways through the codecs."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from drive_can_bridge.core.errors import LocalProtocolError, RemoteProtocolError
+from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.parameters import Parameter, ParameterType
+from drive_can_bridge.protocols.cannord import identifiers, process_data, states
+from drive_can_bridge.protocols.cannord.identifiers import MessageObject
+from drive_can_bridge.protocols.cannord.parameter_frame import (
+    error_text, ERRORS, ParameterFrame, ParameterLayout, Response, RESPONSES, sub_index, Task,
+)
+
+FILE = json.loads((Path(__file__).parents[2] / 'vectors' / 'cannord.json').read_text(
+    encoding='utf-8'))
+OBJECTS = {
+    'request': MessageObject.PROCESS_REQUEST, 'extra_request': MessageObject.PROCESS_REQUEST,
+    'response': MessageObject.PROCESS_RESPONSE, 'extra_response': MessageObject.PROCESS_RESPONSE,
+    'task': MessageObject.PARAMETER_TASK, 'answer': MessageObject.PARAMETER_RESPONSE,
+}
+
+
+def rows(table: str, use: str, *expectations: str) -> list[Any]:
+    return [pytest.param(row, id=f'{row["id"]}-{row["name"]}') for row in FILE[table]
+            if (row['use'] == 'both' or use == 'decode') and row['expect'] in expectations]
+
+
+def made_identifier(row: dict[str, Any]) -> str:
+    """Return the identifier of a vector as the codec makes it, as the vector writes it."""
+    extended = len(row['can_id_hex']) == 8
+    if row['kind'] == 'broadcast_group':
+        value = identifiers.group_identifier(row['station'], extended=extended)
+    elif row['kind'] == 'broadcast_all':
+        value = identifiers.all_identifier(extended=extended)
+    else:
+        value = identifiers.identifier(OBJECTS[row['kind']], row['station'], extended=extended)
+    return f'{value:08X}' if extended else f'{value:03X}'
+
+
+def words(values: list[int]) -> list[int]:
+    return [value & 0xFFFF for value in values]
+
+
+def layout(row: dict[str, Any]) -> ParameterLayout:
+    return ParameterLayout(row.get('value_order', 'high_first'), row.get('index_byte', 'low'))
+
+
+# -- identifiers ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('row', FILE['identifiers'], ids=lambda row: str(row['station']))
+def test_identifiers(row: dict[str, Any]) -> None:
+    station = row['station']
+    names = ('process_request', 'process_response', 'parameter_task', 'parameter_answer')
+    for kind, name, wide in zip(MessageObject, names, row['extended']):
+        assert identifiers.identifier(kind, station) == int(row[name], 16)
+        assert identifiers.identifier(kind, station, extended=True) == int(wide, 16)
+        for text, extended in ((row[name], False), (wide, True)):
+            assert identifiers.decode_identifier(int(text, 16), extended=extended) == (
+                kind, range(station, station + 1))
+    assert identifiers.group_identifier(station) == int(row['group'], 16)
+    assert identifiers.group_identifier(station, extended=True) == int(row['extended'][4], 16)
+
+
+def test_the_manuals_example() -> None:
+    example = FILE['example_of_address_100']
+    assert [identifiers.identifier(kind, 100) for kind in MessageObject] == [
+        200, 201, 712, 713] == [example[name] for name in (
+            'process_request', 'process_response', 'parameter_task', 'parameter_answer')]
+    assert identifiers.group_identifier(100) == 1027 == example['group']
+    assert identifiers.all_identifier() == 1032 == example['all']
+
+
+@pytest.mark.parametrize('row', FILE['groups'], ids=lambda row: str(row['identifier']))
+def test_groups(row: dict[str, int]) -> None:
+    addresses = range(row['first'], row['last'] + 1)
+    assert {identifiers.group_identifier(address) for address in addresses} == {row['identifier']}
+    assert identifiers.decode_identifier(row['identifier']) == (None, addresses)
+
+
+def test_broadcast_to_all() -> None:
+    assert identifiers.decode_identifier(0x408) == (None, range(256))
+    assert identifiers.decode_identifier(0x10200000, extended=True) == (None, range(256))
+    assert identifiers.all_identifier(extended=True) == int(
+        FILE['broadcast_all']['extended'], 16)
+
+
+@pytest.mark.parametrize('text', [row['can_id_hex'] for row in FILE['foreign_identifiers']
+                                  if row['can_id_hex'] != '000000C8'])
+def test_foreign_identifiers(text: str) -> None:
+    with pytest.raises(RemoteProtocolError):
+        identifiers.decode_identifier(int(text, 16), extended=len(text) == 8)
+
+
+def test_a_29_bit_identifier_is_not_the_11_bit_one_of_its_number() -> None:
+    with pytest.raises(RemoteProtocolError, match='zero bits'):
+        identifiers.decode_identifier(0xC8, extended=True)
+    with pytest.raises(RemoteProtocolError, match='out of range'):
+        identifiers.decode_identifier(0x3200000)
+    with pytest.raises(RemoteProtocolError, match='out of range'):
+        identifiers.decode_identifier(-1)
+
+
+@pytest.mark.parametrize('address', [-1, 256])
+def test_addresses_that_do_not_exist(address: int) -> None:
+    with pytest.raises(LocalProtocolError, match='0 to 255'):
+        identifiers.identifier(MessageObject.PROCESS_REQUEST, address)
+    with pytest.raises(LocalProtocolError, match='0 to 255'):
+        identifiers.group_identifier(address)
+
+
+def test_routes() -> None:
+    route = identifiers.route(0xC9)
+    assert route.matches(Frame(0xC9, b'', False))
+    assert not route.matches(Frame(0xC9, b'', True))
+    assert not route.matches(Frame(0xC8, b'', False))
+    wide = identifiers.route(0x03240000, extended=True)
+    assert wide.matches(Frame(0x03240000, b'', True))
+    assert not wide.matches(Frame(0x03240001, b'', True))
+
+
+# -- process data ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('row', rows('process', 'both', 'ok'))
+def test_process_data_are_encoded(row: dict[str, Any]) -> None:
+    data = bytes.fromhex(row['data_hex'])
+    values = words(row.get('given', row['values']))
+    if row['kind'].startswith('extra'):
+        assert process_data.encode_extra(values) == data
+    else:
+        assert process_data.encode_main(int(row['word'], 16), values, length=len(data),
+                                        swap=row.get('swap', False)) == data
+    assert made_identifier(row) == row['can_id_hex']
+
+
+@pytest.mark.parametrize('row', rows('process', 'decode', 'ok'))
+def test_process_data_are_decoded(row: dict[str, Any]) -> None:
+    data = bytes.fromhex(row['data_hex'])
+    values = tuple(words(row['values']))
+    if row['kind'].startswith('extra'):
+        assert process_data.decode_extra(data) == values
+    else:
+        assert process_data.decode_main(data, swap=row.get('swap', False)) == (
+            int(row['word'], 16), values)
+
+
+@pytest.mark.parametrize('row', rows('process', 'decode', 'reject'))
+def test_process_data_are_rejected(row: dict[str, Any]) -> None:
+    with pytest.raises(RemoteProtocolError, match='data bytes'):
+        process_data.decode_main(bytes.fromhex(row['data_hex']))
+
+
+def test_no_frame_is_both_main_and_additional() -> None:
+    for row in FILE['process']:
+        if row['expect'] == 'ok':
+            extra = row['kind'].startswith('extra')
+            other = process_data.decode_main if extra else process_data.decode_extra
+            with pytest.raises(RemoteProtocolError):
+                other(bytes.fromhex(row['data_hex']))
+
+
+@pytest.mark.parametrize(('values', 'length'), [(0, 4), (1, 4), (2, 8), (3, 8)])
+def test_length_of_the_main_frame(values: int, length: int) -> None:
+    assert process_data.main_length(values) == length
+
+
+def test_what_cannot_be_sent() -> None:
+    for values, length in (([1, 2], 4), ([1, 2, 3, 4], 8), ([0], 6), ([0x10000], 4), ([-1], 4)):
+        with pytest.raises(LocalProtocolError):
+            process_data.encode_main(0x047E, values, length=length)
+    for values in ([1, 2, 3], [0x10000], [-1]):
+        with pytest.raises(LocalProtocolError):
+            process_data.encode_extra(values)
+    with pytest.raises(LocalProtocolError):
+        process_data.main_length(4)
+    for size in (0, 4, 6, 8):
+        with pytest.raises(RemoteProtocolError):
+            process_data.decode_extra(bytes(size))
+
+
+# -- parameters -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('row', rows('parameter', 'both', 'ok'))
+def test_parameter_frames_are_encoded(row: dict[str, Any]) -> None:
+    assert layout(row).encode(row['code'], row['number'], row['index'], row['value']) == (
+        bytes.fromhex(row['data_hex']))
+    assert made_identifier(row) == row['can_id_hex']
+
+
+@pytest.mark.parametrize('row', rows('parameter', 'decode', 'ok', 'no_answer'))
+def test_parameter_frames_are_decoded(row: dict[str, Any]) -> None:
+    found = layout(row).decode(bytes.fromhex(row['data_hex']))
+    assert found == ParameterFrame(row['code'], row['number'], row['index'],
+                                   row['value'] & 0xFFFFFFFF)
+    assert found.word == row['value'] & 0xFFFF
+
+
+@pytest.mark.parametrize('row', rows('parameter', 'decode', 'no_answer'))
+def test_answers_that_do_not_exist(row: dict[str, Any]) -> None:
+    assert row['code'] not in list(Response)
+
+
+@pytest.mark.parametrize('row', rows('parameter', 'decode', 'reject'))
+def test_parameter_frames_are_rejected(row: dict[str, Any]) -> None:
+    with pytest.raises(RemoteProtocolError):
+        layout(row).decode(bytes.fromhex(row['data_hex']))
+
+
+@pytest.mark.parametrize(('identifier', 'number', 'index', 'value'), [
+    (16, 1, 0, 0), (-1, 1, 0, 0), (1, 2048, 0, 0), (1, -1, 0, 0), (1, 1, 256, 0), (1, 1, -1, 0),
+    (1, 1, 0, 1 << 32), (1, 1, 0, -(1 << 31) - 1)])
+def test_fields_out_of_range(identifier: int, number: int, index: int, value: int) -> None:
+    with pytest.raises(LocalProtocolError):
+        ParameterLayout().encode(identifier, number, index, value)
+
+
+def test_tasks_and_their_responses() -> None:
+    found = {int(task): [int(entry) for entry in RESPONSES[task]] for task in Task if task}
+    assert found == {row['task']: row['answers'] for row in FILE['tasks']}
+    assert len(found) == 11
+
+
+def test_every_task_and_answer_has_a_vector() -> None:
+    found = {kind: {row['code'] for row in FILE['parameter']
+                    if row['kind'] == kind and row['expect'] == 'ok'}
+             for kind in ('task', 'answer')}
+    assert found == {'task': set(map(int, Task)), 'answer': set(map(int, Response))}
+
+
+def test_errors_have_words() -> None:
+    assert sorted(ERRORS) == FILE['error_numbers']
+    assert error_text(2) == 'error 2: limit exceeded'
+    assert error_text(8) == 'error 8: unknown'
+
+
+def test_sub_indices_of_the_manual() -> None:
+    assert sub_index(5, 2) == 0x15
+    assert sub_index(21, 4) == 0x57
+    assert sub_index(0, 1) == 0
+    for element, chosen in ((64, 1), (-1, 1), (0, 0), (0, 5)):
+        with pytest.raises(LocalProtocolError):
+            sub_index(element, chosen)
+
+
+# -- states ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('row', FILE['status_words'], ids=lambda row: row['word'])
+def test_states(row: dict[str, str]) -> None:
+    word = int(row['word'], 16)
+    assert states.state_of(word).value == row['state']
+    assert states.is_faulted(word) == ('fault' in row['state'])
+
+
+@pytest.mark.parametrize('text', FILE['status_words_of_no_state'])
+def test_words_of_no_state(text: str) -> None:
+    assert states.state_of(int(text, 16)) is states.State.UNKNOWN
+
+
+def test_control_words() -> None:
+    assert (states.READY, states.RUN, states.QUICK_STOP, states.ACKNOWLEDGE) == (
+        0x047E, 0x047F, 0x047A, 0x04FE)
+    assert [states.parameter_set_bits(chosen) for chosen in (1, 2, 3, 4)] == [
+        0, 0x4000, 0x8000, 0xC000]
+    assert [states.parameter_set_of(word) for word in (0x047F, 0x447F, 0x847F, 0xC47F)] == [
+        1, 2, 3, 4]
+    for chosen in (0, 5):
+        with pytest.raises(LocalProtocolError):
+            states.parameter_set_bits(chosen)
+
+
+def test_status_bits() -> None:
+    assert states.STATUS_BITS == {
+        'ready_to_switch_on': 0, 'ready': 1, 'enabled': 2, 'fault': 3, 'voltage_enabled': 4,
+        'no_quick_stop': 5, 'switch_on_disabled': 6, 'warning': 7, 'setpoint_reached': 8,
+        'bus_control': 9, 'bit_10': 10, 'rotating_right': 11, 'rotating_left': 12, 'bit_13': 13}
+
+
+@pytest.mark.parametrize('row', FILE['normalisation'], ids=lambda row: str(row['raw']))
+def test_normalisation(row: dict[str, Any]) -> None:
+    for unit, reference, key in (('%', 100.0, 'percent'), ('Hz', 50.0, 'hertz_of_50')):
+        setpoint = Parameter('setpoint', ParameterType.INT16, unit=unit, scaled=True,
+                             scale=reference / process_data.FULL_SCALE)
+        assert setpoint.value_from_raw(row['raw']) == row[key]
+        assert setpoint.raw_from_value(row[key]) == row['raw']
+
+
+def test_all_vectors_are_run() -> None:
+    assert len(rows('process', 'decode', 'ok', 'reject')) == len(FILE['process']) == 42
+    assert len(rows('parameter', 'decode', 'ok', 'no_answer', 'reject')) == len(
+        FILE['parameter']) == 44

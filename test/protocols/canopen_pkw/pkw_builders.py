@@ -1,0 +1,97 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Registers, frames and conversations of node 5, in candump's notation."""
+
+from typing import Any
+
+from builders import Conversation, drive, INT32, parameter, RAM, RO, WO
+
+from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.parameters import ParameterType
+from drive_can_bridge.core.profile import ControlTable, StatusPattern
+
+UINT32 = ParameterType.UINT32
+
+STATUS = parameter('system_status_1', 455, index=0x2004, subindex=0x06, access=RO)
+STATUS_2 = parameter('system_status_2', 456, index=0x2004, subindex=0x07, access=RO)
+LEVEL = parameter('thermal_level', 465, index=0x2004, subindex=0x10, access=RO, unit='%')
+RATIO = parameter('current_ratio', 466, index=0x2004, subindex=0x11, access=RO, unit='%')
+CURRENT = parameter('average_current', 500, index=0x2004, subindex=0x33, access=RO, type=UINT32,
+                    scale=0.01, unit='A')
+CLASS = parameter('trip_class', 606, index=0x2006, subindex=0x07)
+FLC = parameter('full_load_current', 652, index=0x2007, subindex=0x03, minimum=5.0,
+                maximum=100.0, unit='%')
+FLC_2 = parameter('full_load_current_2', 653, index=0x2007, subindex=0x04, unit='%')
+WORD = parameter('control_register_1', 704, index=0x2008, subindex=0x05, storage=RAM)
+WORD_2 = parameter('control_register_2', 705, index=0x2008, subindex=0x06, storage=RAM)
+SPEED = parameter('speed', 710, index=0x2008, subindex=0x0B, storage=RAM, scale=0.1, unit='Hz',
+                  minimum=0.0, maximum=500.0)
+TORQUE = parameter('torque', 712, index=0x2008, subindex=0x0D, storage=RAM)
+POSITION = parameter('position', 720, index=0x2008, subindex=0x15, storage=RAM, type=INT32)
+KEY = parameter('key', 730, index=0x2008, subindex=0x1F, access=WO)
+TABLE = (STATUS, STATUS_2, LEVEL, RATIO, CURRENT, CLASS, FLC, FLC_2, WORD, WORD_2, SPEED, TORQUE,
+         POSITION, KEY)
+
+CONTROL = ControlTable(
+    parameter='control_register_1', disable=0x0000, enable=0x0001, reset_fault=0x0008,
+    status_parameter='system_status_1', ready=StatusPattern(0x0001, 0x0001),
+    enabled=StatusPattern(0x0080, 0x0080), fault=StatusPattern(0x0004, 0x0004))
+
+START = '000#0105'
+BOOT_UP = '705#00'
+OPERATIONAL = '705#05'
+PRE_OPERATIONAL = '705#7F'
+STOPPED = '705#04'
+IDLE = '505#0000000000000000'
+IDLE_ANSWER = '485#0000000000000000'
+#: read of 455 and 456, toggle 1 and 0, and what the device says: ready, controller power; nothing
+READ_1 = '505#C70100A600000000'
+READ_0 = '505#C701002600000000'
+ANSWER_1 = '485#C70100A641000000'
+ANSWER_0 = '485#C701002641000000'
+#: the same of a tripped device
+TRIPPED_1 = '485#C70100A644000000'
+TRIPPED_0 = '485#C701002644000000'
+#: 704 = 0
+DISABLE_0 = '505#C002002A00000000'
+DISABLE_1 = '505#C00200AA00000000'
+DISABLED_0 = '485#C002002A00000000'
+DISABLED_1 = '485#C00200AA00000000'
+
+
+def configuration(**options: Any) -> DriveConfiguration:
+    """Make node 5 with two status registers in the round."""
+    options.setdefault('station', 5)
+    options.setdefault('table', TABLE)
+    options.setdefault('request', ())
+    options.setdefault('response', (STATUS, STATUS_2))
+    options.setdefault('parameter_timeout', 0.5)
+    return drive('canopen_pkw', **options)
+
+
+def started(**options: Any) -> Conversation:
+    """Return a conversation whose first round is due at 10.05 s."""
+    talk = Conversation(configuration(**options))
+    assert talk.bus_up(9.0) == []
+    assert talk.activate(10.0) == ([START] if options.get('nmt_start', True) else [])
+    return talk
+
+
+def online(**options: Any) -> Conversation:
+    """
+    Return a conversation with a device that answered its first round at 10.053 s.
+
+    Control word and setpoints, if any, are written. The next round is due at 10.07 s; without any
+    it begins with toggle 0.
+    """
+    talk = started(**options)
+    begin = 10.05 if options.get('nmt_start', True) else 10.0
+    assert talk.at(begin) == [IDLE]
+    assert talk.hears(IDLE_ANSWER, begin + 0.001) == [READ_1]
+    sent = talk.hears(ANSWER_1, begin + 0.002)
+    assert talk.session.online
+    while sent:  # disable, neutral setpoints
+        text, = sent
+        assert text[12:] == '00000000'
+        sent = talk.hears(text.replace('505#', '485#'), begin + 0.003)
+    talk.events()
+    return talk

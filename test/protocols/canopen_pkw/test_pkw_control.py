@@ -1,0 +1,288 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Control register 704: written on change, acknowledged, never repeated blindly."""
+
+from dataclasses import replace
+from typing import Any
+
+from builders import Conversation
+from pkw_builders import (
+    ANSWER_0, ANSWER_1, CONTROL, DISABLE_0, DISABLE_1, DISABLED_0, DISABLED_1, IDLE, IDLE_ANSWER,
+    online, READ_0, READ_1, started, TABLE, TRIPPED_0, WORD,
+)
+import pytest
+
+from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.events import Noted, StationLost
+from drive_can_bridge.core.parameters import Access
+from drive_can_bridge.core.session import DriveState
+from drive_can_bridge.protocols.families import FAMILIES
+
+ENABLE_0 = '505#C002002A01000000'
+ENABLE_1 = '505#C00200AA01000000'
+ENABLED_0 = '485#C002002A00000000'
+ENABLED_1 = '485#C00200AA00000000'
+#: ready, on, controller power, motor running
+RUNS_0 = '485#C7010026C3200000'
+RUNS_1 = '485#C70100A6C3200000'
+
+
+def ready(**options: Any) -> Conversation:
+    """Return a drive that is online, disabled and ready; the last read had toggle 1."""
+    talk = online(control=CONTROL, **options)
+    assert talk.until(10.0701) == [(10.07, READ_1)]
+    assert talk.hears(ANSWER_1, 10.071) == []
+    return talk
+
+
+def running(**options: Any) -> Conversation:
+    """Return a drive that was enabled; the last read had toggle 1."""
+    talk = ready(**options)
+    assert talk.asks(ControlAction.ENABLE, 10.075) == [ENABLE_0]
+    assert talk.hears(ENABLED_0, 10.076) == []
+    assert talk.until(10.0901) == [(10.09, READ_1)]
+    assert talk.hears(RUNS_1, 10.091) == []
+    assert talk.control_outcomes() == [('enable', True, 'enabled')]
+    talk.events()
+    return talk
+
+
+def test_disable_is_the_first_thing_that_is_written() -> None:
+    talk = started(control=CONTROL)
+    talk.at(10.05)
+    talk.hears(IDLE_ANSWER, 10.051)
+    assert talk.hears(ANSWER_1, 10.052) == [DISABLE_0]
+    assert talk.hears(DISABLED_0, 10.053) == []
+    assert talk.until(10.0701) == [(10.07, READ_1)], 'once'
+
+
+def test_enable_and_disable() -> None:
+    talk = running()
+    assert talk.session.state is DriveState.ONLINE
+    assert talk.asks(ControlAction.DISABLE, 10.095) == [DISABLE_0]
+    assert talk.hears(DISABLED_0, 10.096) == []
+    assert talk.control_outcomes() == []
+    talk.until(10.1101)
+    talk.hears(RUNS_1, 10.112)
+    assert talk.control_outcomes() == [], 'it still runs'
+    talk.until(10.1301)
+    talk.hears(ANSWER_0, 10.132)
+    assert talk.control_outcomes() == [('disable', True, 'ready')]
+
+
+def test_control_word_waits_for_one_exchange_only() -> None:
+    talk = ready()
+    assert talk.until(10.0901) == [(10.09, READ_0)]
+    assert talk.asks(ControlAction.ENABLE, 10.0902) == []
+    assert talk.hears(ANSWER_0, 10.091) == [ENABLE_1]
+
+
+def test_status_read_before_the_word_confirms_nothing() -> None:
+    """The round was half way when the drive was enabled: its status is from before."""
+    talk = ready()
+    talk.until(10.0901)
+    talk.asks(ControlAction.ENABLE, 10.0902)
+    assert talk.hears(RUNS_0, 10.091) == [ENABLE_1]   # it runs already, whoever did that
+    assert talk.hears(ENABLED_1, 10.092) == []
+    assert talk.control_outcomes() == []
+    talk.until(10.1101)
+    assert talk.hears(RUNS_0, 10.112) == []
+    assert talk.control_outcomes() == [('enable', True, 'enabled')]
+
+
+def test_reset_of_a_trip() -> None:
+    talk = ready()
+    talk.until(10.0901)
+    talk.hears(TRIPPED_0, 10.091)
+    assert talk.session.state is DriveState.FAULT
+    assert talk.events(Noted) == [Noted('fault (status word 0044h)')]
+    assert talk.asks(ControlAction.RESET_FAULT, 10.095) == ['505#C00200AA08000000']
+    assert talk.hears('485#C00200AA00000000', 10.096) == []
+    assert talk.until(10.1101) == [(10.11, READ_0)]
+    assert talk.hears(ANSWER_0, 10.111) == [DISABLE_1], 'the pulse ends'
+    assert talk.hears(DISABLED_1, 10.112) == []
+    assert talk.control_outcomes() == [('reset_fault', True, 'ready')]
+
+
+def test_trip_puts_the_word_back() -> None:
+    talk = running()
+    assert talk.until(10.1101) == [(10.11, READ_0)]
+    assert talk.hears(TRIPPED_0, 10.111) == [DISABLE_1]
+    assert talk.hears(DISABLED_1, 10.112) == []
+    assert talk.session.state is DriveState.FAULT
+    assert [text for _, text in talk.until(10.1301)] == [READ_0]
+    talk.hears(ANSWER_0, 10.131)
+    assert talk.until(10.1501) == [(10.15, READ_1)], 'and stays there'
+
+
+def test_trip_is_known_from_the_first_round_on() -> None:
+    talk = started(control=CONTROL)
+    talk.at(10.05)
+    talk.hears(IDLE_ANSWER, 10.051)
+    assert talk.hears('485#C70100A644000000', 10.052) == [DISABLE_0]
+    assert talk.session.state is DriveState.FAULT
+
+
+def test_enabling_while_tripped_is_refused() -> None:
+    talk = ready()
+    talk.until(10.0901)
+    talk.hears(TRIPPED_0, 10.091)
+    assert talk.asks(ControlAction.ENABLE, 10.095) == []
+    assert talk.control_outcomes() == [('enable', False, 'fault: reset it first')]
+
+
+def test_offline_drive_is_not_enabled() -> None:
+    talk = started(control=CONTROL)
+    assert talk.session.request_control(ControlAction.ENABLE, 10.01) == 'drive offline'
+
+
+# -- lost answers ---------------------------------------------------------------------------------
+
+
+def test_lost_acknowledgement_of_enable_is_read_back_not_repeated() -> None:
+    talk = ready(parameter_timeout=0.1)
+    assert talk.asks(ControlAction.ENABLE, 10.075) == [ENABLE_0]
+    assert talk.until(10.18) == [(10.175, IDLE)]
+    assert talk.hears(IDLE_ANSWER, 10.18) == [READ_1]
+    assert talk.hears(RUNS_1, 10.181) == ['505#C002002500000000'], 'what stands there?'
+    assert talk.hears('485#C002002501000000', 10.182) == []
+    assert talk.control_outcomes() == []
+    talk.at(10.19)
+    talk.hears(RUNS_1, 10.191)
+    assert talk.control_outcomes() == [('enable', True, 'enabled')]
+
+
+def test_lost_enable_is_written_again_when_it_is_not_there() -> None:
+    talk = ready(parameter_timeout=0.1)
+    assert talk.asks(ControlAction.ENABLE, 10.075) == [ENABLE_0]
+    talk.until(10.18)
+    talk.hears(IDLE_ANSWER, 10.18)
+    assert talk.hears(ANSWER_1, 10.181) == ['505#C002002500000000']
+    assert talk.hears('485#C002002500000000', 10.182) == [ENABLE_1]
+    assert talk.hears(ENABLED_1, 10.183) == []
+    talk.at(10.19)
+    talk.hears(RUNS_0, 10.191)
+    assert talk.control_outcomes() == [('enable', True, 'enabled')]
+
+
+def test_word_that_cannot_be_read_back_is_never_repeated() -> None:
+    secret = replace(WORD, access=Access.WRITE_ONLY)
+    talk = ready(parameter_timeout=0.1, table=[
+        secret if entry is WORD else entry for entry in TABLE])
+    assert talk.asks(ControlAction.ENABLE, 10.075) == [ENABLE_0]
+    now, sent = 10.175, talk.at(10.175)
+    while not (outcomes := talk.control_outcomes()):
+        while sent:
+            text = sent.pop()
+            assert text not in (ENABLE_0, ENABLE_1)
+            now += 0.001
+            sent += talk.hears(_answer(text), now)
+        now = max(now, talk.session.next_timer())
+        sent = talk.at(now)
+    (_, success, message), = outcomes
+    assert now == pytest.approx(12.075)
+    assert not success
+    assert 'no confirmation in 2 s' in message
+    assert sent == [DISABLE_1], 'it is not known to be disabled any more'
+
+
+def _answer(text: str) -> str:
+    if text == IDLE:
+        return IDLE_ANSWER
+    if text in (DISABLE_0, DISABLE_1):
+        return text.replace('505#', '485#')
+    return text.replace('505#', '485#')[:12] + '41000000'
+
+
+def test_disable_is_repeated_until_it_is_acknowledged() -> None:
+    talk = running(parameter_timeout=0.1)
+    assert talk.asks(ControlAction.DISABLE, 10.095) == [DISABLE_0]
+    assert talk.until(10.2) == [(10.195, IDLE)]
+    assert talk.hears(IDLE_ANSWER, 10.2) == [READ_1]
+    assert talk.hears(RUNS_1, 10.201) == [DISABLE_0]
+    assert talk.hears(DISABLED_0, 10.202) == []
+    assert talk.at(10.203) == [READ_1]
+
+
+def test_unsent_word_waits_for_the_mailbox() -> None:
+    """Function 00h is not answered: nobody knows whether a write would be executed."""
+    talk = ready(parameter_timeout=0.1)
+    talk.until(10.0901)
+    assert [text for _, text in talk.until(10.1955)] == [IDLE]     # the read was lost
+    assert talk.asks(ControlAction.ENABLE, 10.196) == []
+    (_, text), = talk.until(10.291)
+    assert text == READ_1, 'the read goes out, and synchronises'
+    assert talk.hears(ANSWER_1, 10.3) == [ENABLE_0]
+
+
+# -- refusals -------------------------------------------------------------------------------------
+
+
+def test_refused_word_is_shown_and_not_repeated() -> None:
+    talk = ready()
+    assert talk.asks(ControlAction.ENABLE, 10.075) == [ENABLE_0]
+    assert talk.hears('485#C002004E21000008', 10.076) == []
+    assert talk.session.warning == (
+        'write of control_register_1 0001h refused by the drive: 08000021h (data cannot be '
+        'stored because of local control): look at the device')
+    assert talk.until(10.0901) == [(10.09, READ_1)]
+    talk.hears(ANSWER_1, 10.091)
+    assert talk.until(10.1101) == [(10.11, READ_0)]
+
+
+# -- restart and loss -----------------------------------------------------------------------------
+
+
+def test_restart_puts_the_word_back() -> None:
+    talk = running()
+    assert talk.hears('705#00', 10.1) == ['000#0105']
+    lost, = talk.events(StationLost)
+    assert lost.reason == 'the device restarted'
+    assert talk.until(10.151) == [(10.15, IDLE)]
+    assert talk.hears(IDLE_ANSWER, 10.152) == [READ_0]
+    assert talk.hears(ANSWER_0, 10.153) == [DISABLE_1]
+    talk.hears(DISABLED_1, 10.154)
+    assert [text for _, text in talk.until(10.1701)] == [READ_0]
+    talk.hears(ANSWER_0, 10.171)
+    assert talk.until(10.1901) == [(10.19, READ_1)]
+
+
+def test_silent_drive_is_told_to_stand_still() -> None:
+    """It may have lost its voice only."""
+    talk = running(parameter_timeout=0.05)
+    sent = talk.until(10.7)
+    assert talk.session.state is DriveState.OFFLINE
+    words = [text for _, text in sent if text.startswith('505#C002')]
+    assert words == [DISABLE_1, DISABLE_0, DISABLE_1]
+
+
+def test_enabling_stuck_on_the_way_fails_when_the_device_restarts() -> None:
+    talk = ready()
+    talk.asks(ControlAction.ENABLE, 10.075)
+    talk.hears('705#00', 10.08)
+    assert talk.control_outcomes() == [('enable', False, 'the device restarted')]
+
+
+# -- the word among the cyclic requests -----------------------------------------------------------
+
+
+def test_word_among_the_cyclic_requests_is_refreshed() -> None:
+    talk = ready(request=(WORD,), refresh_interval=0.05)
+    assert talk.session.setpoints.items == ()
+    written = []
+    for due in (10.09, 10.11, 10.13, 10.15, 10.17):
+        sent = [text for _, text in talk.until(due + 1e-4)]
+        while sent:
+            text = sent.pop()
+            written += [due] if text in (DISABLE_0, DISABLE_1) else []
+            sent += talk.hears(_answer(text), due + 0.001)
+    assert written == [10.11, 10.17]
+
+
+@pytest.mark.parametrize('name', ['control_register_1', 'p704', 'x2008.5'])
+def test_users_do_not_write_the_word(name: str) -> None:
+    talk = ready()
+    drive = talk.session.drive
+    parameter = drive.profile.parameters.get(name) or FAMILIES['canopen_pkw'].raw_parameter(
+        drive, name)
+    assert parameter is not None
+    assert talk.session.write_refusal(parameter) == 'use ~/enable'

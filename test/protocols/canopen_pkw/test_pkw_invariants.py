@@ -1,0 +1,510 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+A session under anything that may happen, in any order, watched by somebody who only sees frames.
+
+The observer knows the protocol's bytes and the contract, nothing of the session's inside. The
+device keeps to the mailbox rule to the letter: a request with an unchanged function byte starts
+nothing.
+"""
+
+import math
+
+from builders import frame, read
+from hypothesis import given, settings, strategies as st
+from hypothesis.stateful import initialize, invariant, precondition, rule, RuleBasedStateMachine
+from pkw_builders import (
+    CLASS, configuration, CONTROL, CURRENT, FLC, FLC_2, KEY, LEVEL, POSITION, SPEED, STATUS,
+    STATUS_2, TORQUE,
+)
+import pytest
+
+from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.errors import ValueRefused
+from drive_can_bridge.core.events import RequestCompleted, StationFound, StationLost
+from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.requests import BUSY, Failure, ReadRequest, WriteRequest, Written
+from drive_can_bridge.protocols.families import FAMILIES
+
+FAMILY = FAMILIES['canopen_pkw']
+TIMEOUT = 0.1
+READS = {0x25, 0x26}
+WRITES = {0x2A, 0x2B}
+READABLE = (STATUS, LEVEL, CURRENT, FLC, FLC_2, CLASS, POSITION)
+WRITABLE = (FLC, FLC_2, CLASS, POSITION, KEY)
+SETPOINTS = {710: 0, 712: 1}
+WORD = 704
+
+
+class Device:
+    """Node 5: NMT, and the mailbox."""
+
+    def __init__(self) -> None:
+        self.registers = dict.fromkeys(
+            (455, 456, 465, 500, 501, 606, 652, 653, 704, 710, 712, 720, 721, 730), 0)
+        self.registers[455] = 1
+        self.operational = False
+        self.function = 0
+        self.executed: list[tuple[int, tuple[int, ...]]] = []
+
+    def takes(self, sent: Frame) -> list[Frame]:
+        """Do what the device does with a frame; return its answers."""
+        data = sent.data
+        if sent.identifier == 0:
+            self.operational = True
+            return []
+        if not self.operational or data[3] == self.function:
+            return []
+        self.function = data[3]
+        code, number = data[3] & 0x7F, data[0] | data[1] << 8
+        count = 2 if code in (0x26, 0x2B) else 1
+        numbers = range(number, number + count)
+        if code == 0:
+            return [Frame(0x485, data, False)]
+        if any(entry not in self.registers for entry in numbers):
+            return [Frame(0x485, data[:3] + bytes((data[3] & 0x80 | 0x4E, 0, 0, 2, 6)), False)]
+        if code in WRITES:
+            words = tuple(data[4 + 2 * place] | data[5 + 2 * place] << 8
+                          for place in range(count))
+            self.registers.update(zip(numbers, words))
+            self.executed.append((number, words))
+            return [Frame(0x485, data[:4] + bytes(4), False)]
+        found = [self.registers[entry] for entry in numbers] + [0xA5A5]
+        return [Frame(0x485, data[:4] + b''.join(
+            word.to_bytes(2, 'little') for word in found[:2]), False)]
+
+    def restarts(self) -> None:
+        self.operational = False
+        self.function = 0
+
+
+class Observer:
+    """Checks every frame that the session sends."""
+
+    def __init__(self, *, nmt_start: bool) -> None:
+        self.nmt_start = nmt_start
+        self.active = False
+        self.bus = False
+        self.stopping = False
+        self.blocked_until = -math.inf      # a heartbeat has said: not operational
+        self.asked: tuple[bytes, float] | None = None
+        self.toggle: int | None = None
+        self.armed = [False, False]
+        self.raws = [0, 0]
+        self.online = False
+
+    def sees(self, sent: Frame, now: float) -> None:
+        identifier, data, extended = sent
+        assert not extended
+        assert self.bus, 'nothing is sent on a bus that is down'
+        if identifier == 0:
+            assert data == b'\x01\x05', 'NMT start to this node, nothing else ever'
+            assert self.nmt_start
+            assert self.active
+            return
+        assert identifier == 0x505
+        assert len(data) == 8
+        assert self.active or self.stopping, 'silence after the stop'
+        assert now >= self.blocked_until - 1e-9, 'no PDO to a node that is not operational'
+        code, toggle = data[3] & 0x7F, data[3] >> 7
+        assert data[2] == 0
+        if self.asked is not None and not self.stopping:
+            wait = TIMEOUT if self.asked[0][3] & 0x7F else min(TIMEOUT, 0.1)
+            assert now >= self.asked[1] + min(wait, 0.04) - 1e-7, 'one request at a time'
+        self.asked = data, now
+        if code == 0:
+            assert data == bytes(8)
+            return
+        assert code in READS | WRITES
+        if self.toggle is not None:
+            assert toggle != self.toggle, 'the toggle alternates'
+        self.toggle = toggle
+        if code in READS:
+            assert data[4:] == bytes(4)
+            assert self.active
+            return
+        number = data[0] | data[1] << 8
+        word = data[4] | data[5] << 8
+        if code == 0x2A:
+            assert data[6:] == bytes(2)
+        if number == WORD:
+            assert code == 0x2A
+            assert word in (0, 1, 8)
+            if not self.online:
+                assert word == 0, 'only disable to a drive that is not online'
+        elif number in SETPOINTS:
+            index = SETPOINTS[number]
+            assert word == (self.raws[index] if self.armed[index] else 0)
+        else:
+            assert self.active, 'nothing but what makes it stand still'
+
+
+class SessionMachine(RuleBasedStateMachine):
+    """Everything that may happen to a session."""
+
+    @initialize(period=st.sampled_from([0.02, 0.3]), nmt_start=st.booleans(),
+                control=st.booleans(), refresh=st.sampled_from([0.0, 0.05]),
+                heartbeat_timeout=st.sampled_from([0.0, 0.5]))
+    def begin(self, period: float, nmt_start: bool, control: bool, refresh: float,
+              heartbeat_timeout: float) -> None:
+        self.session = FAMILY.make_session(configuration(
+            period=period, nmt_start=nmt_start, control=CONTROL if control else None,
+            request=(SPEED, TORQUE), response=(STATUS, STATUS_2, LEVEL), command_timeout=0.0,
+            refresh_interval=refresh, heartbeat_timeout=heartbeat_timeout,
+            parameter_timeout=TIMEOUT))
+        self.observer = Observer(nmt_start=nmt_start)
+        self.device = Device()
+        self.device.operational = not nmt_start
+        self.now = 1000.0
+        self.open: list[ReadRequest | WriteRequest] = []
+        self.tickets: list[object] = []
+        self.answers: list[Frame] = []
+        self.key_values = 0
+        self.lossy = False
+
+    # -- looking ----------------------------------------------------------------------------------
+
+    def look(self) -> None:
+        """Fetch and check everything that the session gives out."""
+        sent = self.session.take_frames()
+        for event in self.session.take_events():
+            if isinstance(event, StationLost):
+                assert event.reason
+                self.disarm()
+            elif isinstance(event, StationFound):
+                assert not self.observer.online
+                self.observer.online = True
+            elif isinstance(event, RequestCompleted):
+                assert event.request in self.open, 'one answer per request'
+                self.open.remove(event.request)
+                assert len(event.outcomes) == len(event.request)
+                self.check_key(event)
+        for outcome in self.session.take_control_outcomes():
+            assert outcome.ticket in self.tickets, 'one answer per control request'
+            self.tickets.remove(outcome.ticket)
+        for entry in sent:
+            self.observer.sees(entry, self.now)
+            if not self.lossy:
+                self.answers += self.device.takes(entry)
+            del self.answers[:-3]
+
+    def check_key(self, event: RequestCompleted) -> None:
+        """Look for a write that was executed twice, or never although it was confirmed."""
+        request = event.request
+        if not isinstance(request, WriteRequest):
+            return
+        for (parameter, raw), outcome in zip(request.items, event.outcomes):
+            if parameter is KEY:
+                times = self.device.executed.count((730, (raw,)))
+                assert times <= 1, 'a write is never executed twice'
+                if isinstance(outcome, Written):
+                    assert times == 1
+
+    def disarm(self) -> None:
+        self.observer.armed = [False, False]
+        self.observer.online = False
+
+    # -- the passage of time ----------------------------------------------------------------------
+
+    @rule(steps=st.integers(1, 30), answering=st.sampled_from([True, True, False]))
+    def time_passes_in_time(self, steps: int, answering: bool) -> None:
+        for _ in range(steps):
+            due = self.session.next_timer()
+            if due > self.now + 2.0:
+                self.now += 0.01
+                return
+            self.now = max(self.now, due)
+            self.session.handle_timer(self.now)
+            self.look()
+            while answering and self.answers:
+                self.now += 0.0002
+                self.device_answers(0)
+
+    @rule(steps=st.integers(1, 4))
+    def requests_get_lost(self, steps: int) -> None:
+        self.lossy = True
+        self.time_passes_in_time(steps, True)
+        self.lossy = False
+
+    @rule(index=st.integers(0, 1), raw=st.sampled_from([0, 1, 5]),
+          action=st.sampled_from(ControlAction))
+    def what_is_wanted_changes_while_requests_get_lost(self, index: int, raw: int,
+                                                       action: ControlAction) -> None:
+        self.lossy = True
+        self.control(action)
+        self.command(index, raw)
+        self.time_passes_in_time(3, True)
+        self.lossy = False
+
+    @rule(pause=st.sampled_from([0.0, 0.0001, 0.003, 0.017, 0.06, 0.4, 0.99]))
+    def time_passes_late(self, pause: float) -> None:
+        self.now += pause
+        self.session.handle_timer(self.now)
+        self.look()
+
+    def time_is_lost(self) -> None:
+        self.now += 1.0
+        self.session.time_lost(self.now)
+        if self.observer.active:
+            self.disarm()
+        self.look()
+
+    # -- the device -------------------------------------------------------------------------------
+
+    @precondition(lambda self: self.answers)
+    @rule(choice=st.integers(0, 2))
+    def device_answers(self, choice: int) -> None:
+        answer = self.answers.pop(min(choice, len(self.answers) - 1))
+        if self.observer.bus:
+            asked = self.observer.asked
+            if asked is not None and (
+                    answer.data[3] & 0x7F == 0 == asked[0][3] & 0x7F
+                    or answer.data[:3] == asked[0][:3]
+                    and not (answer.data[3] ^ asked[0][3]) & 0x80):
+                self.observer.asked = None
+            self.hears(answer)
+
+    @rule(number=st.sampled_from([455, 465, 652]), word=st.sampled_from([0, 1, 0x81, 4]))
+    def device_changes(self, number: int, word: int) -> None:
+        self.device.registers[number] = word
+
+    @precondition(lambda self: self.observer.bus)
+    @rule()
+    def device_restarts(self) -> None:
+        self.device.restarts()
+        self.answers.clear()
+        self.observer.asked = None
+        self.disarm_before(Frame(0x705, b'\x00', False))
+
+    @rule()
+    def device_restarts_unheard(self) -> None:
+        self.device.restarts()
+        self.answers.clear()
+
+    @precondition(lambda self: self.observer.bus)
+    @rule(state=st.sampled_from([0x04, 0x05, 0x05, 0x7F]))
+    def heartbeat(self, state: int) -> None:
+        self.device.operational = state == 5
+        self.observer.blocked_until = -math.inf if state == 5 else self.now + 0.99
+        if state != 5:
+            self.observer.asked = None
+            self.disarm_before(Frame(0x705, bytes((state,)), False))
+        else:
+            self.hears(Frame(0x705, bytes((state,)), False))
+
+    def disarm_before(self, heard: Frame) -> None:
+        """Hear something that makes the drive offline, before anything else is sent."""
+        self.session.receive_frame(heard, self.now)
+        self.look()
+        assert not self.session.online
+
+    @precondition(lambda self: self.observer.bus)
+    @rule(code=st.sampled_from([0, 0x2310, 0x8130]))
+    def emergency(self, code: int) -> None:
+        self.hears(Frame(0x085, code.to_bytes(2, 'little') + bytes(6), False))
+        assert bool(self.session.warning.count('emergency')) == bool(code)
+
+    def hears(self, heard: Frame) -> None:
+        self.session.receive_frame(heard, self.now)
+        self.look()
+
+    @precondition(lambda self: self.observer.bus)
+    @rule(identifier=st.one_of(st.sampled_from([0x481, 0x000, 0x085, 0x505]),
+                               st.integers(0, 0x7FF)),
+          data=st.binary(max_size=8), is_extended=st.booleans())
+    def anything_arrives(self, identifier: int, data: bytes, is_extended: bool) -> None:
+        if identifier not in (0x485, 0x705):
+            self.hears(Frame(identifier, data, is_extended))
+
+    # -- users ------------------------------------------------------------------------------------
+
+    @rule(index=st.integers(0, 1), raw=st.sampled_from([0, 0, 1, 5, 7]))
+    def command(self, index: int, raw: int) -> None:
+        observer = self.observer
+        value = raw * 0.1 if index == 0 else raw
+        was_online = self.session.online and observer.active
+        self.session.command(index, value, self.now)
+        if was_online and (observer.armed[index] or raw <= 1):
+            observer.armed[index], observer.raws[index] = True, raw
+        self.look()
+
+    @rule(value=st.sampled_from([math.nan, -1.0, 1e9, True]))
+    def bad_command(self, value: float) -> None:
+        with pytest.raises(ValueRefused):
+            self.session.command(0, value, self.now)
+
+    @rule(parameters=st.lists(st.sampled_from(READABLE), max_size=5), times=st.integers(1, 70))
+    def users_read(self, parameters: list[Parameter], times: int) -> None:
+        for _ in range(times):
+            self.submit(ReadRequest(tuple(parameters)))
+
+    @rule(items=st.lists(st.tuples(st.sampled_from(WRITABLE[:-1]), st.integers(0, 1)),
+                         max_size=3), atomic=st.booleans())
+    def users_write(self, items: list[tuple[Parameter, int]], atomic: bool) -> None:
+        self.submit(WriteRequest(tuple(items), atomic))
+
+    @rule()
+    def users_turn_the_key(self) -> None:
+        self.key_values += 1    # every write has its own value: it can be counted
+        self.submit(WriteRequest(((KEY, self.key_values),)))
+
+    def submit(self, request: ReadRequest | WriteRequest) -> None:
+        waiting = len(self.open)
+        self.open.append(request)
+        self.session.submit(request, self.now)
+        refused = any(
+            isinstance(event, RequestCompleted) and event.request is request
+            and Failure(BUSY) in event.outcomes for event in self.session._events)
+        if refused:
+            assert waiting in (64, 65)
+        self.look()
+        assert len(self.open) <= 65
+
+    @rule(action=st.sampled_from(ControlAction))
+    def control(self, action: ControlAction) -> None:
+        ticket = self.session.request_control(action, self.now)
+        if isinstance(ticket, str):
+            assert ticket
+        else:
+            assert self.observer.active
+            self.tickets.append(ticket)
+        self.look()
+
+    # -- the life of a session --------------------------------------------------------------------
+
+    @rule(kind=st.integers(0, 5))
+    def upset(self, kind: int) -> None:
+        (self.bus_goes_up, self.bus_goes_down, self.activate, self.deactivate,
+         self.deactivate_to_the_end, self.time_is_lost)[kind]()
+
+    @precondition(lambda self: not self.session.online)
+    @rule()
+    def all_is_well(self) -> None:
+        """Bring the drive online."""
+        if not self.observer.bus:
+            self.bus_goes_up()
+        if not self.observer.active:
+            self.activate()
+        self.heartbeat(5)
+        end = self.now + 2.0
+        while not self.session.online and self.now < end:
+            self.heartbeat(5)
+            self.time_passes_in_time(1, True)
+        assert self.session.online
+
+    @precondition(lambda self: self.session.online)
+    @rule()
+    def device_ends_up_as_told(self) -> None:
+        """However many frames were lost before: in peace, it soon has what the session means."""
+        end = self.now + 1.0
+        while self.now < end:
+            self.heartbeat(5)
+            self.time_passes_in_time(5, True)
+        if not self.session.online:
+            return
+        registers = self.device.registers
+        if self.session.control is not None:
+            assert registers[WORD] == self.session.control.word
+        assert [registers[710], registers[712]] == [
+            item.raw for item in self.session.setpoints.items]
+
+    def bus_goes_up(self) -> None:
+        self.observer.bus = True
+        self.session.bus_up(self.now)
+        self.disarm()
+        self.look()
+
+    def bus_goes_down(self) -> None:
+        self.session.bus_down(self.now, 'unplugged')
+        self.look()
+        self.observer.asked = None
+        self.observer.bus = False
+        self.observer.stopping = False
+        self.observer.blocked_until = -math.inf
+        self.answers.clear()
+        assert not self.open
+        assert self.session.next_timer() == math.inf
+
+    def activate(self) -> None:
+        self.observer.active, self.observer.stopping = True, False
+        self.session.activate(self.now)
+        self.disarm()
+        self.look()
+
+    def deactivate(self) -> None:
+        self.observer.active, self.observer.stopping = False, True
+        self.disarm()
+        self.observer.asked = None
+        self.session.deactivate(self.now)
+        self.look()
+        assert not self.open
+        self.disarm()
+
+    def deactivate_to_the_end(self) -> None:
+        self.deactivate()
+        end = self.now + 0.41
+        while self.session.next_timer() <= end:
+            self.now = max(self.now, self.session.next_timer())
+            self.session.handle_timer(self.now)
+            self.look()
+        assert self.session.stopped
+        assert self.session.next_timer() == math.inf
+        assert not self.tickets
+        assert not self.session.online
+        self.observer.stopping = False
+
+    # -- always -----------------------------------------------------------------------------------
+
+    @invariant()
+    def counts_are_right(self) -> None:
+        if not hasattr(self, 'session'):
+            return
+        assert self.session._waiting_requests() <= 64
+        assert self.session.online == self.observer.online or not self.observer.active
+        if not self.observer.bus:
+            assert not self.session.online
+            assert self.session.stopped
+        assert not self.session.take_frames()
+        if not self.session.online:
+            assert not any(item.armed for item in self.session.setpoints.items)
+        if self.session.online:
+            assert self.session.offline_advice == ''
+        else:
+            assert self.session.offline_advice
+
+
+TestSession = SessionMachine.TestCase
+TestSession.settings = settings(max_examples=150, stateful_step_count=50, deadline=None)
+pytestmark = pytest.mark.timeout(600)
+
+
+@given(frames=st.lists(st.tuples(st.integers(0, 0x7FF), st.binary(max_size=8), st.booleans()),
+                       max_size=25),
+       state=st.sampled_from(['inactive', 'looking', 'online', 'asking', 'stopping']),
+       layout=st.sampled_from(['word_le', 'dword_swapped', 'word_be']))
+def test_no_frame_ever_raises(frames: list[tuple[int, bytes, bool]], state: str,
+                              layout: str) -> None:
+    session = FAMILY.make_session(configuration(control=CONTROL, request=(SPEED,)))
+    if state in ('inactive', 'looking'):
+        session = FAMILY.make_session(configuration(layout=layout))
+    session.bus_up(0.0)
+    if state != 'inactive':
+        session.activate(1.0)
+        session.handle_timer(1.05)
+    if state in ('online', 'asking', 'stopping'):
+        session.receive_frame(frame('485#0000000000000000'), 1.06)
+        session.receive_frame(frame('485#C70100A641000000'), 1.07)
+        assert session.online
+        session.receive_frame(frame('485#C002002A00000000'), 1.08)
+    if state == 'asking':
+        session.submit(read(FLC), 1.09)
+    if state == 'stopping':
+        session.deactivate(1.09)
+    now = 1.1
+    own = (0x485, 0x705, 0x085, 0x505, 0x000)
+    for place, (identifier, data, is_extended) in enumerate(frames):
+        chosen = own[identifier % 5] if place % 4 else identifier
+        session.receive_frame(Frame(chosen, data, is_extended and place % 4 == 0), now)
+        session.handle_timer(now)
+        now += 0.01
+    assert session.facts()['nmt_state']

@@ -1,0 +1,221 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""One request at a time: toggle, synchronisation, what fits a request, time-outs."""
+
+import pytest
+
+from drive_can_bridge.protocols.canopen_pkw import pkw
+from drive_can_bridge.protocols.canopen_pkw.mailbox import (
+    Answered, Mailbox, Read, Refused, Reply, Silence, Write,
+)
+from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Layout
+
+REGISTER = Address(455)
+OBJECT = Address(0x2004, 0x06)
+READ = Read(REGISTER)
+
+
+class Box:
+    """A mailbox, spoken to in hex."""
+
+    def __init__(self, **options: object) -> None:
+        self.sent: list[str] = []
+        settings = {'order': 'auto', 'timeout': 0.5, **options}
+        self.box = Mailbox(
+            lambda message: self.sent.append(
+                pkw.encode(message, Layout.WORD_LE).hex(' ').upper()),
+            **settings)  # type: ignore[arg-type]
+
+    def take(self) -> list[str]:
+        sent, self.sent = self.sent, []
+        return sent
+
+    def begin(self, step: Read | Write, now: float) -> list[str]:
+        self.box.begin(step, now)
+        return self.take()
+
+    def hears(self, text: str, now: float) -> Reply | bool:
+        return self.box.receive(pkw.decode(bytes.fromhex(text), Layout.WORD_LE), now)
+
+
+@pytest.fixture(name='box')
+def _box() -> Box:
+    """Return a mailbox that has just read register 455 with toggle 1."""
+    box = Box()
+    assert box.begin(READ, 0.0) == ['00 00 00 00 00 00 00 00']
+    assert box.hears('00 00 00 00 00 00 00 00', 0.01) is True
+    assert box.take() == ['C7 01 00 A5 00 00 00 00']
+    assert box.hears('C7 01 00 A5 83 20 00 00', 0.02) == Answered((0x2083, 0))
+    return box
+
+
+def test_function_zero_goes_first_and_the_toggle_alternates(box: Box) -> None:
+    for second, function in enumerate(('25', 'A5', '25', 'A5')):
+        assert box.begin(READ, 1.0 + second) == [f'C7 01 00 {function} 00 00 00 00']
+        assert box.hears(f'C7 01 00 {function} 83 20 FF FF', 1.1 + second) == Answered(
+            (0x2083, 0xFFFF))
+    assert box.take() == []
+    assert not box.box.busy
+
+
+def test_function_zero_is_answered_with_either_toggle_and_any_content() -> None:
+    for answer in ('00 00 00 00 00 00 00 00', 'C7 01 00 80 83 20 00 00'):
+        box = Box()
+        box.begin(READ, 0.0)
+        assert box.hears(answer, 0.01) is True
+        assert box.take() == ['C7 01 00 A5 00 00 00 00']
+
+
+@pytest.mark.parametrize('wrong', [
+    'C7 01 00 A5 83 20 00 00',     # toggle
+    'C7 01 00 26 83 20 00 00',     # function
+    'C7 01 00 55 83 20 00 00',     # function
+    'C8 01 00 25 83 20 00 00',     # register
+    'C7 02 00 25 83 20 00 00',     # register
+    'C7 01 00 CE 02 00 01 06',     # refusal with the other toggle
+    'C8 01 00 4E 02 00 01 06',     # refusal of another register
+    '00 00 00 00 00 00 00 00',     # function 00h
+])
+def test_responses_that_do_not_fit(box: Box, wrong: str) -> None:
+    box.begin(READ, 1.0)
+    assert box.hears(wrong, 1.1) is False
+    assert box.box.busy
+    assert box.hears('C7 01 00 25 83 20 00 00', 1.2) == Answered((0x2083, 0))
+
+
+@pytest.mark.parametrize('wrong', [
+    '04 20 07 35 83 20 00 00', '04 20 06 B5 83 20 00 00', '05 20 06 35 83 20 00 00',
+    '04 20 07 4E 11 00 09 06',
+])
+def test_sub_index_has_to_fit(box: Box, wrong: str) -> None:
+    assert box.begin(Read(OBJECT), 1.0) == ['04 20 06 35 00 00 00 00']
+    assert box.hears(wrong, 1.1) is False
+    assert box.hears('04 20 06 35 83 20 00 00', 1.2) == Answered((0x2083, 0))
+
+
+def test_low_byte_of_a_register_response_does_not_matter(box: Box) -> None:
+    box.begin(READ, 1.0)
+    assert box.hears('C7 01 99 25 83 20 00 00', 1.1) == Answered((0x2083, 0))
+
+
+def test_nothing_is_expected_while_nothing_was_asked(box: Box) -> None:
+    assert box.hears('C7 01 00 A5 83 20 00 00', 1.0) is False
+    assert box.box.handle_timer(100.0) is None
+
+
+def test_all_eight_functions(box: Box) -> None:
+    steps: list[tuple[Read | Write, str]] = [
+        (Read(REGISTER), 'C7 01 00 25 00 00 00 00'),
+        (Read(REGISTER, 2), 'C7 01 00 A6 00 00 00 00'),
+        (Write(Address(704), (1,)), 'C0 02 00 2A 01 00 00 00'),
+        (Write(Address(704), (8, 0x1234)), 'C0 02 00 AB 08 00 34 12'),
+        (Read(OBJECT), '04 20 06 35 00 00 00 00'),
+        (Read(OBJECT, 2), '04 20 06 B6 00 00 00 00'),
+        (Write(Address(0x2008, 5), (1,)), '08 20 05 3A 01 00 00 00'),
+        (Write(Address(0x2008, 5), (8, 0x1234)), '08 20 05 BB 08 00 34 12'),
+    ]
+    for step, request in steps:
+        assert box.begin(step, 1.0) == [request]
+        assert box.hears(f'{request[:11]} 00 00 00 00', 1.1) == Answered((0, 0))
+
+
+@pytest.mark.parametrize('data, order, code', [
+    ('02 00 01 06', 'auto', 0x06010002), ('01 06 02 00', 'auto', 0x06010002),
+    ('02 00 01 06', 'low_first', 0x06010002), ('02 00 01 06', 'high_first', 0x00020601),
+    ('01 06 02 00', 'high_first', 0x06010002), ('08 00 00 00', 'auto', 8),
+    ('00 00 08 00', 'auto', 8), ('99 00 09 06', 'auto', 0x06090099),
+    ('09 06 99 00', 'auto', 0x06090099), ('34 12 78 56', 'auto', 0x56781234),
+    ('00 00 00 00', 'auto', 0),
+])
+def test_refusals(data: str, order: str, code: int) -> None:
+    box = Box(order=order)
+    box.begin(Write(REGISTER, (0x1234,)), 0.0)
+    box.hears('00 00 00 00 00 00 00 00', 0.01)
+    assert box.take()[-1] == 'C7 01 00 AA 34 12 00 00'
+    assert box.hears(f'C7 01 00 CE {data}', 0.02) == Refused(code)
+
+
+def test_after_silence_function_zero_goes_first_again(box: Box) -> None:
+    box.begin(READ, 1.0)
+    assert box.box.deadline == 1.5
+    assert box.box.handle_timer(1.499) is None
+    assert box.box.handle_timer(1.5) == Silence(sent=True)
+    assert box.begin(READ, 2.0) == ['00 00 00 00 00 00 00 00']
+    # the late answer of the request before is no answer any more
+    assert box.hears('C7 01 00 25 83 20 00 00', 2.01) is False
+    assert box.hears('00 00 00 00 00 00 00 00', 2.02) is True
+    assert box.take() == ['C7 01 00 A5 00 00 00 00']
+    assert box.hears('C7 01 00 25 83 20 00 00', 2.03) is False
+    assert box.hears('C7 01 00 A5 83 20 00 00', 2.04) == Answered((0x2083, 0))
+
+
+def test_refusals_synchronise_as_well(box: Box) -> None:
+    box.begin(READ, 1.0)
+    assert box.hears('C7 01 00 4E 00 00 02 06', 1.1) == Refused(0x06020000)
+    assert box.begin(READ, 2.0) == ['C7 01 00 A5 00 00 00 00']
+
+
+def test_device_that_does_not_answer_function_zero_is_read_all_the_same() -> None:
+    """Its last function byte may be 00h already: then it takes no notice of another one."""
+    box = Box()
+    box.begin(READ, 0.0)
+    box.take()
+    assert box.box.deadline == 0.1
+    assert box.box.handle_timer(0.1) is None
+    assert box.take() == ['C7 01 00 A5 00 00 00 00']
+    assert box.hears('00 00 00 00 00 00 00 00', 0.2) is False
+    assert box.hears('C7 01 00 A5 83 20 00 00', 0.3) == Answered((0x2083, 0))
+    assert box.begin(READ, 1.0) == ['C7 01 00 25 00 00 00 00']
+
+
+def test_two_silences_in_a_row_invert_the_toggle() -> None:
+    box = Box()
+    sent = []
+    for start in (0.0, 10.0, 20.0):
+        sent += box.begin(READ, start)
+        assert box.box.handle_timer(start + 0.1) is None
+        sent += box.take()
+        assert box.box.handle_timer(start + 0.6) == Silence(sent=True)
+    assert [text[9:11] for text in sent] == ['00', 'A5', '00', '25', '00', 'A5']
+
+
+def test_write_is_not_sent_when_nobody_knows_the_function_byte() -> None:
+    box = Box()
+    assert box.begin(Write(REGISTER, (1,)), 0.0) == ['00 00 00 00 00 00 00 00']
+    assert box.box.handle_timer(0.1) == Silence(sent=False)
+    assert box.take() == []
+    assert not box.box.busy
+
+
+def test_lost_answer_of_a_write_is_silence(box: Box) -> None:
+    assert box.begin(Write(REGISTER, (1,)), 1.0) == ['C7 01 00 2A 01 00 00 00']
+    assert box.box.handle_timer(1.5) == Silence(sent=True)
+    assert box.take() == []
+
+
+def test_blind_write_goes_at_once_with_its_own_time_out() -> None:
+    box = Box()
+    assert box.begin(Write(REGISTER, (1,), blind=True, timeout=0.05), 0.0) == [
+        'C7 01 00 AA 01 00 00 00']
+    assert box.box.deadline == 0.05
+    assert box.box.handle_timer(0.05) == Silence(sent=True)
+    assert box.begin(Write(REGISTER, (1,), blind=True), 1.0) == ['C7 01 00 2A 01 00 00 00']
+
+
+def test_short_time_out_counts_for_function_zero_too() -> None:
+    box = Box(timeout=0.02)
+    box.begin(READ, 0.0)
+    assert box.box.deadline == 0.02
+
+
+def test_forgetting_ends_the_exchange_and_the_synchronisation(box: Box) -> None:
+    box.begin(READ, 1.0)
+    box.box.forget()
+    assert not box.box.busy
+    assert box.hears('C7 01 00 25 83 20 00 00', 1.1) is False
+    assert box.begin(READ, 2.0) == ['00 00 00 00 00 00 00 00']
+
+
+def test_one_exchange_at_a_time(box: Box) -> None:
+    box.begin(READ, 1.0)
+    with pytest.raises(RuntimeError):
+        box.begin(READ, 1.1)

@@ -1,0 +1,179 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""NMT, heartbeats and emergency messages as the session handles them."""
+
+from builders import read
+from pkw_builders import (
+    ANSWER_0, ANSWER_1, BOOT_UP, FLC, IDLE, IDLE_ANSWER, online, OPERATIONAL, PRE_OPERATIONAL,
+    READ_0, READ_1, SPEED, START, started, STOPPED,
+)
+import pytest
+
+from drive_can_bridge.core.events import Noted, ProcessDataReceived, StationFound, StationLost
+from drive_can_bridge.core.session import DriveState
+
+TRIP = '085#1023020A00000000'
+
+
+# -- what comes first -----------------------------------------------------------------------------
+
+
+def test_start_is_the_first_frame_and_pdos_wait() -> None:
+    talk = started()
+    assert talk.submits(read(FLC), 10.01) == []
+    assert talk.until(10.0499) == []
+    assert [text for _, text in talk.until(10.0501)] == [IDLE]
+
+
+def test_boot_up_before_the_first_round() -> None:
+    talk = started()
+    assert talk.hears(BOOT_UP, 10.02) == [START]
+    assert talk.until(10.0699) == []
+    assert talk.until(10.0701) == [(10.07, IDLE)]
+    assert talk.events() == [Noted('boot-up: the device has started')]
+
+
+def test_nothing_but_nmt_before_the_node_is_operational() -> None:
+    talk = started()
+    assert talk.hears(PRE_OPERATIONAL, 10.02) == [], 'started 20 ms ago'
+    sent = []
+    for beat in range(1, 20):
+        now = 10.02 + 0.1 * beat
+        sent += [text for _, text in talk.until(now)]
+        sent += talk.hears(PRE_OPERATIONAL, now)
+    assert set(sent) == {START}
+    assert talk.session.offline_advice == 'node is pre-operational'
+    assert talk.session.facts()['nmt_state'] == 'pre-operational'
+    assert talk.hears(OPERATIONAL, 12.0) == []
+    assert talk.at(12.0) == [IDLE]
+    assert talk.hears(IDLE_ANSWER, 12.001) == [READ_1]
+    talk.hears(ANSWER_1, 12.002)
+    assert talk.session.online
+    assert talk.session.facts()['nmt_state'] == 'operational'
+
+
+def test_no_nmt_at_all() -> None:
+    talk = online(nmt_start=False, parameter_timeout=0.1)
+    sent = [text for _, text in talk.until(15.0)]
+    for text in (BOOT_UP, PRE_OPERATIONAL, STOPPED):
+        sent += talk.hears(text, 15.0)
+        sent += [entry for _, entry in talk.until(18.0)]
+    assert len(sent) > 20
+    assert not any(text.startswith('000#') for text in sent), 'polling goes on, NMT is silent'
+
+
+def test_nothing_is_sent_by_nmt_at_shutdown() -> None:
+    talk = online(request=(SPEED,))
+    sent = talk.deactivate(10.06) + [text for _, text in talk.until(20.0)]
+    assert sent
+    assert all(text.startswith('505#C602') for text in sent)
+
+
+# -- heartbeats -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('text, reason', [
+    (PRE_OPERATIONAL, 'node is pre-operational'), (STOPPED, 'node is stopped')])
+def test_node_that_leaves_operational_is_offline_at_once(text: str, reason: str) -> None:
+    talk = online()
+    assert talk.hears(text, 11.0) == [START]
+    assert talk.events(StationLost) == [StationLost(reason)]
+    assert talk.until(11.9) == []
+    assert talk.hears(OPERATIONAL, 11.9) == []
+    assert talk.at(11.9) == [IDLE]
+
+
+def test_heartbeats_of_an_operational_node_change_nothing() -> None:
+    talk = online()
+    for now in (10.055, 10.06, 10.065):
+        assert talk.hears(OPERATIONAL, now) == []
+    assert talk.until(10.0701) == [(10.07, READ_0)]
+    assert talk.session.facts() == {'nmt_state': 'operational', 'emergency': 'none'}
+    assert talk.session.warning == ''
+
+
+def test_answers_to_node_guarding_toggle_bit_7() -> None:
+    talk = online()
+    assert talk.hears('705#85', 10.06) == []
+    assert talk.session.facts()['nmt_state'] == 'operational'
+    assert talk.session.statistics.rejected == 0
+
+
+def test_boot_up_of_a_node_with_heartbeats_waits_for_operational() -> None:
+    talk = online()
+    talk.hears(OPERATIONAL, 10.06)
+    assert talk.hears(BOOT_UP, 10.2) == [START]
+    assert talk.until(10.9) == []
+    assert talk.hears(OPERATIONAL, 10.9) == []
+    assert talk.at(10.9) == [IDLE]
+
+
+def test_lost_heartbeat_makes_it_offline_until_it_is_back() -> None:
+    talk = online(heartbeat_timeout=0.1)
+    assert talk.session.warning == (
+        "no heartbeat although heartbeat_timeout is set: configure the device's heartbeat "
+        'producer (1017h)')
+    talk.hears(OPERATIONAL, 10.06)
+    assert talk.session.warning == ''
+    talk.until(10.0701)
+    talk.hears(ANSWER_0, 10.071)
+    talk.events()
+    talk.until(10.0901)
+    talk.hears(ANSWER_1, 10.091)
+    (now, text), = talk.until(10.1101)
+    talk.hears(ANSWER_0, 10.111)
+    talk.until(10.1301)
+    talk.hears(ANSWER_1, 10.131)
+    talk.until(10.1501)
+    talk.hears(ANSWER_0, 10.151)
+    talk.events()
+    assert [text for _, text in talk.until(10.161)] == []
+    assert talk.events() == [StationLost('no heartbeat for 0.1 s')]
+    assert talk.session.offline_advice == 'no heartbeat for 0.1 s'
+    # its answers alone do not bring it back
+    assert [text for _, text in talk.until(10.1701)] == [READ_1]
+    talk.hears(ANSWER_1, 10.171)
+    assert talk.session.state is DriveState.OFFLINE
+    assert talk.events() == []
+    talk.hears(OPERATIONAL, 10.175)
+    sent = talk.at(10.175)
+    assert sent == [READ_0]
+    talk.hears(ANSWER_0, 10.176)
+    assert talk.events(StationFound, ProcessDataReceived) == [
+        StationFound(), ProcessDataReceived((0x41, 0), 10.176)]
+    assert (now, text) == (pytest.approx(10.11), READ_0)
+
+
+# -- emergencies ----------------------------------------------------------------------------------
+
+
+def test_emergency_is_shown_until_it_is_over() -> None:
+    talk = online()
+    assert talk.hears(TRIP, 10.06) == []
+    text = ('2310h (current, output side), error register 02h, manufacturer 0A 00 00 00 00')
+    assert talk.events() == [Noted(f'emergency {text}')]
+    assert talk.session.facts()['emergency'] == text
+    assert talk.session.warning == f'emergency {text}: remove its cause'
+    assert talk.session.online
+    talk.hears(TRIP, 10.061)
+    assert talk.events() == [], 'told once'
+    talk.hears('085#0000000000000000', 10.062)
+    assert talk.events() == [Noted('emergency over: the node reports no error any more')]
+    assert talk.session.facts()['emergency'] == 'none'
+    assert talk.session.warning == ''
+
+
+def test_restart_ends_an_emergency() -> None:
+    talk = online()
+    talk.hears(TRIP, 10.06)
+    talk.hears(BOOT_UP, 10.07)
+    assert talk.session.facts()['emergency'] == 'none'
+
+
+def test_bus_down_ends_all_knowledge() -> None:
+    talk = online()
+    talk.hears(TRIP, 10.06)
+    talk.hears(PRE_OPERATIONAL, 10.07)
+    talk.bus_down(10.08)
+    assert talk.session.facts() == {'nmt_state': 'unknown', 'emergency': 'none'}
+    assert talk.bus_up(12.0) == [START]
+    assert talk.until(12.0501) == [(12.05, IDLE)]

@@ -1,0 +1,190 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""NMT start, heartbeats and emergency messages, with literal times."""
+
+import math
+from typing import Any
+
+import pytest
+
+from drive_can_bridge.protocols.canopen_pkw.network import Emergency, NmtState
+from drive_can_bridge.protocols.canopen_pkw.node import Change, Node
+
+BOOT_UP, STOPPED, OPERATIONAL, PRE_OPERATIONAL = NmtState
+OVERLOAD = Emergency(0x2310, 0x02, bytes(5))
+
+
+def node(**options: Any) -> Node:
+    settings = {'nmt_start': True, 'heartbeat_timeout': 0.0, **options}
+    made = Node(5, **settings)
+    made.begin(10.0)
+    return made
+
+
+def sent(watched: Node) -> list[str]:
+    return [str(frame) for frame in watched.take_frames()]
+
+
+def hears(watched: Node, state: NmtState, now: float) -> tuple[Change, list[str]]:
+    return watched.receive_heartbeat(state, now, True), sent(watched)
+
+
+def test_start_goes_out_first_and_pdos_wait_a_moment() -> None:
+    watched = node()
+    assert sent(watched) == ['000#0105']
+    assert watched.free_at == pytest.approx(10.05)
+    assert watched.state_text == 'unknown'
+    assert watched.refusal(10.0) == ''
+
+
+def test_without_nmt_nothing_is_sent_ever() -> None:
+    watched = node(nmt_start=False)
+    watched.offline(10.0)
+    assert watched.free_at == 10.0
+    assert watched.next_timer() == math.inf
+    watched.handle_timer(20.0)
+    for state in (PRE_OPERATIONAL, BOOT_UP, STOPPED):
+        assert hears(watched, state, 21.0)[1] == []
+
+
+def test_start_once_a_second_while_offline() -> None:
+    watched = node()
+    watched.offline(10.0)
+    sent(watched)
+    for second in (11.0, 12.0, 13.0):
+        assert watched.next_timer() == second
+        watched.handle_timer(second)
+        assert sent(watched) == ['000#0105']
+    watched.online()
+    assert watched.next_timer() == math.inf
+    watched.offline(20.0)
+    assert watched.next_timer() == 20.0
+
+
+def test_boot_up_is_answered_by_start() -> None:
+    watched = node()
+    sent(watched)
+    assert hears(watched, BOOT_UP, 10.5) == (Change.RESTARTED, ['000#0105'])
+    assert watched.state_text == 'pre-operational'
+    assert watched.free_at == pytest.approx(10.55), 'no heartbeats: nobody will ever say so'
+    assert watched.refusal(10.5) == ''
+
+
+@pytest.mark.parametrize('state, text', [
+    (PRE_OPERATIONAL, 'node is pre-operational'), (STOPPED, 'node is stopped')])
+def test_heartbeats_say_when_pdos_may_be_sent(state: NmtState, text: str) -> None:
+    watched = node()
+    sent(watched)
+    assert hears(watched, state, 10.2) == (Change.NOT_OPERATIONAL, ['000#0105'])
+    assert watched.refusal(10.2) == text
+    assert watched.free_at == pytest.approx(11.2)
+    # still so: started again, but never more than ten times a second
+    assert hears(watched, state, 10.25) == (Change.NONE, [])
+    assert hears(watched, state, 10.35) == (Change.NONE, ['000#0105'])
+    assert watched.free_at == pytest.approx(11.35)
+    assert hears(watched, OPERATIONAL, 10.4) == (Change.OPERATIONAL, [])
+    assert watched.free_at == 10.4
+    assert watched.refusal(10.4) == ''
+    assert hears(watched, OPERATIONAL, 10.5) == (Change.NONE, [])
+
+
+def test_boot_up_of_a_node_with_heartbeats_waits_for_operational() -> None:
+    watched = node()
+    hears(watched, OPERATIONAL, 10.1)
+    assert hears(watched, BOOT_UP, 20.0) == (Change.RESTARTED, ['000#0105'])
+    assert watched.free_at == pytest.approx(21.0)
+    assert watched.refusal(20.5) == 'node is pre-operational'
+    assert hears(watched, OPERATIONAL, 20.1) == (Change.OPERATIONAL, [])
+    assert watched.free_at == 20.1
+
+
+def test_slow_heartbeats_are_believed_for_three_intervals() -> None:
+    watched = node()
+    for now in (20.0, 25.0):
+        hears(watched, PRE_OPERATIONAL, now)
+    assert watched.free_at == pytest.approx(40.0)
+    assert watched.refusal(39.9) == 'node is pre-operational'
+    assert watched.refusal(40.1) == '', 'heartbeats ceased: nothing is known any more'
+
+
+def test_pause_longer_than_any_interval_is_none() -> None:
+    watched = node()
+    hears(watched, OPERATIONAL, 20.0)
+    hears(watched, PRE_OPERATIONAL, 1000.0)
+    assert watched.free_at == pytest.approx(1001.0)
+
+
+def test_listening_only_sends_nothing() -> None:
+    watched = node()
+    sent(watched)
+    for state in (PRE_OPERATIONAL, BOOT_UP):
+        watched.receive_heartbeat(state, 11.0, False)
+        assert sent(watched) == []
+    watched.begin(11.5)
+    assert sent(watched) == ['000#0105']
+    assert watched.free_at == pytest.approx(12.0), 'what was heard before still counts'
+
+
+def test_heartbeat_time_out() -> None:
+    watched = node(heartbeat_timeout=0.5)
+    assert watched.next_timer() == math.inf, 'watched from the first one'
+    hears(watched, OPERATIONAL, 11.0)
+    assert watched.next_timer() == 11.5
+    assert watched.handle_timer(11.499) is Change.NONE
+    hears(watched, OPERATIONAL, 11.4)
+    assert watched.handle_timer(11.5) is Change.NONE
+    assert watched.handle_timer(11.9) is Change.HEARTBEAT_LOST
+    assert watched.heartbeat_lost
+    assert watched.handle_timer(12.5) is Change.NONE, 'told once'
+    assert hears(watched, OPERATIONAL, 13.0) == (Change.OPERATIONAL, [])
+    assert not watched.heartbeat_lost
+    assert watched.next_timer() == 13.5
+
+
+def test_heartbeats_are_watched_after_boot_up_too() -> None:
+    watched = node(heartbeat_timeout=0.5)
+    hears(watched, BOOT_UP, 11.0)
+    assert watched.handle_timer(11.5) is Change.HEARTBEAT_LOST
+
+
+def test_heartbeats_are_not_watched_by_default() -> None:
+    watched = node()
+    hears(watched, OPERATIONAL, 11.0)
+    assert watched.next_timer() == math.inf
+    assert watched.handle_timer(1000.0) is Change.NONE
+
+
+def test_no_heartbeat_was_due_while_nobody_listened() -> None:
+    watched = node(heartbeat_timeout=0.5)
+    hears(watched, OPERATIONAL, 11.0)
+    watched.begin(20.0)
+    assert watched.handle_timer(20.4) is Change.NONE
+    assert watched.handle_timer(20.5) is Change.HEARTBEAT_LOST
+
+
+def test_emergencies_last_until_they_are_over() -> None:
+    watched = node()
+    assert watched.receive_emergency(OVERLOAD) == (
+        'emergency 2310h (current, output side), error register 02h')
+    assert watched.emergency == OVERLOAD
+    assert watched.receive_emergency(OVERLOAD) == '', 'nothing new'
+    assert watched.receive_emergency(Emergency(0)) == (
+        'emergency over: the node reports no error any more')
+    assert watched.emergency is None
+    assert watched.receive_emergency(Emergency(0)) == ''
+
+
+def test_boot_up_ends_an_emergency() -> None:
+    watched = node()
+    watched.receive_emergency(OVERLOAD)
+    hears(watched, BOOT_UP, 11.0)
+    assert watched.emergency is None
+
+
+def test_forgetting() -> None:
+    watched = node(heartbeat_timeout=0.5)
+    watched.receive_emergency(OVERLOAD)
+    hears(watched, PRE_OPERATIONAL, 11.0)
+    watched.forget()
+    assert (watched.state, watched.emergency, watched.next_timer()) == (None, None, math.inf)
+    assert watched.free_at == math.inf
+    assert sent(watched) == []

@@ -1,0 +1,326 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""The polled exchange: what is read, what is published, what counts as missed."""
+
+import math
+from typing import Any
+
+from builders import Conversation
+from pkw_builders import (
+    ANSWER_0, ANSWER_1, configuration, CONTROL, CURRENT, IDLE, IDLE_ANSWER, LEVEL, online, RATIO,
+    READ_0, READ_1, START, started, STATUS, STATUS_2,
+)
+import pytest
+
+from drive_can_bridge.core.events import (
+    FrameRejected, Noted, ProcessDataReceived, StationFound, StationLost,
+)
+from drive_can_bridge.core.session import DriveState
+
+READ_SINGLE_0 = '505#C701002500000000'
+
+
+def test_the_way_to_the_first_sample() -> None:
+    talk = started()
+    assert talk.session.offline_advice == 'being looked for'
+    assert talk.until(10.049) == []
+    assert talk.until(10.05) == [(10.05, IDLE)]
+    assert talk.hears(IDLE_ANSWER, 10.051) == [READ_1]
+    assert talk.hears('485#C70100A641000200', 10.052) == []
+    found, sample = talk.events()
+    assert found == StationFound()
+    assert sample == ProcessDataReceived((0x0041, 0x0002), 10.052)
+    assert talk.session.online
+    assert talk.session.ever_online
+    assert talk.session.offline_advice == ''
+    assert talk.session.state is DriveState.ONLINE
+
+
+def test_rounds_keep_their_beat_and_alternate_the_toggle() -> None:
+    talk = online()
+    for due, read, answer in [(10.07, READ_0, ANSWER_0), (10.09, READ_1, ANSWER_1),
+                              (10.11, READ_0, ANSWER_0)]:
+        assert talk.until(due + 1e-6) == [(pytest.approx(due), read)]
+        assert talk.hears(answer, due + 0.004) == []
+    assert talk.samples() == [(0x41, 0)] * 3
+    statistics = talk.session.statistics
+    assert (statistics.exchanges, statistics.missed, statistics.rejected) == (4, 0, 0)
+    assert statistics.latency.maximum == pytest.approx(0.004)
+    assert statistics.period_error.maximum < 1e-6
+
+
+@pytest.mark.parametrize('response, requests', [
+    ((LEVEL,), ['D10100A5']),
+    ((RATIO, LEVEL), ['D10100A6']),
+    ((STATUS, LEVEL, RATIO, STATUS_2), ['C70100A6', 'D1010026']),
+    ((STATUS, LEVEL), ['C70100A5', 'D1010025']),
+    ((CURRENT, STATUS), ['C70100A5', 'F4010026']),
+])
+def test_adjacent_registers_share_a_read(response: Any, requests: list[str]) -> None:
+    talk = started(response=response)
+    talk.at(10.05)
+    sent = talk.hears(IDLE_ANSWER, 10.051)
+    seen = []
+    while sent:
+        request, = sent
+        seen.append(request[4:12])
+        sent = talk.hears(f'485#{request[4:12]}01000200', 10.052)
+    assert seen == requests
+    assert talk.session.online
+
+
+def test_values_come_in_the_order_of_the_configuration() -> None:
+    talk = started(response=(RATIO, CURRENT, LEVEL))
+    talk.at(10.05)
+    assert talk.hears(IDLE_ANSWER, 10.051) == ['505#D10100A600000000']
+    assert talk.hears('485#D10100A605000600', 10.052) == ['505#F401002600000000']
+    assert talk.hears('485#F401002601000002', 10.053) == []
+    assert talk.samples() == [(6, 0x00010200, 5)]
+
+
+@pytest.mark.parametrize('options, raw', [
+    ({}, 0x00000384), ({'word_order': 'low_first'}, 0x03840000)])
+def test_word_order(options: dict[str, Any], raw: int) -> None:
+    talk = started(response=(CURRENT,), **options)
+    talk.at(10.05)
+    talk.hears(IDLE_ANSWER, 10.051)
+    talk.hears('485#F40100A600008403', 10.052)
+    assert talk.samples() == [(raw,)]
+
+
+@pytest.mark.parametrize('layout, idle, read, answer', [
+    ('dword_swapped', '505#0000000000000000', '505#00A6C70100000000', '485#00A6C70100004100'),
+    ('word_be', '505#0000000000000000', '505#01C7A60000000000', '485#01C7A60000410000'),
+])
+def test_other_layouts(layout: str, idle: str, read: str, answer: str) -> None:
+    talk = started(layout=layout)
+    assert talk.at(10.05) == [idle]
+    assert talk.hears('485#0000000000000000', 10.051) == [read]
+    assert talk.hears(answer, 10.052) == []
+    assert talk.samples() == [(0x41, 0)]
+
+
+def test_addressing_by_index() -> None:
+    talk = started(addressing='canopen')
+    talk.at(10.05)
+    assert talk.hears(IDLE_ANSWER, 10.051) == ['505#042006B600000000']
+    talk.hears('485#042006B641000700', 10.052)
+    assert talk.samples() == [(0x41, 7)]
+
+
+def test_other_identifiers() -> None:
+    talk = started(request_cob_id=0x301, response_cob_id=0x281)
+    assert talk.at(10.05) == ['301#0000000000000000']
+    assert talk.hears(IDLE_ANSWER, 10.051) == []
+    assert talk.hears('281#0000000000000000', 10.051) == ['301#C70100A600000000']
+    talk.hears('281#C70100A641000000', 10.052)
+    assert talk.samples() == [(0x41, 0)]
+
+
+# -- trouble --------------------------------------------------------------------------------------
+
+
+def test_device_that_takes_no_notice_of_function_zero() -> None:
+    """It has just started: its last function byte is 00h already."""
+    talk = started()
+    assert talk.at(10.05) == [IDLE]
+    assert talk.until(10.16) == [(10.15, READ_1)]
+    talk.hears(ANSWER_1, 10.2)
+    assert talk.session.online
+    assert talk.session.statistics.missed == 0
+
+
+def test_lost_response_costs_one_round_and_synchronises_again() -> None:
+    talk = online(parameter_timeout=0.1)
+    assert talk.until(10.075) == [(10.07, READ_0)]
+    assert talk.until(10.18) == [(10.17, IDLE)], 'the next round begins with function 00h'
+    assert talk.hears(IDLE_ANSWER, 10.18) == [READ_1]
+    talk.hears(ANSWER_1, 10.181)
+    assert talk.session.statistics.missed == 1
+    assert talk.session.online
+    assert talk.samples() == [(0x41, 0)]
+
+
+def test_late_response_is_counted_and_not_believed() -> None:
+    talk = online(parameter_timeout=0.1)
+    talk.until(10.075)
+    talk.until(10.18)
+    assert talk.hears(ANSWER_0, 10.18) == []
+    assert talk.session.statistics.rejected == 1
+    rejected, = talk.events()
+    assert rejected == FrameRejected(
+        'PKW response that nobody asked for: function 26h, register 455')
+    assert talk.hears(IDLE_ANSWER, 10.181) == [READ_1]
+    talk.hears(ANSWER_1, 10.182)
+    assert talk.samples() == [(0x41, 0)]
+
+
+def test_three_missed_rounds_make_it_offline_and_one_good_one_online() -> None:
+    talk = online(parameter_timeout=0.1)
+    sent = talk.until(10.6)
+    assert [text for _, text in sent] == [READ_0, IDLE, READ_1, IDLE, READ_0, IDLE]
+    lost, = talk.events(StationLost)
+    assert lost == StationLost('no complete round of reads for 3 periods')
+    assert talk.session.offline_advice == lost.reason
+    assert talk.session.statistics.missed == 3
+    assert talk.session.state is DriveState.OFFLINE
+    assert talk.until(10.7) == [(10.67, READ_1)]
+    talk.hears(ANSWER_1, 10.71)
+    assert talk.session.online
+    assert talk.events(StationFound, ProcessDataReceived) == [
+        StationFound(), ProcessDataReceived((0x41, 0), 10.71)]
+
+
+def test_one_good_round_forgives_missed_ones() -> None:
+    talk = online(parameter_timeout=0.1, period=1.0)
+    assert talk.until(12.5) == [(11.05, READ_0), (12.05, IDLE), (12.15, READ_1)]
+    assert talk.until(13.051) == [(13.05, IDLE)]
+    assert talk.hears(IDLE_ANSWER, 13.052) == [READ_0]
+    assert talk.hears(ANSWER_0, 13.053) == []
+    assert talk.until(15.5) == [(14.05, READ_1), (15.05, IDLE), (15.15, READ_0)]
+    assert talk.session.statistics.missed == 4
+    assert talk.session.online
+    talk.until(16.5)
+    assert not talk.session.online
+
+
+def test_offline_drive_is_started_once_a_second() -> None:
+    talk = online(parameter_timeout=0.1)
+    sent = talk.until(13.1)
+    assert [now for now, text in sent if text == START] == [11.0, 12.0, 13.0]
+
+
+def test_nobody_there() -> None:
+    talk = started(parameter_timeout=0.1)
+    sent = talk.until(13.1)
+    assert [now for now, text in sent if text == START] == [11.0, 12.0, 13.0]
+    assert {text for _, text in sent} == {START, IDLE, READ_0, READ_1}
+    assert not talk.session.ever_online
+    assert talk.session.offline_advice.startswith('no complete round of reads: drive silent')
+    assert talk.events() == []
+
+
+def test_slow_device_gets_no_bursts() -> None:
+    """It answers after 50 ms: the next round begins when the last one is over, once."""
+    talk = online()
+    assert talk.until(10.11) == [(10.07, READ_0)]
+    assert talk.hears(ANSWER_0, 10.12) == []
+    assert talk.at(10.12) == [READ_1]
+    assert talk.until(10.169) == []
+    assert talk.hears(ANSWER_1, 10.17) == []
+    assert talk.at(10.17) == [READ_0]
+    assert talk.session.statistics.missed == 0
+
+
+def test_half_of_a_round_publishes_nothing() -> None:
+    talk = started(parameter_timeout=0.1, response=(STATUS, LEVEL))
+    talk.at(10.05)
+    talk.hears(IDLE_ANSWER, 10.051)
+    assert talk.hears('485#C70100A541000000', 10.052) == ['505#D101002500000000']
+    assert talk.until(10.16) == [(10.152, IDLE)], 'a new round, from its first read'
+    assert talk.hears(IDLE_ANSWER, 10.153) == ['505#C70100A500000000']
+    assert talk.events(ProcessDataReceived, StationFound) == []
+    assert talk.session.statistics.missed == 1
+
+
+# -- refusals -------------------------------------------------------------------------------------
+
+
+def test_refused_poll_is_an_answer_but_shown() -> None:
+    talk = started(response=(STATUS, LEVEL))
+    talk.at(10.05)
+    talk.hears(IDLE_ANSWER, 10.051)
+    assert talk.hears('485#C70100A541000000', 10.052) == ['505#D101002500000000']
+    assert talk.hears('485#D101004E00000206', 10.053) == []
+    assert talk.session.online
+    assert talk.session.statistics.missed == 0
+    assert talk.session.statistics.exchanges == 0
+    assert talk.session.warning == (
+        'poll of thermal_level refused by the drive: 06020000h (no such register or object): '
+        'correct cyclic_response or the profile')
+    assert talk.events() == [
+        Noted('read thermal_level: refused by the drive: 06020000h (no such register or object)'),
+        StationFound()]
+    # told once; gone when it is answered
+    talk.until(10.0701)
+    talk.hears('485#C70100A541000000', 10.071)
+    talk.hears('485#D101004E00000206', 10.072)
+    assert talk.events() == []
+    talk.until(10.0901)
+    talk.hears('485#C70100A541000000', 10.091)
+    talk.hears('485#D101002507000000', 10.092)
+    assert talk.session.warning == ''
+    assert talk.samples() == [(0x41, 7)]
+
+
+def test_refused_pair_is_read_one_by_one_from_then_on() -> None:
+    talk = started()
+    talk.at(10.05)
+    talk.hears(IDLE_ANSWER, 10.051)
+    assert talk.hears('485#C70100CE00000206', 10.052) == [READ_SINGLE_0]
+    assert talk.hears('485#C701002541000000', 10.053) == ['505#C80100A500000000']
+    assert talk.hears('485#C80100A507000000', 10.054) == []
+    assert talk.samples() == [(0x41, 7)]
+    assert talk.session.warning == ''
+    assert talk.until(10.0701) == [(10.07, READ_SINGLE_0)]
+
+
+def test_refused_32_bits_have_no_halves() -> None:
+    talk = started(response=(CURRENT,))
+    talk.at(10.05)
+    talk.hears(IDLE_ANSWER, 10.051)
+    assert talk.hears('485#F40100CE00000206', 10.052) == []
+    assert talk.session.online
+    assert 'average_current refused' in talk.session.warning
+
+
+def test_status_that_is_no_response_is_read_along() -> None:
+    talk = started(response=(LEVEL,), control=CONTROL)
+    talk.at(10.05)
+    assert talk.hears(IDLE_ANSWER, 10.051) == ['505#C70100A500000000']
+    assert talk.hears('485#C70100A541000000', 10.052) == ['505#D101002500000000']
+    assert talk.hears('485#D101002507000000', 10.053) == ['505#C00200AA00000000']
+    assert talk.samples() == [(7,)]
+
+
+# -- what is no answer ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('text', [
+    '485#C701002641000000',        # nobody asked
+    '485#', '485#00', '485#C7010026410000',
+    '705#', '705#01', '705#0500', '085#', '085#1023',
+])
+def test_malformed_and_unasked_frames_are_counted(text: str) -> None:
+    talk = online()
+    assert talk.hears(text, 10.06) == []
+    assert talk.session.statistics.rejected == 1
+    assert len(talk.events(FrameRejected)) == 1
+    assert talk.session.online
+
+
+@pytest.mark.parametrize('text', [
+    '486#C701002641000000', '00000485#C701002641000000', '000#0200', '000#0105', '123#00',
+    '00000705#00', '706#00', '086#1023000000000000'])
+def test_frames_of_others_do_not_matter(text: str) -> None:
+    talk = online()
+    assert talk.hears(text, 10.06) == []
+    assert talk.session.statistics.rejected == 0
+    assert talk.events() == []
+    assert talk.session.online
+
+
+def test_another_master_is_noticed() -> None:
+    talk = online()
+    assert talk.hears('505#C002002A01000000', 10.06) == []
+    event, = talk.events()
+    assert event.text == 'another master sends PKW requests to node 5: 505#C002002A01000000'
+
+
+def test_nothing_is_planned_before_activation() -> None:
+    talk = Conversation(configuration())
+    assert talk.session.offline_advice == 'not activated'
+    assert talk.session.next_timer() == math.inf
+    assert talk.bus_up(1.0) == []
+    assert talk.at(5.0) == []
+    assert talk.hears('705#00', 6.0) == []
+    assert talk.session.facts() == {'nmt_state': 'pre-operational', 'emergency': 'none'}

@@ -1,0 +1,273 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Setpoints: written on change and after a while, neutral when in doubt, and the safe stop."""
+
+import math
+from typing import Any
+
+from builders import Conversation, read
+from pkw_builders import (
+    ANSWER_0, BOOT_UP, CLASS, CONTROL, IDLE, IDLE_ANSWER, online, POSITION, READ_0,
+    SPEED, STOPPED, TORQUE,
+)
+import pytest
+
+from drive_can_bridge.core.events import SetpointsExpired, StationLost
+from drive_can_bridge.core.session import DriveState
+from drive_can_bridge.core.setpoints import CommandOutcome
+
+#: 710 = 100
+SPEED_0 = '505#C602002A64000000'
+SPEED_1 = '505#C60200AA64000000'
+STILL_0 = '505#C602002A00000000'
+STILL_1 = '505#C60200AA00000000'
+
+
+def answered(talk: Conversation, sent: list[str], now: float) -> list[str]:
+    """Let the device answer until nothing more is sent; return the writes."""
+    writes = []
+    while sent:
+        text, = sent
+        function = text[10:12]
+        reply = text.replace('505#', '485#')
+        if function in ('26', 'A6', '25', 'A5'):
+            reply = reply[:12] + '41000000'
+        elif function != '00':
+            writes.append(text[4:8] + text[12:])
+        now += 0.0002
+        sent = talk.hears(reply, now)
+    return writes
+
+
+def cycle(talk: Conversation, now: float) -> list[str]:
+    """Let the round of this time pass; return address and words of what was written."""
+    return answered(talk, talk.at(now), now)
+
+
+def armed(**options: Any) -> Conversation:
+    """Return a drive whose speed was commanded to 0 and then to 10 Hz."""
+    options.setdefault('request', (SPEED,))
+    talk = online(**options)
+    assert talk.commands(0, 0.0, 10.06) is CommandOutcome.ARMED
+    assert talk.commands(0, 10.0, 10.06) is CommandOutcome.ACCEPTED
+    return talk
+
+
+def test_neutral_is_written_first() -> None:
+    talk = online(request=())
+    talk = online(request=(SPEED, TORQUE), command_timeout=0.0)
+    assert talk.session.state is DriveState.NOT_ARMED
+    assert cycle(talk, 10.07) == [], 'that was done when it was found'
+
+
+def test_change_is_written_before_the_round_and_once() -> None:
+    talk = armed(command_timeout=0.0)
+    assert talk.until(10.069) == []
+    assert talk.at(10.07) == [SPEED_1]
+    assert talk.hears('485#C60200AA00000000', 10.071) == [READ_0]
+    assert talk.hears(ANSWER_0, 10.072) == []
+    assert cycle(talk, 10.09) == []
+
+
+def test_newest_command_wins() -> None:
+    talk = armed(command_timeout=0.0)
+    for value in (20.0, 30.0, 40.0):
+        talk.commands(0, value, 10.065)
+    assert cycle(talk, 10.07) == ['C60290010000']
+
+
+def test_command_while_the_write_is_under_way_goes_with_the_next_round() -> None:
+    talk = armed(command_timeout=0.0)
+    assert talk.at(10.07) == [SPEED_1]
+    talk.commands(0, 20.0, 10.0705)
+    assert answered(talk, [SPEED_1], 10.071) == ['C60264000000']
+    assert cycle(talk, 10.09) == ['C602C8000000']
+
+
+def test_unchanged_values_are_written_again_after_the_refresh_interval() -> None:
+    talk = armed(command_timeout=0.0, refresh_interval=0.1)
+    written = [cycle(talk, 10.07 + 0.02 * beat) for beat in range(13)]
+    assert [beat for beat, writes in enumerate(written) if writes] == [0, 5, 10]
+
+
+def test_no_refresh_without_an_interval() -> None:
+    talk = armed(command_timeout=0.0, refresh_interval=0.0, period=1.0)
+    assert cycle(talk, 11.05) == ['C60264000000']
+    assert [cycle(talk, 12.05 + beat) for beat in range(20)] == [[]] * 20
+
+
+def test_32_bits() -> None:
+    talk = online(request=(POSITION,), command_timeout=0.0)
+    talk.commands(0, 0, 10.06)
+    talk.commands(0, -2, 10.06)
+    assert cycle(talk, 10.07) == ['D002FFFFFEFF']
+
+
+def test_command_timeout_sends_neutral() -> None:
+    talk = armed(command_timeout=0.05)
+    assert cycle(talk, 10.07) == ['C60264000000']
+    assert cycle(talk, 10.09) == []
+    assert cycle(talk, 10.12) == ['C60200000000']
+    assert talk.events(SetpointsExpired) == [SetpointsExpired(('speed',))]
+    assert talk.session.state is DriveState.NOT_ARMED
+
+
+def test_neutral_does_not_wait_for_the_next_round() -> None:
+    talk = armed(command_timeout=0.5, parameter_timeout=0.1, period=2.0)
+    talk.commands(0, 0.0, 12.04)
+    talk.commands(0, 10.0, 12.04)
+    assert cycle(talk, 12.05) == ['C60264000000']
+    talk.submits(read(CLASS), 12.5)
+    talk.events()
+    assert talk.at(12.6) == [IDLE]
+    assert talk.events(SetpointsExpired) == [SetpointsExpired(('speed',))]
+    assert answered(talk, [IDLE], 12.6) == ['C60200000000']
+
+
+def test_setpoints_go_out_although_a_parameter_is_silent() -> None:
+    talk = armed(command_timeout=0.0, parameter_timeout=0.1)
+    assert talk.submits(read(CLASS), 10.061) == ['505#5E0200A500000000']
+    assert talk.until(10.1609) == []
+    (_, text), = talk.until(10.162)
+    assert text == IDLE
+    assert talk.hears(IDLE_ANSWER, 10.162) == [SPEED_0], 'before anything else'
+
+
+# -- lost and refused -----------------------------------------------------------------------------
+
+
+def test_lost_acknowledgement_is_written_again_with_the_next_round() -> None:
+    talk = armed(command_timeout=0.0, parameter_timeout=0.05, refresh_interval=0.0)
+    assert talk.at(10.07) == [SPEED_1]
+    assert talk.at(10.1201) == [IDLE]
+    assert answered(talk, [IDLE], 10.121) == []
+    assert cycle(talk, 10.13) == ['C60264000000']
+    assert cycle(talk, 10.15) == []
+
+
+def test_refused_setpoint_is_shown_until_one_is_taken() -> None:
+    talk = armed(command_timeout=0.0)
+    assert talk.at(10.07) == [SPEED_1]
+    assert answered(talk, talk.hears('485#C60200CE30000906', 10.071), 10.071) == []
+    assert talk.session.warning == (
+        'write of speed refused by the drive: 06090030h (value out of range): correct '
+        'cyclic_request, the command or the profile')
+    assert talk.session.online
+    assert cycle(talk, 10.09) == [], 'not repeated before the refresh'
+    talk.commands(0, 5.0, 10.1)
+    assert cycle(talk, 10.11) == ['C60232000000']
+    assert talk.session.warning == ''
+
+
+# -- loss -----------------------------------------------------------------------------------------
+
+
+def test_restart_disarms() -> None:
+    talk = armed(command_timeout=0.0)
+    cycle(talk, 10.07)
+    talk.hears(BOOT_UP, 10.075)
+    assert talk.session.state is DriveState.OFFLINE
+    assert [item.armed for item in talk.session.setpoints.items] == [False]
+    assert talk.commands(0, 10.0, 10.08) is CommandOutcome.NOT_ARMED
+    assert answered(talk, talk.at(10.13), 10.13) == ['C60200000000']
+    assert talk.session.state is DriveState.NOT_ARMED
+    assert talk.commands(0, 10.0, 10.14) is CommandOutcome.NOT_ARMED
+    assert cycle(talk, 10.16) == []
+
+
+def test_silent_drive_gets_neutral_before_it_is_left_alone() -> None:
+    talk = armed(command_timeout=0.0, parameter_timeout=0.05)
+    cycle(talk, 10.07)
+    sent = [text for _, text in talk.until(10.6) if text.startswith('505#C602')]
+    assert sent == [STILL_0, STILL_1, STILL_0]
+    assert talk.events(StationLost)
+
+
+# -- the stop -------------------------------------------------------------------------------------
+
+
+def test_stop_is_acknowledged_and_then_silent() -> None:
+    talk = armed(control=CONTROL)
+    cycle(talk, 10.07)
+    assert talk.deactivate(10.075) == ['505#C002002A00000000']
+    assert not talk.session.stopped
+    assert talk.hears('485#C002002A00000000', 10.076) == [STILL_1]
+    assert talk.hears('485#C60200AA00000000', 10.077) == []
+    assert talk.session.stopped
+    assert talk.session.next_timer() == math.inf
+    assert talk.events(StationLost) == [StationLost('deactivated')]
+    assert talk.hears(BOOT_UP, 11.0) == []
+    assert talk.at(20.0) == []
+
+
+def test_stop_is_tried_three_times() -> None:
+    """Within 0.4 s all together: the exchange does not wait much longer."""
+    talk = armed(control=CONTROL)
+    cycle(talk, 10.07)
+    sent = [(10.075, *talk.deactivate(10.075)), *talk.until(20.0)]
+    assert [text for _, text in sent] == [
+        '505#C002002A00000000', '505#C00200AA00000000', '505#C002002A00000000',
+        STILL_1, STILL_0, STILL_1]
+    assert [round(now - 10.075, 3) for now, _ in sent] == [0.0, 0.067, 0.133, 0.2, 0.267, 0.333]
+    assert talk.session.stopped
+
+
+def test_stop_does_not_wait_for_a_request_under_way() -> None:
+    talk = armed()
+    assert talk.submits(read(CLASS), 10.061) == ['505#5E0200A500000000']
+    assert talk.deactivate(10.062) == [STILL_0]
+    assert talk.outcomes() == [['bridge inactive']]
+
+
+def test_refused_stop_is_an_answer() -> None:
+    talk = armed()
+    assert talk.deactivate(10.061) == [STILL_1]
+    assert talk.hears('485#C60200CE22000008', 10.062) == []
+    assert talk.session.stopped
+
+
+def test_nothing_to_stop() -> None:
+    talk = online()
+    assert talk.deactivate(10.06) == []
+    assert talk.session.stopped
+
+
+def test_stopped_node_is_left_alone() -> None:
+    talk = armed()
+    talk.hears(STOPPED, 10.061)
+    assert talk.deactivate(10.062) == []
+    assert talk.session.stopped
+
+
+def test_node_that_restarts_during_the_stop_has_stopped() -> None:
+    talk = armed()
+    assert talk.deactivate(10.061) == [STILL_1]
+    assert talk.hears(BOOT_UP, 10.062) == []
+    assert talk.session.stopped
+    assert talk.at(11.0) == []
+
+
+def test_activation_during_the_stop() -> None:
+    talk = armed()
+    assert talk.deactivate(10.061) == [STILL_1]
+    assert talk.activate(10.07) == ['000#0105']
+    assert talk.hears('485#C60200AA00000000', 10.08) == []
+    assert answered(talk, talk.at(10.121), 10.121) == ['C60200000000']
+    assert talk.session.online
+    assert not talk.session.stopped
+
+
+def test_lost_time_means_neutral() -> None:
+    talk = armed(command_timeout=0.0)
+    cycle(talk, 10.07)
+    assert talk.time_lost(15.0) == ['000#0105']
+    assert talk.events(StationLost) == [StationLost('the bridge stood still')]
+    assert answered(talk, talk.at(15.05), 15.05) == ['C60200000000']
+    assert talk.session.state is DriveState.NOT_ARMED
+
+
+@pytest.mark.parametrize('value', [-0.1, 500.1, math.nan, True])
+def test_bad_commands_change_nothing(value: float) -> None:
+    talk = armed(command_timeout=0.0)
+    with pytest.raises(ValueError, match='.'):
+        talk.commands(0, value, 10.065)
+    assert cycle(talk, 10.07) == ['C60264000000']

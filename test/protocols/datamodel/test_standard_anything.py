@@ -1,0 +1,552 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+An 11-bit drive's codec with anything at all, and its session under anything that may happen.
+
+The observer knows the protocol's bytes and the contract, nothing of the session's inside. It keeps
+its own books: which read is open, until when there has to be silence, which commands went through.
+"""
+
+import math
+from typing import NamedTuple
+
+from builders import (
+    ACTUAL, CONTROL, CURRENT, DAMPING, drive, FLAG, frame, GAIN, KEY, LIMIT, MAXIMUM, ORDER,
+    parameter, RAMP, RO, SPEED, STATUS, WORD,
+)
+from hypothesis import example, given, settings, strategies as st
+from hypothesis.stateful import initialize, invariant, precondition, rule, RuleBasedStateMachine
+import pytest
+from standard_builders import ANSWER
+
+from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.errors import RemoteProtocolError, ValueRefused
+from drive_can_bridge.core.events import (
+    ProcessDataReceived, RequestCompleted, StationFound, StationLost,
+)
+from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.requests import BUSY, Failure, ReadRequest, WriteRequest
+from drive_can_bridge.core.setpoints import CommandOutcome
+from drive_can_bridge.protocols.datamodel import standard
+from drive_can_bridge.protocols.families import FAMILIES
+
+#: more than rounding errors, less than anything that matters
+SLACK = 1e-7
+TIMEOUT = 0.1
+QUARANTINE = 0.1
+#: between an answer and the next read
+PAUSE = 0.001
+GAP = 0.02
+FAR = parameter('heat', 300, access=RO)
+RAW = parameter('p600', 600, listed=False)
+READABLE = (GAIN, DAMPING, FLAG, RAMP, MAXIMUM, STATUS, FAR, RAW)
+WRITABLE = (GAIN, DAMPING, FLAG, RAMP, MAXIMUM, ORDER, KEY, KEY, RAW)
+#: in EEPROM, or nobody knows
+EEPROMS = {30, 31, 44, 600}
+RAMS = {40, 41, 42, 43}
+SETPOINTS = (50, 51)
+CONTROL_WORD = 52
+REGISTERS = (30, 31, 40, 41, 42, 43, 44, 50, 51, 52, 209, 210, 211, 300, 600)
+
+
+# -- the codec ------------------------------------------------------------------------------------
+
+WORDS = st.lists(st.integers(0, 0xFFFF), min_size=1, max_size=4)
+
+
+@given(st.integers(0, 0x7FF), st.integers(0, 0xFFFF), st.integers(1, 4), st.integers(0, 0xFFFF),
+       WORDS)
+def test_telegrams(identifier: int, number: int, count: int, word: int, words: list[int]) -> None:
+    written = standard.encode_write(identifier, number, word)
+    assert written.data == bytes([6, number & 255, number >> 8, word & 255, word >> 8, 0, 0, 0])
+    assert standard.decode_request(written) == standard.Write(number, word)
+    if number + count <= 0x10000:
+        asked = standard.encode_read_request(identifier, number, count)
+        assert asked.data == bytes([3, number & 255, number >> 8, count, 0, 0, 0, 0])
+        assert standard.decode_request(asked) == standard.ReadRequest(number, count)
+    answer = standard.encode_read_response(identifier, words)
+    assert (answer.identifier, len(answer.data), answer.extended) == (identifier, 8, False)
+    for wanted in range(1, len(words) + 1):
+        assert standard.decode_read_response(answer, wanted) == tuple(words[:wanted])
+
+
+@given(st.integers(0, 0x1FFFFFFF), st.binary(max_size=8), st.booleans(), st.integers(1, 4),
+       st.booleans())
+@example(0x3F1, bytes.fromhex('03FFFF0200000000'), False, 1, False)
+@example(0x3F1, bytes.fromhex('03D1000000000000'), False, 1, False)
+@example(0x7F1, bytes(2), False, 1, True)
+def test_anything(identifier: int, data: bytes, is_extended: bool, count: int,
+                  strict: bool) -> None:
+    heard = Frame(identifier if is_extended else identifier & 0x7FF, data, is_extended)
+    try:
+        request = standard.decode_request(heard)
+    except RemoteProtocolError as error:
+        assert str(error)
+    else:
+        assert not is_extended
+        assert len(data) == 8
+        assert data[0] == (6 if isinstance(request, standard.Write) else 3)
+    try:
+        words = standard.decode_read_response(heard, count, strict=strict)
+    except RemoteProtocolError as error:
+        assert str(error)
+        assert is_extended or len(data) < 2 * count or strict and len(data) != 8
+    else:
+        assert not is_extended
+        assert [word % 256 for word in words] == list(data[0:2 * count:2])
+        assert [word // 256 for word in words] == list(data[1:2 * count:2])
+
+
+# -- the session ----------------------------------------------------------------------------------
+
+
+class Asked(NamedTuple):
+    """A read on the wire."""
+
+    number: int
+    count: int
+    at: float
+
+
+class Observer:
+    """Checks every frame that the session sends."""
+
+    def __init__(self, *, period: float, timeout: float, immediate: bool, strict: bool) -> None:
+        self.period = period
+        self.timeout = timeout
+        self.immediate = immediate
+        self.strict = strict
+        self.active = self.bus = self.online = False
+        self.farewell = 0          # setpoints that a drive may still get which is not online
+        self.asked: Asked | None = None
+        self.quiet_until = -math.inf
+        self.eeprom_at = -math.inf
+        self.raws = [0, 0]
+        self.since = [-math.inf, -math.inf]
+        self.armed = [False, False]
+        self.enabling = False
+        #: what the words could have been before the call that is being looked at
+        self.before: list[set[int]] = [{0}, {0}, {0}]
+
+    def call_begins(self) -> None:
+        """Keep what may be sent until this call finds out otherwise."""
+        self.before = self.possible()
+
+    def possible(self) -> list[set[int]]:
+        """Return what may be in the setpoints, and in the control word."""
+        words = [{raw & 0xFFFF} if armed else {0} for raw, armed in zip(self.raws, self.armed)]
+        return [*words, {0, 1, 2, 0x80} if self.enabling else {0, 2, 0x80}]
+
+    def disarm(self) -> None:
+        self.online = self.enabling = False
+        self.armed = [False, False]
+
+    def lost(self) -> None:
+        self.disarm()
+        # three times each, and what was due when it happened
+        self.farewell = 4 * 3
+
+    def cleared(self) -> None:
+        """Take note that the session wants no answer any more; silence is kept all the same."""
+        self.asked = None
+
+    def commanded(self, index: int, raw: int, outcome: CommandOutcome, now: float) -> None:
+        if outcome is CommandOutcome.NOT_ARMED:
+            assert not (self.online and self.active and self.immediate)
+            if self.timeout and now - self.since[index] > self.timeout:
+                self.armed[index] = False
+            assert not self.armed[index], 'a command in time has to count'
+            return
+        assert self.online, 'only a drive that answers is armed'
+        assert self.active
+        if outcome is CommandOutcome.ACCEPTED:
+            assert self.armed[index]
+        else:
+            assert self.immediate or abs(raw) <= 1, 'armed by something that is not neutral'
+        self.armed[index], self.raws[index], self.since[index] = True, raw, now
+
+    def sees(self, sent: Frame, now: float) -> None:
+        assert self.bus, 'nothing is sent on a bus that is down'
+        assert not sent.extended
+        assert sent.identifier == 0x3F1
+        data = sent.data
+        assert len(data) == 8
+        number = data[1] + 256 * data[2]
+        if data[0] == 3:
+            assert data[4:] == bytes(4)
+            self.sees_read(number, data[3], now)
+        else:
+            assert data[0] == 6
+            assert data[5:] == bytes(3)
+            self.sees_write(number, data[3] + 256 * data[4], now)
+
+    def sees_read(self, number: int, count: int, now: float) -> None:
+        assert self.active, 'nothing is asked after the stop'
+        assert 1 <= count <= 4
+        assert number + count <= 0x10000
+        assert self.asked is None or now >= self.asked.at + TIMEOUT - SLACK, 'one read at a time'
+        assert now >= self.quiet_until - SLACK, 'silence'
+        assert now >= self.eeprom_at + GAP - SLACK, 'reads wait for the EEPROM'
+        self.asked = Asked(number, count, now)
+        self.quiet_until = now + TIMEOUT + QUARANTINE
+
+    def sees_write(self, number: int, word: int, now: float) -> None:
+        if number in SETPOINTS or number == CONTROL_WORD:
+            index = (*SETPOINTS, CONTROL_WORD).index(number)
+            if not self.online:
+                self.farewell -= 1
+                assert self.farewell >= 0, 'a drive that does not answer is left alone'
+            allowed = self.before[index] | self.possible()[index] | {0}
+            assert word in allowed, f'{number} := {word}, possible {allowed}'
+            if number != CONTROL_WORD and word and self.timeout:
+                assert now - self.since[index] <= self.timeout + 2 * self.period + SLACK, 'stale'
+            return
+        assert self.active
+        assert number in EEPROMS | RAMS
+        if number in EEPROMS:
+            assert now >= self.eeprom_at + GAP - SLACK, 'EEPROM writes are paced'
+            self.eeprom_at = now
+
+    def timer_ran(self, now: float) -> None:
+        """Take note that the session had the chance to see a time-out."""
+        if self.asked is not None and now >= self.asked.at + TIMEOUT:
+            self.asked = None
+            self.quiet_until = max(self.quiet_until, now + QUARANTINE)
+
+    def hears(self, heard: Frame, now: float) -> None:
+        """Keep the books before the session gets a frame."""
+        if heard.extended or heard.identifier != 0x7F1:
+            return
+        if self.asked is None:
+            self.quiet_until = max(self.quiet_until, now + QUARANTINE)
+        elif len(heard.data) >= (8 if self.strict else 2 * self.asked.count):
+            self.quiet_until = now + PAUSE
+            self.asked = None
+
+
+class SessionMachine(RuleBasedStateMachine):
+    """Everything that may happen to a session."""
+
+    @initialize(period=st.sampled_from([0.02, 0.02, 0.3]), timeout=st.sampled_from([0.0, 0.05]),
+                immediate=st.booleans(), control=st.sampled_from(['', 'listed', 'by hand']),
+                strict=st.booleans(), refresh=st.sampled_from([0.0, 0.05, 0.5]))
+    def begin(self, period: float, timeout: float, immediate: bool, control: str, strict: bool,
+              refresh: float) -> None:
+        setpoints = (SPEED, LIMIT, WORD) if control == 'listed' else (SPEED, LIMIT)
+        self.session = FAMILIES['datamodel_standard'].make_session(drive(
+            'datamodel_standard', period=period, command_timeout=timeout,
+            rearm_immediate=immediate, control=CONTROL if control else None,
+            table=(SPEED, LIMIT, WORD, ACTUAL, CURRENT, STATUS, FAR, *WRITABLE[:-2]),
+            request=setpoints, response=(ACTUAL, CURRENT, STATUS, FAR), parameter_timeout=TIMEOUT,
+            quarantine=QUARANTINE, refresh_interval=refresh,
+            length_policy='strict' if strict else 'lenient'))
+        self.observer = Observer(period=period, timeout=timeout, immediate=immediate,
+                                 strict=strict)
+        self.now = 1000.0
+        self.open: list[ReadRequest | WriteRequest] = []
+        self.tickets: list[object] = []
+        self.registers = dict.fromkeys(REGISTERS, 0)
+        self.registers[211] = 1
+        self.unanswered: list[Frame] = []
+        self.samples = 0
+
+    # -- looking ----------------------------------------------------------------------------------
+
+    def look(self, *, silent: bool = False) -> None:
+        """Fetch and check everything that the session gives out."""
+        observer = self.observer
+        for event in self.session.take_events():
+            if isinstance(event, StationLost):
+                assert observer.online, 'lost, but it was not there'
+                observer.lost()
+            elif isinstance(event, StationFound):
+                assert not observer.online
+                assert observer.active
+                assert observer.bus
+                observer.online = True
+            elif isinstance(event, ProcessDataReceived):
+                assert self.session.active
+                assert len(event.raws) == 4
+                assert event.received_at <= self.now
+                self.samples += 1
+            elif isinstance(event, RequestCompleted):
+                assert event.request in self.open, 'one answer per request'
+                self.open.remove(event.request)
+                assert len(event.outcomes) == len(event.request)
+        for outcome in self.session.take_control_outcomes():
+            assert outcome.ticket in self.tickets, 'one answer per control request'
+            self.tickets.remove(outcome.ticket)
+        sent = self.session.take_frames()
+        assert not (silent and sent)
+        for entry in sent:
+            observer.sees(entry, self.now)
+            self.apply(entry)
+        if sent:
+            self.session.frames_left(self.now)
+        observer.call_begins()
+
+    def apply(self, sent: Frame) -> None:
+        """Do what a drive does with a frame; its answers wait until somebody hands them over."""
+        number = sent.data[1] + 256 * sent.data[2]
+        if sent.data[0] == 6:
+            self.registers[number] = sent.data[3] + 256 * sent.data[4]
+        else:
+            self.unanswered.append(sent)
+            del self.unanswered[:-3]
+
+    def timer(self) -> None:
+        """Run the timer until there is nothing left to be done now."""
+        for _ in range(20):
+            stopped = self.session.stopped
+            self.session.handle_timer(self.now)
+            self.look(silent=stopped)
+            self.observer.timer_ran(self.now)
+            if self.session.next_timer() > self.now:
+                return
+        raise AssertionError('the timer spins')
+
+    # -- the passage of time ----------------------------------------------------------------------
+
+    @rule(steps=st.integers(1, 30))
+    def time_passes_well(self, steps: int) -> None:
+        self.time_passes_in_time(steps, True)
+
+    @rule(steps=st.integers(1, 12), answering=st.booleans())
+    def time_passes_in_time(self, steps: int, answering: bool) -> None:
+        for _ in range(steps):
+            due = self.session.next_timer()
+            if due > self.now + 2.0:
+                self.now += 0.01
+                return
+            self.now = max(self.now, due)
+            self.timer()
+            while answering and self.unanswered:
+                self.now += 0.0002
+                self.drive_answers(0)
+
+    @rule(pause=st.sampled_from([0.0, 0.0001, 0.003, 0.017, 0.06, 0.101, 0.4, 0.99]))
+    def time_passes_late(self, pause: float) -> None:
+        self.now += pause
+        self.timer()
+
+    def time_is_lost(self) -> None:
+        self.now += 1.0
+        self.observer.disarm()
+        if self.session.online:
+            self.observer.online = True  # until the event says otherwise
+        self.session.time_lost(self.now)
+        self.look()
+
+    # -- the drive --------------------------------------------------------------------------------
+
+    @precondition(lambda self: self.unanswered)
+    @rule(choice=st.integers(0, 2), length=st.sampled_from([8, 7, 6, 2, 1]))
+    def drive_answers(self, choice: int, length: int = 8) -> None:
+        asked = self.unanswered.pop(min(choice, len(self.unanswered) - 1))
+        number = asked.data[1] + 256 * asked.data[2]
+        numbers = range(number, number + asked.data[3])
+        if all(entry in self.registers for entry in numbers):
+            data = b''.join(self.registers[entry].to_bytes(2, 'little') for entry in numbers)
+            self.hears(Frame(0x7F1, data.ljust(8, b'\xA5')[:length], False))
+
+    def hears(self, heard: Frame) -> None:
+        self.observer.hears(heard, self.now)
+        self.session.receive_frame(heard, self.now)
+        self.look()
+
+    @rule(number=st.sampled_from([30, 40, 209, 211, 211, 211]),
+          word=st.sampled_from([0, 1, 3, 8, 0xFFFF]))
+    def drive_changes(self, number: int, word: int) -> None:
+        self.registers[number] = word
+
+    @rule(identifier=st.one_of(st.sampled_from([0x7F1, 0x7F1, 0x3F1, 0x7F2, 0x103FFFF0]),
+                               st.integers(0, 0x1FFFFFFF)),
+          data=st.one_of(st.binary(max_size=8), st.just(bytes(8))), is_extended=st.booleans())
+    def anything_arrives(self, identifier: int, data: bytes, is_extended: bool) -> None:
+        self.hears(Frame(identifier if is_extended else identifier & 0x7FF, data, is_extended))
+
+    # -- users ------------------------------------------------------------------------------------
+
+    @rule(index=st.integers(0, 1), value=st.sampled_from([0.0, 5.0, 7.5]))
+    def good_command(self, index: int, value: float) -> None:
+        self.command(index, value)
+        self.time_passes_in_time(4, True)
+
+    @rule(index=st.integers(0, 1), value=st.sampled_from([0.0, 0.1, 5.0, 5, math.nan, 1e6, True]))
+    def command(self, index: int, value: float) -> None:
+        try:
+            outcome = self.session.command(index, value, self.now)
+        except ValueRefused:
+            assert not 0 <= value <= 5 or value is True
+            return
+        self.observer.commanded(index, round(10 * value), outcome, self.now)
+        self.look(silent=True)
+
+    @rule(index=st.integers(0, 1), value=st.sampled_from([5.0, 7.5]))
+    def commander_falls_silent(self, index: int, value: float) -> None:
+        self.command(index, 0.0)
+        self.command(index, value)
+        self.time_passes_in_time(40, True)
+
+    @rule(parameters=st.lists(st.sampled_from(READABLE), max_size=5), times=st.integers(1, 80))
+    def users_read(self, parameters: list[object], times: int) -> None:
+        for _ in range(times):
+            self.submit(ReadRequest(tuple(parameters)))
+
+    @rule(items=st.lists(st.tuples(st.sampled_from(WRITABLE), st.integers(0, 1)), max_size=3),
+          atomic=st.booleans())
+    def users_write(self, items: list[tuple[object, int]], atomic: bool) -> None:
+        self.submit(WriteRequest(tuple(items), atomic))
+
+    def submit(self, request: ReadRequest | WriteRequest) -> None:
+        waiting = len(self.open)
+        self.open.append(request)
+        self.session.submit(request, self.now)
+        refused = any(
+            isinstance(event, RequestCompleted) and event.request is request
+            and Failure(BUSY) in event.outcomes for event in self.session._events)
+        possible = self.observer.active and self.observer.bus and len(request) > 0
+        if refused or possible and waiting == 65:   # 64 wait; one more may be under way
+            assert refused and possible and waiting in (64, 65)
+        self.look()
+        # a request may have been what noticed the time-out
+        assert len(self.open) <= 65
+
+    @rule(action=st.sampled_from(ControlAction))
+    def control(self, action: ControlAction) -> None:
+        if action is ControlAction.ENABLE and self.session.online:
+            self.observer.enabling = True
+        ticket = self.session.request_control(action, self.now)
+        if isinstance(ticket, str):
+            assert ticket
+        else:
+            assert self.observer.active
+            self.tickets.append(ticket)
+        self.look()
+
+    # -- the life of a session --------------------------------------------------------------------
+
+    @rule(kind=st.integers(0, 5))
+    def upset(self, kind: int) -> None:
+        (self.bus_goes_up, self.bus_goes_down, self.activate, self.deactivate,
+         self.deactivate_to_the_end, self.time_is_lost)[kind]()
+
+    @rule(bus=st.booleans(), steps=st.integers(0, 3))
+    def restart(self, bus: bool, steps: int) -> None:
+        """Begin anew while the last read may be unanswered."""
+        self.time_passes_in_time(steps, False)
+        if bus:
+            self.bus_goes_down()
+            self.bus_goes_up()
+        else:
+            self.deactivate()
+            self.activate()
+        self.time_passes_in_time(2, False)
+
+    @precondition(lambda self: not self.session.online)
+    @rule()
+    def all_is_well(self) -> None:
+        """Bring the drive online."""
+        if not self.observer.bus:
+            self.bus_goes_up()
+        if not self.observer.active:
+            self.activate()
+        for _ in range(3):
+            self.time_passes_in_time(8, True)
+
+    def bus_goes_up(self) -> None:
+        self.observer.bus = True
+        self.session.bus_up(self.now)
+        self.look()
+
+    def bus_goes_down(self) -> None:
+        self.session.bus_down(self.now, 'unplugged')
+        self.observer.cleared()
+        self.observer.bus = False
+        self.look(silent=True)
+        assert not self.open
+        assert not self.tickets
+        assert self.session.stopped
+        assert self.session.next_timer() == math.inf
+
+    def activate(self) -> None:
+        self.observer.active = True
+        self.session.activate(self.now)
+        self.look()
+
+    def deactivate(self) -> None:
+        self.observer.active = False
+        if self.session.online or self.observer.farewell:
+            self.observer.lost()  # what it was being told already begins anew
+        self.observer.online = self.session.online  # until the event says otherwise
+        self.observer.enabling = False
+        self.observer.armed = [False, False]
+        self.observer.before = self.observer.possible()
+        self.observer.cleared()
+        self.session.deactivate(self.now)
+        self.look()
+        assert not self.open
+        assert not self.tickets
+
+    def deactivate_to_the_end(self) -> None:
+        self.deactivate()
+        end = self.now + 2.0
+        while self.session.next_timer() <= end:
+            self.now = max(self.now, self.session.next_timer())
+            self.timer()
+        assert self.session.stopped
+        assert self.session.next_timer() == math.inf
+        assert not self.session.online
+
+    # -- always -----------------------------------------------------------------------------------
+
+    @invariant()
+    def counts_are_right(self) -> None:
+        if not hasattr(self, 'session'):
+            return
+        assert self.session._waiting_requests() <= 64
+        assert self.session.online == self.observer.online
+        if not self.observer.bus:
+            assert not self.session.online
+            assert self.session.stopped
+        assert not self.session.take_frames()
+        assert self.session.statistics.exchanges == self.samples
+        if not self.session.online:
+            assert not any(item.armed for item in self.session.setpoints.items)
+        if self.observer.active and self.observer.bus:
+            assert self.session.next_timer() < math.inf, 'polling goes on'
+
+    def teardown(self) -> None:
+        if hasattr(self, 'session'):
+            self.deactivate_to_the_end()
+
+
+TestSession = SessionMachine.TestCase
+TestSession.settings = settings(max_examples=150, stateful_step_count=50, deadline=None)
+pytestmark = pytest.mark.timeout(600)
+
+
+@given(frames=st.lists(st.tuples(st.integers(0, 0x1FFFFFFF), st.binary(max_size=8),
+                                 st.booleans()), max_size=20),
+       state=st.sampled_from(['inactive', 'looking', 'online', 'stopping']))
+def test_no_frame_ever_raises(frames: list[tuple[int, bytes, bool]], state: str) -> None:
+    session = FAMILIES['datamodel_standard'].make_session(
+        drive('datamodel_standard', control=CONTROL))
+    session.bus_up(0.0)
+    if state != 'inactive':
+        session.activate(1.0)
+        session.handle_timer(1.0)
+    if state in ('online', 'stopping'):
+        session.receive_frame(frame(ANSWER), 1.001)
+        assert session.online
+    if state == 'stopping':
+        session.deactivate(1.002)
+    now = 1.002
+    near = [0x7F1, 0x3F1, 0x7F1]
+    for place, (identifier, data, is_extended) in enumerate(frames):
+        if place % 2:
+            identifier = near[place % 3]
+            is_extended = False
+        session.receive_frame(Frame(identifier if is_extended else identifier & 0x7FF, data,
+                                    is_extended), now)
+        session.handle_timer(now)
+        now += 0.001

@@ -1,0 +1,139 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+A process that stands still for a moment: answers wait in buffers until somebody takes them.
+
+The silence after an unanswered read is worth nothing when nobody listened to it. The timer thread
+may be the first to go on; what the reader thread finds then is from before.
+"""
+
+import heapq
+import random
+
+from builders import Conversation, drive, frame, GAIN, read
+import pytest
+from standard_builders import ANSWER, ASK, online
+from test_standard_late import ASKED, LateDrive, POLLED
+
+from drive_can_bridge.core.events import ProcessDataReceived, RequestCompleted
+from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.requests import ReadRequest, ReadValue
+
+
+class SlowDrive(LateDrive):
+    """Answers late or not at all, but never twice."""
+
+    def latenesses(self) -> list[float]:
+        return super().latenesses()[:1]
+
+
+def test_an_answer_from_before_the_question_is_none() -> None:
+    talk = online()
+    assert talk.until(10.0205) == [(10.02, ASK)]
+    # as stamped by the kernel, it was received at 10.019 s
+    talk.session.receive_frame(frame(ANSWER), 10.021, age=0.002)
+    assert talk.samples() == []
+    assert talk.session.statistics.rejected == 1
+    # the question is still open
+    talk.session.receive_frame(frame(ANSWER), 10.023, age=0.001)
+    assert talk.samples() == [(1000, 250, 1)]
+
+
+def quarantined() -> Conversation:
+    """Return a conversation at 10.15 s, with silence until 10.22 s and a user who waits."""
+    talk = online()
+    assert talk.until(10.0205) == [(10.02, ASK)]
+    assert talk.until(10.15) == []
+    talk.submits(read(GAIN), 10.15)
+    return talk
+
+
+def test_silence_that_nobody_listened_to() -> None:
+    talk = quarantined()
+    # 0.2 s too late, and the timer thread is the first to go on
+    assert talk.at(10.42) == []
+    assert talk.hears(ANSWER, 10.421) == []
+    assert talk.samples() == []
+    assert talk.session.statistics.rejected == 1
+    reads = [when for when, text in talk.until(10.55) if text.startswith('3F1#03')]
+    # a silence after that answer; setpoints are refreshed just then
+    assert reads == [pytest.approx(10.521, abs=0.005)]
+
+
+def test_when_nothing_was_in_the_buffers_it_goes_on_soon() -> None:
+    talk = quarantined()
+    assert talk.at(10.42) == []
+    sent = talk.until(10.44)
+    assert len(sent) == 1
+    assert sent[0][0] == pytest.approx(10.43)
+
+
+def test_who_is_always_late_reads_all_the_same() -> None:
+    talk = quarantined()
+    assert talk.at(10.42) == []
+    assert len(talk.at(10.5)) == 1
+
+
+def test_a_timer_in_time_loses_none() -> None:
+    talk = quarantined()
+    assert [when for when, _ in talk.until(10.3)] == [pytest.approx(10.22)]
+
+
+def test_setpoints_do_not_wait_for_that() -> None:
+    talk = online(rearm_immediate=True)
+    assert talk.until(10.0205) == [(10.02, ASK)]
+    talk.until(10.15)
+    talk.commands(0, 150.0, 10.4)
+    assert talk.at(10.42) == ['3F1#063200DC05000000']
+
+
+@pytest.mark.parametrize('seed', [1, 2])
+def test_no_answer_is_taken_for_another_by_somebody_who_stumbles(seed: int) -> None:
+    """As in the run without stalls; here a tenth of all timers come up to 0.4 s too late."""
+    chance = random.Random(seed)
+    partner = SlowDrive(chance)
+    session = Conversation(drive(
+        'datamodel_standard', table=(*POLLED, *ASKED), request=(), response=POLLED,
+        parameter_retries=1)).session
+    now = 10.0
+    session.bus_up(now)
+    session.activate(now)
+    samples = good = open_requests = 0
+    while partner.reads < 3000:
+        due = session.next_timer()
+        stalled = chance.random() < 0.1
+        if stalled:  # first the timer, then what lay in the buffer
+            now = max(now, due) + chance.uniform(0.0, 0.4)
+            session.handle_timer(now)
+        elif partner.answers and partner.answers[0][0] <= due:
+            now, _, heard = heapq.heappop(partner.answers)
+            session.receive_frame(heard, now)
+        else:
+            now = max(now, due)
+            session.handle_timer(now)
+        buffered: list[Frame] = []
+        while stalled and partner.answers and partner.answers[0][0] <= now:
+            buffered.append(heapq.heappop(partner.answers)[2])
+        for place in range(len(buffered) + 1):
+            if open_requests < 3 and chance.random() < 0.3:
+                open_requests += 1
+                session.submit(ReadRequest(tuple(
+                    chance.sample(ASKED, chance.randint(1, 4)))), now)
+            for sent in session.take_frames():
+                partner.hear(sent, now)
+            for event in session.take_events():
+                if isinstance(event, ProcessDataReceived):
+                    samples += 1
+                    for parameter_, raw in zip(POLLED, event.raws):
+                        assert raw in partner.history[parameter_.number]
+                elif isinstance(event, RequestCompleted):
+                    open_requests -= 1
+                    assert isinstance(event.request, ReadRequest)
+                    for parameter_, outcome in zip(event.request.parameters, event.outcomes):
+                        if isinstance(outcome, ReadValue):
+                            good += 1
+                            assert outcome.raw in partner.history[parameter_.number]
+            if place < len(buffered):
+                now += 0.0005
+                session.receive_frame(buffered[place], now)
+    assert samples > 50
+    assert good > 100

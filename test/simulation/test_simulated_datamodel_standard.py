@@ -1,0 +1,493 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The simulated DataModel drive with 11-bit identifiers: golden vectors and literal bytes.
+
+It shares the codec with the bridge and would share its mistakes; so what goes in and what is
+compared here are the literal bytes of the vectors and of the manual's tables.
+"""
+
+from collections.abc import Iterable
+from dataclasses import replace
+import json
+from pathlib import Path
+from typing import Any
+
+from hypothesis import given, strategies as st
+import pytest
+from simulation_builders import (
+    ACTUAL_SPEED, ask, bridge, configuration, CONTROL, CONTROL_WORD, EEPROM, EXAMPLE, frame,
+    MOTOR_CURRENT, parameter, RAM, SPEED_SETPOINT, STATUS_WORD, WO,
+)
+
+from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.errors import LocalProtocolError, ValueRefused
+from drive_can_bridge.core.frame import Frame, Route
+from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.simulation.datamodel_standard import SimulatedDataModelStandardDrive
+from drive_can_bridge.simulation.drives import make_drives
+
+VECTORS = json.loads((Path(__file__).parents[1] / 'vectors' / 'datamodel.json').read_text(
+    encoding='utf-8'))['vectors']
+NUMBERS = (30, 31, 50, 209, 0x1234, 0x1235, 0xFFFD, 0xFFFE, 0xFFFF)
+UNTOUCHED = 0x5151
+
+READ_RAMP = '3F1#031E000100000000'
+LOST = 'EEPROM write less than 20 ms after the one before (lost)'
+TOO_EARLY = 'read while an EEPROM write is under way (not answered)'
+UNDEFINED = 'frame that the manual does not define (ignored)'
+
+
+def standard(parameters: Iterable[Parameter] = EXAMPLE, **options: Any) -> DriveConfiguration:
+    """Make the configuration of an 11-bit drive."""
+    return replace(configuration(parameters, **options), protocol='datamodel_standard')
+
+
+def drive(parameters: Iterable[Parameter] = EXAMPLE, *, neighbours: Iterable[Route] = (),
+          **options: Any) -> SimulatedDataModelStandardDrive:
+    """Make an 11-bit drive."""
+    return SimulatedDataModelStandardDrive(
+        standard(parameters, **options), neighbours=tuple(neighbours))
+
+
+# -- golden vectors -------------------------------------------------------------------------------
+
+
+def rows(*kinds: str) -> list[Any]:
+    """Return the 11-bit vectors of some kinds."""
+    return [pytest.param(row, id=f'{row["id"]}-{row["name"]}') for row in VECTORS
+            if row['protocol'] == 'standard' and row['kind'] in kinds]
+
+
+def data_of(row: dict[str, Any]) -> bytes:
+    return bytes.fromhex(row['data_hex'])
+
+
+def frame_of(row: dict[str, Any]) -> Frame:
+    return Frame(int(row['can_id_hex'], 16), data_of(row), row['is_extended_id'])
+
+
+def register_name(number: int) -> str:
+    """Return the name of a register of ``plain_drive``; map entries have raw names only."""
+    return f'p{number}' if 122 <= number <= 129 else f'reg_{number}'
+
+
+def plain_drive(row: dict[str, Any]) -> SimulatedDataModelStandardDrive:
+    """Make a drive whose parameters are plain registers, with the addresses of the vector."""
+    fields = row['fields']
+    address = fields.get('address', 1)
+    bases = {}
+    if address == 20:
+        bases = {'request_id_base': 0x300, 'response_id_base': 0x380}
+    made = drive([parameter(f'reg_{number}', number, storage=RAM) for number in NUMBERS],
+                 station=address, request=(), response=(), **bases)
+    for number in NUMBERS:
+        made.set_value(f'reg_{number}', UNTOUCHED)
+    return made
+
+
+def test_there_are_vectors_of_every_kind() -> None:
+    assert len(rows('std_read_request')) >= 5
+    assert len(rows('std_read_response')) >= 6
+    assert len(rows('std_write')) >= 2
+    assert len(rows('invalid')) >= 3
+
+
+@pytest.mark.parametrize('row', rows('std_read_request'))
+def test_read_request(row: dict[str, Any]) -> None:
+    made = plain_drive(row)
+    fields = row['fields']
+    address, count = fields['address'], fields['count']
+
+    made.receive_frame(frame_of(row), 0.0)
+
+    answer, = made.frames_to_send()
+    assert answer.identifier == {1: 0x7F1, 15: 0x7FF, 20: 0x394}[address]
+    assert not answer.extended
+    used = b'\0' * 8 if fields['pnu'] == 122 else b'\x51' * 2 * count
+    assert answer.data == used[:2 * count] + b'\xA5' * (8 - 2 * count)
+    assert not made.violations
+
+
+#: what is asked for the answers of the vectors: bytes of the manual's table, by hand
+QUESTIONS = {
+    'V55': ('3F1#03D1000100000000', 209), 'V56': ('3F1#03D1000100000000', 209),
+    'V58': ('3F1#037A000400000000', 122), 'V60': ('3F1#0334120200000000', 0x1234),
+    'V64': ('3FF#03D1000100000000', 209), 'V66': ('314#031E000200000000', 30),
+}
+
+
+@pytest.mark.parametrize('row', rows('std_read_response'))
+def test_read_response(row: dict[str, Any]) -> None:
+    question, first = QUESTIONS[row['id']]
+    made = plain_drive(row)
+    data = data_of(row)
+    count = row['fields']['expected_count']
+    for place in range(count):
+        made.set_value(register_name(first + place),
+                       data[2 * place] + 256 * data[2 * place + 1])
+
+    made.receive_frame(frame(question), 0.0)
+
+    answer, = made.frames_to_send()
+    assert answer.identifier == int(row['can_id_hex'], 16)
+    assert not answer.extended
+    assert answer.data[:2 * count] == data[:2 * count]
+    assert answer.data[2 * count:] == b'\xA5' * (8 - 2 * count)
+
+
+@pytest.mark.parametrize('row', rows('std_write'))
+def test_write(row: dict[str, Any]) -> None:
+    made = plain_drive(row)
+
+    made.receive_frame(frame_of(row), 0.0)
+
+    data = data_of(row)
+    expected = dict.fromkeys(NUMBERS, UNTOUCHED)
+    expected[row['fields']['pnu']] = data[3] + 256 * data[4]
+    assert {number: made.value(f'reg_{number}') for number in NUMBERS} == expected
+    assert made.frames_to_send() == []
+    assert not made.violations
+
+
+@pytest.mark.parametrize('row', rows('invalid'))
+def test_what_the_manual_does_not_define(row: dict[str, Any]) -> None:
+    made = plain_drive(row)
+
+    made.receive_frame(frame_of(row), 0.0)
+
+    assert made.frames_to_send() == []
+    assert {made.value(f'reg_{number}') for number in NUMBERS} == {UNTOUCHED}
+    assert made.violations == {UNDEFINED: 1}
+    assert made.requests == 0
+
+
+@pytest.mark.parametrize('text', [
+    '3F1#', '3F1#03', '3F1#03D10001', '3F1#03D10001000000', '3F1#0632006400',
+    '3F1#0032000100000000', '3F1#FF32000100000000', '3F1#10D1000100000000',
+    '3F1#03FFFF0200000000', '3F1#03FDFF0400000000',         # past parameter 65535
+    '3F1#03D1000600000000', '3F1#03D100FF00000000',
+])
+def test_other_frames_that_it_does_not_understand(text: str) -> None:
+    made = drive()
+    assert ask(made, text, 0.0) == []
+    assert made.violations == {UNDEFINED: 1}
+
+
+# -- reads ----------------------------------------------------------------------------------------
+
+
+def test_reads_of_one_to_four_with_junk_in_unused_words() -> None:
+    table = [parameter(f'x_{number}', number, storage=RAM) for number in range(300, 304)]
+    made = drive(table, request=(), response=())
+    for number in range(300, 304):
+        made.set_value(f'x_{number}', 0x0100 * (number - 299) + 0xE0)
+    assert ask(made, '3F1#032C010100000000', 0.0) == ['7F1#E001A5A5A5A5A5A5']
+    assert ask(made, '3F1#032C010200000000', 0.0) == ['7F1#E001E002A5A5A5A5']
+    assert ask(made, '3F1#032C010300000000', 0.0) == ['7F1#E001E002E003A5A5']
+    assert ask(made, '3F1#032C010400000000', 0.0) == ['7F1#E001E002E003E004']
+    assert made.requests == made.answers == 4
+    assert not made.violations
+
+
+def test_a_window_with_an_unknown_parameter_is_not_answered() -> None:
+    made = drive()
+    # 209 to 211 exist, 212 does not, nor does 208
+    assert ask(made, '3F1#03D1000300000000', 0.0) == ['7F1#0000C8000300A5A5']
+    assert ask(made, '3F1#03D1000400000000', 0.0) == []
+    assert ask(made, '3F1#03D0000200000000', 0.0) == []
+    assert ask(made, '3F1#03D4000100000000', 0.0) == []
+    assert (made.requests, made.answers) == (4, 1)
+    assert not made.violations
+
+
+def test_a_write_only_parameter_is_written_and_not_read() -> None:
+    made = drive([*EXAMPLE, parameter('user_command', 70, access=WO, storage=RAM)])
+    assert ask(made, '3F1#0646000100000000', 0.0) == []
+    assert made.value('user_command') == 1
+    assert ask(made, '3F1#0346000100000000', 0.0) == []
+
+
+def test_unused_bytes_of_requests_have_to_be_zero() -> None:
+    made = drive([*EXAMPLE, parameter('gain', 60, storage=RAM)])
+    assert ask(made, '3F1#031E000100000001', 0.0) == ['7F1#6400A5A5A5A5A5A5']
+    assert ask(made, '3F1#063C000700000100', 0.0) == []
+    assert made.value('gain') == 7
+    assert made.violations == {
+        'read request with unused bytes other than 00h': 1,
+        'write with unused bytes other than 00h': 1}
+    assert made.take_notices() == [
+        'conveyor: violation: read request with unused bytes other than 00h',
+        'conveyor: violation: write with unused bytes other than 00h']
+
+
+def test_the_motor_moves_between_reads() -> None:
+    made = drive()
+    assert ask(made, '3F1#063200983A000000', 10.0) == []   # 1500.0 rpm
+    # at 3000 rpm per second
+    assert ask(made, '3F1#03D1000100000000', 10.25) == ['7F1#4C1DA5A5A5A5A5A5']   # 750.0
+    assert ask(made, '3F1#03D1000100000000', 10.75) == ['7F1#983AA5A5A5A5A5A5']
+
+
+def test_a_setpoint_beyond_the_limits_is_clamped() -> None:
+    made = drive()
+    ask(made, '3F1#063200FF7F000000', 0.0)      # 3276.7 rpm becomes 3000.0 = 7530h
+    assert ask(made, '3F1#0332000100000000', 0.0) == ['7F1#3075A5A5A5A5A5A5']
+    ask(made, '3F1#0632000080000000', 0.0)
+    assert ask(made, '3F1#0332000100000000', 0.0) == ['7F1#D08AA5A5A5A5A5A5']
+
+
+def test_read_only_and_unknown_parameters_are_not_written() -> None:
+    made = drive()
+    assert ask(made, '3F1#06D1003412000000', 0.0) == []
+    assert ask(made, '3F1#060F273412000000', 0.0) == []
+    assert made.value('actual_speed') == 0.0
+    assert made.eeprom_writes == 0
+    # neither took EEPROM time
+    assert len(ask(made, READ_RAMP, 0.001)) == 1
+
+
+def test_an_offset_moves_everything_on_the_wire() -> None:
+    made = drive(parameter_offset=-1)
+    assert ask(made, '3F1#03D0000300000000', 0.0) == ['7F1#0000C8000300A5A5']
+    ask(made, '3F1#061D00C800000000', 0.0)
+    assert made.value('ramp_time') == made.value('p30') == 2.0
+
+
+# -- whom it listens to ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('text', [
+    '000003F1#03D1000100000000', '000003F1#0632006400000000',    # the 29-bit twin
+    '000007F1#0000000000000000', '003FFFF0#0000000000000000', '00200D11#0000000000000000',
+    '3F0#03D1000100000000', '3F2#03D1000100000000', '7F2#0000000000000000', '000#0101',
+])
+def test_frames_of_others_and_of_the_other_format(text: str) -> None:
+    made = drive()
+    assert ask(made, text, 0.0) == []
+    assert made.requests == 0
+    assert not made.violations
+
+
+def test_somebody_else_answers_in_its_place() -> None:
+    made = drive()
+    assert ask(made, '7F1#0000000000000000', 0.0) == []
+    assert made.violations == {'frame that only this drive may send': 1}
+
+
+@pytest.mark.parametrize(('station', 'options', 'request_text', 'response'), [
+    (1, {}, '3F1', '7F1'), (15, {}, '3FF', '7FF'),
+    (20, {'request_id_base': 0x300, 'response_id_base': 0x380}, '314', '394'),
+    # a sum, not an OR: 3F1h | 1 is 3F1h
+    (1, {'request_id_base': 0x3F1, 'response_id_base': 0x7F1}, '3F2', '7F2'),
+    (2046, {'request_id_base': 0, 'response_id_base': 1}, '7FE', '7FF'),
+])
+def test_identifiers_are_sums(station: int, options: dict[str, int], request_text: str,
+                              response: str) -> None:
+    made = drive(station=station, **options)
+    assert ask(made, f'{request_text}#031E000100000000', 0.0) == [f'{response}#6400A5A5A5A5A5A5']
+    assert ask(made, f'00000{request_text}#031E000100000000', 0.0) == []
+    assert made.routes(made.configuration) == [
+        Route(int(request_text, 16), 0x7FF, False), Route(int(response, 16), 0x7FF, False)]
+
+
+def test_an_identifier_over_7ff_is_refused() -> None:
+    with pytest.raises(LocalProtocolError, match='7F0h . 16 = 800h does not fit 11 bits'):
+        drive(station=16)
+
+
+@given(st.integers(0, 0x1FFFFFFF), st.binary(max_size=8), st.booleans(), st.booleans())
+def test_anything(identifier: int, data: bytes, is_extended: bool, near: bool) -> None:
+    made = drive()
+    if near:
+        identifier, is_extended = 0x3F1, False
+    made.receive_frame(Frame(identifier if is_extended else identifier & 0x7FF, data,
+                             is_extended), 0.0)
+    for answer in made.frames_to_send():
+        assert data[0] == 3
+        assert (answer.identifier, len(answer.data), answer.extended) == (0x7F1, 8, False)
+
+
+# -- EEPROM ---------------------------------------------------------------------------------------
+
+
+def test_a_second_eeprom_write_too_early_is_lost() -> None:
+    made = drive()
+    ask(made, '3F1#061E00C800000000', 5.000)
+    ask(made, '3F1#061E002C01000000', 5.019)
+    assert made.value('ramp_time') == 2.0
+    assert made.violations == {LOST: 1}
+    assert made.eeprom_writes == 1
+
+
+def test_a_second_eeprom_write_in_time() -> None:
+    made = drive()
+    ask(made, '3F1#061E00C800000000', 5.000)
+    ask(made, '3F1#061E002C01000000', 5.020)
+    assert made.value('ramp_time') == 3.0
+    assert not made.violations
+    assert made.eeprom_writes == 2
+
+
+def test_reads_wait_for_the_eeprom_too() -> None:
+    made = drive()
+    ask(made, '3F1#061E00C800000000', 0.0)
+    assert ask(made, '3F1#0332000100000000', 0.019) == []
+    assert ask(made, READ_RAMP, 0.020) == ['7F1#C800A5A5A5A5A5A5']
+    assert made.violations == {TOO_EARLY: 1}
+
+
+@pytest.mark.parametrize(('storage', 'writes'), [(RAM, 0), (EEPROM, 2), (None, 2)])
+def test_what_is_not_known_counts_as_eeprom(storage: object, writes: int) -> None:
+    made = drive([parameter('gain', 60, storage=storage)], request=(), response=())
+    ask(made, '3F1#063C000100000000', 0.0)
+    ask(made, '3F1#063C000200000000', 0.02)
+    assert made.eeprom_writes == writes
+    assert made.value('gain') == 2
+
+
+def test_ram_is_written_while_the_eeprom_is_busy() -> None:
+    made = drive([*EXAMPLE, parameter('gain', 60, storage=RAM)])
+    ask(made, '3F1#061E00C800000000', 0.0)
+    ask(made, '3F1#063C000700000000', 0.001)
+    assert made.value('gain') == 7
+    assert not made.violations
+
+
+def test_setpoints_written_cyclically_take_no_eeprom_time() -> None:
+    # their storage is not in the profile; what is sent again and again is volatile
+    made = drive([parameter('speed_setpoint', 50), ACTUAL_SPEED],
+                 request=(parameter('speed_setpoint', 50),), response=(ACTUAL_SPEED,))
+    for place in range(5):
+        ask(made, f'3F1#063200{place:02X}00000000', 0.001 * place)
+    assert made.value('speed_setpoint') == 4
+    assert len(ask(made, '3F1#0332000100000000', 0.0045)) == 1
+    assert not made.violations
+    assert made.eeprom_writes == 0
+
+
+# -- by hand --------------------------------------------------------------------------------------
+
+
+def test_raw_names() -> None:
+    made = drive()
+    assert made.value('p30') == made.value('ramp_time') == made.value('p030') == 1.0
+    made.set_value('p30', 2.5)
+    assert made.value('ramp_time') == 2.5
+    for name in ('p31', 'p', 'p30.1', 'x2000.1', 'nonsense'):
+        with pytest.raises(ValueRefused, match='has no parameter'):
+            made.value(name)
+
+
+def test_a_stuck_parameter_by_its_raw_name() -> None:
+    made = drive()
+    made.fault('stuck=p30', 0.0)
+    ask(made, '3F1#061E00C800000000', 0.0)
+    assert ask(made, READ_RAMP, 0.02) == ['7F1#6400A5A5A5A5A5A5']
+
+
+def test_more_parameters_than_a_map_holds() -> None:
+    many = [parameter(f'x_{number}', number, storage=RAM) for number in range(300, 312)]
+    made = drive(many, request=many[:6], response=many)
+    made.set_value('x_311', 5)
+    assert ask(made, '3F1#0334010400000000', 0.0)[0].startswith('7F1#')
+    assert ask(made, '3F1#0337010100000000', 0.0) == ['7F1#0500A5A5A5A5A5A5']
+
+
+def test_control() -> None:
+    made = drive([*EXAMPLE, CONTROL_WORD], control=CONTROL,
+                 request=(SPEED_SETPOINT, CONTROL_WORD), response=(ACTUAL_SPEED, STATUS_WORD))
+    ask(made, '3F1#0632003075000000', 0.0)                       # 3000 rpm
+    assert ask(made, '3F1#03D3000100000000', 1.0) == ['7F1#0100A5A5A5A5A5A5']     # ready
+    assert made.value('actual_speed', 1.0) == 0.0
+    ask(made, '3F1#0634000100000000', 1.0)
+    assert ask(made, '3F1#03D3000100000000', 1.0) == ['7F1#0300A5A5A5A5A5A5']     # enabled
+    assert ask(made, '3F1#03D1000100000000', 1.5) == ['7F1#983AA5A5A5A5A5A5']     # 1500 rpm
+
+
+def test_power_cycle() -> None:
+    made = drive()
+    ask(made, '3F1#061E00C800000000', 0.0)
+    ask(made, '3F1#063200983A000000', 0.0)
+    made.fault('restart', 1.0)
+    assert ask(made, READ_RAMP, 1.4) == []
+    assert ask(made, READ_RAMP, 1.5) == ['7F1#C800A5A5A5A5A5A5']
+    assert ask(made, '3F1#0332000100000000', 1.5) == ['7F1#0000A5A5A5A5A5A5']
+
+
+# -- faults ---------------------------------------------------------------------------------------
+
+
+def test_late_answers() -> None:
+    made = drive()
+    made.fault('late=0.15', 0.0)
+    assert ask(made, READ_RAMP, 1.0) == []
+    assert made.next_timer() == pytest.approx(1.15)
+    made.handle_timer(1.149)
+    assert made.frames_to_send() == []
+    made.handle_timer(1.15)
+    assert [str(sent) for sent in made.frames_to_send()] == ['7F1#6400A5A5A5A5A5A5']
+
+
+@pytest.mark.parametrize(('fault', 'answers'), [
+    ('silent', []), ('duplicate', ['7F1#6400A5A5A5A5A5A5'] * 2), ('length=2', ['7F1#6400']),
+    ('length=0', ['7F1#']), ('drop=1', [])])
+def test_spoilt_answers(fault: str, answers: list[str]) -> None:
+    made = drive()
+    made.fault(fault, 0.0)
+    assert ask(made, READ_RAMP, 1.0) == answers
+
+
+def foreign(made: SimulatedDataModelStandardDrive, question: str) -> list[str]:
+    """Return the foreign frames that come with three answers."""
+    made.fault('foreign', 0.0)
+    found = [ask(made, question, 1.0) for _ in range(3)]
+    assert all(entry[-1][4:8] == '6400' for entry in found)
+    return [text for entry in found for text in entry[:-1]]
+
+
+def test_foreign_frames() -> None:
+    assert foreign(drive(), READ_RAMP) == [
+        '000007F1#5A5A5A5A5A5A5A5A', '7F9#5A5A5A5A5A5A5A5A', '701#05']
+
+
+def test_foreign_frames_stay_clear_of_neighbours() -> None:
+    # station 9 is there: somebody else has to be absent
+    made = drive(neighbours=[Route(0x3F9, 0x7FF, False), Route(0x7F9, 0x7FF, False)])
+    assert foreign(made, READ_RAMP) == ['000007F1#5A5A5A5A5A5A5A5A', '7F5#5A5A5A5A5A5A5A5A',
+                                        '701#05']
+    # a neighbour of another protocol with 29 bits, and one that uses 701h
+    made = drive(neighbours=[Route(0x7F1, 0x1FFFFFFF, True), Route(0x701, 0x7FF, False)])
+    assert foreign(made, READ_RAMP) == ['7F9#5A5A5A5A5A5A5A5A']
+    # nobody is absent
+    made = drive(neighbours=[Route(0, 0, True), Route(0, 0, False)])
+    assert foreign(made, READ_RAMP) == []
+
+
+@pytest.mark.parametrize(('station', 'request_base', 'response_base'), [
+    (1, 0x3F0, 0x3F8), (1, 0x3F8, 0x3F0), (1, 0x600, 0x700), (1, 0x700, 0x600)])
+def test_foreign_frames_are_never_its_own(station: int, request_base: int,
+                                          response_base: int) -> None:
+    made = drive(station=station, request_id_base=request_base, response_id_base=response_base)
+    texts = foreign(made, f'{request_base + station:03X}#031E000100000000')
+    assert texts
+    own = (f'{request_base + station:03X}#', f'{response_base + station:03X}#')
+    assert not [text for text in texts if text.startswith(own)]
+
+
+def test_drives_of_a_bus_know_each_other() -> None:
+    first = standard(name='first', station=1)
+    second = standard(name='second', station=9)
+    third = configuration(name='third', station=1)
+    drives = make_drives(bridge(first, second, third))
+    assert isinstance(drives['first'], SimulatedDataModelStandardDrive)
+    assert Route(0x7F9, 0x7FF, False) in drives['first'].neighbours
+    assert Route(0x3F9, 0x7FF, False) in drives['first'].neighbours
+    assert any(route.extended for route in drives['first'].neighbours)
+    # the 29-bit drive of the same station hears nothing of it
+    assert ask(drives['third'], READ_RAMP, 0.0) == []       # type: ignore[arg-type]
+    assert not drives['third'].violations
+
+
+def test_motor_current_is_there() -> None:
+    made = drive(response=(MOTOR_CURRENT,))
+    assert ask(made, '3F1#03D2000100000000', 0.0) == ['7F1#C800A5A5A5A5A5A5']

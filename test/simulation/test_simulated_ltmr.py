@@ -1,0 +1,716 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Conversations with the simulated LTMR, in literal bytes and literal times. Its node-ID is 5."""
+
+from dataclasses import replace
+import json
+from pathlib import Path
+from typing import Any
+
+from hypothesis import given, settings, strategies as st
+from ltmr_builders import configuration, LTMR, Ltmr, NODE
+import pytest
+
+from drive_can_bridge.core.errors import ValueRefused
+from drive_can_bridge.core.frame import EXTENDED_IDENTIFIER_MAX, Frame, Route
+from drive_can_bridge.core.parameters import Access, Parameter, ParameterType
+from drive_can_bridge.core.profile import Profile
+from drive_can_bridge.simulation.canopen_pkw import SimulatedPkwDrive
+
+VECTORS = json.loads((Path(__file__).parents[1] / 'vectors' / 'canopen_pkw.json').read_text(
+    encoding='utf-8'))
+
+START = '000#0105'
+IDLE = '505#0000000000000000'
+READ_455 = '505#C701002500000000'
+READ_455_TOGGLED = '505#C70100A500000000'
+NOT_OPERATIONAL = 'request while the node is not operational (ignored)'
+
+
+def prepared(**options: Any) -> Ltmr:
+    """Return a controller with the registers of the vectors: 455 = 2083h, 501 = 900."""
+    made = Ltmr(**options)
+    for name, value in (('system_status_1', 0x2083), ('system_status_2', 0),
+                        ('average_current', 9.0), ('flc1_ratio', 33.0)):
+        made.drive.set_value(name, value)
+    return made
+
+
+class TestVectors:
+
+    @pytest.mark.parametrize('row', VECTORS['exchanges'], ids=lambda row: str(row['name']))
+    def test_exchange(self, row: dict[str, Any]) -> None:
+        made = prepared()
+        expected: list[str] = []
+        for step in row['frames']:
+            direction, text = step.split()
+            if direction == '>':
+                assert expected == []
+                expected = made.ask(text, 1.0)
+            else:
+                assert expected.pop(0) == text
+        assert expected == []
+
+    @pytest.mark.parametrize('row', VECTORS['sdo'], ids=lambda row: str(row['name']))
+    def test_sdo(self, row: dict[str, Any]) -> None:
+        assert prepared().ask(row['request'], 1.0) == [row['response']]
+
+    def test_low_word_first(self) -> None:
+        made = prepared(word_order='low_first')
+        assert made.ask('505#F401002600000000', 1.0) == ['485#F401002684030000']
+        assert made.ask('505#F401002500000000', 1.0) == ['485#F401002584030000']
+        assert made.ask('505#F501002600000000', 1.0)[0].startswith('485#F50100260000')
+
+    def test_word_order_of_a_single_parameter(self) -> None:
+        parameters = dict(LTMR.parameters)
+        parameters['average_current'] = replace(parameters['average_current'],
+                                                word_order='low_first')
+        made = Ltmr(replace(LTMR, parameters=parameters))
+        made.drive.set_value('average_current', 9.0)
+        made.drive.set_value('l1_current', 9.0)
+        assert made.ask('505#F401002600000000', 1.0) == ['485#F401002684030000']
+        assert made.ask('505#F60100A600000000', 1.0) == ['485#F60100A600008403']
+
+    @pytest.mark.parametrize(('layout', 'request_text', 'response'), [
+        ('dword_swapped', '0025C70100000000', '0025C70100008320'),
+        ('dword_swapped', '00AAC70100003412', '00CEC70101060200'),
+        ('word_be', '01C7250000000000', '01C7250020830000'),
+        ('word_be', '01C7AA0012340000', '01C7CE0000020601'),
+    ])
+    def test_layouts(self, layout: str, request_text: str, response: str) -> None:
+        made = prepared(layout=layout)
+        assert made.ask(f'505#{request_text}', 1.0) == [f'485#{response}']
+
+    def test_high_half_of_an_abort_code_first(self) -> None:
+        made = prepared(abort_code_order='high_first')
+        assert made.ask('505#C70100AA34120000', 1.0) == ['485#C70100CE01060200']
+
+
+class TestNetwork:
+
+    def test_boot_up_comes_first_and_heartbeats_follow(self) -> None:
+        made = Ltmr(started=False)
+        due = made.drive.next_timer()
+        assert due is not None
+        assert due < 0.0
+        assert made.at(10.0) == ['705#00']
+        assert made.until(13.5) == [(11.0, '705#7F'), (12.0, '705#7F'), (13.0, '705#7F')]
+
+    @pytest.mark.parametrize(('command', 'state'), [('01', '05'), ('02', '04'), ('80', '7F')])
+    @pytest.mark.parametrize('node', ['05', '00'])
+    def test_commands(self, command: str, state: str, node: str) -> None:
+        made = Ltmr()
+        assert made.ask(f'000#{command}{node}', 0.5) == []
+        assert made.until(1.0) == [(1.0, f'705#{state}')]
+
+    @pytest.mark.parametrize('text', ['000#0206', '000#027F', '000#7705', '000#0285'])
+    def test_commands_for_others(self, text: str) -> None:
+        made = Ltmr()
+        made.ask(text, 0.5)
+        assert made.until(1.0) == [(1.0, '705#05')]
+        assert not made.drive.violations
+
+    @pytest.mark.parametrize('text', ['000#', '000#02', '000#020500'])
+    def test_commands_of_another_length(self, text: str) -> None:
+        made = Ltmr()
+        made.ask(text, 0.5)
+        assert made.until(1.0) == [(1.0, '705#05')]
+        assert sum(made.drive.violations.values()) == 1
+
+    @pytest.mark.parametrize('command', ['', '000#8005', '000#0205'])
+    def test_requests_count_in_operational_only(self, command: str) -> None:
+        made = Ltmr(started=False)
+        made.at(0.0)
+        if command:
+            made.ask(START, 0.0)
+            made.ask(command, 0.0)
+        assert made.ask('505#C002002A01000000', 0.1) == []
+        assert made.drive.violations == {NOT_OPERATIONAL: 1}
+        made.ask(START, 0.2)
+        assert made.drive.value('control_register_1') == 0
+        # what came before was not taken, so that the same function byte is news
+        assert made.ask('505#C002002A01000000', 0.3) == ['485#C002002A00000000']
+
+    def test_without_boot_up_there_is_nobody(self) -> None:
+        made = Ltmr(started=False)
+        made.fault('off', 0.0)
+        assert made.drive.next_timer() is None
+        for text in (START, READ_455, '605#4000100000000000'):
+            assert made.ask(text, 0.1) == []
+        assert made.at(100.0) == []
+
+    def test_reset_of_the_node(self) -> None:
+        made = Ltmr()
+        made.write(704, 1, 0.5)
+        assert made.drive.value('control_register_1') == 1
+        assert made.ask('000#8105', 1.0) == []
+        assert made.ask(READ_455, 1.02) == []
+        assert made.until(1.5) == [(1.05, '705#00')]
+        assert made.drive.value('control_register_1') == 0
+        assert made.ask(READ_455, 1.5) == []
+        made.ask(START, 1.6)
+        assert len(made.ask(READ_455, 1.7)) == 1
+
+    def test_reset_of_the_communication_leaves_the_motor_alone(self) -> None:
+        made = Ltmr()
+        made.write(704, 1, 0.5)
+        made.ask('000#8205', 1.0)
+        assert made.until(1.1) == [(1.05, '705#00')]
+        assert made.drive.value('control_register_1') == 1
+        made.ask(START, 1.1)
+        assert made.read(458, 1.1) == 1
+
+    def test_heartbeats_as_often_as_they_are_watched(self) -> None:
+        made = Ltmr(heartbeat_timeout=0.6)
+        assert made.until(0.65) == [(0.2, '705#05'), (0.4, '705#05'), (0.6, '705#05')]
+
+    def test_heartbeats_are_set_by_sdo(self) -> None:
+        made = Ltmr()
+        assert made.ask('605#2B171000FA000000', 0.1) == ['585#6017100000000000']
+        assert made.until(0.7) == [(0.35, '705#05'), (0.6, '705#05')]
+        assert made.ask('605#4017100000000000', 0.7) == ['585#4B171000FA000000']
+        made.ask('605#2B17100000000000', 0.7)
+        assert made.until(100.0) == []
+        # lost with the power
+        made.fault('restart', 100.0)
+        assert made.until(101.6) == [(100.5, '705#00'), (101.5, '705#7F')]
+
+    def test_late_heartbeats_keep_the_beat(self) -> None:
+        made = Ltmr()
+        assert made.at(5.25) == ['705#05']
+        assert made.until(6.5) == [(6.0, '705#05')]
+
+    def test_power_cycle(self) -> None:
+        made = Ltmr()
+        made.write(704, 1, 0.5)
+        made.fault('restart=2.5', 1.0)
+        assert made.ask(START, 3.0) == []
+        assert made.until(3.6) == [(3.5, '705#00')]
+        assert made.ask(READ_455, 3.6) == []
+        made.ask(START, 3.7)
+        assert made.read(704, 3.8) == 0
+        assert made.read(458, 3.8) == 0
+
+    def test_routes(self) -> None:
+        found = SimulatedPkwDrive.routes(configuration())
+        assert Route(0x505, 0x7FF, False) in found
+        for identifier in (0x000, 0x485, 0x505, 0x585, 0x605, 0x705, 0x085):
+            assert any(route.matches(Frame(identifier, b'', False)) for route in found)
+        for identifier in (0x486, 0x504, 0x700, 0x080, 0x100):
+            assert not any(route.matches(Frame(identifier, b'', False)) for route in found)
+
+    def test_other_identifiers(self) -> None:
+        made = Ltmr(request_cob_id=0x123, response_cob_id=0x456)
+        assert made.ask(READ_455, 0.1) == []
+        assert made.ask('123#C701002500000000', 0.1)[0].startswith('456#C7010025')
+        assert made.ask('605#4003140100000000', 0.2) == ['585#4303140123010000']
+        assert made.ask('605#4003180100000000', 0.2) == ['585#4303180156040000']
+
+    @pytest.mark.parametrize('text', ['485#C701002500000000', '705#05', '085#0000000000000000',
+                                      '585#6017100000000000'])
+    def test_a_second_device_with_this_node_id(self, text: str) -> None:
+        made = Ltmr()
+        assert made.ask(text, 0.1) == []
+        assert made.drive.violations == {'frame that only this drive may send': 1}
+
+
+class TestMailbox:
+
+    def test_a_repeated_frame_starts_nothing(self) -> None:
+        made = Ltmr()
+        assert len(made.ask(READ_455, 0.1)) == 1
+        assert made.ask(READ_455, 0.2) == []
+        assert made.drive.requests == 1
+        assert not made.drive.violations
+
+    def test_new_data_with_the_same_function_byte_start_nothing(self) -> None:
+        made = Ltmr()
+        made.ask('505#C002002A01000000', 0.1)
+        assert made.ask('505#C002002A00000000', 0.2) == []
+        assert made.drive.value('control_register_1') == 1
+        assert made.drive.violations == {
+            'request with the function byte of the one before (ignored)': 1}
+
+    def test_a_repeated_toggle_executes_again(self) -> None:
+        made = Ltmr()
+        made.ask('505#C002002A01000000', 0.1)
+        made.drive.set_value('control_register_1', 0)
+        made.ask('505#C00200AA01000000', 0.2)
+        assert made.drive.value('control_register_1') == 1
+
+    @pytest.mark.parametrize('function', ['00', '80'])
+    def test_function_00_is_echoed_and_starts_nothing(self, function: str) -> None:
+        made = Ltmr()
+        made.ask(READ_455, 0.1)
+        assert made.ask(f'505#C00200{function}01000000', 0.2) == [
+            f'485#C00200{function}00000000']
+        assert made.drive.value('control_register_1') == 0
+        assert len(made.ask(READ_455, 0.3)) == 1
+
+    def test_function_00_after_power_on_changes_nothing(self) -> None:
+        # the function byte is 00h already
+        made = Ltmr()
+        assert made.ask(IDLE, 0.1) == []
+        assert len(made.ask('505#0000008000000000', 0.2)) == 1
+
+    def test_a_restart_forgets_the_function_byte(self) -> None:
+        made = Ltmr()
+        made.ask(READ_455, 0.1)
+        made.fault('restart', 0.2)
+        made.until(1.0)
+        made.ask(START, 1.0)
+        assert len(made.ask(READ_455, 1.1)) == 1
+
+    @pytest.mark.parametrize('function', ['01', '24', '2C', '55', '4E', '7F', 'D5'])
+    def test_unknown_function(self, function: str) -> None:
+        made = Ltmr()
+        toggled = 'CE' if function == 'D5' else '4E'
+        assert made.ask(f'505#C00200{function}01000000', 0.1) == [
+            f'485#C00200{toggled}01000405']
+        assert made.drive.value('control_register_1') == 0
+
+    @pytest.mark.parametrize('data', ['', 'C7010025', 'C7010025000000'])
+    def test_request_of_another_length(self, data: str) -> None:
+        made = Ltmr()
+        assert made.ask(f'505#{data}', 0.1) == []
+        assert made.drive.violations == {'request without eight data bytes (ignored)': 1}
+
+    def test_illegal_value_is_refused_and_the_register_keeps_its_value(self) -> None:
+        made = Ltmr()
+        before = made.read(652, 0.0)
+        assert made.write(652, 0xFFFF, 0.1) == ['485#8C02004E30000906']
+        assert made.write(652, 4, 0.2) == ['485#8C02004E30000906']
+        # the trip class knows steps of 5 s only
+        assert made.write(606, 12, 0.3) == ['485#5E02004E30000906']
+        assert made.read(652, 0.4) == before == 33
+        assert made.read(606, 0.4) == 5
+        assert made.drive.eeprom_writes == 0
+        assert made.write(606, 15, 0.5) == ['485#5E02002A00000000']
+        assert made.read(606, 0.5) == 15
+        assert made.drive.eeprom_writes == 1
+
+    def test_two_registers_are_written_together_or_not_at_all(self) -> None:
+        made = Ltmr()
+        # 652 := 50, 653 := 60; then 652 := 70, 653 := 200
+        assert made.ask('505#8C02002B32003C00', 0.1) == ['485#8C02002B00000000']
+        assert (made.read(652, 0.2), made.read(653, 0.2)) == (50, 60)
+        assert made.ask('505#8C0200AB4600C800', 0.3) == ['485#8C0200CE30000906']
+        assert (made.read(652, 0.4), made.read(653, 0.4)) == (50, 60)
+
+    @pytest.mark.parametrize(('request_text', 'code'), [
+        ('0F27002500000000', '00000206'), ('FFFF00A600000000', '00000206'),
+        ('C80100A600000000', None), ('FF01002600000000', '00000206'),
+        ('0420003500000000', '11000906'), ('04205B3500000000', '11000906'),
+        ('0920013500000000', '00000206'), ('0020013500000000', '11000906'),
+        ('0820063600000000', '11000906'),
+    ])
+    def test_registers_that_do_not_exist(self, request_text: str, code: str | None) -> None:
+        answer, = Ltmr().ask(f'505#{request_text}', 0.1)
+        if code is None:
+            assert answer.startswith('485#C80100A6')
+        else:
+            assert answer[:10] == f'485#{request_text[:6]}'
+            assert answer[10:12] in ('4E', 'CE')
+            assert answer[12:] == code
+
+    def test_write_only_and_read_only(self) -> None:
+        parameters = {'key': Parameter('key', number=10, access=Access.WRITE_ONLY),
+                      'name': Parameter('name', number=11, access=Access.READ_ONLY)}
+        made = Ltmr(Profile('table', '/table.yaml', '', ('canopen_pkw',), parameters),
+                    response=('name',))
+        assert made.ask('505#0A00002500000000', 0.1) == ['485#0A00004E01000106']
+        assert made.ask('505#0A00002A07000000', 0.2) == ['485#0A00002A00000000']
+        assert made.drive.value('key') == 7
+        assert made.ask('505#0A0000AB08000900', 0.3) == ['485#0A0000CE02000106']
+        assert made.drive.value('key') == 7
+
+    def test_one_word_of_a_32_bit_value_is_written(self) -> None:
+        parameters = {'total': Parameter('total', number=20, type=ParameterType.INT32)}
+        made = Ltmr(Profile('table', '/table.yaml', '', ('canopen_pkw',), parameters),
+                    response=('total',))
+        assert made.ask('505#1400002BFFFFFEFF', 0.1) == ['485#1400002B00000000']
+        assert made.drive.value('total') == -2
+        assert made.ask('505#1500002A05000000', 0.2) == ['485#1500002A00000000']
+        assert made.drive.value('total') == -65531
+        assert made.ask('505#1400002600000000', 0.3) == ['485#14000026FFFF0500']
+
+    def test_parameters_with_one_address_only_have_the_other_by_the_table(self) -> None:
+        parameters = {'left': Parameter('left', number=704),
+                      'right': Parameter('right', index=0x2008, subindex=6),
+                      'own': Parameter('own', index=0x3100, subindex=1)}
+        made = Ltmr(Profile('table', '/table.yaml', '', ('canopen_pkw',), parameters),
+                    response=('left',))
+        made.ask('505#082005BB22114433', 0.1)
+        assert (made.drive.value('left'), made.drive.value('right')) == (0x1122, 0x3344)
+        assert made.ask('505#C102002500000000', 0.2) == ['485#C102002544330000']
+        assert made.ask('505#0031013A07000000', 0.3) == ['485#0031013A00000000']
+        assert made.drive.value('own') == 7
+        assert made.ask('505#0031023500000000', 0.4) == ['485#0031024E11000906']
+
+    def test_raw_names(self) -> None:
+        made = Ltmr()
+        assert made.drive.value('p652') == made.drive.value('x2007.3') == 33.0
+        made.drive.set_value('x2007.3', 40.0)
+        assert made.drive.value('flc1_ratio') == 40.0
+        for name in ('p9999', 'x2007', 'x2007.zz', 'p652.1', 'pump'):
+            with pytest.raises(ValueRefused, match=name):
+                made.drive.value(name)
+
+    def test_stuck_register_is_acknowledged_and_keeps_its_value(self) -> None:
+        made = Ltmr()
+        made.fault('stuck=flc1_ratio', 0.0)
+        assert made.write(652, 50, 0.1) == ['485#8C02002A00000000']
+        assert made.read(652, 0.2) == 33
+
+
+class TestFaults:
+
+    def test_silent_obeys_and_its_heart_beats(self) -> None:
+        made = Ltmr()
+        made.fault('silent', 0.0)
+        assert made.ask('505#C002002A01000000', 0.1) == []
+        assert made.drive.value('control_register_1') == 1
+        assert made.ask('605#4000100000000000', 0.2) == []
+        assert [text for _, text in made.until(1.0)] == ['705#05']
+
+    def test_late(self) -> None:
+        made = Ltmr()
+        made.fault('late=0.3', 0.0)
+        assert made.ask(READ_455, 0.1) == []
+        assert [now for now, text in made.until(0.5) if text.startswith('485')] == [0.4]
+
+    def test_late_answers_are_lost_in_a_restart(self) -> None:
+        made = Ltmr()
+        made.fault('late=0.3', 0.0)
+        made.ask(READ_455, 0.1)
+        made.fault('restart=0.1', 0.2)
+        assert made.until(0.6) == [(0.3, '705#00')]
+
+    def test_length_and_duplicate(self) -> None:
+        made = Ltmr()
+        made.fault('length=4', 0.0)
+        assert made.ask(READ_455, 0.1) == ['485#C7010025']
+        made.fault('ok', 0.1)
+        made.fault('duplicate', 0.2)
+        first, second = made.ask(READ_455_TOGGLED, 0.3)
+        assert first == second
+
+    def test_foreign(self) -> None:
+        made = Ltmr()
+        made.drive.set_value('system_status_1', 0x2083)
+        made.fault('foreign', 0.0)
+        asked = [made.ask(text, 0.1) for text in (READ_455, READ_455_TOGGLED) * 3]
+        assert asked[:5] == [
+            ['481#C701002583200000', '485#C701002583200000'],
+            ['00000485#C70100A583200000', '485#C70100A583200000'],
+            ['485#C70100A55A5A5A5A', '485#C701002583200000'],
+            ['485#C60100A55A5A5A5A', '485#C70100A583200000'],
+            ['481#C701002583200000', '485#C701002583200000']]
+
+    def test_foreign_frames_keep_clear_of_neighbours(self) -> None:
+        neighbour = SimulatedPkwDrive.routes(configuration(name='fan', station=1))
+        made = Ltmr()
+        made.drive.neighbours = tuple(neighbour)
+        made.fault('foreign', 0.0)
+        assert made.ask(READ_455, 0.1)[0].startswith('482#')
+
+    def test_off_and_on_again(self) -> None:
+        made = Ltmr()
+        made.fault('off', 0.5)
+        assert made.until(5.0) == []
+        made.fault('ok', 5.0)
+        assert made.until(6.0) == [(5.5, '705#00')]
+
+
+class TestMotor:
+
+    def test_runs_and_stops(self) -> None:
+        made = Ltmr()
+        # ready, controller power
+        assert made.read(455, 0.5) == 0x0041
+        assert made.write(704, 1, 1.0) == ['485#C002002A00000000']
+        # on, motor running, starting, far above 200 %
+        assert made.read(455, 1.0) == 0x8000 | 63 << 8 | 0x80 | 0x43
+        assert made.read(458, 1.0) == 1
+        assert made.drive.value('average_current', 1.0) == 45.0
+        # 6.3 A of 33 % of 27 A are 71 %: 23 of 32
+        assert made.read(455, 10.0) == 23 << 8 | 0x80 | 0x43
+        assert made.drive.value('average_current', 10.0) == pytest.approx(6.3)
+        assert made.read(466, 10.0) == 71
+        made.write(704, 0, 11.0)
+        assert made.read(455, 11.0) == 0x0041
+        assert made.drive.value('average_current', 11.0) == 0.0
+
+    def test_reverse_and_both(self) -> None:
+        made = Ltmr()
+        made.write(704, 2, 1.0)
+        assert made.read(458, 1.0) == 2
+        made.write(704, 3, 2.0)
+        assert made.read(458, 2.0) == 0
+        # other bits do not stop it
+        made.write(704, 0x41, 3.0)
+        assert made.read(458, 3.0) == 1
+
+    def test_trip_reset_and_run_again(self) -> None:
+        made = Ltmr()
+        made.write(704, 1, 1.0)
+        assert made.fault('trip', 2.0) == ['085#00FF810A00000000']
+        # trip, tripped, reset authorised, controller power; not ready, off
+        assert made.read(455, 2.1) & 0xFF == 0x74
+        assert made.read(451, 2.1) == 10
+        assert made.read(452, 2.1) == 1 << 9
+        assert made.read(458, 2.1) == 0
+        # the run bit still stands: neither it nor its repetition starts the motor
+        made.write(704, 1, 2.2)
+        assert made.read(458, 2.2) == 0
+        assert made.ask('505#C00200AA08000000', 2.3) == [
+            '485#C00200AA00000000', '085#0000000000000000']
+        assert made.read(455, 2.4) == 0x0041
+        assert made.read(451, 2.4) == 0
+        made.write(704, 1, 2.5)
+        assert made.read(458, 2.5) == 1
+
+    def test_reset_with_the_run_bit_does_not_start(self) -> None:
+        made = Ltmr()
+        made.write(704, 1, 1.0)
+        made.fault('trip', 2.0)
+        made.write(704, 9, 2.1)
+        assert made.read(455, 2.2) == 0x0041
+        made.write(704, 1, 2.3)
+        assert made.read(458, 2.3) == 0
+        made.write(704, 0, 2.4)
+        made.write(704, 1, 2.5)
+        assert made.read(458, 2.5) == 1
+
+    def test_reset_before_the_cause_is_gone(self) -> None:
+        made = Ltmr()
+        made.fault('trip=3.0', 1.0)
+        assert made.read(455, 1.1) & 0x20 == 0
+        made.write(704, 8, 2.0)
+        assert made.read(455, 2.0) & 4
+        # the bit has to appear anew
+        made.write(704, 8, 4.5)
+        assert made.read(455, 4.5) & 0x24 == 0x24
+        made.write(704, 0, 4.6)
+        made.write(704, 8, 4.7)
+        assert made.read(455, 4.7) & 4 == 0
+
+    def test_thermal_overload(self) -> None:
+        made = Ltmr()
+        made.write(704, 1, 0.0)
+        made.until(60.0)
+        made.drive.frames_to_send()
+        assert 10 < made.read(465, 60.0) < 50
+        # 10 % of 27 A: the motor takes 233 %
+        made.write(652, 10, 60.0)
+        left = made.read(511, 60.0)
+        assert 5 < left < 60
+        tripped = [now for now, text in made.until(200.0) if text == '085#00FF810400000000']
+        assert tripped == [pytest.approx(60.0 + left, abs=1.5)]
+        assert made.read(451, 200.0) == 4
+        assert made.read(452, 200.0) == 1 << 3
+        assert made.read(458, 200.0) == 0
+
+    def test_reset_after_an_overload_waits_for_the_motor_to_cool_down(self) -> None:
+        made = Ltmr()
+        made.write(652, 5, 0.0)
+        made.write(704, 1, 0.0)
+        assert '085#00FF810400000000' in [text for _, text in made.until(30.0)]
+        wait = made.read(450, 30.0)
+        assert wait > 0
+        made.write(704, 8, 30.0)
+        assert made.read(455, 30.0) & 4
+        made.write(704, 0, 31.0)
+        made.until(32.0 + wait)
+        made.write(704, 8, 32.0 + wait)
+        assert made.read(455, 32.0 + wait) == 0x0041
+
+    def test_cleared_thermal_level(self) -> None:
+        made = Ltmr()
+        made.write(652, 5, 0.0)
+        made.write(704, 1, 0.0)
+        made.until(30.0)
+        made.write(705, 1 << 2, 30.0)
+        assert made.read(465, 30.0) == 0
+        made.write(704, 8, 30.0)
+        assert made.read(455, 30.0) == 0x0041
+
+    def test_cleared_settings(self) -> None:
+        made = Ltmr()
+        made.write(652, 50, 0.0)
+        made.write(606, 20, 0.0)
+        made.write(705, 1 << 3, 0.1)
+        assert (made.read(652, 0.2), made.read(606, 0.2)) == (33, 5)
+
+    def test_trip_class_is_the_time_at_six_times_the_full_load_current(self) -> None:
+        starter = Ltmr().drive.plant.starter
+        for trip_class in (5, 10, 30):
+            starter.settings(33.0, trip_class)
+            full = starter.full_load_current
+            level = 100.0 * (6.0 / 1.1) ** 2
+            assert full == pytest.approx(8.91)
+            # 100 = level * (1 - exp(-t / T))
+            assert level * (1.0 - 2.718281828459045 ** (-trip_class / starter.time_constant)) \
+                == pytest.approx(100.0)
+
+    @settings(deadline=None)
+    @given(st.lists(st.floats(0.0, 3.0), min_size=1, max_size=20))
+    def test_it_hardly_matters_how_often_time_passes(self, steps: list[float]) -> None:
+        coarse, fine = Ltmr().drive.plant.starter, Ltmr().drive.plant.starter
+        coarse.switch(True)
+        fine.switch(True)
+        coarse.advance(sum(steps))
+        for step in steps:
+            fine.advance(step)
+        assert fine.thermal == pytest.approx(coarse.thermal, abs=0.5)
+        assert fine.current == pytest.approx(coarse.current, abs=1e-6)
+
+    def test_emergency_waits_for_a_node_that_may_send_it(self) -> None:
+        made = Ltmr()
+        made.ask('000#0205', 0.1)
+        assert made.fault('trip', 0.2) == []
+        assert made.ask(START, 0.3) == ['085#00FF810A00000000']
+        # and is repeated after communication began anew
+        made.ask('000#8205', 1.0)
+        assert made.until(1.1) == [(1.05, '705#00'), (1.05, '085#00FF810A00000000')]
+        assert made.fault('ok', 1.2) == ['085#0000000000000000']
+
+    def test_power_cycle_ends_a_trip(self) -> None:
+        made = Ltmr()
+        made.fault('trip', 0.1)
+        made.fault('restart', 0.2)
+        assert [text for _, text in made.until(1.0)] == ['705#00']
+        made.ask(START, 1.0)
+        assert made.read(455, 1.1) == 0x0041
+
+    def test_read_only_register_held_by_hand(self) -> None:
+        made = Ltmr()
+        made.drive.set_value('thermal_capacity', 42.0)
+        assert made.read(465, 0.1) == 42
+        made.drive.release('thermal_capacity')
+        assert made.read(465, 0.2) == 0
+
+    def test_node_address(self) -> None:
+        assert Ltmr().read(696, 0.1) == NODE
+
+    def test_another_profile_is_played_by_its_names(self) -> None:
+        parameters = {
+            'speed_setpoint': Parameter('speed_setpoint', number=10, type=ParameterType.INT16,
+                                        minimum=-100.0, maximum=100.0, scaled=True, unit='rpm'),
+            'actual_speed': Parameter('actual_speed', number=455, type=ParameterType.INT16,
+                                      access=Access.READ_ONLY, scaled=True, unit='rpm')}
+        made = Ltmr(Profile('table', '/table.yaml', '', ('canopen_pkw',), parameters),
+                    request=('speed_setpoint',), response=('actual_speed',))
+        made.write(10, 50, 1.0)
+        assert made.read(455, 5.0) == 50
+
+
+class TestObjects:
+
+    @pytest.mark.parametrize(('request_text', 'response'), [
+        ('4000100000000000', '4300100000000000'),           # device type
+        ('4001100000000000', '4F01100000000000'),           # error register, one byte
+        ('4014100000000000', '4314100085000000'),           # identifier of emergencies
+        ('4018100100000000', '4318100100000000'),
+        ('4018100200000000', '8018100211000906'),
+        ('4003180200000000', '4F031802FF000000'),           # sent on change
+        ('4000300000000000', '4F00300004000000'),
+        ('4004200000000000', '4F0420003E000000'),           # highest sub-index: 511
+        ('4008200500000000', '4B08200500000000'),
+        ('2F08200501000000', '8008200513000706'),           # one byte for two
+        ('2308200501000000', '8008200512000706'),           # four bytes for two
+        ('2B00200001000000', '8000200011000906'),
+        ('2314100001000000', '8014100002000106'),           # read-only
+        ('2B17100101000000', '8017100111000906'),
+        ('2117100004000000', '8017100001000405'),           # segmented write
+        ('A017100000000000', '8017100001000405'),           # block transfer
+        ('6000000000000000', '8000000001000405'),           # segment without a transfer
+    ])
+    def test_objects(self, request_text: str, response: str) -> None:
+        assert Ltmr().ask(f'605#{request_text}', 0.1) == [f'585#{response}']
+
+    def test_device_name_comes_in_segments(self) -> None:
+        made = Ltmr()
+        assert made.ask('605#4008100000000000', 0.1) == ['585#410810000E000000']
+        assert made.ask('605#6000000000000000', 0.1) == ['585#0073696D756C6174']
+        assert made.ask('605#7000000000000000', 0.1) == ['585#116564204C544D52']
+        assert made.ask('605#6000000000000000', 0.1) == ['585#8008100001000405']
+
+    def test_segment_with_the_wrong_toggle(self) -> None:
+        made = Ltmr()
+        made.ask('605#4008100000000000', 0.1)
+        assert made.ask('605#7000000000000000', 0.1) == ['585#8008100000000305']
+
+    def test_abort_by_the_client_is_not_answered(self) -> None:
+        made = Ltmr()
+        made.ask('605#4008100000000000', 0.1)
+        assert made.ask('605#8008100000000405', 0.1) == []
+        assert made.ask('605#6000000000000000', 0.1) == ['585#8008100001000405']
+
+    def test_not_in_stopped(self) -> None:
+        made = Ltmr()
+        made.ask('000#0205', 0.1)
+        assert made.ask('605#4000100000000000', 0.2) == []
+        made.ask('000#8005', 0.3)
+        assert len(made.ask('605#4000100000000000', 0.4)) == 1
+
+    def test_other_lengths_are_no_requests(self) -> None:
+        assert Ltmr().ask('605#40001000', 0.1) == []
+
+    def test_the_mailbox_as_objects(self) -> None:
+        made = prepared()
+        made.ask(READ_455, 0.1)
+        for subindex, content in ((1, 'C7010025'), (2, '00000000'), (3, 'C7010025'),
+                                  (4, '83200000')):
+            assert made.ask(f'605#400030{subindex:02X}00000000', 0.2) == [
+                f'585#430030{subindex:02X}{content}']
+
+    def test_error_register(self) -> None:
+        made = Ltmr()
+        made.fault('trip', 0.1)
+        assert made.ask('605#4001100000000000', 0.2) == ['585#4F01100081000000']
+        assert made.ask('605#4003100100000000', 0.2) == ['585#4303100100FF0000']
+
+    def test_registers_by_both_ways_are_the_same(self) -> None:
+        made = Ltmr()
+        made.ask('605#2B0720032D000000', 0.1)
+        assert made.read(652, 0.2) == 45
+
+
+_ANY_FRAME = st.one_of(
+    st.builds(Frame, st.sampled_from([0x000, 0x505, 0x605, 0x485, 0x585, 0x705, 0x085]),
+              st.binary(max_size=8), st.just(False)),
+    st.builds(Frame, st.just(0x505), st.builds(
+        lambda word, low, function, words: word.to_bytes(2, 'little') + bytes((low, function))
+        + words, st.sampled_from([455, 500, 652, 704, 705, 606, 0x2004, 0x2008]),
+        st.integers(0, 80), st.sampled_from([0x25, 0xA6, 0x2A, 0xAB, 0x35, 0xB6, 0x3A, 0xBB, 0]),
+        st.binary(min_size=4, max_size=4)), st.just(False)),
+    st.just(Frame(0x000, b'\x01\x05', False)),
+    st.builds(Frame, st.integers(0, EXTENDED_IDENTIFIER_MAX), st.binary(max_size=8),
+              st.just(True)))
+
+
+@settings(deadline=None)
+@given(st.lists(st.tuples(st.floats(0.0, 0.6), _ANY_FRAME), max_size=40))
+def test_whatever_comes_it_stays_a_good_node(steps: list[tuple[float, Frame]]) -> None:
+    made = Ltmr(started=False)
+    operational = False
+    now = 0.0
+    made.at(now)
+    for wait, frame in steps:
+        now += wait
+        for _, text in made.until(now):
+            assert text.startswith(('705#', '085#'))
+            operational = operational and text != '705#00'
+        made.drive.receive_frame(frame, now)
+        for answer in made.drive.frames_to_send():
+            assert not answer.extended
+            assert answer.identifier in (0x485, 0x585, 0x705, 0x085)
+            assert len(answer.data) == (1 if answer.identifier == 0x705 else 8)
+            assert answer.identifier != 0x485 or operational
+        if frame.identifier == 0 and not frame.extended and len(frame.data) == 2 \
+                and frame.data[1] in (0, NODE):
+            operational = frame.data[0] == 1 or operational and frame.data[0] not in (
+                2, 0x80, 0x81, 0x82)
+        raw = made.drive.plant.raw
+        assert 5 <= raw('flc1_ratio') <= 100
+        assert raw('motor_trip_class') % 5 == 0

@@ -1,0 +1,373 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The session of a bridge and a simulated LTMR, both without a clock: conversations in literal times.
+
+A frame takes a millisecond. Nothing here waits, and nothing depends on the machine.
+"""
+
+import math
+from typing import Any
+
+from builders import drive, read, text_of, write
+from hypothesis import given, Phase, settings, strategies as st
+from ltmr_builders import LTMR, names, NODE
+import pytest
+
+from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.events import (
+    Event, FrameRejected, ProcessDataReceived, RequestCompleted, StationFound, StationLost,
+)
+from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.requests import Request
+from drive_can_bridge.protocols.families import make_sessions
+from drive_can_bridge.simulation.canopen_pkw import SimulatedPkwDrive
+
+FRAME_TIME = 0.001
+RATIO, TRIP_CLASS = names('flc1_ratio', 'motor_trip_class')
+RESPONSE = names('system_status_1', 'system_status_2', 'thermal_capacity', 'average_current')
+
+
+class Line:
+    """
+    A bridge and a controller at the two ends of a cable.
+
+    :ivar sent: what the bridge has sent, with its time.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        configuration = drive(
+            'canopen_pkw', name='pump', station=NODE, table=LTMR.parameters.values(),
+            control=LTMR.control, request=(), response=RESPONSE,
+            **{'period': 0.1, 'parameter_timeout': 0.5, **options})
+        self.session, = make_sessions([configuration])
+        self.ltmr = SimulatedPkwDrive(configuration)
+        self.now = 0.0
+        self.sent: list[tuple[float, str]] = []
+        self.events: list[tuple[float, Event]] = []
+        self._under_way: list[tuple[float, bool, Frame]] = []
+        self.session.bus_up(0.0)
+        self.session.activate(0.0)
+        self.ltmr.handle_timer(0.0)
+        self._collect()
+
+    def run(self, until: float) -> None:
+        """Let time pass."""
+        for _ in range(100_000):
+            timer = self.ltmr.next_timer()
+            due = min(self.session.next_timer(), math.inf if timer is None else timer,
+                      *(at for at, _, _ in self._under_way), math.inf)
+            if due > until:
+                self.now = until
+                return
+            self.now = max(self.now, due)
+            arrived = [entry for entry in self._under_way if entry[0] <= self.now]
+            self._under_way = [entry for entry in self._under_way if entry[0] > self.now]
+            for _, to_device, frame in arrived:
+                if to_device:
+                    self.ltmr.receive_frame(frame, self.now)
+                else:
+                    self.session.receive_frame(frame, self.now)
+            if timer is not None and timer <= self.now:
+                self.ltmr.handle_timer(self.now)
+            self.session.handle_timer(self.now)
+            self._collect()
+        raise AssertionError(f'nothing goes on at {self.now}')
+
+    def _collect(self) -> None:
+        for frame in self.session.take_frames():
+            self.sent.append((round(self.now, 6), str(frame)))
+            self._under_way.append((self.now + FRAME_TIME, True, frame))
+        self.session.frames_left(self.now)
+        for frame in self.ltmr.frames_to_send():
+            self._under_way.append((self.now + FRAME_TIME, False, frame))
+        self.events += [(round(self.now, 6), event) for event in self.session.take_events()]
+
+    def submit(self, request: Request) -> None:
+        self.session.submit(request, self.now)
+        self._collect()
+
+    def outcome(self, request: Request, patience: float = 20.0) -> list[object]:
+        """Submit a request; let time pass until it has its outcome."""
+        self.submit(request)
+        return self.wait(request, patience)
+
+    def wait(self, request: Request, patience: float = 20.0) -> list[object]:
+        """Let time pass until a request has its outcome."""
+        limit = self.now + patience
+        while not self.outcomes(request):
+            assert self.now < limit, 'no outcome'
+            self.run(self.now + 0.05)
+        return self.outcomes(request)[0]
+
+    def outcomes(self, request: Request) -> list[list[object]]:
+        return [[text_of(outcome) for outcome in event.outcomes]
+                for event in self.found(RequestCompleted) if event.request is request]
+
+    def control(self, action: ControlAction, patience: float = 20.0) -> tuple[bool, str]:
+        """Ask for a control action; let time pass until it has its outcome."""
+        ticket = self.session.request_control(action, self.now)
+        assert not isinstance(ticket, str), ticket
+        self._collect()
+        limit = self.now + patience
+        while True:
+            for done in self.session.take_control_outcomes():
+                return done.success, done.message
+            assert self.now < limit, 'no outcome'
+            self.run(self.now + 0.05)
+
+    def fault(self, text: str) -> None:
+        self.ltmr.fault(text, self.now)
+        self._collect()
+
+    def found(self, kind: type) -> list[Any]:
+        return [event for _, event in self.events if isinstance(event, kind)]
+
+    def writes(self, register: str) -> list[str]:
+        """Return the words that the bridge has written to a register (bytes 0 and 1 in hex)."""
+        return [text[12:16] for _, text in self.sent
+                if text.startswith(f'505#{register}00') and text[10:12] in ('2A', 'AA')]
+
+
+def test_start() -> None:
+    line = Line()
+    line.run(0.5)
+    assert line.session.online
+    frames = [text for _, text in line.sent]
+    # start twice: at the beginning, and after the boot-up frame; only then a PDO
+    first = next(place for place, text in enumerate(frames) if text.startswith('505#'))
+    assert set(frames[:first]) == {'000#0105'}
+    assert {text[:9] for text in frames[first:] if text[:3] == '505'} >= {
+        '505#C7010', '505#D1010', '505#F4010'}
+    assert line.found(ProcessDataReceived)[-1].raws == (0x0041, 0, 0, 0)
+    assert not line.ltmr.violations
+    assert not line.found(FrameRejected)
+    # the control word was written once
+    assert line.writes('C002') == ['0000']
+
+
+def test_reads_and_writes() -> None:
+    line = Line()
+    line.run(1.0)
+    assert line.outcome(read(RATIO, TRIP_CLASS)) == [33, 5]
+    assert line.outcome(write((RATIO, 50))) == ['written']
+    refused, = line.outcome(write((TRIP_CLASS, 7)))
+    assert '06090030h' in str(refused)
+    assert line.outcome(read(RATIO, TRIP_CLASS)) == [50, 5]
+    assert not line.ltmr.violations
+
+
+def test_run_trip_reset() -> None:
+    line = Line(control_timeout=5.0)
+    line.run(1.0)
+    assert line.control(ControlAction.ENABLE) == (True, 'enabled')
+    line.run(5.0)
+    status, _, thermal, current = line.found(ProcessDataReceived)[-1].raws
+    assert status & 0x83 == 0x83
+    assert thermal > 0
+    assert current == 630
+    line.fault('trip')
+    line.run(6.0)
+    assert line.session.facts()['emergency'].startswith('FF00h')
+    assert line.session.warning
+    assert not line.control(ControlAction.ENABLE)[0]
+    assert line.control(ControlAction.RESET_FAULT)[0]
+    line.run(7.0)
+    assert line.session.facts()['emergency'] == 'none'
+    assert line.control(ControlAction.ENABLE)[0]
+    assert line.control(ControlAction.DISABLE)[0]
+    # disable; run; disable after the trip; (enable refused;) reset, disable; run; disable
+    assert line.writes('C002') == ['0000', '0100', '0000', '0800', '0000', '0100', '0000']
+    assert not line.ltmr.violations
+
+
+def test_a_lost_answer_to_a_write() -> None:
+    line = Line()
+    line.run(1.0)
+    request = write((RATIO, 50))
+    line.fault('silent')
+    line.submit(request)
+    line.run(1.002)
+    # only this one answer is lost; whatever is sent again would be answered
+    line.fault('ok')
+    assert line.wait(request) == ['no answer in 0.5 s, 1 attempt']
+    line.run(5.0)
+    assert line.session.online
+    assert line.writes('8C02') == ['3200']
+    assert line.ltmr.value('flc1_ratio') == 50.0
+    assert line.outcome(write((RATIO, 60))) == ['written']
+    assert line.ltmr.value('flc1_ratio') == 60.0
+
+
+def test_a_write_is_not_sent_into_the_unknown() -> None:
+    line = Line()
+    line.run(1.0)
+    line.fault('silent')
+    # a read of the round has not been answered: the last function byte is unknown
+    line.run(1.6)
+    answer, = line.outcome(write((RATIO, 50)))
+    assert str(answer).startswith('no answer')
+    assert line.writes('8C02') == []
+    assert line.ltmr.value('flc1_ratio') == 33.0
+
+
+def test_unasked_answers_are_rejected() -> None:
+    line = Line()
+    line.run(1.0)
+    line.fault('foreign')
+    line.run(5.0)
+    assert len(line.found(FrameRejected)) > 20
+    assert {event.raws for event in line.found(ProcessDataReceived)} == {(0x0041, 0, 0, 0)}
+    assert line.outcome(read(RATIO, TRIP_CLASS)) == [33, 5]
+
+
+@pytest.mark.parametrize('late', [0.05, 0.3, 0.6, 0.9])
+def test_late_answers_are_never_taken_for_others(late: float) -> None:
+    line = Line(missed_limit=10, parameter_retries=5)
+    line.run(1.0)
+    line.fault(f'late={late}')
+    for value in (50, 51, 52):
+        answer, = line.outcome(write((RATIO, value)), 60.0)
+        assert answer == 'written' or str(answer).startswith('no answer')
+        found, = line.outcome(read(RATIO), 60.0)
+        assert found == line.ltmr.plant.raw('flc1_ratio') or str(found).startswith('no answer')
+        if late < 0.5:
+            assert (answer, found) == ('written', value)
+
+
+@pytest.mark.parametrize('boot', [0.0, 0.02, 0.5, 3.0])
+def test_restart_in_the_middle_of_a_write(boot: float) -> None:
+    line = Line()
+    line.run(1.0)
+    assert line.control(ControlAction.ENABLE)[0]
+    line.run(2.05)
+    request = write((RATIO, 50))
+    line.submit(request)
+    # the write is on its way
+    line.fault(f'restart={boot}')
+    before = len(line.sent)
+    answer, = line.wait(request)
+    assert str(answer).startswith(('no answer', 'drive offline'))
+    line.run(line.now + 10.0)
+    assert line.session.online
+    assert line.found(StationLost)
+    assert len(line.writes('8C02')) == 1
+    # the boot-up frame was answered at once, and the drive was told to stand still
+    after = line.sent[before:]
+    assert (round(2.051 + boot, 6), '000#0105') in after
+    assert [text for _, text in after if text[:9] == '505#C0020' and text[11] == 'A']
+    # the motor is off, and stays so until somebody enables it
+    assert line.writes('C002')[-1] == '0000'
+    assert not line.ltmr.plant.operation.enabled
+    assert line.ltmr.value('flc1_ratio') in (33.0, 50.0)
+    assert line.outcome(read(RATIO)) == [line.ltmr.plant.raw('flc1_ratio')]
+    assert line.control(ControlAction.ENABLE)[0]
+
+
+@pytest.mark.parametrize('function', ['00', '80', '25', 'A5', '26', 'A6', '2A', 'AA', '2B', 'AB'])
+def test_unknown_last_function_byte(function: str) -> None:
+    line = Line()
+    line.ltmr.receive_frame(Frame(0x000, b'\x01\x05', False), 0.0)
+    line.ltmr.receive_frame(Frame(0x505, bytes.fromhex(f'C80100{function}00000000'), False), 0.0)
+    line.ltmr.frames_to_send()
+    line.run(2.0)
+    assert line.session.online
+    assert line.outcome(write((RATIO, 50))) == ['written']
+    assert line.ltmr.value('flc1_ratio') == 50.0
+
+
+def test_stopped_node_is_started_again() -> None:
+    line = Line()
+    line.run(1.0)
+    sent = len(line.sent)
+    line.ltmr.receive_frame(Frame(0x000, b'\x02\x05', False), 1.0)
+    line.run(5.0)
+    assert '000#0105' in [text for _, text in line.sent[sent:]]
+    assert line.session.online
+    assert line.session.facts()['nmt_state'] == 'operational'
+
+
+def test_lost_heartbeats() -> None:
+    line = Line(heartbeat_timeout=0.6, missed_limit=1000)
+    line.run(1.0)
+    line.fault('off')
+    line.run(3.0)
+    assert not line.session.online
+    lost, = (at for at, event in line.events if isinstance(event, StationLost))
+    # the last one came at 1.0 at the latest, 0.2 s apart
+    assert 1.4 <= lost <= 1.61
+    line.fault('ok')
+    line.run(6.0)
+    assert line.session.online
+
+
+def test_safe_stop() -> None:
+    line = Line()
+    line.run(1.0)
+    assert line.control(ControlAction.ENABLE)[0]
+    line.session.deactivate(line.now)
+    line._collect()
+    line.run(line.now + 2.0)
+    assert line.session.stopped
+    assert not line.ltmr.plant.operation.enabled
+    assert line.writes('C002')[-1] == '0000'
+    # nothing by NMT, and silence
+    last = line.sent[-1][0]
+    line.run(line.now + 5.0)
+    assert line.sent[-1][0] == last
+
+
+_STEPS = st.lists(st.tuples(
+    st.sampled_from([0.0, 0.004, 0.03, 0.1, 0.35, 1.2]),
+    st.one_of(
+        st.integers(5, 100).map(lambda value: ('write', value)),
+        st.integers(0, 40).map(lambda value: ('class', value)),
+        st.just(('read', 0)),
+        st.sampled_from(['silent', 'late=0.04', 'late=0.6', 'drop=2', 'drop=3', 'length=5',
+                         'foreign', 'duplicate', 'restart=0', 'restart=0.3', 'off', 'ok', 'trip',
+                         ]).map(lambda text: ('fault', text)),
+        st.sampled_from([ControlAction.ENABLE, ControlAction.DISABLE, ControlAction.RESET_FAULT],
+                        ).map(lambda action: ('control', action)))), max_size=25)
+
+
+# without shrinking: an example is readable as it is, and takes a second to find out about
+@settings(deadline=None, max_examples=30, phases=[Phase.explicit, Phase.reuse, Phase.generate])
+@given(_STEPS)
+def test_whatever_happens_answers_are_true_and_the_drive_comes_back(
+        steps: list[tuple[float, tuple[str, Any]]]) -> None:
+    line = Line(parameter_retries=1)
+    line.run(0.5)
+    asked: list[Any] = []
+    for wait, (what, value) in steps:
+        line.run(line.now + wait)
+        if what == 'fault':
+            line.fault(value)
+        elif what == 'control':
+            line.session.request_control(value, line.now)
+            line._collect()
+        else:
+            request: Any = read(RATIO)
+            if what != 'read':
+                request = write((RATIO if what == 'write' else TRIP_CLASS, value))
+            asked.append(request)
+            line.submit(request)
+    line.run(line.now + 40.0)
+    for request in asked:
+        (answer,), = line.outcomes(request)     # exactly one outcome
+        if isinstance(answer, int):
+            assert 5 <= answer <= 100
+        elif answer != 'written':
+            assert str(answer).startswith(('no answer', 'refused by the drive', 'drive offline'))
+            if 'refused' in str(answer):
+                assert request.items[0][0] is TRIP_CLASS
+                assert request.items[0][1] % 5 or not 5 <= request.items[0][1] <= 30
+    # once all is well again, so is the bridge; and what it reads is what is there
+    line.fault('ok')
+    line.run(line.now + 10.0)
+    assert line.session.online
+    assert line.outcome(write((RATIO, 42))) == ['written']
+    assert line.ltmr.value('flc1_ratio') == 42.0
+    assert line.outcome(read(RATIO)) == [42]
+    found = line.found(StationFound)
+    assert len(found) - 1 <= len(line.found(StationLost))
+    # no PDO before the node was ready for it, but for those that crossed a boot-up frame
+    assert set(line.ltmr.violations) <= {'request while the node is not operational (ignored)'}
