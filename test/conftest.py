@@ -2,6 +2,8 @@
 """
 Puts this directory on the path: every test may import ``builders``.
 
+Takes hypothesis' time limits away: how long an example takes says how busy the machine is.
+
 Gives the test run a ROS domain of its own, before anything of ROS is imported: nothing leaves this
 machine, and two test runs on it never meet. The lock ends with the process.
 """
@@ -10,6 +12,11 @@ import fcntl
 import os
 from pathlib import Path
 import tempfile
+
+from hypothesis import HealthCheck, settings
+
+settings.register_profile('patient', deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile('patient')
 
 DOMAINS = range(10, 90)
 

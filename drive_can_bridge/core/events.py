@@ -79,9 +79,14 @@ class ForeignMasterSeen:
 
 @dataclass(frozen=True)
 class Noted:
-    """Anything else that belongs into the log."""
+    """
+    Anything else that belongs into the log.
+
+    :param warning: somebody should do something about it.
+    """
 
     text: str
+    warning: bool = False
 
 
 Event = Union[ProcessDataReceived, StationFound, StationLost, MappingDiffered, MappingWritten,

@@ -191,7 +191,10 @@ class DriveNode:
             self.foreign_text = event.text
             self.warn('foreign master', event.text)
         elif isinstance(event, Noted):
-            self._logger.info(f'{self.name}: {event.text}')
+            if event.warning:
+                self._warn_now(event.text)
+            else:
+                self._logger.info(f'{self.name}: {event.text}')
 
     def control_completed(self, outcome: ControlCompleted) -> None:
         """Answer a control request."""

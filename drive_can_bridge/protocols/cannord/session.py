@@ -487,7 +487,7 @@ class CannordSession(Session):
                 self._timeout_warning = timeout_warning(
                     parameter, float(parameter.value_from_raw(outcome.raw)), self.drive.period)
                 if self._timeout_warning:
-                    self._events.append(Noted(self._timeout_warning))
+                    self._events.append(Noted(self._timeout_warning, warning=True))
             elif isinstance(outcome, Failure):
                 self._events.append(Noted(f'telegram time-out ({parameter.address}) unknown: '
                                           f'{outcome.reason}'))
