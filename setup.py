@@ -73,7 +73,7 @@ setup(
         ],
         'test': [
             # A CANopen stack to test against. No rosdep key: tests that need it skip without it.
-            'canopen>=2.2',
+            'canopen>=2.3',
             'hypothesis',
             'mypy',
             'pytest',

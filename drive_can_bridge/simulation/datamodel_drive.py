@@ -1,5 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""What simulated DataModel drives have in common: the parameter table, whatever the identifiers."""
+"""What simulated DataModel drives have in common: the parameter table."""
 
 from collections.abc import Sequence
 

@@ -281,6 +281,7 @@ class CannordSession(Session):
         if not self._awaiting:
             return
         self._awaiting = False
+        self._forgiven = 1      # one answer too many is on its way, if this one is only late
         self.statistics.missed += 1
         self._missed_in_row += 1
         if self._missed_in_row >= self.drive.missed_limit and not self._stopping:

@@ -355,6 +355,17 @@ def test_one_lost_answer_does_no_harm() -> None:
     assert talk.session.statistics.missed == 2
 
 
+def test_one_answer_too_many_after_a_late_one_is_no_surprise() -> None:
+    talk = online()
+    assert [text for _, text in talk.until(10.041)] == [READY_FRAME] * 2
+    talk.hears(READY, 10.0415)  # of 10.02
+    talk.hears(READY, 10.042)
+    assert talk.events(FrameRejected) == []
+    assert talk.session.statistics.missed == 1
+    talk.hears(READY, 10.043)
+    assert len(talk.events(FrameRejected)) == 1
+
+
 def test_latency_counts_from_the_frame() -> None:
     talk = online()
     talk.until(10.021)

@@ -226,15 +226,22 @@ class SessionMachine(RuleBasedStateMachine):
         self.time_passes_in_time(steps, True)
         self.lossy = False
 
+    @precondition(lambda self: self.session.online)
     @rule(index=st.integers(0, 1), raw=st.sampled_from([0, 1, 5]),
-          action=st.sampled_from(ControlAction))
-    def what_is_wanted_changes_while_requests_get_lost(self, index: int, raw: int,
-                                                       action: ControlAction) -> None:
-        self.lossy = True
+          action=st.sampled_from(ControlAction), steps=st.integers(1, 4),
+          executed=st.booleans())
+    def wishes_change_while_frames_get_lost(self, index: int, raw: int, action: ControlAction,
+                                            steps: int, executed: bool) -> None:
+        """Either the requests do not arrive, or their answers."""
+        self.command(index, 0)
+        self.time_passes_in_time(4, True)
+        self.lossy = not executed
         self.control(action)
         self.command(index, raw)
-        self.time_passes_in_time(3, True)
+        self.time_passes_in_time(steps, False)
         self.lossy = False
+        self.answers.clear()
+        self.device_ends_up_as_told()
 
     @rule(pause=st.sampled_from([0.0, 0.0001, 0.003, 0.017, 0.06, 0.4, 0.99]))
     def time_passes_late(self, pause: float) -> None:
@@ -398,10 +405,11 @@ class SessionMachine(RuleBasedStateMachine):
         """However many frames were lost before: in peace, it soon has what the session means."""
         end = self.now + 1.0
         while self.now < end:
-            self.heartbeat(5)
+            if self.observer.bus:
+                self.heartbeat(5)
             self.time_passes_in_time(5, True)
         if not self.session.online:
-            return
+            return  # what was heard, or not heard, before
         registers = self.device.registers
         if self.session.control is not None:
             assert registers[WORD] == self.session.control.word

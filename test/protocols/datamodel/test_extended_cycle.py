@@ -107,6 +107,17 @@ def test_late_answer_counts_for_the_next_cycle_which_then_is_not_missed() -> Non
     assert talk.session.statistics.exchanges == 2
 
 
+def test_one_answer_too_many_after_a_late_one_is_no_surprise() -> None:
+    talk = online()
+    assert talk.until(10.04 + TICK) == [(10.02, NEUTRAL), (10.04, NEUTRAL)]
+    talk.hears(ANSWER, 10.041)  # of 10.02
+    talk.hears(ANSWER, 10.042)
+    assert talk.events(FrameRejected) == []
+    assert talk.session.statistics.missed == 1
+    talk.hears(ANSWER, 10.043)
+    assert len(talk.events(FrameRejected)) == 1
+
+
 def test_unasked_answer_before_the_first_cycle() -> None:
     talk = Conversation(drive())
     talk.bus_up(9.0)

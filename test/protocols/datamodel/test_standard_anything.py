@@ -53,6 +53,7 @@ REGISTERS = (30, 31, 40, 41, 42, 43, 44, 50, 51, 52, 209, 210, 211, 300, 600)
 WORDS = st.lists(st.integers(0, 0xFFFF), min_size=1, max_size=4)
 
 
+@settings(deadline=None)  # machines may be busy
 @given(st.integers(0, 0x7FF), st.integers(0, 0xFFFF), st.integers(1, 4), st.integers(0, 0xFFFF),
        WORDS)
 def test_telegrams(identifier: int, number: int, count: int, word: int, words: list[int]) -> None:
@@ -69,6 +70,7 @@ def test_telegrams(identifier: int, number: int, count: int, word: int, words: l
         assert standard.decode_read_response(answer, wanted) == tuple(words[:wanted])
 
 
+@settings(deadline=None)  # machines may be busy
 @given(st.integers(0, 0x1FFFFFFF), st.binary(max_size=8), st.booleans(), st.integers(1, 4),
        st.booleans())
 @example(0x3F1, bytes.fromhex('03FFFF0200000000'), False, 1, False)
@@ -525,6 +527,7 @@ TestSession.settings = settings(max_examples=150, stateful_step_count=50, deadli
 pytestmark = pytest.mark.timeout(600)
 
 
+@settings(deadline=None)  # machines may be busy
 @given(frames=st.lists(st.tuples(st.integers(0, 0x1FFFFFFF), st.binary(max_size=8),
                                  st.booleans()), max_size=20),
        state=st.sampled_from(['inactive', 'looking', 'online', 'stopping']))
