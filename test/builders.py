@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.configuration.schema import family_defaults
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import Event, ProcessDataReceived, RequestCompleted
 from drive_can_bridge.core.frame import Frame
@@ -69,8 +70,7 @@ def drive(protocol: str = 'datamodel_extended', *, name: str = 'conveyor', stati
           ) -> DriveConfiguration:
     """Make a drive; further keywords are its keys, those of the family included."""
     keys = {key: value for key, value in options.items() if key in _DRIVE_KEYS}
-    family = {key: entry['default']
-              for key, entry in FAMILIES[protocol].options_schema.items()}
+    family = {**family_defaults(FAMILIES[protocol]), **FAMILIES[protocol].station_defaults(station)}
     unknown = set(options) - set(keys) - set(family)
     if unknown:
         raise ValueError(f'no such keys: {unknown}')

@@ -129,8 +129,9 @@ class DriveChecker:
 
     def _build(self, family: Family, lists: dict[str, tuple[Parameter, ...]],
                ) -> DriveConfiguration:
-        values = {**defaults('drive'), **getattr(family, 'drive_defaults', {}), **self._entry}
-        options = family_defaults(family)
+        values = {**defaults('drive'), **family.drive_defaults, **self._entry}
+        options = {**family_defaults(family),
+                   **family.station_defaults(values.get('station', 1))}
         options.update({key: self._entry[key] for key in family.options_schema
                         if key in self._entry})
         for key, option in family.options_schema.items():

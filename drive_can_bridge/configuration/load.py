@@ -31,8 +31,6 @@ __all__ = ['check_dynamic', 'configuration_from_file', 'configuration_from_overr
 #: parameters that ROS itself puts beside ours
 STANDARD_PARAMETERS = frozenset((
     'use_sim_time', 'qos_overrides', 'start_type_description_service'))
-#: protocols of the contract; those that are no family of this version are named as such
-PROTOCOLS = ('datamodel_extended', 'datamodel_standard', 'cannord', 'canopen_pkw')
 
 
 def configuration_from_file(path: str | FilePath, *, adapters: Adapters | None = None,
@@ -170,6 +168,4 @@ def _unknown_protocol(value: Any) -> str:
     available = ', '.join(FAMILIES)
     if not isinstance(value, str):
         return f'{show(value)} is no protocol; available: {available}'
-    if value in PROTOCOLS:
-        return f'{show(value)} is not built into this version; available: {available}'
     return f'{show(value)} is unknown{hint(value, FAMILIES)}; available: {available}'

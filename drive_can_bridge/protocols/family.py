@@ -7,7 +7,8 @@ through the row in :mod:`drive_can_bridge.protocols.families`.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from drive_can_bridge.configuration.model import DriveConfiguration
@@ -59,10 +60,16 @@ class Family(ABC):
     control_built_in: bool = False
     #: JSON Schema properties of the keys that only this family has; each has a ``default``
     options_schema: dict[str, Any]
+    #: keys that all families have, but whose default is another one here
+    drive_defaults: Mapping[str, Any] = MappingProxyType({})
 
     @abstractmethod
     def check(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         """Yield everything that this family cannot do with the drive as configured."""
+
+    def station_defaults(self, station: int) -> dict[str, Any]:
+        """Return the default values of keys of this family that depend on the station."""
+        return {}
 
     def check_together(self, drives: Sequence[DriveConfiguration],
                        ) -> Iterator[tuple[DriveConfiguration, Complaint]]:

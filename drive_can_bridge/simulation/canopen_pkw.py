@@ -47,14 +47,16 @@ _NMT_ROUTE = Route(network.NMT_IDENTIFIER, STANDARD_IDENTIFIER_MAX, False)
 
 def request_identifier(configuration: DriveConfiguration) -> int:
     """Return the identifier of requests, which the device's receive PDO4 has."""
-    option: int | None = configuration.family_options.get('request_cob_id')
-    return option or network.REQUEST_BASE + configuration.station
+    identifier: int = configuration.family_options.get(
+        'request_cob_id', network.REQUEST_BASE + configuration.station)
+    return identifier
 
 
 def response_identifier(configuration: DriveConfiguration) -> int:
     """Return the identifier of responses, which the device's transmit PDO4 has."""
-    option: int | None = configuration.family_options.get('response_cob_id')
-    return option or network.RESPONSE_BASE + configuration.station
+    identifier: int = configuration.family_options.get(
+        'response_cob_id', network.RESPONSE_BASE + configuration.station)
+    return identifier
 
 
 class SimulatedPkwDrive(SimulatedDrive):

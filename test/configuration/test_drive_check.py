@@ -6,7 +6,6 @@ from pathlib import Path
 from configuration_builders import changed, FILE, load, problems, PROFILE, warnings
 import pytest
 
-from drive_can_bridge.configuration.load import PROTOCOLS
 from drive_can_bridge.protocols.families import FAMILIES
 
 CASES = [
@@ -258,15 +257,6 @@ def test_name_too_long(tmp_path: Path) -> None:
     found = problems(tmp_path, changed(FILE, 'conveyor', 'c' * 101))
     assert len(found) == 1
     assert found[0].startswith(f'f.yaml:10: drives.{"c" * 101}: ')
-
-
-@pytest.mark.parametrize('protocol', [name for name in PROTOCOLS if name not in FAMILIES])
-def test_protocol_not_built_in(tmp_path: Path, protocol: str) -> None:
-    # The key is one of a family that this version cannot know.
-    text = changed(FILE, 'protocol: datamodel_extended', f'protocol: {protocol}\n        zzz: 1')
-    assert problems(tmp_path, text) == [
-        f"f.yaml:12: drives.conveyor.protocol: '{protocol}' is not built into this version; "
-        f'available: {", ".join(FAMILIES)}']
 
 
 @pytest.mark.parametrize(('given', 'message'), [

@@ -63,7 +63,7 @@ def test_defaults(drive: DriveConfiguration) -> None:
     assert drive.family_options == {
         'layout': 'word_le', 'word_order': 'high_first', 'abort_code_order': 'auto',
         'addressing': 'register', 'nmt_start': True, 'heartbeat_timeout': 0.0,
-        'request_cob_id': 0, 'response_cob_id': 0, 'refresh_interval': 1.0}
+        'request_cob_id': 0x505, 'response_cob_id': 0x485, 'refresh_interval': 1.0}
 
 
 def test_claims(drive: DriveConfiguration) -> None:
@@ -78,7 +78,8 @@ def test_claims(drive: DriveConfiguration) -> None:
 def test_claims_collide_with_the_same_node_only(drive: DriveConfiguration) -> None:
     own = FAMILY.claims(drive)
     for station in range(1, 128):
-        others = FAMILY.claims(replace(drive, station=station))
+        others = FAMILY.claims(replace(drive, station=station, family_options={
+            **drive.family_options, **FAMILY.station_defaults(station)}))
         assert any(mine.overlaps(other) for mine in own for other in others) == (station == 5)
 
 
@@ -119,7 +120,8 @@ def test_drive_keys(tmp_path: Path, old: str, new: str, problem: str) -> None:
 
 
 @pytest.mark.parametrize('line', [
-    'request_cob_id: 0x800', 'response_cob_id: -1', 'layout: big', 'word_order: high',
+    'request_cob_id: 0', 'request_cob_id: 0x800', 'response_cob_id: 0', 'response_cob_id: -1',
+    'layout: big', 'word_order: high',
     'abort_code_order: none', 'addressing: sdo', 'heartbeat_timeout: -1', 'nmt_start: 1',
     'refresh_interval: -0.1', 'mapping: verify'])
 def test_values_out_of_range(tmp_path: Path, line: str) -> None:

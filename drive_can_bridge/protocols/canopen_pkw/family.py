@@ -63,14 +63,13 @@ class CanopenPkw(Family):
             'type': 'number', 'minimum': 0, 'maximum': 3600, 'default': 0.0,
         },
         'request_cob_id': {
-            'description': 'Identifier of requests to the device (receive PDO4); 0: the '
-                           'predefined one, 500h + node.',
-            'type': 'integer', 'minimum': 0, 'maximum': STANDARD_IDENTIFIER_MAX, 'default': 0,
+            'description': 'Identifier of requests to the device (receive PDO4); by default '
+                           '500h + node.',
+            'type': 'integer', 'minimum': 1, 'maximum': STANDARD_IDENTIFIER_MAX,
         },
         'response_cob_id': {
-            'description': 'Identifier of responses (transmit PDO4); 0: the predefined one, '
-                           '480h + node.',
-            'type': 'integer', 'minimum': 0, 'maximum': STANDARD_IDENTIFIER_MAX, 'default': 0,
+            'description': 'Identifier of responses (transmit PDO4); by default 480h + node.',
+            'type': 'integer', 'minimum': 1, 'maximum': STANDARD_IDENTIFIER_MAX,
         },
         'refresh_interval': {
             'description': 's: unchanged values of cyclic_request are written again this often; '
@@ -78,6 +77,11 @@ class CanopenPkw(Family):
             'type': 'number', 'minimum': 0, 'maximum': 3600, 'default': 1.0,
         },
     }
+
+    def station_defaults(self, station: int) -> dict[str, Any]:
+        """Return the predefined COB-IDs of a node."""
+        return {'request_cob_id': network.REQUEST_BASE + station,
+                'response_cob_id': network.RESPONSE_BASE + station}
 
     def check(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         """Yield everything that this family cannot do with the drive as configured."""

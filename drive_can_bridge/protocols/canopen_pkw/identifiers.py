@@ -24,10 +24,9 @@ class Identifiers(NamedTuple):
 
     @classmethod
     def of(cls, drive: DriveConfiguration) -> 'Identifiers':
-        """Return those of a configured drive: the predefined ones, unless it says otherwise."""
+        """Return those of a configured drive."""
         node, options = drive.station, drive.family_options
         return cls(
-            request=options['request_cob_id'] or network.REQUEST_BASE + node,
-            response=options['response_cob_id'] or network.RESPONSE_BASE + node,
+            request=options['request_cob_id'], response=options['response_cob_id'],
             emergency=network.EMERGENCY_BASE + node,
             heartbeat=network.HEARTBEAT_BASE + node)
