@@ -3,8 +3,12 @@
 
 from rclpy.node import Node
 from rclpy.parameter import Parameter as NodeParameter
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSPolicyKind, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
+
+#: the default policies, and that which makes a topic a latched one
+_OVERRIDABLE = (QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH, QoSPolicyKind.RELIABILITY,
+                QoSPolicyKind.DURABILITY)
 
 
 def state_quality() -> QoSProfile:
@@ -37,7 +41,7 @@ def overriding(node: Node, topic: str) -> QoSOverridingOptions | None:
     """
     prefix = f'qos_overrides.{node.resolve_topic_name(topic)}.'
     if any(name.startswith(prefix) for name in node._parameter_overrides):
-        return QoSOverridingOptions.with_default_policies()
+        return QoSOverridingOptions(policy_kinds=_OVERRIDABLE)
     return None
 
 

@@ -1,14 +1,20 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Names: namespaces, remaps, two bridges, qualities."""
 
+from pathlib import Path
+import signal
+import subprocess
+import sys
+
 from bridges import Bridge, CONVEYOR, LIFT, parameters, StartBridge
-from clients import Client, ERROR, wait_until
+from clients import Client, ERROR, patience, wait_until
 import pytest
 from rcl_interfaces.msg import LoggerLevel, ParameterEvent
 from rcl_interfaces.srv import SetLoggerLevels
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Bool, Float64
 from std_srvs.srv import SetBool
+import yaml
 
 
 def own_nodes(client: Client) -> set[str]:
@@ -149,21 +155,18 @@ def test_quality_can_be_overridden(bridge: StartBridge, client: Client, key: str
         wait_until(lambda: recorder.words()[:1] == (30,))
 
 
-@pytest.mark.parametrize('way', ['argument', 'service'])
-def test_log_level(bridge: StartBridge, client: Client, way: str) -> None:
-    # levels belong to the process: a logger of its own for each
-    name = f'{way}.drive_can_bridge'
-    arguments = ('--log-level', f'{name}:=warn') if way == 'argument' else ()
+def test_log_level_by_service(bridge: StartBridge, client: Client) -> None:
+    # levels belong to the process: a namespace, and thereby a logger, of its own
+    name = 'levelled.drive_can_bridge'
+    bridge(autostart=False, arguments=('-r', '__ns:=/levelled'))
     client.listen()
-    bridge(autostart=False, arguments=('-r', f'__ns:=/{way}', *arguments))
-    node = f'/{way}/drive_can_bridge'
+    node = '/levelled/drive_can_bridge'
 
     def level(number: int) -> None:
         answer = client.call(f'{node}/set_logger_levels', SetLoggerLevels, SetLoggerLevels.Request(
             levels=[LoggerLevel(name=name, level=number)]))
         assert [result.successful for result in answer.results] == [True]
-    if way == 'service':
-        level(LoggerLevel.LOG_LEVEL_WARN)
+    level(LoggerLevel.LOG_LEVEL_WARN)
     assert client.transition(1, node=node)
     assert not client.transition(1, node=node)
     client.wait_logged('transition number 1 is not possible')
@@ -171,3 +174,26 @@ def test_log_level(bridge: StartBridge, client: Client, way: str) -> None:
     level(LoggerLevel.LOG_LEVEL_INFO)
     assert client.transition(3, node=node)
     client.wait_logged('active: 1 drives on 1 buses')
+
+
+@pytest.mark.parametrize(('level', 'told'), [('info', True), ('warn', False)])
+def test_log_level_by_argument(client: Client, tmp_path: Path, level: str, told: bool) -> None:
+    """In a process of its own: the first context of a process decides."""
+    file = tmp_path / 'bridge.yaml'
+    file.write_text(yaml.dump({'/**/drive_can_bridge': {'ros__parameters': {
+        **parameters(buses={'main': {'interface': 'virtual', 'channel': level}},
+                     conveyor=CONVEYOR)}}}), encoding='utf-8')
+    process = subprocess.Popen(
+        [sys.executable, '-m', 'drive_can_bridge.ros.main', '--ros-args', '--params-file',
+         str(file), '-r', f'__ns:=/{level}', '--log-level', level],
+        stderr=subprocess.PIPE, text=True)
+    try:
+        node = f'/{level}/drive_can_bridge'
+        wait_until(lambda: node in client.nodes(), 60.0)
+        wait_until(lambda: client.state(node) == 'active', 60.0)
+    finally:
+        process.send_signal(signal.SIGINT)
+        lines = process.communicate(timeout=patience(60.0))[1]
+    assert process.returncode == 0
+    assert ('active: 1 drives on 1 buses' in lines) is told
+    wait_until(lambda: node not in client.nodes())

@@ -37,7 +37,7 @@ def pkw_reads(frames: list[tuple[int, bytes]]) -> int:
 
 
 @pytest.mark.parametrize(('protocol', 'count', 'together'), [
-    ('datamodel_extended', extended_reads, 4), ('datamodel_standard', standard_reads, 3),
+    ('datamodel_extended', extended_reads, 4), ('datamodel_standard', standard_reads, 4),
     ('cannord', cannord_reads, 1), ('canopen_pkw', pkw_reads, 2)])
 def test_two_hundred_names(bridge: StartBridge, client: Client, tmp_path: Path, protocol: str,
                            count: Callable[[list[tuple[int, bytes]]], int], together: int,

@@ -191,7 +191,7 @@ class ExtendedSession(DataModelSession):
         self._forgiven = False
         self._in_pace = False
         self._missed_in_row = 0
-        self._next_cycle = max(now, self._sent_at + self.drive.period)
+        self._next_cycle = self._next_turn(max(now, self._sent_at + self.drive.period))
         self._advice = 'no cyclic response: drive silent or response identifier taken'
 
     def _cycle(self, now: float) -> None:
@@ -250,6 +250,7 @@ class ExtendedSession(DataModelSession):
 
     def _miss(self, now: float) -> None:
         self._awaiting = False
+        self._forgiven = True  # one answer too many is on its way, if this one is only late
         self.statistics.missed += 1
         self._missed_in_row += 1
         if self._stopping:

@@ -1,0 +1,108 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""The commands of the README, with the real ``ros2`` wherever it is installed."""
+
+from collections.abc import Callable
+import importlib.util
+from pathlib import Path
+import subprocess
+import sys
+
+from bridges import Bridge, StartBridge
+from clients import Client, patience, wait_until
+import pytest
+import yaml
+
+CONFIG = Path(__file__).parents[2] / 'config'
+MAIN = 'import sys; from ros2cli.cli import main; sys.exit(main())'
+#: no daemon: it would outlive the test
+ALONE = ('--no-daemon', '--spin-time', '3')
+
+#: runs a command; returns what it says (what its exit code says differs between versions)
+Ros2 = Callable[..., str]
+
+
+@pytest.fixture(name='demo')
+def _demo(bridge: StartBridge, client: Client) -> Bridge:
+    text = (CONFIG / 'demo.yaml').read_text(encoding='utf-8')
+    one = bridge(text.replace('channel: demo', 'channel: ros_test_command_line'))
+    one.online()
+    wait_until(lambda: {'/conveyor', '/lift', '/turntable'} <= set(client.nodes()))
+    return one
+
+
+@pytest.fixture(name='ros2')
+def _ros2() -> Ros2:
+    for module in ('ros2cli', 'ros2param', 'ros2node', 'ros2service', 'ros2topic',
+                   'ros2lifecycle'):
+        if importlib.util.find_spec(module) is None:
+            pytest.skip(f'{module} is not installed')
+
+    def run(*words: str) -> str:
+        for _ in range(5):  # on a busy machine the nodes are not found at once
+            done = subprocess.run([sys.executable, '-c', MAIN, *words], capture_output=True,
+                                  text=True, timeout=patience(60.0), check=False)
+            told = done.stdout + done.stderr
+            assert 'Traceback' not in told, told
+            if 'Node not found' not in told:
+                break
+        return told
+    return run
+
+
+def test_nodes(ros2: Ros2, demo: Bridge) -> None:
+    assert {'/conveyor', '/drive_can_bridge', '/lift', '/turntable'} <= set(
+        ros2('node', 'list', *ALONE).split())
+    told = ros2('node', 'info', '/conveyor', *ALONE)
+    for line in ('/conveyor/response: rcl_interfaces/msg/ParameterEvent',
+                 '/conveyor/command/speed_setpoint: std_msgs/msg/Float64',
+                 '/conveyor/set_parameters: rcl_interfaces/srv/SetParameters'):
+        assert line in told
+    assert ros2('lifecycle', 'get', '/drive_can_bridge', *ALONE) == 'active [3]\n'
+
+
+def test_parameters(ros2: Ros2, demo: Bridge, tmp_path: Path) -> None:
+    drive = demo.played['conveyor']
+    listed = ros2('param', 'list', '/conveyor', *ALONE).split()
+    assert len(listed) == 25 and 'ramp_time' in listed
+    drive.set_value('ramp_time', 1.0)
+    assert ros2('param', 'get', '/conveyor', 'ramp_time', *ALONE) == 'Double value is: 1.0\n'
+    assert ros2('param', 'get', '/conveyor', 'p30', *ALONE) == 'Integer value is: 100\n'
+    assert ros2('param', 'set', '/conveyor', 'ramp_time', '1.5', *ALONE) == (
+        'Set parameter successful\n')
+    assert drive.value('ramp_time') == pytest.approx(1.5)
+    assert ros2('param', 'set', '/conveyor', 'ramp_time', '100', *ALONE) == (
+        'Setting parameter failed: 100 is out of range: 0.01 to 60 s\n')
+    told = ros2('param', 'describe', '/conveyor', 'ramp_time', *ALONE)
+    for line in ('Type: double', 'Ramp from standstill to maximum speed (P30, unit s, storage '
+                 'eeprom)', 'Min value: 0.01', 'Max value: 60.0', 'Step: 0.01'):
+        assert line in told
+    dumped = ros2('param', 'dump', '/conveyor', *ALONE)
+    values = yaml.safe_load(dumped)['/conveyor']['ros__parameters']
+    assert sorted(values) == sorted(listed)
+    assert values['ramp_time'] == pytest.approx(1.5) and values['user_command'] is None
+    file = tmp_path / 'conveyor.yaml'
+    file.write_text(dumped.replace('ramp_time: 1.5', 'ramp_time: 2.5'), encoding='utf-8')
+    told = ros2('param', 'load', '/conveyor', str(file), *ALONE)
+    assert 'Set parameter ramp_time successful' in told
+    assert 'Set parameter actual_speed failed: read-only' in told
+    assert drive.value('ramp_time') == pytest.approx(2.5)
+
+
+def test_topics_and_services(ros2: Ros2, demo: Bridge) -> None:
+    assert '/lift/status_word/enabled [std_msgs/msg/Bool]' in ros2(
+        'topic', 'list', '-t', *ALONE)
+    assert ros2('topic', 'echo', '--once', '/conveyor/online', *ALONE) == 'data: true\n---\n'
+    sample = next(yaml.safe_load_all(
+        ros2('topic', 'echo', '--once', '/conveyor/response', *ALONE)))
+    assert sample['node'] == '/conveyor'
+    assert [entry['name'] for entry in sample['changed_parameters']] == [
+        'actual_speed', 'motor_current', 'status_word', 'dc_link_voltage']
+    assert "success=True, message='enabled'" in ros2(
+        'service', 'call', '/lift/enable', 'std_srvs/srv/SetBool', '{data: true}')
+    ros2('topic', 'pub', '--once', '-w', '1', '/turntable/command/torque_limit',
+         'std_msgs/msg/Float64', '{data: 0.0}')
+    wait_until(lambda: demo.node.drives['turntable'].session.setpoints.items[2].armed)
+    assert ros2('lifecycle', 'set', '/drive_can_bridge', 'deactivate', *ALONE) == (
+        'Transitioning successful\n')
+    assert ros2('param', 'set', '/conveyor', 'ramp_time', '1.0', *ALONE) == (
+        'Setting parameter failed: bridge inactive\n')
