@@ -58,6 +58,8 @@ class Session(ABC):
     :ivar control: the control and status word machine, or None.
     :ivar online: the drive exchanges process data.
     :ivar ever_online: it did so at least once since activation.
+    :ivar phase: s, when in each period of the steady clock this drive has its turn, for drives
+        that share a bus; None: whenever it is ready.
     """
 
     def __init__(self, drive: DriveConfiguration, control: ControlMachine | None) -> None:
@@ -74,6 +76,7 @@ class Session(ABC):
         self.ever_online = False
         self.active = False
         self.bus_available = False
+        self.phase: float | None = None
         self._frames: list[Frame] = []
         self._events: list[Event] = []
         self._cyclic_names = {parameter.name for parameter in drive.cyclic_request}
@@ -137,6 +140,12 @@ class Session(ABC):
     @abstractmethod
     def next_timer(self) -> float:
         """Return when ``handle_timer`` wants to be called next; infinity: never."""
+
+    def _next_turn(self, earliest: float) -> float:
+        """Return the time from ``earliest`` on at which cycles may begin."""
+        if self.phase is None:
+            return earliest
+        return earliest + (self.phase - earliest) % self.drive.period
 
     def take_frames(self) -> list[Frame]:
         """Return the frames to be sent now, in order."""
