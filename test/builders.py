@@ -70,7 +70,8 @@ def drive(protocol: str = 'datamodel_extended', *, name: str = 'conveyor', stati
           ) -> DriveConfiguration:
     """Make a drive; further keywords are its keys, those of the family included."""
     keys = {key: value for key, value in options.items() if key in _DRIVE_KEYS}
-    family = {**family_defaults(FAMILIES[protocol]), **FAMILIES[protocol].station_defaults(station)}
+    row = FAMILIES[protocol]
+    family = {**family_defaults(row), **row.station_defaults(station)}
     unknown = set(options) - set(keys) - set(family)
     if unknown:
         raise ValueError(f'no such keys: {unknown}')

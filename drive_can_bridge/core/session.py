@@ -24,7 +24,9 @@ from drive_can_bridge.configuration.model import DriveConfiguration
 from drive_can_bridge.core.control import (
     ControlAction, ControlCompleted, ControlMachine, ControlTicket,
 )
-from drive_can_bridge.core.events import Event, RequestCompleted
+from drive_can_bridge.core.events import (
+    Event, FrameRejected, Noted, RequestCompleted, StationLost,
+)
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.requests import (
@@ -80,6 +82,8 @@ class Session(ABC):
         self._frames: list[Frame] = []
         self._events: list[Event] = []
         self._cyclic_names = {parameter.name for parameter in drive.cyclic_request}
+        self._open_requests: list[Request] = []
+        self._advice = 'not activated'
 
     @property
     def builtin_parameters(self) -> tuple[Parameter, ...]:
@@ -186,6 +190,7 @@ class Session(ABC):
         elif not len(request):
             self._complete(request, ())
         else:
+            self._open_requests.append(request)
             self._enqueue(request, now)
 
     def _refusal(self) -> str:
@@ -207,11 +212,22 @@ class Session(ABC):
 
     @abstractmethod
     def _enqueue(self, request: Request, now: float) -> None:
-        """Queue a request that may be served."""
+        """Queue a request that may be served; it ends with :meth:`_answer`."""
 
     @abstractmethod
     def _waiting_requests(self) -> int:
         """Return how many user requests wait behind the one being served."""
+
+    def _answer(self, request: Request, outcomes: tuple[Outcome, ...]) -> None:
+        """Answer a request that was queued."""
+        self._open_requests.remove(request)
+        self._complete(request, outcomes)
+
+    def _fail_open_requests(self, reason: str) -> None:
+        """Answer whatever was queued. The family has forgotten it already."""
+        requests, self._open_requests = self._open_requests, []
+        for request in requests:
+            self._complete(request, (Failure(reason),) * len(request))
 
     def _complete(self, request: Request, outcomes: tuple[Outcome, ...]) -> None:
         for outcome in outcomes:
@@ -284,6 +300,25 @@ class Session(ABC):
         return {}
 
     @property
-    @abstractmethod
     def offline_advice(self) -> str:
         """While not online: what is missing and what to look at; '' while online."""
+        return self._advice
+
+    # -- for the families -------------------------------------------------------------------------
+
+    def _be_offline(self, reason: str) -> None:
+        """Tell that the drive is offline, if it was not."""
+        if self.online:
+            self.online = False
+            self._events.append(StationLost(reason))
+
+    def _reject(self, text: str) -> None:
+        """Count and tell a frame of the drive that is malformed or unasked."""
+        self.statistics.rejected += 1
+        self._events.append(FrameRejected(text))
+
+    def _tell_notes(self) -> None:
+        """Tell what the control machine noted."""
+        if self.control is not None:
+            for note in self.control.take_notes():
+                self._events.append(Noted(note))

@@ -21,8 +21,8 @@ from types import TracebackType
 #: through the launch that started it: without this grace the second signal would end the process
 #: before its first neutral frame.
 GRACE = 0.3
-#: s within which the same signal counts once: timeout(1), for one, sends it to its child and, in the
-#: next breath, to its whole process group
+#: s within which the same signal counts once: timeout(1), for one, sends it to its child and, in
+#: the next breath, to its whole process group
 SAME_BREATH = 0.05
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 

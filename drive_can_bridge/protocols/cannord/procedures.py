@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 from drive_can_bridge.core.parameters import Parameter, Storage, Value
 from drive_can_bridge.core.requests import (
-    Failure, NO_ANSWER_OFFLINE, Outcome, ReadValue, Written,
+    Failure, NO_ANSWER_OFFLINE, Outcome, ReadRequest, ReadValue, Request, Written,
 )
-from drive_can_bridge.protocols.cannord.channel import Ask, Reply
+from drive_can_bridge.protocols.cannord.channel import Ask, Procedure, Reply
 from drive_can_bridge.protocols.cannord.parameter_frame import (
     error_text, ParameterFrame, Response, Task, WRITE_TASKS,
 )
@@ -46,6 +46,15 @@ class Conditions:
             return Failure(NO_ANSWER_OFFLINE)
         noun = 'attempt' if attempts == 1 else 'attempts'
         return Failure(f'no answer in {self.timeout:g} s, {attempts} {noun}')
+
+
+def of_request(request: Request, conditions: Conditions) -> Procedure:
+    """Return the procedure that serves a request of a user."""
+    if isinstance(request, ReadRequest):
+        return read_parameters(request.parameters, conditions)
+    if request.atomic:
+        return write_together(request.items, conditions)
+    return write_parameters(request.items, conditions)
 
 
 def read_parameters(parameters: Sequence[Parameter], conditions: Conditions,

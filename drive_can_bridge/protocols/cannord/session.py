@@ -16,24 +16,22 @@ is a sample like any other. Tasks of the parameter channel go out whenever there
 data beside them: lower identifiers win on the bus.
 """
 
-from collections.abc import Generator
 import math
 
 from drive_can_bridge.configuration.model import DriveConfiguration
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.events import (
-    ForeignMasterSeen, FrameRejected, Noted, ProcessDataReceived, SetpointsExpired, StationFound,
-    StationLost,
+    ForeignMasterSeen, Noted, ProcessDataReceived, SetpointsExpired, StationFound,
 )
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Access, Parameter
 from drive_can_bridge.core.requests import (
-    BRIDGE_INACTIVE, BUS_DOWN, Failure, Outcome, ReadRequest, ReadValue, Request, WriteRequest,
+    BRIDGE_INACTIVE, BUS_DOWN, Failure, Outcome, ReadValue, Request, WriteRequest,
     Written,
 )
 from drive_can_bridge.core.session import Session, STOP_CYCLES
 from drive_can_bridge.protocols.cannord import procedures
-from drive_can_bridge.protocols.cannord.channel import Ask, Reply, TaskChannel
+from drive_can_bridge.protocols.cannord.channel import TaskChannel
 from drive_can_bridge.protocols.cannord.control import CannordControl
 from drive_can_bridge.protocols.cannord.identifiers import identifier, MessageObject
 from drive_can_bridge.protocols.cannord.monitoring import (
@@ -89,7 +87,6 @@ class CannordSession(Session):
             ParameterLayout(options['value_order'], options['index_byte']), self._send_task,
             timeout=drive.parameter_timeout, attempts=drive.parameter_retries + 1)
         self._conditions = self._make_conditions()
-        self._open: list[Request] = []
         self._cycling = False
         self._stopping = False
         self._cycles_left = 0               # before a stop is complete
@@ -106,7 +103,6 @@ class CannordSession(Session):
         self._in_pace = False  # the last cycle was a period ago: its distance says something
         self._next_cycle = math.inf
         self._missed_in_row = 0
-        self._advice = 'not activated'
         self._timeout_warning = ''
 
     @property
@@ -190,9 +186,7 @@ class CannordSession(Session):
         self._last_sample = ()
         self._extra_missing = False
         self._timeout_warning = ''
-        if self.online:
-            self.online = False
-            self._events.append(StationLost(reason))
+        super()._be_offline(reason)
 
     def _withdraw(self, reason: str, now: float) -> None:
         """Go neutral, and back to ``disable``."""
@@ -401,17 +395,8 @@ class CannordSession(Session):
         self._events.append(ForeignMasterSeen(
             f'another master sends to station {self.drive.station}: {frame}'))
 
-    def _reject(self, text: str) -> None:
-        self.statistics.rejected += 1
-        self._events.append(FrameRejected(text))
-
     def _control_changed(self, now: float) -> None:
         self._tell_notes()
-
-    def _tell_notes(self) -> None:
-        """Tell what the control machine noted."""
-        for note in self._machine.take_notes():
-            self._events.append(Noted(note))
 
     # -- parameters -------------------------------------------------------------------------------
 
@@ -433,33 +418,21 @@ class CannordSession(Session):
         return None
 
     def _enqueue(self, request: Request, now: float) -> None:
-        procedure: Generator[Ask, Reply, tuple[Outcome, ...]]
-        if isinstance(request, ReadRequest):
-            procedure = procedures.read_parameters(request.parameters, self._conditions)
-        elif request.atomic:
-            procedure = procedures.write_together(request.items, self._conditions)
-        else:
-            procedure = procedures.write_parameters(request.items, self._conditions)
-        self._open.append(request)
-
         def done(outcomes: tuple[Outcome, ...]) -> None:
-            self._open.remove(request)
-            self._complete(request, outcomes)
+            self._answer(request, outcomes)
             if isinstance(request, WriteRequest) and any(
                     parameter.number == TIMEOUT_NUMBER and isinstance(outcome, Written)
                     for (parameter, _), outcome in zip(request.items, outcomes)):
                 self._look_at_timeout(self._channel.now)
 
-        self._channel.run(procedure, done, now)
+        self._channel.run(procedures.of_request(request, self._conditions), done, now)
 
     def _waiting_requests(self) -> int:
         return self._channel.waiting_users
 
     def _fail_requests(self, reason: str) -> None:
         self._channel.clear()
-        requests, self._open = self._open, []
-        for request in requests:
-            self._complete(request, (Failure(reason),) * len(request))
+        self._fail_open_requests(reason)
 
     def write_refusal(self, parameter: Parameter) -> str:
         refusal = super().write_refusal(parameter)
@@ -514,10 +487,6 @@ class CannordSession(Session):
                    self._channel.next_timer())
 
     # -- state ------------------------------------------------------------------------------------
-
-    @property
-    def offline_advice(self) -> str:
-        return self._advice
 
     @property
     def warning(self) -> str:

@@ -11,10 +11,11 @@ from typing import Union
 
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.requests import (
-    Failure, NO_ANSWER_OFFLINE, Outcome, ReadValue, Written,
+    Failure, NO_ANSWER_OFFLINE, Outcome, ReadRequest, ReadValue, Request, Written,
 )
 from drive_can_bridge.protocols.canopen_pkw import addresses
 from drive_can_bridge.protocols.canopen_pkw.addresses import Span
+from drive_can_bridge.protocols.canopen_pkw.channel import Procedure
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
     Answered, Read, Refused, Reply, Silence, Step, Write,
 )
@@ -54,6 +55,15 @@ class Conditions:
 
 
 # -- parameters of users --------------------------------------------------------------------------
+
+
+def of_request(request: Request, conditions: Conditions) -> Procedure:
+    """Return the procedure that serves a request of a user."""
+    if isinstance(request, ReadRequest):
+        return read_parameters(request.parameters, conditions)
+    if request.atomic:
+        return write_together(request.items, conditions)
+    return write_parameters(request.items, conditions)
 
 
 def read_parameters(parameters: Sequence[Parameter], conditions: Conditions,

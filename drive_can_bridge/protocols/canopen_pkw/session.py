@@ -27,8 +27,7 @@ from drive_can_bridge.configuration.model import DriveConfiguration
 from drive_can_bridge.core.control import ControlMachine, ProfileControl
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.events import (
-    ForeignMasterSeen, FrameRejected, Noted, ProcessDataReceived, SetpointsExpired, StationFound,
-    StationLost,
+    ForeignMasterSeen, Noted, ProcessDataReceived, SetpointsExpired, StationFound,
 )
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter
@@ -43,7 +42,6 @@ from drive_can_bridge.protocols.canopen_pkw.mailbox import Mailbox, Refused
 from drive_can_bridge.protocols.canopen_pkw.node import Change, Node
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Layout, Message
 from drive_can_bridge.protocols.canopen_pkw.setpoint_writer import SetpointWriter
-from drive_can_bridge.protocols.canopen_pkw.user_requests import UserRequests
 from drive_can_bridge.protocols.polling import Beat
 
 #: how often, and for how long (s, all together), a drive is told to stand still
@@ -80,8 +78,7 @@ class PkwSession(Session):
                           heartbeat_timeout=options['heartbeat_timeout'])
         self._channel = Channel(Mailbox(
             self._send, order=options['abort_code_order'], timeout=drive.parameter_timeout))
-        self._users = UserRequests(
-            self._channel, drive, offline=lambda: not self.online, complete=self._complete)
+        self._conditions = self._make_conditions()
         self._setpoint_writer = SetpointWriter(
             self._channel, self.setpoints, addressing=self._addressing,
             word_order=self._word_order, refresh=options['refresh_interval'])
@@ -104,7 +101,6 @@ class PkwSession(Session):
         self._missed_in_row = 0
         self._round_began = -math.inf
         self._received_at = -math.inf
-        self._advice = 'not activated'
 
     # -- life cycle -------------------------------------------------------------------------------
 
@@ -117,7 +113,7 @@ class PkwSession(Session):
     def deactivate(self, now: float) -> None:
         was_running = self._phase is Phase.RUNNING and self.ever_online
         self.active = False
-        self._users.fail(BRIDGE_INACTIVE)
+        self._fail_requests(BRIDGE_INACTIVE)
         self._withdraw(BRIDGE_INACTIVE, now)
         self._node.stop()
         self._beat.stop()
@@ -143,7 +139,7 @@ class PkwSession(Session):
 
     def bus_down(self, now: float, reason: str) -> None:
         self.bus_available = False
-        self._users.fail(BUS_DOWN)
+        self._fail_requests(BUS_DOWN)
         text = f'bus down: {reason}'
         self._withdraw(text, now)
         self._node.forget()
@@ -203,11 +199,6 @@ class PkwSession(Session):
         self._missed_in_row = 0
         self._be_offline(reason)
 
-    def _be_offline(self, reason: str) -> None:
-        if self.online:
-            self.online = False
-            self._events.append(StationLost(reason))
-
     def _withdraw(self, reason: str, now: float) -> None:
         """Go neutral, and back to ``disable``."""
         self.setpoints.disarm()
@@ -230,7 +221,7 @@ class PkwSession(Session):
         """Handle a node that takes no PDOs: nothing that was sent is answered any more."""
         self._be_lost(reason, now)
         self._channel.clear()
-        self._users.fail(answer)
+        self._fail_requests(answer)
 
     def _neutral_writes(self) -> list[tuple[Span, tuple[int, ...]]]:
         """Return what makes a drive stand still."""
@@ -393,10 +384,6 @@ class PkwSession(Session):
             self._beat.start(max(now, free_at))
         self._channel.advance(now)
 
-    def _reject(self, text: str) -> None:
-        self.statistics.rejected += 1
-        self._events.append(FrameRejected(text))
-
     # -- timer ------------------------------------------------------------------------------------
 
     def handle_timer(self, now: float) -> None:
@@ -430,10 +417,6 @@ class PkwSession(Session):
         if self._control_writer is not None and self.online:
             self._control_writer.update(now)
 
-    def _tell_notes(self) -> None:
-        if self.control is not None:
-            self._events += [Noted(note) for note in self.control.take_notes()]
-
     # -- users ------------------------------------------------------------------------------------
 
     def submit(self, request: Request, now: float) -> None:
@@ -444,10 +427,16 @@ class PkwSession(Session):
             super().submit(request, now)
 
     def _enqueue(self, request: Request, now: float) -> None:
-        self._users.add(request, now)
+        self._channel.run(
+            Lane.USERS, procedures.of_request(request, self._conditions),
+            lambda outcomes: self._answer(request, outcomes), now)
+
+    def _fail_requests(self, reason: str) -> None:
+        self._channel.cancel(Lane.USERS)
+        self._fail_open_requests(reason)
 
     def _waiting_requests(self) -> int:
-        return self._users.waiting
+        return self._channel.waiting_users
 
     def write_refusal(self, parameter: Parameter) -> str:
         if not parameter.listed:
@@ -464,7 +453,15 @@ class PkwSession(Session):
                     parameter_timeout: float | None = None) -> None:
         super().reconfigure(command_timeout=command_timeout, rearm_immediate=rearm_immediate,
                             parameter_timeout=parameter_timeout)
-        self._users.reconfigure(self.drive)
+        self._channel.mailbox.timeout = self.drive.parameter_timeout
+        self._conditions = self._make_conditions()
+
+    def _make_conditions(self) -> procedures.Conditions:
+        drive = self.drive
+        return procedures.Conditions(
+            offline=lambda: not self.online, timeout=drive.parameter_timeout,
+            attempts=drive.parameter_retries + 1, addressing=self._addressing,
+            word_order=self._word_order)
 
     # -- state ------------------------------------------------------------------------------------
 
@@ -488,7 +485,3 @@ class PkwSession(Session):
         emergency = self._node.emergency
         return {'nmt_state': self._node.state_text,
                 'emergency': 'none' if emergency is None else emergency.text}
-
-    @property
-    def offline_advice(self) -> str:
-        return self._advice

@@ -7,16 +7,15 @@ import math
 
 from drive_can_bridge.configuration.model import DriveConfiguration
 from drive_can_bridge.core.control import ControlMachine, ProfileControl
-from drive_can_bridge.core.events import FrameRejected, Noted, StationLost
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.requests import Request
 from drive_can_bridge.core.session import DriveState, Session
+from drive_can_bridge.protocols.datamodel import procedures
 from drive_can_bridge.protocols.datamodel.acyclic_control import control_by_hand
-from drive_can_bridge.protocols.datamodel.channel import AcyclicChannel, Polling, Words
+from drive_can_bridge.protocols.datamodel.channel import AcyclicChannel, Lane, Polling, Words
 from drive_can_bridge.protocols.datamodel.extended import SLOTS
 from drive_can_bridge.protocols.datamodel.process_words import slot_of
-from drive_can_bridge.protocols.datamodel.user_requests import UserRequests
 
 #: longest pause between the neutral cycles of a stop, however long the period is
 STOP_SPACING_MAX = 0.1
@@ -48,9 +47,8 @@ class DataModelSession(Session):
             encode_read=encode_read, encode_write=encode_write,
             timeout=drive.parameter_timeout, attempts=drive.parameter_retries + 1,
             eeprom_gap=options['eeprom_write_gap'], polling=polling)
-        self._users = UserRequests(
-            self._channel, drive, offline=lambda: self.state is DriveState.OFFLINE,
-            offset=self._offset, together=together, complete=self._complete)
+        self._together = together
+        self._conditions = self._make_conditions()
         status_name = table.status_parameter or '' if table is not None else ''
         self._control_slot = slot_of(drive.cyclic_request, self._control_name)
         self._status_slot = slot_of(drive.cyclic_response, status_name)
@@ -58,11 +56,6 @@ class DataModelSession(Session):
             drive, self._channel, self.control, self._control_changed,
             word=self._control_name if self._control_slot is None else '',
             status=status_name if self._status_slot is None else '')
-        self._advice = 'not activated'
-
-    @property
-    def offline_advice(self) -> str:
-        return self._advice
 
     def take_frames(self) -> list[Frame]:
         frames = super().take_frames()
@@ -78,14 +71,16 @@ class DataModelSession(Session):
     # -- user requests ----------------------------------------------------------------------------
 
     def _enqueue(self, request: Request, now: float) -> None:
-        self._users.add(request, now)
+        self._channel.run(
+            procedures.of_request(request, self._conditions),
+            lambda outcomes: self._answer(request, outcomes), now, Lane.USERS)
 
     def _waiting_requests(self) -> int:
-        return self._users.waiting
+        return self._channel.waiting_users
 
     def _fail_requests(self, reason: str) -> None:
         self._clear_channel()
-        self._users.fail(reason)
+        self._fail_open_requests(reason)
 
     def _clear_channel(self) -> None:
         """Forget everything acyclic, and whatever waits for its outcome."""
@@ -98,7 +93,15 @@ class DataModelSession(Session):
                     parameter_timeout: float | None = None) -> None:
         super().reconfigure(command_timeout=command_timeout, rearm_immediate=rearm_immediate,
                             parameter_timeout=parameter_timeout)
-        self._users.reconfigure(self.drive)
+        self._channel.timeout = self.drive.parameter_timeout
+        self._conditions = self._make_conditions()
+
+    def _make_conditions(self) -> procedures.Conditions:
+        drive = self.drive
+        return procedures.Conditions(
+            offline=lambda: self.state is DriveState.OFFLINE, timeout=drive.parameter_timeout,
+            attempts=drive.parameter_retries + 1, verify=drive.verify_writes,
+            offset=self._offset, together=self._together)
 
     def write_refusal(self, parameter: Parameter) -> str:
         number = (parameter.number or 0) + self._offset
@@ -114,11 +117,6 @@ class DataModelSession(Session):
         self._withdraw(reason, now)
         self._advice = reason
         self._be_offline(reason)
-
-    def _be_offline(self, reason: str) -> None:
-        if self.online:
-            self.online = False
-            self._events.append(StationLost(reason))
 
     def _withdraw(self, reason: str, now: float) -> None:
         """Go neutral, and back to ``disable``."""
@@ -150,14 +148,9 @@ class DataModelSession(Session):
     def _control_changed(self, now: float) -> None:
         """Tell what the control machine noted; then see to its word."""
         if self.control is not None:
-            for note in self.control.take_notes():
-                self._events.append(Noted(note))
+            self._tell_notes()
             self._update_control_word(now)
 
     @abstractmethod
     def _update_control_word(self, now: float) -> None:
         """Write a control word that changed, unless it goes with the cycle."""
-
-    def _reject(self, text: str) -> None:
-        self.statistics.rejected += 1
-        self._events.append(FrameRejected(text))

@@ -11,9 +11,10 @@ from typing import NamedTuple, Union
 
 from drive_can_bridge.core.parameters import Parameter, ParameterType, Storage, Value
 from drive_can_bridge.core.requests import (
-    Failure, NO_ANSWER_OFFLINE, Outcome, ReadValue, SENT_UNACKNOWLEDGED, Written,
+    Failure, NO_ANSWER_OFFLINE, Outcome, ReadRequest, ReadValue, Request, SENT_UNACKNOWLEDGED,
+    Written,
 )
-from drive_can_bridge.protocols.datamodel.channel import Read, Step, Words, Write
+from drive_can_bridge.protocols.datamodel.channel import Procedure, Read, Step, Words, Write
 from drive_can_bridge.protocols.datamodel.extended import CYCLIC_PARAMETER, SLOTS
 from drive_can_bridge.protocols.datamodel.mapping import effective, padded
 
@@ -72,6 +73,15 @@ def groups(numbers: Sequence[int], size: int = SLOTS) -> list[list[int]]:
         else:
             runs.append([number])
     return runs
+
+
+def of_request(request: Request, conditions: Conditions) -> Procedure:
+    """Return the procedure that serves a request of a user."""
+    if isinstance(request, ReadRequest):
+        return read_parameters(request.parameters, conditions)
+    if request.atomic:
+        return write_together(request.items, conditions)
+    return write_parameters(request.items, conditions)
 
 
 def read_parameters(parameters: Sequence[Parameter], conditions: Conditions,
