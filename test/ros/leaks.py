@@ -27,7 +27,8 @@ def open_channels() -> list[str]:
 def drive_nodes() -> int:
     """Return how many drive nodes are still in memory."""
     gc.collect()
-    return sum(isinstance(thing, DriveNode) for thing in gc.get_objects())
+    # isinstance would ask each thing for its class, and some answer with an exception
+    return sum(issubclass(type(thing), DriveNode) for thing in gc.get_objects())
 
 
 def assert_nothing_left(client: Client) -> None:
