@@ -1,56 +1,90 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-The drives of the benches: a process that answers at once and does nothing else.
+The drives of the benches: a process that answers at once and notes when it was asked.
 
 Written without the package's codec and simulation, so that nothing of the bridge is measured
-against itself.
+against itself. What it notes is how regular the requests are as a drive sees them, whoever sends.
 """
 
+from array import array
 import socket
 import struct
 import sys
+import threading
+import time
+
+from child import serve
 
 CAN_FRAME = struct.Struct('=IB3x8s')
-EXTENDED = 0x80000000
 DIR = 0x10000000
 CYCLIC = 0x001FFFF0
 REQUEST_MAP = struct.pack('>4H', 50, 51, 60, 61)
 RESPONSE_MAP = struct.pack('>4H', 209, 210, 211, 212)
+STATIONS = 128
 
 
-def answer(frame: bytes, count: int) -> bytes | None:
-    """Return the answer to a frame, or None."""
-    identifier, _, _ = CAN_FRAME.unpack(frame)
-    if identifier & CYCLIC == CYCLIC:
-        data = struct.pack('>4H', count & 0xFFFF, 1, 2, 3)
-    elif identifier & 0x00100000:
-        return None
-    else:
-        number = identifier >> 4 & 0xFFFF
-        data = {122: REQUEST_MAP, 126: RESPONSE_MAP}.get(number, struct.pack('>4H', 7, 8, 9, 10))
-    return CAN_FRAME.pack(identifier | DIR, 8, data)
+class Drives:
+    """All drives of the bus."""
+
+    def __init__(self) -> None:
+        self._last = [0.0] * STATIONS
+        self._distances = array('d')
+        self._values = 0
+
+    def answer(self, frame: bytes) -> bytes | None:
+        """Return the answer to a frame, or None."""
+        identifier, _, _ = CAN_FRAME.unpack(frame)
+        if identifier & CYCLIC == CYCLIC:
+            now = time.monotonic()
+            station = identifier >> 21 & 127
+            last, self._last[station] = self._last[station], now
+            if last:
+                self._distances.append(now - last)
+            self._values = self._values + 1 & 0x7FFF
+            data = struct.pack('>4H', self._values, 1, 2, 3)
+        elif identifier & 0x00100000:
+            return None
+        else:
+            number = identifier >> 4 & 0xFFFF
+            data = {122: REQUEST_MAP, 126: RESPONSE_MAP}.get(
+                number, struct.pack('>4H', 7, 8, 9, 10))
+        return CAN_FRAME.pack(identifier | DIR, 8, data)
+
+    def clear(self) -> bool:
+        """Begin to note anew."""
+        self._last = [0.0] * STATIONS
+        self._distances = array('d')
+        return True
+
+    def distances(self) -> list[float]:
+        """Return the times between two requests to the same drive in s."""
+        return list(self._distances)
+
+    def run(self, server: socket.socket) -> None:
+        """Serve one client after the other."""
+        while True:
+            client, _ = server.accept()
+            while True:
+                try:
+                    frame = client.recv(16)
+                    if not frame:
+                        break
+                    reply = self.answer(frame)
+                    if reply is not None:
+                        client.send(reply)
+                except OSError:
+                    break
+            client.close()
 
 
 def main() -> None:
-    """Serve one client after the other until killed."""
+    """Listen on the Unix socket given."""
     server = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     server.bind(sys.argv[1])
     server.listen()
-    print('ready', flush=True)
-    while True:
-        client, _ = server.accept()
-        count = 0
-        while True:
-            frame = client.recv(16)
-            if not frame:
-                break
-            count += 1
-            reply = answer(frame, count)
-            if reply is not None:
-                try:
-                    client.send(reply)
-                except OSError:
-                    break
+    drives = Drives()
+    threading.Thread(target=drives.run, args=(server,), daemon=True).start()
+    serve({'clear': drives.clear, 'distances': drives.distances})
 
 
 if __name__ == '__main__':

@@ -1,53 +1,56 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-The floors: what the same work costs with nothing around it.
+The floor: what the same exchange costs with nothing around it.
 
-``CanFloor`` is one loop: sleep to the next cycle, python-can send for every drive, python-can
-receive, ``struct``, the same publishes. ``sleeping_thread`` is a thread that only sleeps to
-absolute deadlines. ``RosFloor`` is a publisher of a stamped message and nothing else.
+One loop: sleep to the next cycle, python-can send for every drive, python-can receive, ``struct``,
+the same publishes. Started with channel, number of drives and period.
 """
 
-from dataclasses import dataclass, field
 import struct
+import sys
 import threading
 import time
 from typing import Any
 
 import can
-from rcl_interfaces.msg import Parameter, ParameterEvent, ParameterValue
+from child import serve, sleep_until
+import rclpy  # isort: skip
 from rclpy.node import Node
-from std_msgs.msg import Float64, Int64
+from topics import DriveTopics
+from unix_bus import INTERFACE, register
 
 CYCLIC = 0x001FFFF0
 DIR = 0x10000000
 
 
-@dataclass
-class Measured:
-    """CPU time of the loop's thread in s, exchanges done, errors of the period in s."""
+class Floor:
+    """The loop, in a thread of its own so that its CPU time is known."""
 
-    cpu: float = 0.0
-    exchanges: int = 0
-    period_errors: list[float] = field(default_factory=list)
+    def __init__(self, node: Node, channel: str, drives: int, period: float) -> None:
+        self._bus = can.Bus(interface=INTERFACE, channel=channel, ignore_config=True)
+        self._topics = [DriveTopics(node, f'floor{number}') for number in range(drives)]
+        self._period = period
 
+    def run(self, duration: float) -> dict[str, Any]:
+        """Exchange for so long; return CPU time, exchanges, errors of the period."""
+        found: dict[str, Any] = {'cpu': 0.0, 'exchanges': 0, 'period_errors': []}
+        thread = threading.Thread(target=self._loop, args=(duration, found))
+        thread.start()
+        thread.join()
+        return found
 
-def run_can_floor(node: Node, prefix: str, channel: str, interface: str, drives: int,
-                  period: float, duration: float, *, publish: bool) -> Measured:
-    """Exchange with ``drives`` drives in one bare loop; return what it cost."""
-    bus = can.Bus(interface=interface, channel=channel, ignore_config=True)
-    topics = [_Topics(node, f'/{prefix}{number}') for number in range(drives)]
-    measured = Measured()
-
-    def loop() -> None:
+    def _loop(self, duration: float, found: dict[str, Any]) -> None:
         request, response = struct.Struct('>hHhH').pack, struct.Struct('>hhhH').unpack
-        first = time.monotonic()
-        deadline, last = first, 0.0
-        started = time.thread_time()
-        while deadline < first + duration:
-            time.sleep(max(0.0, deadline - time.monotonic()))
+        drives, period, bus = len(self._topics), self._period, self._bus
+        errors: list[float] = found['period_errors']
+        deadline, last = time.monotonic(), 0.0
+        end = deadline + duration
+        cpu = time.thread_time()
+        while deadline < end:
+            sleep_until(deadline)
             now = time.monotonic()
             if last:
-                measured.period_errors.append(abs(now - last - period))
+                errors.append(abs(now - last - period))
             last = now
             for number in range(drives):
                 bus.send(can.Message(arbitration_id=(number + 1) << 21 | CYCLIC,
@@ -57,71 +60,22 @@ def run_can_floor(node: Node, prefix: str, channel: str, interface: str, drives:
                 if message is None:
                     raise RuntimeError('a drive did not answer')
                 speed, current, position, inputs = response(message.data)
-                measured.exchanges += 1
-                if publish:
-                    topics[((message.arbitration_id & ~DIR) >> 21) - 1].publish(
-                        speed * 0.1, current * 0.01, position * 0.1, inputs)
+                station = (message.arbitration_id & ~DIR) >> 21
+                self._topics[station - 1].publish(
+                    time.time_ns(), speed * 0.1, current * 0.01, position * 0.1, inputs)
+                found['exchanges'] += 1
             deadline += period
-        measured.cpu = time.thread_time() - started
-
-    thread = threading.Thread(target=loop)
-    thread.start()
-    thread.join()
-    bus.shutdown()
-    return measured
+        found['cpu'] = time.thread_time() - cpu
 
 
-def sleeping_thread(period: float, duration: float) -> list[float]:
-    """Return the period errors of a thread that only sleeps, in s."""
-    errors: list[float] = []
-    first = time.monotonic()
-    deadline, last = first, 0.0
-    while deadline < first + duration:
-        time.sleep(max(0.0, deadline - time.monotonic()))
-        now = time.monotonic()
-        if last:
-            errors.append(abs(now - last - period))
-        last = now
-        deadline += period
-    return errors
+def main() -> None:
+    """Obey."""
+    register()
+    rclpy.init(args=[])
+    floor = Floor(Node('bench_floor', enable_rosout=False), sys.argv[1], int(sys.argv[2]),
+                  float(sys.argv[3]))
+    serve({'run': floor.run})
 
 
-def run_ros_floor(node: Node, prefix: str, period: float, duration: float) -> None:
-    """Publish a bare stamped message each period: the subscriber measures the latency."""
-    topics = _Topics(node, f'/{prefix}0')
-    end = time.monotonic() + duration
-    while time.monotonic() < end:
-        topics.publish_event(0.1, 0.2, 0.3, 4)
-        time.sleep(period)
-
-
-class _Topics:
-    """The same topics as the bridge publishes for a drive, prebuilt messages included."""
-
-    def __init__(self, node: Node, name: str) -> None:
-        self._double = [(node.create_publisher(Float64, f'{name}/{topic}', 10), Float64())
-                        for topic in ('actual_speed', 'motor_current', 'actual_position')]
-        self._integer = (node.create_publisher(Int64, f'{name}/digital_inputs', 10), Int64())
-        self._event = node.create_publisher(ParameterEvent, f'{name}/response', 10)
-        self._values = [ParameterValue(type=3) for _ in range(3)] + [ParameterValue(type=2)]
-        self._message = ParameterEvent(node=name, changed_parameters=[
-            Parameter(name=topic, value=value) for topic, value in zip(
-                ('actual_speed', 'motor_current', 'actual_position', 'digital_inputs'),
-                self._values)])
-
-    def publish(self, speed: float, current: float, position: float, inputs: int) -> None:
-        for (publisher, message), value in zip(self._double, (speed, current, position)):
-            message.data = value
-            publisher.publish(message)
-        publisher, message = self._integer
-        message.data = inputs
-        publisher.publish(message)
-        self.publish_event(speed, current, position, inputs)
-
-    def publish_event(self, *values: Any) -> None:
-        for entry, value in zip(self._values[:3], values):
-            entry.double_value = value
-        self._values[3].integer_value = values[3]
-        message = self._message
-        message.stamp.sec, message.stamp.nanosec = divmod(time.time_ns(), 1_000_000_000)
-        self._event.publish(message)
+if __name__ == '__main__':
+    main()

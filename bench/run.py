@@ -1,12 +1,91 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""Run the benches; all arguments go to :mod:`exchange`."""
+"""
+What the bridge costs and how regular it is, each figure beside its floor from the same run.
 
+Compare the ratios, not the milliseconds: machines differ and are noisy.
+"""
+
+import argparse
+from collections.abc import Callable
+import json
 import os
+from pathlib import Path
+import platform
 import sys
+from typing import Any
 
-os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-os.environ.setdefault('ROS_DOMAIN_ID', '97')
+import report
+import scenarios
+from scenarios import Load
+
+
+def plan(options: argparse.Namespace) -> dict[str, Callable[[], Any]]:
+    """Return the scenarios by name."""
+    drives, period, duration = options.drives, options.period, options.duration
+    return {
+        'full': lambda: scenarios.exchange(Load(drives, period, commands=200.0), duration),
+        'subscribed': lambda: scenarios.exchange(Load(drives, period), duration),
+        'unsubscribed': lambda: scenarios.exchange(
+            Load(drives, period, subscribed=False), duration),
+        'latency': lambda: scenarios.latency(Load(drives, period), duration),
+        'diy': lambda: scenarios.do_it_yourself(Load(8, 0.01, commands=100.0), duration),
+        'service': lambda: scenarios.service(Load(1, 0.02, subscribed=False), 300),
+        'flood': lambda: scenarios.flood(Load(8, 0.01, subscribed=False), duration, 10000.0),
+        'drives': lambda: {number: scenarios.exchange(
+            Load(number, period, subscribed=False), duration, floor=False)
+            for number in sorted({1, 4, 8, drives})},
+        'start': lambda: scenarios.start(drives, options.memory_duration),
+    }
+
+
+def machine() -> str:
+    """Describe the machine and how busy it is."""
+    model = platform.processor() or platform.machine()
+    try:
+        for line in Path('/proc/cpuinfo').read_text(encoding='utf-8').splitlines():
+            if line.startswith('model name'):
+                model = line.split(':', 1)[1].strip()
+                break
+    except OSError:
+        pass
+    load = ', '.join(f'{value:.1f}' for value in os.getloadavg())
+    return (f'{os.cpu_count()} × {model}, Python {platform.python_version()}, '
+            f'load average {load}')
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('scenarios', nargs='*', help='which ones (default: all)')
+    parser.add_argument('--drives', type=int, default=15)
+    parser.add_argument('--period', type=float, default=0.005, help='s')
+    parser.add_argument('--duration', type=float, default=5.0, help='s of each measurement')
+    parser.add_argument('--memory-duration', type=float, default=60.0, help='s')
+    parser.add_argument('--repeat', type=int, default=1, help='runs; the median one is shown')
+    parser.add_argument('--json', type=Path, help='write figures and samples to this file')
+    parser.add_argument('--plot', type=Path, help='write the distributions to this PNG file')
+    options = parser.parse_args(arguments)
+    planned = plan(options)
+    unknown = [name for name in options.scenarios if name not in planned]
+    if unknown:
+        parser.error(f'{", ".join(unknown)}: allowed are {", ".join(planned)}')
+    begun = machine()
+    results: dict[str, list[Any]] = {}
+    for _ in range(options.repeat):
+        for name in options.scenarios or planned:
+            print(f'{name} …', file=sys.stderr, flush=True)
+            results.setdefault(name, []).append(planned[name]())
+    lines = report.figures(results)
+    print(f'before: {begun}\nafter:  {machine()}\n\n{report.table(lines)}')
+    if options.json:
+        options.json.write_text(json.dumps(
+            {'machine': begun, 'figures': report.as_json(lines), 'results': results}))
+    if options.plot:
+        reason = report.plot(results, options.plot)
+        if reason:
+            print(f'no plot: {reason}', file=sys.stderr)
+    return 0
+
 
 if __name__ == '__main__':
-    import exchange
-    sys.exit(exchange.main())
+    sys.exit(main())

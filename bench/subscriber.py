@@ -1,64 +1,69 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-The other process: subscribes to every topic and measures from stamp to callback.
+Other processes that subscribe.
 
-Prints one JSON line with the latencies of the stamped topics in s when told to by a line on
-standard input, and ends with the standard input.
+``subscriber.py all PREFIX,… COUNT`` is matched with every topic of all drives and takes nothing:
+its middleware receives and acknowledges everything, as any subscriber's does, but no Python runs,
+which would not keep up with 15,000 messages a second and starve the bench on a small machine.
+
+``subscriber.py listen NAME …`` measures from the stamp of ``/NAME/response`` to the callback.
 """
 
-import json
 import sys
 import threading
 import time
 
+from child import serve
 from rcl_interfaces.msg import ParameterEvent
-import rclpy
+import rclpy  # isort: skip
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from std_msgs.msg import Float64, Int64
+from topics import TYPES
 
-SAMPLES_MAX = 20000
+
+class Listener:
+    """Latencies by name, in s."""
+
+    def __init__(self, node: Node, names: list[str]) -> None:
+        self._latencies: dict[str, list[float]] = {name: [] for name in names}
+        for name in names:
+            node.create_subscription(
+                ParameterEvent, f'/{name}/response',
+                lambda message, name=name: self._received(name, message), 10)
+
+    def _received(self, name: str, message: ParameterEvent) -> None:
+        sent = message.stamp.sec * 1_000_000_000 + message.stamp.nanosec
+        self._latencies[name].append((time.time_ns() - sent) * 1e-9)
+
+    def clear(self) -> bool:
+        """Begin anew."""
+        for latencies in self._latencies.values():
+            latencies.clear()
+        return True
+
+    def latencies(self) -> dict[str, list[float]]:
+        """Return what was found."""
+        return {name: list(found) for name, found in self._latencies.items()}
 
 
 def main() -> None:
-    """Subscribe to ``prefix`` + number + topics for all prefixes given."""
-    prefixes, count = sys.argv[1].split(','), int(sys.argv[2])
-    topics = {topic: {'double': Float64, 'integer': Int64}[kind]
-              for topic, kind in (entry.split(':') for entry in sys.argv[3].split(','))}
-    rclpy.init()
-    node = Node('bench_subscriber')
-    latencies: dict[str, list[float]] = {prefix: [] for prefix in prefixes}
-    received: dict[str, int] = dict.fromkeys(prefixes, 0)
-
-    def stamped(prefix: str, message: ParameterEvent) -> None:
-        now = time.time_ns()
-        received[prefix] += 1
-        if len(latencies[prefix]) < SAMPLES_MAX:
-            sent = message.stamp.sec * 1_000_000_000 + message.stamp.nanosec
-            latencies[prefix].append((now - sent) * 1e-9)
-
-    def plain(prefix: str) -> None:
-        received[prefix] += 1
-
-    for prefix in prefixes:
-        for number in range(count):
-            name = f'/{prefix}{number}'
-            node.create_subscription(ParameterEvent, f'{name}/response',
-                                     lambda message, prefix=prefix: stamped(prefix, message), 10)
-            for topic, message_type in topics.items():
-                node.create_subscription(message_type, f'{name}/{topic}',
-                                         lambda _, prefix=prefix: plain(prefix), 10)
+    """Subscribe."""
+    rclpy.init(args=[])
+    node = Node(f'bench_subscriber_{sys.argv[1]}', enable_rosout=False,
+                start_parameter_services=False)
+    if sys.argv[1] == 'all':
+        for prefix in sys.argv[2].split(','):
+            for number in range(int(sys.argv[3])):
+                for topic, message_type in TYPES.items():
+                    node.create_subscription(message_type, f'/{prefix}{number}/{topic}',
+                                             lambda _: None, 10)
+        serve({})
+        return
+    listener = Listener(node, sys.argv[2:])
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     threading.Thread(target=executor.spin, daemon=True).start()
-    print('ready', flush=True)
-    for line in sys.stdin:
-        if line.strip() == 'clear':
-            for prefix in prefixes:
-                latencies[prefix].clear()
-                received[prefix] = 0
-            continue
-        print(json.dumps({'latencies': latencies, 'received': received}), flush=True)
+    serve({'clear': listener.clear, 'latencies': listener.latencies})
 
 
 if __name__ == '__main__':

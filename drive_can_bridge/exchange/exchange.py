@@ -10,7 +10,7 @@ in the thread that received it: a hop through an executor costs 50 µs and a qua
 
 The timer is a plain thread that sleeps until the earliest of its sessions' deadlines, which are
 absolute: it needs no executor, no wait set, and follows each session's own rhythm (cycles, time-
-outs, EEPROM gaps) instead of one period.
+outs, EEPROM gaps) instead of one period. Drives of equal periods take turns (:mod:`.phases`).
 """
 
 from collections.abc import Callable, Sequence
@@ -24,6 +24,8 @@ from drive_can_bridge.core.events import Event, ProcessDataReceived
 from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.core.requests import Request
 from drive_can_bridge.core.session import Session
+from drive_can_bridge.exchange.alarm import Alarm
+from drive_can_bridge.exchange.phases import spread
 from drive_can_bridge.exchange.router import Router
 from drive_can_bridge.transport.link import Link, steady_now
 
@@ -73,13 +75,19 @@ class BusListener(Protocol):
 
 
 class Member:
-    """A drive on the bus: its session and whoever listens to it."""
+    """
+    A drive on the bus: its session and whoever listens to it.
 
-    __slots__ = ('listener', 'session')
+    :ivar due: when the session wants to be called; kept here, so that a pass over all drives costs
+        a comparison each.
+    """
+
+    __slots__ = ('due', 'listener', 'session')
 
     def __init__(self, session: Session, listener: DriveListener) -> None:
         self.session = session
         self.listener = listener
+        self.due = session.next_timer()
 
 
 class BusExchange:
@@ -104,7 +112,9 @@ class BusExchange:
         shortest = min((session.drive.period for session in sessions), default=0.1)
         self.link = Link(bus, [route for entries in routes for route in entries], self,
                          send_timeout=min(0.5 * shortest, 0.05), stations=len(self._sessions))
-        self._wake = threading.Event()
+        for session, phase in zip(sessions, spread([each.drive.period for each in sessions])):
+            session.phase = phase
+        self._alarm = Alarm()
         self._wake_at = 0.0
         self._last_pass = 0.0
         self._closing = False
@@ -141,7 +151,7 @@ class BusExchange:
                 member.listener.discard_commands()
                 member.session.activate(now)
                 self._pump(member, now)
-        self._wake.set()
+        self._alarm.ring()
 
     def deactivate(self) -> bool:
         """
@@ -155,7 +165,7 @@ class BusExchange:
             for member in self._members:
                 member.session.deactivate(now)
                 self._pump(member, now)
-        self._wake.set()
+        self._alarm.ring()
         end = now + STOP_MARGIN + 3 * min(
             max((session.drive.period for session in self._sessions), default=0.0), 0.1)
         while not self._stopped():
@@ -170,7 +180,7 @@ class BusExchange:
     def close(self) -> None:
         """End both threads and close the bus."""
         self._closing = True
-        self._wake.set()
+        self._alarm.ring()
         if self._thread.is_alive() and self._thread is not threading.current_thread():
             self._thread.join(timeout=2.0)
         self.link.stop()
@@ -188,9 +198,8 @@ class BusExchange:
             now = self._clock()
             session.submit(request, now)
             self._pump(member, now)
-            due = session.next_timer()
-        if due < self._wake_at:
-            self._wake.set()
+        if member.due < self._wake_at:
+            self._alarm.ring()
 
     def request_control(self, session: Session, action: ControlAction,
                         register: Callable[[ControlTicket], None]) -> str:
@@ -208,13 +217,15 @@ class BusExchange:
                 return ticket
             register(ticket)
             self._pump(member, now)
-        self._wake.set()
+        self._alarm.ring()
         return ''
 
     def reconfigure(self, session: Session, **changes: Any) -> None:
         """Change what may change while running (see :meth:`.Session.reconfigure`)."""
+        member = self._member(session)
         with self.lock:
             session.reconfigure(**changes)
+            member.due = session.next_timer()
 
     def _member(self, session: Session) -> Member:
         return next(member for member in self._members if member.session is session)
@@ -226,8 +237,7 @@ class BusExchange:
             while not self._closing:
                 with self.lock:
                     self._wake_at = self._pass()
-                self._wake.wait(max(0.0, self._wake_at - self._clock()))
-                self._wake.clear()
+                self._alarm.sleep(self._wake_at - self._clock())
         except Exception as error:  # noqa: BLE001  outermost loop: no failure is silent
             self._fail(f'{type(error).__name__}: {error}')
 
@@ -237,16 +247,13 @@ class BusExchange:
         self._notice_lost_time(now)
         soonest = now + PASS_PERIOD
         for member in self._members:
-            session = member.session
-            due = session.next_timer()
-            if due <= now:
+            if member.due <= now:
                 now = self._clock()  # the drives before took their time
                 member.listener.take_commands(now)
-                session.handle_timer(now)
+                member.session.handle_timer(now)
                 self._pump(member, now)
-                due = session.next_timer()
-            if due < soonest:
-                soonest = due
+            if member.due < soonest:
+                soonest = member.due
         return soonest
 
     def _notice_lost_time(self, now: float) -> None:
@@ -263,6 +270,7 @@ class BusExchange:
 
     def frame_received(self, frame: Frame, age: float) -> None:
         """Take a frame from the link. The fast path of the reader."""
+        arrived = self._clock() - age
         with self.lock:
             now = self._clock()
             if now - self._last_pass >= LOST_TIME:
@@ -272,11 +280,10 @@ class BusExchange:
             if member is None:
                 self.frames_rejected += 1
                 return
-            member.session.receive_frame(frame, now, age)
+            member.session.receive_frame(frame, now, now - arrived)
             self._pump(member, now)
-            due = member.session.next_timer()
-        if due < self._wake_at:
-            self._wake.set()
+        if member.due < self._wake_at:
+            self._alarm.ring()
 
     def bus_opened(self) -> None:
         """Begin (again) with every drive."""
@@ -286,7 +293,7 @@ class BusExchange:
             for member in self._members:
                 member.session.bus_up(now)
                 self._pump(member, now)
-        self._wake.set()
+        self._alarm.ring()
         self._listener.bus_opened(self.bus.name)
 
     def bus_lost(self, reason: str) -> None:
@@ -331,6 +338,7 @@ class BusExchange:
         if session.control is not None:
             for outcome in session.take_control_outcomes():
                 member.listener.control_completed(outcome)
+        member.due = session.next_timer()
 
 
 def _bits(frame: Frame) -> int:

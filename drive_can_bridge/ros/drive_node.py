@@ -120,6 +120,7 @@ class DriveNode:
     def destroy(self) -> None:
         """Take the drive out of the graph. The exchange must be closed."""
         self._executor.remove_node(self.node)
+        self.commands.destroy()
         self.node.destroy_node()
 
     # -- log --------------------------------------------------------------------------------------

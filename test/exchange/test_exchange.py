@@ -366,19 +366,19 @@ def test_whatever_is_due_sooner_wakes_the_timer() -> None:
     bench.hears(ANSWER, 10.001)
     exchange = bench.exchange
     exchange._wake_at = exchange._pass()
-    exchange._wake.clear()
+    exchange._alarm.sleep(0.0)
     exchange.submit(bench.sessions[0], read(GAIN))
-    assert exchange._wake.is_set()            # its time-out comes before the next pass
+    assert exchange._alarm.ringing            # its time-out comes before the next pass
 
     exchange._wake_at = 10.01
-    exchange._wake.clear()
+    exchange._alarm.sleep(0.0)
     bench.hears('10200281#0007000000000000', 10.003)
-    assert not exchange._wake.is_set()        # nothing to wait for any more
+    assert not exchange._alarm.ringing        # nothing to wait for any more
     exchange._wake_at = 20.0
     bench.hears('7F1#00', 10.004)
-    assert not exchange._wake.is_set()
+    assert not exchange._alarm.ringing
     bench.hears('102001E0#0000000000000000', 10.005)
-    assert exchange._wake.is_set()            # the next cycle comes before that
+    assert exchange._alarm.ringing            # the next cycle comes before that
 
 
 def test_age_of_a_frame_does_not_shorten_the_pause_after_an_eeprom_write() -> None:

@@ -1,0 +1,107 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The bridge as the executable runs it, with a way to ask what it cost.
+
+Started with a parameter file. Prints how long it took from rclpy.init to the first exchange of
+every drive.
+"""
+
+import sys
+import threading
+import time
+from typing import Any
+
+from child import serve
+import rclpy  # isort: skip
+import topics  # noqa: F401  sets the environment of rclpy
+from unix_bus import register
+
+from drive_can_bridge.ros.bridge_node import BridgeNode
+from drive_can_bridge.ros.executor_thread import ExecutorThread
+
+ONLINE_TIMEOUT = 30.0
+
+
+class Measured:
+    """The bridge and the counts at the beginning of a measurement."""
+
+    def __init__(self) -> None:
+        self._spinner = ExecutorThread('services', _complain, rclpy.get_default_context())
+        self.bridge = BridgeNode(self._spinner.executor, _complain)
+        self._spinner.start()
+        if not self.bridge.start():
+            raise SystemExit('the bridge did not start')
+        self.sessions = [drive.session for drive in self.bridge.drives.values()]
+        exchange, = self.bridge.exchanges.values()
+        self._threads = {'timer': exchange._thread, 'reader': exchange.link._thread,
+                         'services': self._spinner._thread}
+        self._before: dict[str, Any] = {}
+
+    def clear(self) -> bool:
+        """Begin a measurement."""
+        for session in self.sessions:
+            for statistic in (session.statistics.period_error, session.statistics.latency):
+                statistic.__init__()  # type: ignore[misc]
+        self._before = self._counts()
+        return True
+
+    def result(self) -> dict[str, Any]:
+        """Return what happened since."""
+        now, before = self._counts(), self._before
+        statistics = [session.statistics for session in self.sessions]
+        return {
+            'elapsed': now['at'] - before['at'],
+            'exchanges': now['exchanges'] - before['exchanges'],
+            'missed': now['missed'] - before['missed'],
+            'cpu': {name: now['cpu'][name] - before['cpu'][name] for name in self._threads},
+            'process_cpu': now['process'] - before['process'],
+            'period_errors': [error for each in statistics for error in
+                              each.period_error.samples()],
+            'latencies': [error for each in statistics for error in each.latency.samples()],
+            'online': sum(session.online for session in self.sessions),
+        }
+
+    def close(self) -> None:
+        """End well."""
+        self.bridge.stop()
+        self._spinner.stop()
+        self.bridge.close()
+        self.bridge.destroy_node()
+        rclpy.try_shutdown()
+
+    def _counts(self) -> dict[str, Any]:
+        return {
+            'at': time.monotonic(), 'process': time.process_time(),
+            'exchanges': sum(each.statistics.exchanges for each in self.sessions),
+            'missed': sum(each.statistics.missed for each in self.sessions),
+            'cpu': {name: _cpu(thread) for name, thread in self._threads.items()},
+        }
+
+
+def _cpu(thread: threading.Thread) -> float:
+    assert thread.ident is not None
+    return time.clock_gettime(time.pthread_getcpuclockid(thread.ident))
+
+
+def _complain(text: str) -> None:
+    print(text, file=sys.stderr)
+
+
+def main() -> None:
+    """Obey."""
+    register()
+    rclpy.init(args=['bench', '--ros-args', '--log-level', 'error', '--params-file', sys.argv[1]])
+    begun = time.monotonic()
+    measured = Measured()
+    waited_until = begun + ONLINE_TIMEOUT
+    while not all(session.online for session in measured.sessions):
+        if time.monotonic() > waited_until:
+            raise SystemExit('the drives did not come online')
+        time.sleep(0.005)
+    serve({'clear': measured.clear, 'result': measured.result},
+          ready=time.monotonic() - begun)
+    measured.close()
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,93 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+Processes of a bench that are told what to do by lines, and answer each with a line of JSON.
+
+Everything that is measured, and everything that makes load, is a process of its own, so that no
+Python lock is shared by what is not shared in real life.
+"""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+import json
+from pathlib import Path
+import subprocess
+import sys
+import time
+from typing import Any
+
+HERE = Path(__file__).resolve().parent
+ANSWER_TIMEOUT = 120.0
+
+
+class Child:
+    """The near end."""
+
+    def __init__(self, script: str, *arguments: object) -> None:
+        self.script = script
+        self.process = subprocess.Popen(
+            [sys.executable, str(HERE / script), *map(str, arguments)],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        self.ready = self._read()
+
+    def ask(self, line: str) -> Any:
+        """Tell something; return the answer."""
+        assert self.process.stdin is not None
+        self.process.stdin.write(line + '\n')
+        self.process.stdin.flush()
+        return self._read()
+
+    def cpu(self) -> float:
+        """Return the CPU time of the whole process in s."""
+        fields = Path(f'/proc/{self.process.pid}/schedstat').read_text().split()
+        total = int(fields[0])
+        for task in Path(f'/proc/{self.process.pid}/task').iterdir():
+            if task.name != str(self.process.pid):
+                total += int((task / 'schedstat').read_text().split()[0])
+        return total * 1e-9
+
+    def resident_mb(self) -> float:
+        """Return the resident memory in MB."""
+        status = Path(f'/proc/{self.process.pid}/status').read_text()
+        return int(status.split('VmRSS:')[1].split()[0]) / 1024
+
+    def close(self) -> None:
+        """Let it end."""
+        if self.process.stdin is not None:
+            self.process.stdin.close()
+        try:
+            self.process.wait(timeout=10.0)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+
+    def _read(self) -> Any:
+        assert self.process.stdout is not None
+        line = self.process.stdout.readline()
+        if not line:
+            raise SystemExit(f'{self.script} ended before its time')
+        return json.loads(line)
+
+
+@contextmanager
+def child(script: str, *arguments: object) -> Iterator[Child]:
+    """Run a process for as long as needed."""
+    process = Child(script, *arguments)
+    try:
+        yield process
+    finally:
+        process.close()
+
+
+def serve(commands: dict[str, Callable[..., Any]], ready: Any = True) -> None:
+    """Be the far end: obey until the standard input ends."""
+    print(json.dumps(ready), flush=True)
+    for line in sys.stdin:
+        name, *arguments = line.split()
+        print(json.dumps(commands[name](*map(float, arguments))), flush=True)
+
+
+def sleep_until(deadline: float) -> None:
+    """Sleep to an absolute time of the steady clock."""
+    left = deadline - time.monotonic()
+    if left > 0.0:
+        time.sleep(left)

@@ -1,0 +1,196 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Figures from what the scenarios found, as a table, and as a plot where matplotlib is there."""
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+import math
+from pathlib import Path
+from typing import Any
+
+from scenarios import median, p99
+
+
+@dataclass(frozen=True)
+class Figure:
+    """
+    One line of the table.
+
+    :param value: as measured; ``floor``: beside it; ``goal``: of ``judged``, at most.
+    """
+
+    name: str
+    value: str
+    floor: str
+    judged: float
+    goal: float
+    at_least: bool = False
+
+    @property
+    def met(self) -> bool:
+        """The goal is reached."""
+        return self.judged >= self.goal if self.at_least else self.judged <= self.goal
+
+
+def exchange_figures(found: dict[str, Any], name: str, goal: float) -> list[Figure]:
+    """CPU, exchanges held, period."""
+    bridge, floor = found['bridge'], found['floor']
+    cpu = sum(bridge['cpu'].values()) / max(1, bridge['exchanges'])
+    floor_cpu = floor['cpu'] / max(1, floor['exchanges'])
+    parts = ', '.join(f'{thread} {1e6 * value / max(1, bridge["exchanges"]):.0f}'
+                      for thread, value in bridge['cpu'].items())
+    period, sleeping = p99(bridge['period_errors']), p99(found['sleeper'])
+    return [
+        Figure(f'CPU per exchange, {name}', f'{1e6 * cpu:.0f} µs ({parts})',
+               f'{1e6 * floor_cpu:.0f} µs', cpu / floor_cpu, goal),
+        Figure(f'exchanges/s, {name}', f'{bridge["exchanges"] / bridge["elapsed"]:.0f}',
+               f'{bridge["missed"]} missed',
+               bridge['exchanges'] / bridge['elapsed'] if not bridge['missed'] else 0.0,
+               2990.0, at_least=True),
+        Figure(f'period error p99, {name}', f'{1e3 * period:.3f} ms',
+               f'sleeping {1e3 * sleeping:.3f} ms, bare loop '
+               f'{1e3 * p99(floor["period_errors"]):.3f} ms', period / sleeping, 2.0),
+    ]
+
+
+def diy_figures(found: dict[str, Any]) -> list[Figure]:
+    """Against the node of an ordinary user."""
+    bridge, diy = found['bridge'], found['diy']
+    return [
+        Figure('CPU of the process, do-it-yourself node / bridge', f'{100 * bridge["cpu"]:.0f} %',
+               f'{100 * diy["cpu"]:.0f} %', diy['cpu'] / bridge['cpu'], 4.0, at_least=True),
+        Figure('period error p99 at the drive, bridge / do-it-yourself',
+               f'{1e3 * p99(bridge["period_errors"]):.3f} ms '
+               f'({bridge["requests_per_s"]:.0f} requests/s)',
+               f'{1e3 * p99(diy["period_errors"]):.3f} ms '
+               f'({diy["requests_per_s"]:.0f} requests/s)',
+               p99(bridge['period_errors']) / p99(diy['period_errors']), 1.0),
+    ]
+
+
+def latency_figures(found: dict[str, list[float]]) -> list[Figure]:
+    """From frame to callback."""
+    drive, bare = median(found['drive0']), median(found['bare'])
+    return [Figure('frame to callback, median', f'{1e3 * drive:.3f} ms', f'{1e3 * bare:.3f} ms',
+                   drive / bare, 1.25)]
+
+
+def service_figures(found: dict[str, list[float]]) -> list[Figure]:
+    """Parameter services."""
+    drive, bare = median(found['drive']), median(found['bare'])
+    exchange = median(found['exchange'])
+    return [Figure('get_parameters, median', f'{1e3 * drive:.3f} ms',
+                   f'{1e3 * bare:.3f} ms + exchange {1e3 * exchange:.3f} ms',
+                   drive / (bare + exchange), 1.5)]
+
+
+def flood_figures(found: dict[str, Any]) -> list[Figure]:
+    """Regularity in a flood."""
+    quiet, flood = (p99(found[name]['period_errors']) for name in ('quiet', 'flood'))
+    sleeping = [p99(found[name]['sleeper']) for name in ('quiet', 'flood')]
+    return [Figure(f'period error p99 in a flood ({found["calls"]} calls answered)',
+                   f'{1e3 * flood:.3f} ms ({found["flood"]["missed"]} missed)',
+                   f'{1e3 * quiet:.3f} ms; sleeping {1e3 * sleeping[1]:.3f}, '
+                   f'{1e3 * sleeping[0]:.3f} ms', flood / quiet, 1.2)]
+
+
+def drives_figures(found: dict[str, dict[str, Any]]) -> list[Figure]:
+    """Cost by number of drives."""
+    costs = {int(number): sum(each['bridge']['cpu'][name] for name in ('timer', 'reader'))
+             / max(1, each['bridge']['exchanges']) for number, each in found.items()}
+    services = {int(number): each['bridge']['cpu']['services'] / each['bridge']['elapsed']
+                for number, each in found.items()}
+    least, most = min(costs), max(costs)
+    idle = (services[most] - services[least]) / (most - least)
+    return [
+        Figure('CPU per exchange by drives',
+               ', '.join(f'{number}: {1e6 * cost:.0f} µs' for number, cost in costs.items()),
+               'linear: no more than with few', costs[most] / costs[sorted(costs)[1]], 1.1),
+        Figure('service executor per drive',
+               f'{1e3 * idle:.2f} ms/s', 'nothing', 1e2 * idle, 0.1),
+    ]
+
+
+def start_figures(found: dict[str, Any]) -> list[Figure]:
+    """Start and memory."""
+    memory = found['resident_mb']
+    return [
+        Figure('rclpy.init to the first exchange of all', f'{found["first_exchange_s"]:.2f} s',
+               f'bare nodes {found["bare_nodes_s"]:.2f} s', found['first_exchange_s'], 1.0),
+        Figure('resident memory', f'{memory[-1]:.0f} MB', f'bare nodes '
+               f'{found["bare_nodes_mb"]:.0f} MB', memory[-1], 120.0),
+        Figure('its growth', f'{memory[-1] - memory[1]:+.1f} MB', f'from {memory[1]:.1f} MB',
+               memory[-1] - memory[1], 1.0),
+    ]
+
+
+FIGURES: dict[str, Callable[[Any], list[Figure]]] = {
+    'full': lambda found: exchange_figures(found, 'subscribed, commands', 1.5),
+    'subscribed': lambda found: exchange_figures(found, 'subscribed', 1.5),
+    'unsubscribed': lambda found: exchange_figures(found, 'nobody subscribed', 1.0),
+    'diy': diy_figures, 'latency': latency_figures, 'service': service_figures,
+    'flood': flood_figures, 'drives': drives_figures, 'start': start_figures,
+}
+
+
+def figures(results: dict[str, list[Any]]) -> list[Figure]:
+    """Return the figures of each scenario; of several runs the one with the median ratio."""
+    lines = []
+    for name, runs in results.items():
+        for same in zip(*(FIGURES[name](run) for run in runs)):
+            ordered = sorted(same, key=lambda figure: (
+                math.isnan(figure.judged), figure.judged))
+            lines.append(ordered[len(ordered) // 2])
+    return lines
+
+
+def table(lines: list[Figure]) -> str:
+    """Return a table in Markdown."""
+    rows = ['| figure | measured | beside it | ratio or value | goal | met |', '|' + '---|' * 6]
+    rows += [f'| {line.name} | {line.value} | {line.floor} | {line.judged:.3g} '
+             f'| {"≥" if line.at_least else "≤"} {line.goal:g} | {"yes" if line.met else "no"} |'
+             for line in lines]
+    return '\n'.join(rows)
+
+
+def as_json(lines: list[Figure]) -> list[dict[str, Any]]:
+    """Return the figures as plain data."""
+    return [{**asdict(line), 'met': line.met} for line in lines]
+
+
+def plot(results: dict[str, list[Any]], path: Path) -> str:
+    """
+    Draw the distributions of period errors and latencies.
+
+    :return: why not, or ''.
+    """
+    try:
+        import matplotlib
+        matplotlib.use('Agg')
+        from matplotlib import pyplot
+    except ImportError:
+        return 'matplotlib is not installed'
+    chart, (left, right) = pyplot.subplots(1, 2, figsize=(11, 4.5), layout='constrained')
+    curves: list[tuple[Any, str, list[float]]] = []
+    for name in ('full', 'subscribed', 'unsubscribed'):
+        for run in results.get(name, [])[:1]:
+            curves.append((left, f'bridge, {name}', run['bridge']['period_errors']))
+            curves.append((left, f'sleeping thread, {name}', run['sleeper']))
+    for run in results.get('diy', [])[:1]:
+        curves.append((left, 'do-it-yourself node, 8 drives', run['diy']['period_errors']))
+    for run in results.get('latency', [])[:1]:
+        curves += [(right, 'bridge', run['drive0']), (right, 'bare pair', run['bare'])]
+    for run in results.get('service', [])[:1]:
+        curves += [(right, 'get_parameters, bridge', run['drive']),
+                   (right, 'get_parameters, bare service', run['bare'])]
+    for axes, label, samples in curves:
+        ordered = sorted(1e3 * max(each, 1e-6) for each in samples)
+        shares = [1.0 - place / len(ordered) for place in range(len(ordered))]
+        axes.plot(ordered, shares, label=label, drawstyle='steps-post')
+    for axes, title in ((left, 'period error'), (right, 'latency')):
+        axes.set(xscale='log', yscale='log', xlabel='ms', title=title,
+                 ylabel='share of samples that are worse')
+        axes.grid(which='both', alpha=0.3)
+        if axes.lines:
+            axes.legend(fontsize='small')
+    chart.savefig(path, dpi=110)
+    return ''

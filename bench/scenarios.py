@@ -1,0 +1,204 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+What is measured. Each scenario runs the bridge and its floor one after the other, or at once.
+
+All return plain numbers: times in s, CPU time in s, memory in MB; lists are samples.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager, ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+import statistics
+import tempfile
+import time
+from typing import Any
+
+from child import Child, child, HERE
+from unix_bus import INTERFACE
+
+#: s until discovery and the first publishes are over
+SETTLE = 2.0
+REQUESTS = 'speed_setpoint, torque_limit, position_setpoint, digital_outputs'
+RESPONSES = 'actual_speed, motor_current, actual_position, digital_inputs'
+
+
+@dataclass(frozen=True)
+class Load:
+    """
+    What the bridge has to do.
+
+    :param subscribed: every topic has a subscriber in another process.
+    :param commands: setpoints per second and drive.
+    """
+
+    drives: int
+    period: float
+    subscribed: bool = True
+    commands: float = 0.0
+
+
+class Bus:
+    """The drives, and the parameter file of a bridge for them."""
+
+    def __init__(self, stack: ExitStack, load: Load) -> None:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        self.channel = folder / 'bus'
+        self.file = folder / 'bench.yaml'
+        lines = ['/**/drive_can_bridge:', '  ros__parameters:', '    buses:', '      main:',
+                 f'        interface: {INTERFACE}', f'        channel: {self.channel}',
+                 '        bitrate: 1000000', '    drives:']
+        for number in range(load.drives):
+            lines += [f'      drive{number}:', '        bus: main',
+                      '        protocol: datamodel_extended', f'        station: {number + 1}',
+                      f'        profile: {HERE / "profile.yaml"}', '        rearm: immediate',
+                      f'        period: {load.period}', f'        cyclic_request: [{REQUESTS}]',
+                      f'        cyclic_response: [{RESPONSES}]']
+        self.file.write_text('\n'.join(lines) + '\n', encoding='utf-8')
+        self.drives = stack.enter_context(child('drives.py', self.channel))
+
+
+@contextmanager
+def bridge_under(load: Load, bus: Bus) -> Iterator[Child]:
+    """Run the bridge, and whoever commands it."""
+    with child('bridge.py', bus.file) as bridge, ExitStack() as stack:
+        if load.commands:
+            stack.enter_context(child('publisher.py', 'commands', load.drives, load.commands))
+        time.sleep(SETTLE)
+        yield bridge
+
+
+def subscribers(stack: ExitStack, load: Load) -> None:
+    """Let another process subscribe to everything, if so wanted."""
+    if load.subscribed:
+        stack.enter_context(child('subscriber.py', 'all', 'drive,floor', load.drives))
+
+
+def exchange(load: Load, duration: float, *, floor: bool = True) -> dict[str, Any]:
+    """Measure CPU time and regularity of the exchange beside a bare loop and a sleeping thread."""
+    found: dict[str, Any] = {}
+    with ExitStack() as stack:
+        bus = Bus(stack, load)
+        subscribers(stack, load)
+        if floor:
+            with child('floor.py', bus.channel, load.drives, load.period) as loop:
+                loop.ask(f'run {SETTLE}')
+                found['floor'] = loop.ask(f'run {duration}')
+        with bridge_under(load, bus) as bridge, child('sleeper.py', load.period) as sleeper:
+            begun = bridge.cpu()
+            for each in (bridge, sleeper):
+                each.ask('clear')
+            time.sleep(duration)
+            found['bridge'] = bridge.ask('result')
+            found['bridge']['process_cpu'] = bridge.cpu() - begun
+            found['sleeper'] = sleeper.ask('errors')
+            found['resident_mb'] = bridge.resident_mb()
+    return found
+
+
+def latency(load: Load, duration: float) -> dict[str, list[float]]:
+    """Measure from stamp to callback, of the bridge under load and of a bare pair at once."""
+    with ExitStack() as stack:
+        bus = Bus(stack, load)
+        subscribers(stack, load)
+        with (bridge_under(load, bus), child('publisher.py', 'bare', load.period),
+              child('subscriber.py', 'listen', 'drive0', 'bare') as listener):
+            time.sleep(SETTLE)
+            listener.ask('clear')
+            time.sleep(duration)
+            found: dict[str, list[float]] = listener.ask('latencies')
+    return found
+
+
+def service(load: Load, calls: int) -> dict[str, list[float]]:
+    """Measure parameter service calls beside those of a bare service, and exchanges."""
+    with ExitStack() as stack:
+        bus = Bus(stack, load)
+        with (bridge_under(load, bus) as bridge, child('bare_nodes.py', 1),
+              child('caller.py', load.drives) as caller):
+            caller.ask('ping 20')
+            bridge.ask('clear')
+            found: dict[str, list[float]] = caller.ask(f'ping {calls}')
+            found['exchange'] = bridge.ask('result')['latencies']
+    return found
+
+
+def flood(load: Load, duration: float, commands: float) -> dict[str, Any]:
+    """Measure the period of one bridge in quiet and in a flood of services and commands."""
+    found: dict[str, Any] = {}
+    with ExitStack() as stack:
+        bus = Bus(stack, load)
+        with (bridge_under(load, bus) as bridge,
+              child('sleeper.py', load.period) as sleeper,
+              child('caller.py', load.drives) as caller):
+            for name in ('quiet', 'flood'):
+                if name == 'flood':
+                    stack.enter_context(
+                        child('publisher.py', 'commands', load.drives, commands / load.drives))
+                    caller.ask('flood 4')
+                    time.sleep(SETTLE)
+                bridge.ask('clear')
+                sleeper.ask('clear')
+                time.sleep(duration)
+                result = bridge.ask('result')
+                found[name] = {'period_errors': result['period_errors'],
+                               'missed': result['missed'], 'exchanges': result['exchanges'],
+                               'sleeper': sleeper.ask('errors')}
+            found['calls'] = caller.ask('calm')
+    return found
+
+
+def do_it_yourself(load: Load, duration: float) -> dict[str, Any]:
+    """Measure the bridge and the node that a user writes, from the outside."""
+    found: dict[str, Any] = {}
+    with ExitStack() as stack:
+        bus = Bus(stack, load)
+        subscribers(stack, load)
+        for name, script, arguments in (
+                ('diy', 'diy_node.py', (bus.channel, load.drives, load.period)),
+                ('bridge', 'bridge.py', (bus.file,))):
+            with child(script, *arguments) as process, ExitStack() as inner:
+                if load.commands:
+                    inner.enter_context(
+                        child('publisher.py', 'commands', load.drives, load.commands))
+                time.sleep(SETTLE)
+                bus.drives.ask('clear')
+                cpu, begun = process.cpu(), time.monotonic()
+                time.sleep(duration)
+                elapsed = time.monotonic() - begun
+                distances = bus.drives.ask('distances')
+                found[name] = {
+                    'cpu': (process.cpu() - cpu) / elapsed,
+                    'requests_per_s': len(distances) / elapsed,
+                    'period_errors': [abs(each - load.period) for each in distances]}
+    return found
+
+
+def start(drives: int, duration: float) -> dict[str, Any]:
+    """Measure the time to the first exchange of all drives, and memory, beside bare nodes."""
+    load = Load(drives, 0.02)
+    found: dict[str, Any] = {}
+    with child('bare_nodes.py', drives) as bare:
+        found['bare_nodes_s'] = bare.ready
+        found['bare_nodes_mb'] = bare.resident_mb()
+    with ExitStack() as stack:
+        bus = Bus(stack, load)
+        subscribers(stack, load)
+        with bridge_under(load, bus) as bridge:
+            found['first_exchange_s'] = bridge.ready
+            found['resident_mb'] = [bridge.resident_mb()]
+            for _ in range(4):
+                time.sleep(duration / 4)
+                found['resident_mb'].append(bridge.resident_mb())
+    return found
+
+
+def p99(samples: list[float]) -> float:
+    """Return the 99th percentile; NaN without samples."""
+    ordered = sorted(samples)
+    return ordered[min(len(ordered) - 1, int(0.99 * len(ordered)))] if ordered else float('nan')
+
+
+def median(samples: list[float]) -> float:
+    """Return the median; NaN without samples."""
+    return statistics.median(samples) if samples else float('nan')

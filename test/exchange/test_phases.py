@@ -1,0 +1,53 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Drives of a bus take turns."""
+
+from builders import drive
+from exchange_builders import Bench
+import pytest
+
+from drive_can_bridge.exchange.phases import spread
+
+
+def test_one_drive_has_the_bus_for_itself() -> None:
+    assert spread([0.02]) == [0.0]
+
+
+def test_drives_are_spread_over_their_period() -> None:
+    assert spread([0.02] * 4) == pytest.approx([0.0, 0.005, 0.01, 0.015])
+
+
+def test_no_finer_than_a_slot() -> None:
+    # fifteen drives every 5 ms: five slots of three
+    phases = spread([0.005] * 15)
+    assert phases == pytest.approx(
+        [0.0] * 3 + [0.001] * 3 + [0.002] * 3 + [0.003] * 3 + [0.004] * 3)
+    assert len(set(phases)) == 5  # equal ones exactly: they are served together
+
+
+def test_each_period_for_itself() -> None:
+    assert spread([0.01, 0.1, 0.01, 0.1]) == pytest.approx([0.0, 0.0, 0.005, 0.05])
+
+
+def test_periods_below_a_slot() -> None:
+    assert spread([0.0005, 0.0005]) == [0.0, 0.0]
+
+
+def test_nobody() -> None:
+    assert spread([]) == []
+
+
+def test_exchange_gives_every_drive_its_turn() -> None:
+    bench = Bench(drive(name='first', station=1, mapping='assume'),
+                  drive(name='second', station=2, mapping='assume'))
+    bench.now = 100.0041
+    bench.exchange._last_pass = bench.now
+    bench.exchange.bus_opened()
+    bench.exchange.activate()
+    sent = {}
+    for tick in range(1, 80):
+        now = 100.0041 + 0.001 * tick
+        for text in bench.at(now):
+            sent.setdefault(text[:8], []).append(now)
+            bench.hears('1' + text[1:9] + '03E800FA00010000', now + 0.0002)
+    assert sent['003FFFF0'] == pytest.approx([100.0201, 100.0401, 100.0601, 100.0801], abs=2e-3)
+    assert sent['005FFFF0'] == pytest.approx([100.0101, 100.0301, 100.0501, 100.0701], abs=2e-3)
