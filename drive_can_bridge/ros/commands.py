@@ -67,8 +67,30 @@ class Warn(Protocol):
 
 #: handle of a subscription, type of its messages, what takes them
 _Taker = tuple[Any, type, Callable[[Any, float], None]]
-#: handle of an event, what tells of it
-_Event = tuple[Any, Callable[[Any], None]]
+
+
+class PolledEvent:
+    """
+    An event of a subscription for which nobody waits. To be destroyed before the subscription.
+
+    :param tell: takes the status when there is news.
+    """
+
+    def __init__(self, subscription: Subscription, kind: Any,
+                 tell: Callable[[Any], None]) -> None:
+        self._handle = rclpy_implementation.EventHandle(subscription.handle, kind)
+        self._tell = tell
+
+    def look(self) -> None:
+        """Tell what happened since the last look, if anything did."""
+        with self._handle:
+            status = self._handle.take_event()
+        if status is not None and status.total_count_change > 0:
+            self._tell(status)
+
+    def destroy(self) -> None:
+        """Let go of the subscription."""
+        self._handle.destroy_when_not_in_use()
 
 
 class CommandIntake:
@@ -87,17 +109,20 @@ class CommandIntake:
         self._takers: list[_Taker] = []
         self._published: list[_Taker] = []  # by somebody, as far as known
         self._count_at = -math.inf
-        self._events: list[_Event] = []
+        self._events: list[PolledEvent] = []
         self._look_at = -math.inf
         self._subscriptions: list[Subscription] = []
         self._index = {setpoint.parameter.name: index
                        for index, setpoint in enumerate(session.setpoints.items)}
-        for name, index in self._index.items():
-            kind = session.setpoints.items[index].parameter.kind
-            self._subscribe(node, TOPIC_TYPES[kind], f'~/command/{name}', self._taker(index))
-        joint = drive.joint
-        if joint is not None:
-            self._subscribe(node, JointState, '~/joint_command', self._take_joint)
+        try:
+            for name, index in self._index.items():
+                kind = session.setpoints.items[index].parameter.kind
+                self._subscribe(node, TOPIC_TYPES[kind], f'~/command/{name}', self._taker(index))
+            if drive.joint is not None:
+                self._subscribe(node, JointState, '~/joint_command', self._take_joint)
+        except BaseException:
+            self.destroy()
+            raise
 
     def take(self, now: float) -> None:
         """Hand all waiting commands to the session, oldest first."""
@@ -110,7 +135,8 @@ class CommandIntake:
                     taker for taker in takers if taker[0].get_publisher_count()]
                 if now >= self._look_at:
                     self._look_at = now + EVENT_PERIOD
-                    self._look_at_events()
+                    for event in self._events:
+                        event.look()
             except (InvalidHandle, RCLError):  # the node is being destroyed
                 return
         for handle, message_type, take in takers:
@@ -132,20 +158,12 @@ class CommandIntake:
                 return
 
     def destroy(self) -> None:
-        """Let go of the subscriptions. Before the node is destroyed."""
+        """Let go of the subscriptions. Before the node is destroyed, which has them otherwise."""
         events, self._events = self._events, []
-        for event, _ in events:
-            event.destroy_when_not_in_use()
+        for event in events:
+            event.destroy()
 
     # -- inside -----------------------------------------------------------------------------------
-
-    def _look_at_events(self) -> None:
-        """Tell of publishers from which nothing can be received."""
-        for event, tell in self._events:
-            with event:
-                status = event.take_event()
-            if status is not None and status.total_count_change > 0:
-                tell(status)
 
     def _subscribe(self, node: Node, message_type: type, topic: str,
                    take: Callable[[Any, float], None]) -> None:
@@ -159,9 +177,9 @@ class CommandIntake:
             message_type, topic, _never, command_quality(), callback_group=self._group,
             qos_overriding_options=overriding(node, topic),
             event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False))
-        self._events.append((rclpy_implementation.EventHandle(
-            subscription.handle,
-            QoSSubscriptionEventType.RCL_SUBSCRIPTION_REQUESTED_INCOMPATIBLE_QOS), incompatible))
+        self._events.append(PolledEvent(
+            subscription, QoSSubscriptionEventType.RCL_SUBSCRIPTION_REQUESTED_INCOMPATIBLE_QOS,
+            incompatible))
         self._subscriptions.append(subscription)
         self._takers.append((subscription.handle, message_type, take))
 

@@ -71,7 +71,12 @@ class DriveNode:
                                  NodeParameter('use_sim_time', value=False),
                                  *quality_overrides(bridge)])
         try:
-            self._populate(bridge.get_clock(), family)
+            self.commands = CommandIntake(self.node, drive, session, self.warn)
+            try:
+                self._populate(bridge.get_clock(), family)
+            except BaseException:
+                self.commands.destroy()
+                raise
         except BaseException:
             self.node.destroy_node()
             raise
@@ -86,7 +91,6 @@ class DriveNode:
             Bool, '~/online', latched_quality(),
             qos_overriding_options=overriding(self.node, '~/online'))
         self._online.publish(Bool(data=False))
-        self.commands = CommandIntake(self.node, drive, session, self.warn)
         directory = ParameterDirectory(drive.profile.parameters,
                                        lambda name: family.raw_parameter(drive, name))
         ParameterServices(self.node, directory, clock, submit=self._submit,
