@@ -16,6 +16,7 @@ import rclpy  # isort: skip
 import topics  # noqa: F401  sets the environment of rclpy
 from unix_bus import register
 
+from drive_can_bridge.process.scheduling import let_others_in
 from drive_can_bridge.ros.bridge_node import BridgeNode
 from drive_can_bridge.ros.executor_thread import ExecutorThread
 
@@ -90,6 +91,7 @@ def _complain(text: str) -> None:
 def main() -> None:
     """Obey."""
     register()
+    let_others_in()
     rclpy.init(args=['bench', '--ros-args', '--log-level', 'error', '--params-file', sys.argv[1]])
     begun = time.monotonic()
     measured = Measured()
