@@ -25,7 +25,9 @@ class Bench:
         self.drive = f'/{namespace}/conveyor'
         # a queue of requests that moves: each is answered long before the caller gives up
         file = bridge_file(directory, drives={'conveyor': {
-            **CONVEYOR, 'command_timeout': 60.0, 'parameter_timeout': 1.0}})
+            **CONVEYOR, 'command_timeout': 60.0, 'parameter_timeout': 1.0,
+            # how regular the exchange stays is the bench's business; machines may be slow
+            'missed_limit': 250}})
         self.simulator: Simulator = processes.simulator(file)
         self.bridge: Process = processes.bridge(file, namespace)
         client.online(self.drive)
