@@ -266,6 +266,10 @@ class Client:
         """Wait until a latched topic of a named bit has this value."""
         self.ask('latched', topic=topic, wanted=wanted)
 
+    def flashed(self, topic: str) -> None:
+        """Wait until a named bit was set, for however short, since the client looks at it."""
+        self.ask('flashed', topic=topic)
+
     def control(self, service: str, wanted: bool | None = None) -> tuple[bool, str]:
         """Call ~/enable, or ~/quick_stop and ~/reset_fault (None); return what they answer."""
         success, message = self.ask('control', service=service, wanted=wanted)

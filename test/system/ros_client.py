@@ -78,7 +78,7 @@ class Client:
             messages = deque(maxlen=1000)
             quality = QoSProfile(depth=100)
             if latched:
-                quality = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+                quality = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
             subscription = self.node.create_subscription(
                 kind, topic, lambda message: messages.append(message.data), quality)
             self.received[topic] = messages, subscription
@@ -97,6 +97,10 @@ class Client:
     def latched(self, topic, wanted, timeout):
         messages = self.listen(topic, Bool, latched=True)
         self.until(lambda: messages and messages[-1] is wanted, timeout, f'{topic} {wanted}')
+
+    def flashed(self, topic, timeout):
+        messages = self.listen(topic, Bool, latched=True)
+        self.until(lambda: True in messages, timeout, f'{topic} True, however short')
 
     def rest(self, seconds, timeout):
         deadline = time.monotonic() + seconds

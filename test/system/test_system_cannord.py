@@ -409,7 +409,7 @@ def test_unasked_fault_frame_and_bytes_of_the_examples(
     client.bit(f'{drive}/status_word/fault', False)
     # once, unasked: the answers before and after it tell of no fault
     peer.send(b't0C94380B0010\r')
-    client.bit(f'{drive}/status_word/fault', True)
+    client.flashed(f'{drive}/status_word/fault')
     client.bit(f'{drive}/status_word/fault', False)
     # and it ended the run: only ~/enable starts the drive again
     peer.wait_for('t0C847E04', len(peer.lines), 3)
