@@ -22,6 +22,8 @@ SECONDS = float(os.environ.get('DRIVE_CAN_SOAK_SECONDS', '60'))
 SEED = int(os.environ.get('DRIVE_CAN_SOAK_SEED', str(random.randrange(1_000_000))))
 #: how often something that has to work is tried, because a busy machine may lose the drive
 ATTEMPTS = 5
+#: s; an answer within two of them is known to be late: late=0.5 must never cause a wrong value
+PARAMETER_TIMEOUT = 0.35
 #: rounds after which buffers and caches have the size that they keep
 WARM = 3
 #: MB
@@ -47,8 +49,8 @@ class Soak:
         self.processes = processes
         self.client = client
         self.random = random.Random(SEED)
-        drive = {**CONVEYOR, 'mapping': 'configure', 'missed_limit': 10, 'parameter_timeout': 0.1,
-                 'command_timeout': 2.0 * SLOWNESS}
+        drive = {**CONVEYOR, 'mapping': 'configure', 'missed_limit': 10,
+                 'parameter_timeout': PARAMETER_TIMEOUT, 'command_timeout': 2.0 * SLOWNESS}
         self.file = bridge_file(directory, drives={'conveyor': drive,
                                                    'neighbour': {**drive, 'station': 2}})
         self.simulator: Simulator = processes.simulator(self.file)

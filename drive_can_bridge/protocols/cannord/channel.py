@@ -11,7 +11,9 @@ late response to an earlier task. A response to a write that fits in all but the
 remembered, so that somebody can be told when nothing better follows.
 
 A read is repeated when nobody answers. A write is not: its response may have been lost after it
-was carried out, and a second one would be carried out again.
+was carried out, and a second one would be carried out again. A parameter whose task nobody
+answered is left alone until a late response must have come (:mod:`..quarantine`): its value may be
+older than a write in between, and look like the response to that write.
 """
 
 from collections import deque
@@ -24,6 +26,7 @@ from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.protocols.cannord.parameter_frame import (
     ParameterFrame, ParameterLayout, Response, RESPONSES, Task,
 )
+from drive_can_bridge.protocols.quarantine import Quarantine
 
 READS = frozenset((Task.READ, Task.READ_ARRAY, Task.READ_ELEMENTS))
 #: responses that carry a word; the high half of the value says nothing then
@@ -88,9 +91,12 @@ class TaskChannel:
         self._waiting: deque[_Job] = deque()
         self._running: _Job | None = None
         self._task: Ask | None = None
+        self._waits = False  # the task has not been sent yet
         self._contrary: ParameterFrame | None = None
         self._attempts_left = 0
+        self._repeated = False
         self._deadline = math.inf
+        self._quarantine = Quarantine()
 
     @property
     def waiting_users(self) -> int:
@@ -100,7 +106,7 @@ class TaskChannel:
     @property
     def outstanding(self) -> Ask | None:
         """The task that waits for its response, if any."""
-        return self._task
+        return None if self._waits else self._task
 
     def run(self, procedure: Procedure, done: Done, now: float, *, own: bool = False) -> None:
         """
@@ -118,9 +124,11 @@ class TaskChannel:
 
     def clear(self) -> None:
         """Forget everything under way. Nobody is told: that is the caller's business."""
+        self._be_quiet(self._deadline)
         jobs = [*self._waiting] if self._running is None else [self._running, *self._waiting]
         self._waiting.clear()
         self._running = self._task = None
+        self._waits = False
         self._deadline = math.inf
         for job in jobs:
             job.procedure.close()
@@ -133,7 +141,7 @@ class TaskChannel:
         """
         self.now = now
         response = self._layout.decode(data)
-        task = self._task
+        task = self.outstanding
         if task is None:
             raise RemoteProtocolError('parameter response that nobody asked for')
         if not self._belongs(response, task):
@@ -145,6 +153,8 @@ class TaskChannel:
             self._contrary = response
             raise RemoteProtocolError(f'response to writing P{task.number}.{task.index} with '
                                       'another value')
+        if self._repeated:  # it may be the response to the attempt before
+            self._be_quiet(self._deadline)
         self._finish(Reply(response), now)
 
     def handle_timer(self, now: float) -> None:
@@ -153,7 +163,12 @@ class TaskChannel:
         task = self._task
         if task is None or now < self._deadline:
             return
+        if self._waits:
+            self._begin(task, now)
+            return
+        self._be_quiet(now)
         if self._attempts_left > 0:
+            self._repeated = True
             self._transmit(task, now)
         else:
             self._finish(Reply(None, self._contrary), now)
@@ -199,10 +214,27 @@ class TaskChannel:
             return
         self._contrary = None
         self._attempts_left = self.attempts if task.task in READS else 1
-        self._transmit(task, now)
+        self._repeated = False
+        self._begin(task, now)
+
+    def _begin(self, task: Ask, now: float) -> None:
+        """Send a task, unless a late response could be mistaken for that to this one."""
+        self._task = task
+        key = task.number, task.index
+        ready_at = self._quarantine.ready_at(key)
+        self._waits = now < ready_at or self._quarantine.holds(key, now, now - ready_at)
+        if self._waits:
+            self._deadline = self._quarantine.ready_at(key)
+        else:
+            self._transmit(task, now)
+
+    def _be_quiet(self, since: float) -> None:
+        """Ask nothing that a response after ``since`` could be mistaken for."""
+        task = self.outstanding
+        if task is not None:
+            self._quarantine.begin((task.number, task.index), since + self.timeout)
 
     def _transmit(self, task: Ask, now: float) -> None:
-        self._task = task
         self._attempts_left -= 1
         self._deadline = now + self.timeout
         self._send(self._layout.encode(task.task, task.number, task.index, task.value))

@@ -22,10 +22,10 @@ Pace: at least 20 ms lie between two EEPROM writes to a station and between such
 next read (manual, "Scrittura di un parametro": "almeno 20msec"); a frame leaves only while no
 cyclic request is under way, because nothing is known about how many requests a drive can hold.
 
-Quarantine: where an answer does not say what it answers (11-bit identifiers), a read that nobody
-answered is followed by a silence. What arrives in it belongs to the past, is thrown away, and
-begins the silence anew. A silence counts only if somebody listened: where the process stood still
-at its end, what arrived meanwhile may still lie in a buffer, and gets time to come out of it.
+Quarantine (:mod:`..quarantine`): after a read that nobody answered, the same parameters are not
+read again for as long as one waits for an answer. Where an answer does not say what it answers
+(11-bit identifiers), nothing at all is read, for the time that is configured, and whatever arrives
+then begins the silence anew.
 """
 
 from collections import deque
@@ -36,24 +36,32 @@ import math
 from typing import Any, Union
 
 from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.protocols.quarantine import Quarantine
 
 #: s between an unacknowledged write and the next acyclic frame, so that a drive with a single
 #: receive buffer has fetched the first; and, where answers carry no address, between an answer and
 #: the next read
 SPACING = 0.001
-#: s by which the read after a silence may be late, and the silence still was listened to
-PUNCTUAL = 0.0005
-#: s for the reader to fetch what a process that stood still finds in its buffers
-CATCHING_UP = 0.01
 
 
 @dataclass(frozen=True)
 class Read:
-    """Read ``count`` consecutive parameters; ``attempts`` None: as configured."""
+    """
+    Read ``count`` consecutive parameters.
+
+    :param attempts: None: as configured.
+    :param late_will_do: the late answer to the same question is as good as any: no quarantine.
+    """
 
     number: int
     count: int = 1
     attempts: int | None = None
+    late_will_do: bool = False
+
+    @property
+    def key(self) -> tuple[int, int]:
+        """What an answer with a 29-bit identifier repeats."""
+        return self.number, self.count
 
 
 @dataclass(frozen=True)
@@ -94,11 +102,12 @@ class Polling:
 class _Queue:
     """The procedures of one lane, and the step that the first of them wants done."""
 
-    __slots__ = ('_running', 'attempts_left', 'step', 'waiting')
+    __slots__ = ('_running', 'attempts_left', 'repeated', 'step', 'waiting')
 
     def __init__(self) -> None:
         self.waiting: deque[tuple[Procedure, Done]] = deque()
         self.attempts_left = 0
+        self.repeated = False  # nobody answered the attempt before
         self.step: Step | None = None
         self._running: tuple[Procedure, Done] | None = None
 
@@ -114,6 +123,7 @@ class _Queue:
         if self._running is None:
             raise RuntimeError('no procedure to resume')
         procedure, done = self._running
+        self.repeated = False
         try:
             step = self.step = procedure.send(result)
         except StopIteration as stop:
@@ -159,8 +169,9 @@ class AcyclicChannel:
         self.now = -math.inf
         self.asked_at = -math.inf
         self._eeprom_gap = eeprom_gap
+        self._polling = polling
         self._polled = polling is not None
-        self._quarantine = polling.quarantine if polling is not None else 0.0
+        self._quarantine = Quarantine()
         self._queues = {lane: _Queue() for lane in Lane}
         own, users = self._queues.values()
         self._orders = (own, users), (users, own)
@@ -173,8 +184,6 @@ class AcyclicChannel:
         self._outstanding = False
         self._deadline = math.inf
         self._not_before = -math.inf
-        self._quiet_until = -math.inf
-        self._listened = True  # to the silence before, or there was none
         self._eeprom_free_at = -math.inf
         self._eeprom_leaving = False
         self._held_until = -math.inf
@@ -217,8 +226,8 @@ class AcyclicChannel:
 
         An answer may still be on its way. It must not meet the next read.
         """
-        if self._outstanding and self._polled:
-            self._be_quiet(self._deadline + self._quarantine)
+        if self._outstanding:
+            self._be_quiet(self._deadline)
         for queue in self._queues.values():
             queue.clear()
         self._first = None
@@ -266,12 +275,14 @@ class AcyclicChannel:
         self.now = now
         if self._polled:  # a second answer, if there is one, must not meet the next read
             self._not_before = max(self._not_before, now + SPACING)
+        elif self._serving.repeated:  # it may be the answer to the attempt before
+            self._be_quiet(self._deadline)
         self._finish(words)
         self.advance(now)
 
     def disturbed(self, now: float) -> None:
         """Take note of an answer that nobody asked for: more may follow."""
-        self._be_quiet(now + self._quarantine)
+        self._be_quiet(now)
 
     def advance(self, now: float) -> None:
         """Do all that is possible now."""
@@ -290,46 +301,51 @@ class AcyclicChannel:
         if self._outstanding:
             if now < self._deadline:
                 return self._polled and self._advance_first(now)
-            self._be_quiet(now + self._quarantine)
+            self._be_quiet(now)
             if self._serving.attempts_left <= 0:
                 self._finish(None)
                 return True
             self._outstanding = False
+            self._serving.repeated = True
             self._change_turns()
         if self._first is not None:
             return self._advance_first(now)
-        step = self._choose()
-        if step is None:
+        queue = self._choose()
+        if queue is None:
             self._busy = self._first is not None
             return True
-        ready_at = self._ready_at(step)
-        if now < ready_at or isinstance(step, Read) and self._has_to_listen(now, now - ready_at):
+        ready_at = self._ready_at(queue)
+        if now < ready_at or self._quarantined(queue) and (
+                self._quarantine.holds(self._key(queue.step), now, now - ready_at)):
             return False
-        self._send(step, now)
+        self._send(queue, now)
         return True
 
-    def _be_quiet(self, until: float) -> None:
-        """Ask for nothing before ``until``."""
-        if self._polled:
-            self._quiet_until = max(self._quiet_until, until)
-            self._listened = False
+    def _be_quiet(self, since: float) -> None:
+        """Do not ask again what an answer after ``since`` could be mistaken for."""
+        if self._polling is not None:
+            self._quarantine.begin(None, since + self._polling.quarantine)
+            return
+        step = self._serving.step
+        if isinstance(step, Read) and not step.late_will_do:
+            self._quarantine.begin(step.key, since + self.timeout)
 
-    def _has_to_listen(self, now: float, late: float) -> bool:
-        """Prolong a silence, once, when the read after it comes late: nobody was there."""
-        if self._listened:
-            return False
-        self._listened = True
-        if late <= PUNCTUAL:
-            return False
-        self._quiet_until = now + CATCHING_UP
-        return True
+    def _quarantined(self, queue: _Queue) -> bool:
+        """Tell whether a quarantine, if there is one, concerns the step of a queue."""
+        step = queue.step
+        return isinstance(step, Read) and (
+            # its own second attempt may get the late answer to the first: that is as good
+            self._polled or not (queue.repeated or step.late_will_do))
+
+    def _key(self, step: Step | None) -> tuple[int, int] | None:
+        return step.key if isinstance(step, Read) and not self._polled else None
 
     def _advance_first(self, now: float) -> bool:
         """Write what goes before everything else, if there is such a thing and it may go."""
         if self._first is None:
             return False
         write, sent = self._first
-        if now < self._ready_at(write):
+        if now < self._writable_at(write):
             return False
         self._first = None
         self._send_write(write, now)
@@ -342,14 +358,17 @@ class AcyclicChannel:
             return math.inf
         if self._outstanding:
             if self._first is not None and self._polled:
-                return min(self._deadline, self._ready_at(self._first[0]))
+                return min(self._deadline, self._writable_at(self._first[0]))
             return self._deadline
         if self._first is not None:
-            return self._ready_at(self._first[0])
+            return self._writable_at(self._first[0])
+        soonest = math.inf
         for queue in self._order():
             if queue.step is not None:
-                return self._ready_at(queue.step)
-        return math.inf
+                soonest = min(soonest, self._ready_at(queue))
+                if not self._steps_aside(queue):
+                    break
+        return soonest
 
     def frames_left(self, now: float) -> None:
         """Take note that the frames are on their way: the pause of the EEPROM begins now."""
@@ -370,14 +389,22 @@ class AcyclicChannel:
         """Return the queues in the order in which they are served now."""
         return self._orders[self._users_next]
 
-    def _choose(self) -> Step | None:
-        """Return the step to be done next; None when there is nothing to do."""
+    def _choose(self) -> _Queue | None:
+        """Return the queue whose step is to be done next; None when there is nothing to do."""
+        chosen: _Queue | None = None
         for queue in self._order():
-            step = queue.fetch(self.attempts)
-            if step is not None:
-                self._serving = queue
-                return step
-        return None
+            if queue.fetch(self.attempts) is None:
+                continue
+            if not self._steps_aside(queue):
+                return queue
+            if chosen is None or self._ready_at(queue) < self._ready_at(chosen):
+                chosen = queue
+        return chosen
+
+    def _steps_aside(self, queue: _Queue) -> bool:
+        """Tell whether the other queue goes on while the step of this one is in quarantine."""
+        return not self._polled and self._quarantined(queue) and (
+            self._quarantine.ready_at(self._key(queue.step)) > self.now)
 
     def _finish(self, result: Words | None) -> None:
         """End the step under way; then it is the other lane's turn."""
@@ -396,20 +423,30 @@ class AcyclicChannel:
         elif not self._polled:
             self._users_next = True
 
-    def _ready_at(self, step: Step) -> float:
-        ready = max(self._held_until, self._not_before)
-        if isinstance(step, Read):
-            return max(ready, self._eeprom_free_at, self._quiet_until)
-        return max(ready, self._eeprom_free_at) if step.eeprom else ready
+    def _ready_at(self, queue: _Queue) -> float:
+        """Return when the step of a queue may be done."""
+        step = queue.step
+        if isinstance(step, Write):
+            return self._writable_at(step)
+        ready = max(self._held_until, self._not_before, self._eeprom_free_at)
+        if self._quarantined(queue):
+            return max(ready, self._quarantine.ready_at(self._key(step)))
+        return ready
 
-    def _send(self, step: Step, now: float) -> None:
+    def _writable_at(self, write: Write) -> float:
+        ready = max(self._held_until, self._not_before)
+        return max(ready, self._eeprom_free_at) if write.eeprom else ready
+
+    def _send(self, queue: _Queue, now: float) -> None:
+        self._serving = queue
+        step = queue.step
         if isinstance(step, Read):
             self._frames.append(self._encode_read(step.number, step.count))
             self._outstanding = True
             self.asked_at = now
-            self._serving.attempts_left -= 1
+            queue.attempts_left -= 1
             self._deadline = now + self.timeout
-        else:
+        elif step is not None:
             self._send_write(step, now)
             self._finish(None)
 

@@ -199,12 +199,12 @@ def read_maps(request_base: int, response_base: int, *, needed: tuple[int, ...] 
     :param needed: request map of a drive that is being cycled. Any other one ends the look at
         once, because each further cycle would put setpoints into wrong parameters.
     """
-    request = yield Read(request_base, SLOTS, attempts=1)
+    request = yield Read(request_base, SLOTS, attempts=1, late_will_do=True)
     if request is None:
         return None
     if needed is not None and effective(request) != needed:
         return Maps(request, None)
-    response = yield Read(response_base, SLOTS, attempts=1)
+    response = yield Read(response_base, SLOTS, attempts=1, late_will_do=True)
     return Maps(request, response)
 
 
