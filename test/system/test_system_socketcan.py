@@ -116,6 +116,7 @@ def test_interface_taken_down_and_up(processes: Processes, client: Client, names
     ip('link', 'set', 'dev', own, 'down')
     client.online(drive, wanted=False)
     assert 'Network is down' in bridge.error(r'bus main: .*tried again every 0\.2 s')
+    client.diagnostics(bus, state='^down$')
     for _ in range(3):  # at every attempt: SocketCAN opens an interface that is down
         facts = client.diagnostics(bus)
         assert (facts['state'], facts['level']) == ('down', '2')
@@ -141,8 +142,9 @@ def test_interface_deleted_and_created(processes: Processes, client: Client, nam
     ip('link', 'delete', 'dev', own)
     client.online(drive, wanted=False)
     bridge.error(r'bus main: socketcan \w+: .*No such device')
-    facts = client.diagnostics(f'{namespace}/drive_can_bridge: bus main', state='^down$')
-    assert 'No such device' in facts['message']
+    # first the interface goes down, then there is none
+    client.diagnostics(f'{namespace}/drive_can_bridge: bus main', state='^down$',
+                       message='No such device')
     count = len(simulator.frames())
     make_own()
     rearm_and_move(client, drive, bridge, simulator, count)
