@@ -127,6 +127,7 @@ FIGURES: dict[str, Callable[[Any], list[Figure]]] = {
     'full': lambda found: exchange_figures(found, 'subscribed, commands', 1.5),
     'subscribed': lambda found: exchange_figures(found, 'subscribed', 1.5),
     'unsubscribed': lambda found: exchange_figures(found, 'nobody subscribed', 1.0),
+    'ordinary': lambda found: exchange_figures(found, 'all of it at ordinary priority', 1.5),
     'diy': diy_figures, 'latency': latency_figures, 'service': service_figures,
     'flood': flood_figures, 'drives': drives_figures, 'start': start_figures,
 }

@@ -30,12 +30,19 @@ class Load:
 
     :param subscribed: every topic has a subscriber in another process.
     :param commands: setpoints per second and drive.
+    :param real_time: the exchange may have the priority that it asks for.
     """
 
     drives: int
     period: float
     subscribed: bool = True
     commands: float = 0.0
+    real_time: bool = True
+
+    @property
+    def how(self) -> tuple[str, ...]:
+        """What the process of the bridge is told."""
+        return () if self.real_time else ('ordinary',)
 
 
 class Bus:
@@ -61,7 +68,7 @@ class Bus:
 @contextmanager
 def bridge_under(load: Load, bus: Bus) -> Iterator[Child]:
     """Run the bridge, and whoever commands it."""
-    with child('bridge.py', bus.file) as bridge, ExitStack() as stack:
+    with child('bridge.py', bus.file, *load.how) as bridge, ExitStack() as stack:
         if load.commands:
             stack.enter_context(child('publisher.py', 'commands', load.drives, load.commands))
         time.sleep(SETTLE)
@@ -156,7 +163,7 @@ def do_it_yourself(load: Load, duration: float) -> dict[str, Any]:
         subscribers(stack, load)
         for name, script, arguments in (
                 ('diy', 'diy_node.py', (bus.channel, load.drives, load.period)),
-                ('bridge', 'bridge.py', (bus.file,))):
+                ('bridge', 'bridge.py', (bus.file, *load.how))):
             with child(script, *arguments) as process, ExitStack() as inner:
                 if load.commands:
                     inner.enter_context(

@@ -95,14 +95,17 @@ class BusExchange:
     All drives of one bus.
 
     :param routes: for each session, in the same order, the identifiers it wants to see.
+    :param prepare_thread: called first in each of the two threads.
     """
 
     def __init__(self, bus: BusConfiguration, sessions: Sequence[Session],
                  routes: Sequence[Sequence[Route]], listener: BusListener, *,
-                 clock: Callable[[], float] = steady_now) -> None:
+                 clock: Callable[[], float] = steady_now,
+                 prepare_thread: Callable[[], object] = lambda: None) -> None:
         self.bus = bus
         self.lock = threading.Lock()
         self._clock = clock
+        self._prepare_thread = prepare_thread
         self._listener = listener
         self._members: list[Member] = []
         self._sessions = list(sessions)
@@ -111,7 +114,8 @@ class BusExchange:
         # a send may hold up every drive of the bus: never for more than half a cycle
         shortest = min((session.drive.period for session in sessions), default=0.1)
         self.link = Link(bus, [route for entries in routes for route in entries], self,
-                         send_timeout=min(0.5 * shortest, 0.05), stations=len(self._sessions))
+                         send_timeout=min(0.5 * shortest, 0.05), stations=len(self._sessions),
+                         prepare_thread=prepare_thread)
         for session, phase in zip(sessions, spread([each.drive.period for each in sessions])):
             session.phase = phase
         self._alarm = Alarm()
@@ -234,6 +238,7 @@ class BusExchange:
 
     def _run(self) -> None:
         try:
+            self._prepare_thread()
             while not self._closing:
                 with self.lock:
                     self._wake_at = self._pass()

@@ -28,6 +28,7 @@ from drive_can_bridge.configuration.load import configuration_from_overrides
 from drive_can_bridge.configuration.model import BridgeConfiguration
 from drive_can_bridge.core.errors import ConfigurationError
 from drive_can_bridge.exchange.exchange import BusExchange
+from drive_can_bridge.process.scheduling import raise_priority
 from drive_can_bridge.protocols.families import FAMILIES, make_sessions
 from drive_can_bridge.ros.diagnostics import Diagnostics
 from drive_can_bridge.ros.drive_node import DriveNode
@@ -66,6 +67,7 @@ class BridgeNode(LifecycleNode):
         self._configuring = False
         self._ending = False
         self._misconfigured: list[str] = []
+        self._priority = ''
         self._leaving: list[DriveNode] = []
         self.configuration: BridgeConfiguration | None = None
         self.exchanges: dict[str, BusExchange] = {}
@@ -175,7 +177,8 @@ class BridgeNode(LifecycleNode):
             sessions = make_sessions(drives)
             routes = [[claim.route for claim in family.claims(drive)]
                       for family, drive in zip(families, drives)]
-            exchange = BusExchange(bus, sessions, routes, self)
+            exchange = BusExchange(bus, sessions, routes, self,
+                                   prepare_thread=self._prepare_thread)
             self.exchanges[bus.name] = exchange
             for drive, session, family in zip(drives, sessions, families):
                 node = DriveNode(self, drive, session, family, exchange, self._mailbox,
@@ -191,6 +194,7 @@ class BridgeNode(LifecycleNode):
             exchange.link.wait_first_attempt(max(0.0, deadline - steady_now()))
         if self._misconfigured:
             raise ConfigurationError(self._misconfigured)
+        self.get_logger().info(self._priority)
         self._diagnostics = Diagnostics(self, list(self.exchanges.values()),
                                         list(self.drives.values()))
         self._start_diagnostics_timer(configuration.diagnostics_period)
@@ -300,6 +304,10 @@ class BridgeNode(LifecycleNode):
             self._diagnostics.publish(steady_now())
 
     # -- from the exchanges (BusListener) ---------------------------------------------------------
+
+    def _prepare_thread(self) -> None:
+        """Make a thread of an exchange punctual."""
+        self._priority = raise_priority()
 
     def bus_opened(self, bus: str) -> None:
         """Log it."""

@@ -16,7 +16,7 @@ import sys
 import tempfile
 from typing import TYPE_CHECKING
 
-from drive_can_bridge.process.scheduling import let_others_in
+from drive_can_bridge.process.scheduling import be_punctual
 from drive_can_bridge.process.signals import SignalWatcher
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ checks a parameter file, 'drive_can demo' shows the bridge with simulated drives
 def main(args: Sequence[str] | None = None) -> int:
     """Run the bridge until a signal; return the exit code."""
     arguments = list(sys.argv if args is None else args)
-    let_others_in()
+    be_punctual()
     # in a process of our own, signals are looked after to the very end
     with SignalWatcher(keep=args is None) as watcher:
         return watcher.exit_code(_main(watcher, arguments))

@@ -13,7 +13,7 @@ Both happen every ``reconnect_period``. While it is not known yet that somebody 
 first frame without room blocks the bus at once.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 import threading
 import time
 from typing import Protocol
@@ -64,15 +64,18 @@ class Link:
     :param routes: acceptance filters.
     :param send_timeout: s that one send may take.
     :param stations: how many drives are on the bus, for each of which a frame may wait.
+    :param prepare_thread: called first in the reader thread.
     """
 
     def __init__(self, bus: BusConfiguration, routes: Sequence[Route], listener: LinkListener, *,
-                 send_timeout: float, stations: int = 0) -> None:
+                 send_timeout: float, stations: int = 0,
+                 prepare_thread: Callable[[], object] = lambda: None) -> None:
         self.bus = bus
         self._routes = routes
         self._listener = listener
         self._send_timeout = send_timeout
         self._stations = stations
+        self._prepare_thread = prepare_thread
         self._port: Port | None = None
         self._loss: str | None = None
         self._blocked: str | None = None
@@ -181,6 +184,7 @@ class Link:
 
     def _run(self) -> None:
         try:
+            self._prepare_thread()
             self._keep_open()
         except BusMisconfigured as error:
             self._listener.bus_misconfigured(in_words(error))

@@ -2,6 +2,7 @@
 """Statistics of exchanges."""
 
 import math
+import random
 
 import pytest
 
@@ -41,6 +42,19 @@ def test_window_forgets_and_the_rest_does_not() -> None:
     assert statistic.count == WINDOW + 1
     assert statistic.mean == pytest.approx((100.0 + WINDOW) / (WINDOW + 1))
     assert len(statistic.samples()) == WINDOW
+
+
+def test_percentile_of_times_that_become_better_and_worse() -> None:
+    chance = random.Random(1)
+    statistic, samples = Statistic(), []
+    for round_ in range(60):
+        scale = chance.choice((0.001, 1.0, 1.0, 50.0))
+        for _ in range(chance.randint(1, 400)):
+            samples.append(chance.expovariate(1.0) * scale * chance.choice((0.0, 1.0, 1.0)))
+            statistic.add(samples[-1])
+        window = sorted(samples[-WINDOW:])
+        assert statistic.p99 == window[math.ceil(0.99 * len(window)) - 1], round_
+        assert statistic.p99 == statistic.p99
 
 
 def test_negative_samples_have_a_maximum() -> None:

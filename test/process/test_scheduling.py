@@ -1,8 +1,10 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""No thread keeps the interpreter for long."""
+"""No thread keeps the interpreter for long; those of an exchange go first."""
 
+import os
 from pathlib import Path
 import sys
+import threading
 
 import pytest
 
@@ -11,15 +13,65 @@ from drive_can_bridge.process import scheduling
 SOURCES = Path(scheduling.__file__).parents[1]
 
 
-def test_switch_interval() -> None:
+@pytest.mark.parametrize('allowed', [True, False])
+def test_be_punctual(monkeypatch: pytest.MonkeyPatch, allowed: bool) -> None:
+    asked: list[tuple[int, ...]] = []
+
+    def set_priority(*arguments: int) -> None:
+        asked.append(arguments)
+        if not allowed:
+            raise PermissionError(13, 'Permission denied')
+    monkeypatch.setattr(os, 'setpriority', set_priority)
     before = sys.getswitchinterval()
     try:
-        scheduling.let_others_in()
+        scheduling.be_punctual()
         assert sys.getswitchinterval() == pytest.approx(0.0001)
+        assert asked == [(os.PRIO_PROCESS, 0, -10)]
     finally:
         sys.setswitchinterval(before)
 
 
 @pytest.mark.parametrize('path', ['ros/main.py', 'ros/demo/application.py'])
 def test_whoever_runs_a_bridge_asks_for_it(path: str) -> None:
-    assert '    let_others_in()\n' in (SOURCES / path).read_text(encoding='utf-8')
+    assert '    be_punctual()\n' in (SOURCES / path).read_text(encoding='utf-8')
+
+
+def test_priority_is_asked_for_this_thread_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[tuple[int, int, int]] = []
+    monkeypatch.setattr(os, 'sched_setscheduler', lambda thread, policy, parameter: asked.append(
+        (thread, policy, parameter.sched_priority)))
+    assert scheduling.raise_priority() == 'real-time priority 40'
+    # first in, first out; what this thread starts is not
+    assert asked == [(0, 0x40000000 | 1, 40)]
+
+
+def test_a_system_that_does_not_allow_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise PermissionError(1, 'Operation not permitted')
+    monkeypatch.setattr(os, 'sched_setscheduler', refuse)
+    assert scheduling.raise_priority().startswith('no real-time priority, ')
+    monkeypatch.delattr(os, 'sched_setscheduler')  # as on other systems
+    assert scheduling.raise_priority().startswith('no real-time priority, ')
+
+
+def test_threads_that_a_real_time_thread_starts_are_ordinary() -> None:
+    policies: list[int] = []
+
+    def child() -> None:
+        policies.append(os.sched_getscheduler(0))
+
+    def parent() -> None:
+        if scheduling.raise_priority() != scheduling.RAISED:
+            return
+        policies.append(os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK)
+        thread = threading.Thread(target=child)
+        thread.start()
+        thread.join()
+
+    thread = threading.Thread(target=parent)
+    thread.start()
+    thread.join()
+    if not policies:
+        pytest.skip('this system does not allow real-time priorities')
+    assert policies == [os.SCHED_FIFO, os.SCHED_OTHER]
+    assert os.sched_getscheduler(0) == os.SCHED_OTHER

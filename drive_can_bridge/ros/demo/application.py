@@ -20,7 +20,7 @@ from rclpy.signals import SignalHandlerOptions
 from drive_can_bridge.configuration.load import declared_parameters
 from drive_can_bridge.configuration.model import BridgeConfiguration
 from drive_can_bridge.core.errors import DriveCanError
-from drive_can_bridge.process.scheduling import let_others_in
+from drive_can_bridge.process.scheduling import be_punctual
 from drive_can_bridge.process.signals import SignalWatcher
 from drive_can_bridge.ros.bridge_node import BridgeNode
 from drive_can_bridge.ros.demo.commander import Commander
@@ -81,7 +81,7 @@ def run(options: Options, watcher: SignalWatcher, presenter: Presenter) -> int:
     :return: 0 after a signal or the duration, 1 when the bridge could not start or go on.
     :raises DriveCanError: something is not there or not right.
     """
-    let_others_in()
+    be_punctual()
     frame_log = None
     code = 1
     try:
