@@ -2,9 +2,8 @@
 """
 The bridge as the executable runs it, with a way to ask what it cost.
 
-Started with a parameter file, and the word "ordinary" where no thread is to get real-time priority.
-Prints how long it took from rclpy.init to the first exchange of
-every drive.
+Started with a parameter file, and the word "ordinary" where no thread is to get real-time
+priority. Prints how long it took from rclpy.init to the first exchange of every drive.
 """
 
 import sys

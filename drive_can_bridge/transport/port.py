@@ -54,8 +54,8 @@ class Port:
     :ivar error_frames: error frames seen.
     :ivar last_error: the last of them that asks for something to be done; None: there was none.
     :ivar controller: state of the controller as far as it tells, '' while all is well.
-    :ivar ignored_frames: remote and CAN FD frames seen; no protocol here has a use for them.
-    :ivar malformed_frames: what arrived and was no frame: a serial adapter's line with bytes lost.
+    :ivar malformed_frames: what arrived and is no data frame: a serial adapter's line with bytes
+        lost; remote and CAN FD frames, for which no protocol here has a use.
     """
 
     def __init__(self, bus: can.BusABC, *, kernel_errors: bool = False) -> None:
@@ -73,7 +73,6 @@ class Port:
         self._malformed_in_row = 0
         self.age = 0.0
         self.error_frames = 0
-        self.ignored_frames = 0
         self.malformed_frames = 0
         self.last_error: BusError | None = None
         self.controller = ERROR_ACTIVE
@@ -104,7 +103,7 @@ class Port:
         if not (filtered or self._matches(message)):
             return None
         if message.is_remote_frame or message.is_fd:
-            self.ignored_frames += 1
+            self.malformed_frames += 1
             return None
         data = bytes(message.data)
         highest = EXTENDED_IDENTIFIER_MAX if message.is_extended_id else STANDARD_IDENTIFIER_MAX

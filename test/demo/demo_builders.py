@@ -1,15 +1,15 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Snapshots without a bridge, and the demo as a process."""
 
-from collections.abc import Callable
 import math
 import os
 from pathlib import Path
 import re
 import subprocess
 import sys
-import time
 from typing import Any
+
+from waiting import wait_for
 
 from drive_can_bridge.core.session import DriveState
 from drive_can_bridge.ros.demo.snapshot import (
@@ -99,15 +99,3 @@ class Demo:
         if self.process.poll() is None:
             self.process.kill()
         self.process.wait()
-
-
-def wait_for(condition: Callable[[], Any], what: str, timeout: float = 30.0) -> Any:
-    """Wait until a condition holds, and return its value."""
-    deadline = time.monotonic() + timeout
-    while True:
-        value = condition()
-        if value:
-            return value
-        if time.monotonic() > deadline:
-            raise AssertionError(f'no {what} in {timeout} s')
-        time.sleep(0.01)

@@ -8,8 +8,9 @@ import signal
 import subprocess
 from typing import Any
 
-from demo_builders import Demo, DOMAIN_ID, wait_for
+from demo_builders import Demo, DOMAIN_ID
 import pytest
+from waiting import wait_for
 
 pytest.importorskip('rclpy')
 

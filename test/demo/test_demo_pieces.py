@@ -8,8 +8,8 @@ import shlex
 import subprocess
 import sys
 
-from demo_builders import wait_for
 import pytest
+from waiting import wait_for
 
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.configuration.model import BridgeConfiguration, BusConfiguration

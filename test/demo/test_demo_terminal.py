@@ -12,8 +12,9 @@ import struct
 import termios
 from typing import Any
 
-from demo_builders import Demo, wait_for
+from demo_builders import Demo
 import pytest
+from waiting import wait_for
 
 pytest.importorskip('rclpy')
 pytest.importorskip('rich')

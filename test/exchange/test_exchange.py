@@ -2,11 +2,11 @@
 """The exchange of one bus, without a bus: routing, time, stops, and who is told what."""
 
 import threading
-import time
 
 from builders import CONTROL, drive, GAIN, RAMP, read, SPEED, WORD, write
 from exchange_builders import all_routes, Bench, BusNotes
 import pytest
+from waiting import wait_for
 
 from drive_can_bridge.configuration.model import BusConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlTicket
@@ -19,14 +19,6 @@ ZEROS = '0000000000000000'
 NEUTRAL = f'003FFFF0#{ZEROS}'
 ASK_MAP_1, ASK_MAP_2 = f'002007A4#{ZEROS}', f'004007A4#{ZEROS}'
 ANSWER = '103FFFF0#03E800FA00010000'
-
-
-def wait_for(condition: object, timeout: float = 10.0) -> None:
-    deadline = time.monotonic() + timeout
-    while not condition():  # type: ignore[operator]
-        if time.monotonic() > deadline:
-            raise AssertionError('waited in vain')
-        time.sleep(0.001)
 
 
 # -- routing --------------------------------------------------------------------------------------

@@ -6,13 +6,13 @@ It plays the master of a simulated LTMR, and the node that a bridge follows. It 
 of the bridge: without it these tests skip.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 import itertools
-import time
 from typing import Any
 
 from builders import drive, read, text_of, write
 import pytest
+from waiting import wait_for
 
 from drive_can_bridge.configuration.model import (
     BridgeConfiguration, BusConfiguration, DriveConfiguration,
@@ -35,18 +35,6 @@ NODE = 5
 DEADLINE = 30.0
 LTMR = read_profile(profiles_directory() / 'tesys_t_ltmr.yaml').profile
 _CHANNELS = itertools.count(1)
-
-
-def wait_for(condition: Callable[[], Any], what: str) -> Any:
-    """Wait until a condition holds, and return its value."""
-    deadline = time.monotonic() + DEADLINE
-    while True:
-        value = condition()
-        if value:
-            return value
-        if time.monotonic() > deadline:
-            raise AssertionError(f'waited {DEADLINE:g} s for {what}')
-        time.sleep(0.002)
 
 
 @pytest.fixture

@@ -1,8 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Configurations, drives and frames for the tests of the simulation."""
 
-from collections.abc import Callable, Iterable
-import time
+from collections.abc import Iterable
 from typing import Any
 
 from drive_can_bridge.configuration.model import (
@@ -84,15 +83,3 @@ def ask(simulated: SimulatedDataModelDrive, text: str, now: float) -> list[str]:
     """Send a frame to a drive; return its answers as candump writes them."""
     simulated.receive_frame(frame(text), now)
     return [str(answer) for answer in simulated.frames_to_send()]
-
-
-def wait_for(condition: Callable[[], Any], what: str, timeout: float = 10.0) -> Any:
-    """Wait until a condition holds, and return its value."""
-    deadline = time.monotonic() + timeout
-    while True:
-        value = condition()
-        if value:
-            return value
-        if time.monotonic() > deadline:
-            raise AssertionError(f'no {what} in {timeout} s')
-        time.sleep(0.002)

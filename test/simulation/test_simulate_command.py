@@ -12,7 +12,7 @@ from typing import Any
 
 import can
 import pytest
-from simulation_builders import wait_for
+from waiting import wait_for
 
 PARAMETERS = """
 /**/drive_can_bridge:

@@ -11,7 +11,8 @@ from typing import Any
 import can
 from hypothesis import given, strategies as st
 import pytest
-from simulation_builders import bridge, frame, wait_for
+from simulation_builders import bridge, frame
+from waiting import wait_for
 
 from drive_can_bridge.core.errors import BusUnavailable
 from drive_can_bridge.core.frame import EXTENDED_IDENTIFIER_MAX, Frame

@@ -10,7 +10,8 @@ from typing import Any
 
 import can
 import pytest
-from simulation_builders import bridge, configuration, frame, wait_for
+from simulation_builders import bridge, configuration, frame
+from waiting import wait_for
 
 from drive_can_bridge.configuration.model import BusConfiguration
 from drive_can_bridge.core.errors import (

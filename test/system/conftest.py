@@ -12,8 +12,9 @@ import os
 from pathlib import Path
 from typing import Any
 
-from processes import Client, DEADLINE, Processes
+from processes import Client, Processes
 import pytest
+from waiting import DEADLINE
 
 # Before the first process starts: nothing leaves this machine, and others on it are left alone.
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'

@@ -5,7 +5,7 @@ Processes as a user starts them: output in files, waiting for lines, signals, an
 Whoever waits here waits for a condition, with a deadline that only a hang exceeds.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 import json
 import os
 from pathlib import Path
@@ -13,30 +13,14 @@ import re
 import signal
 import subprocess
 import sys
-import time
 from typing import Any
 
-#: an emulated machine is this much slower
-SLOWNESS = 12.0 if os.environ.get('DRIVE_CAN_EMULATED') else 1.0
-#: s after which a thing that has not happened never will
-DEADLINE = 60.0 * SLOWNESS
+from waiting import DEADLINE, wait_for
 
 ROOT = Path(__file__).resolve().parents[2]
 #: executable -> module, for trees that are not installed
 EXECUTABLES = {'drive_can_bridge': 'drive_can_bridge.ros.main',
                'drive_can': 'drive_can_bridge.cli.main'}
-
-
-def wait_for(condition: Callable[[], Any], what: str, timeout: float = DEADLINE) -> Any:
-    """Wait until a condition is true, and return what it returned."""
-    deadline = time.monotonic() + timeout
-    while True:
-        value = condition()
-        if value:
-            return value
-        if time.monotonic() > deadline:
-            raise AssertionError(f'waited {timeout:g} s for {what}')
-        time.sleep(0.005)
 
 
 def command_line(name: str) -> list[str]:

@@ -15,7 +15,8 @@ import time
 import tty
 from typing import NamedTuple
 
-from processes import wait_for
+from waiting import wait_for
+
 
 ZEROS = '0' * 16
 

@@ -14,9 +14,10 @@ import signal
 import time
 
 from parameter_files import bridge_file, CONVEYOR
-from processes import Client, Process, Processes, Simulator, SLOWNESS
+from processes import Client, Process, Processes, Simulator
 import pytest
 from test_system_reconnection import status_of
+from waiting import SLOWNESS
 
 SECONDS = float(os.environ.get('DRIVE_CAN_SOAK_SECONDS', '60'))
 SEED = int(os.environ.get('DRIVE_CAN_SOAK_SEED', str(random.randrange(1_000_000))))

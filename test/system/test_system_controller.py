@@ -12,11 +12,12 @@ from pathlib import Path
 
 from kernel_adapter import ip, KernelAdapter
 from parameter_files import bridge_file, CONVEYOR
-from processes import Client, Processes, SLOWNESS, wait_for
+from processes import Client, Processes
 import pytest
 from repeating import again_and_again
 from slcan_peer import ZEROS
 from test_system_reconnection import rearm_and_move, start_moving, status_of
+from waiting import SLOWNESS, wait_for
 
 CYCLIC_REQUEST = 'T003FFFF08'
 MOVING = f'{CYCLIC_REQUEST}05DC{ZEROS[4:]}'

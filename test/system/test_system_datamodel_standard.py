@@ -13,9 +13,10 @@ import sys
 import time
 
 from parameter_files import bridge_file, CONVEYOR
-from processes import Client, Process, Processes, Simulator, SLOWNESS
+from processes import Client, Process, Processes, Simulator
 import pytest
 from test_system_reconnection import status_of
+from waiting import SLOWNESS
 
 #: a machine that is busy lets simulated drives answer too late for their period
 LONG = {**CONVEYOR, 'missed_limit': 250}

@@ -5,11 +5,12 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from parameter_files import bridge_file, CONVEYOR
-from processes import Client, Processes, SLOWNESS
+from processes import Client, Processes
 import pytest
 from repeating import again_and_again
 from slcan_peer import Peer, ZEROS
 from test_system_reconnection import rearm_and_move, start_moving, status_of
+from waiting import SLOWNESS
 
 CYCLIC_REQUEST = 'T003FFFF08'
 CYCLIC_RESPONSE = 'T103FFFF08'

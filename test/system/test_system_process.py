@@ -10,9 +10,10 @@ import threading
 import tty
 
 from parameter_files import bridge_file, CONVEYOR
-from processes import Client, Process, Processes, wait_for
+from processes import Client, Process, Processes
 import pytest
 from test_system_reconnection import rearm_and_move, start_moving
+from waiting import wait_for
 
 DEACTIVATE = 4
 

@@ -8,9 +8,10 @@ import signal
 import tty
 
 from parameter_files import bridge_file, CONVEYOR
-from processes import Client, Process, Processes, wait_for
+from processes import Client, Process, Processes
 import pytest
 from test_system_reconnection import NEUTRAL, rearm_and_move, start_moving
+from waiting import wait_for
 
 BOTH = pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM],
                                ids=['SIGINT', 'SIGTERM'])

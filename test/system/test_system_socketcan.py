@@ -18,10 +18,11 @@ import subprocess
 
 from kernel_adapter import ip
 from parameter_files import bridge_file, CONVEYOR
-from processes import Client, Processes, SLOWNESS, wait_for
+from processes import Client, Processes
 import pytest
 from repeating import again_and_again
 from test_system_reconnection import rearm_and_move, start_moving
+from waiting import SLOWNESS, wait_for
 
 CHANNEL = os.environ.get('DRIVE_CAN_SOCKETCAN', 'vcan0')
 #: made and deleted here

@@ -11,9 +11,10 @@ from pathlib import Path
 import random
 
 from parameter_files import bridge_file, CONVEYOR
-from processes import Client, Processes, wait_for
+from processes import Client, Processes
 import pytest
 from slcan_peer import Peer, ZEROS
+from waiting import wait_for
 
 READ_REQUEST_MAP = f'T002007A48{ZEROS}'
 READ_RESPONSE_MAP = f'T002007E48{ZEROS}'

@@ -10,6 +10,7 @@ import time
 from typing import Any
 
 import pytest
+from waiting import wait_for
 
 from drive_can_bridge.configuration.model import BusConfiguration
 from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, TransportError
@@ -24,14 +25,6 @@ FULL = 'send: transmit queue full'
 ALONE = ('no other node acknowledges: check that one is switched on, cable, termination and bit '
          'rate')
 BUS = BusConfiguration('main', 'fake', 'x', reconnect_period=0.02)
-
-
-def wait_for(condition: Callable[[], Any]) -> None:
-    """Wait until a condition holds; much longer than ever needed."""
-    deadline = time.monotonic() + 20.0
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.002)
 
 
 class FakePort:

@@ -286,3 +286,12 @@ def test_what_an_earlier_client_left_is_thrown_away() -> None:
 def test_absent_adapter(tmp_path: Path) -> None:
     with pytest.raises(BusUnavailable, match='No such file or directory'):
         open_port(slcan(str(tmp_path / 'nothing')))
+
+
+def test_what_is_no_data_frame_is_counted(bus: FakeBus) -> None:
+    port = Port(bus)
+    bus.coming += [can.Message(arbitration_id=0x003FFFF0, is_remote_frame=True, dlc=8),
+                   can.Message(arbitration_id=0x003FFFF0, is_fd=True, data=bytes(8))]
+    assert [port.receive(0.0), port.receive(0.0)] == [None, None]
+    assert port.malformed_frames == 2
+    assert port.error_frames == 0

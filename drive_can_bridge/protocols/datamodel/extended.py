@@ -227,12 +227,6 @@ def station_route(station: int) -> Route:
     return Route(station << STATION_SHIFT, STATION_MASK, True)
 
 
-def response_route(station: int) -> Route:
-    """Return the route of everything a station sends."""
-    _check_station(station)
-    return Route(DIR | station << STATION_SHIFT, DIR | STATION_MASK, True)
-
-
 def _acyclic_identifier(station: int, number: int, count: int) -> int:
     _check_station(station)
     if not 1 <= count <= SLOTS:

@@ -1,0 +1,25 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Whoever waits in a test waits for a condition, with a deadline that only a hang exceeds."""
+
+from collections.abc import Callable
+import os
+import time
+from typing import Any
+
+#: an emulated machine is this much slower
+SLOWNESS = 12.0 if os.environ.get('DRIVE_CAN_EMULATED') else 1.0
+#: s after which a thing that has not happened never will
+DEADLINE = 60.0 * SLOWNESS
+
+
+def wait_for(condition: Callable[[], Any], what: str = 'a condition', timeout: float = DEADLINE,
+             ) -> Any:
+    """Wait until a condition is true, and return what it returned."""
+    deadline = time.monotonic() + timeout
+    while True:
+        value = condition()
+        if value:
+            return value
+        if time.monotonic() > deadline:
+            raise AssertionError(f'waited {timeout:g} s for {what}')
+        time.sleep(0.002)
