@@ -39,6 +39,8 @@ from drive_can_bridge.core.statistics import DriveStatistics
 WAITING_REQUESTS_MAX = 64
 #: cyclic frames with neutral setpoints that are sent before a drive is left alone
 STOP_CYCLES = 3
+#: advice until more is known
+LOOKING = 'being looked for'
 
 
 class DriveState(Enum):
@@ -101,9 +103,13 @@ class Session(ABC):
 
     # -- life cycle -------------------------------------------------------------------------------
 
-    @abstractmethod
     def activate(self, now: float) -> None:
         """Begin to exchange (as soon as the bus is there)."""
+        self.active = True
+        self.ever_online = False
+        if self.bus_available:
+            self._advice = LOOKING
+            self._begin(now)
 
     @abstractmethod
     def deactivate(self, now: float) -> None:
@@ -114,17 +120,42 @@ class Session(ABC):
     def stopped(self) -> bool:
         """Nothing more will be sent until the next ``activate``."""
 
-    @abstractmethod
     def bus_up(self, now: float) -> None:
         """Begin to use the bus: it was opened."""
+        self.bus_available = True
+        if self.active:
+            self._advice = LOOKING
+            self._begin(now)
 
-    @abstractmethod
     def bus_down(self, now: float, reason: str) -> None:
         """Handle the loss of the bus: requests fail, the drive is offline."""
+        self.bus_available = False
+        self._fail_requests(BUS_DOWN)
+        self._lose(f'bus down: {reason}', now)
+        self._go_idle(f'bus down: {reason}')
+        self._frames.clear()
 
     @abstractmethod
     def time_lost(self, now: float) -> None:
         """Handle a process that stood still: nothing stale goes out, setpoints want re-arming."""
+
+    @abstractmethod
+    def _begin(self, now: float) -> None:
+        """Start over: nothing is known of the drive."""
+
+    @abstractmethod
+    def _go_idle(self, advice: str) -> None:
+        """Send nothing more, and be offline."""
+
+    def _lose(self, reason: str, now: float) -> None:
+        """Make the drive offline, if it is not."""
+        self._withdraw(reason, now)
+        self._advice = reason
+        self._be_offline(reason)
+
+    @abstractmethod
+    def _withdraw(self, reason: str, now: float) -> None:
+        """Go neutral, and back to ``disable``."""
 
     # -- traffic ----------------------------------------------------------------------------------
 
@@ -213,6 +244,10 @@ class Session(ABC):
     @abstractmethod
     def _enqueue(self, request: Request, now: float) -> None:
         """Queue a request that may be served; it ends with :meth:`_answer`."""
+
+    @abstractmethod
+    def _fail_requests(self, reason: str) -> None:
+        """Forget what is under way, and answer it by :meth:`_fail_open_requests`."""
 
     @abstractmethod
     def _waiting_requests(self) -> int:

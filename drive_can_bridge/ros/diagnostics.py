@@ -179,7 +179,7 @@ class DriveReporter:
             drive.foreign_text = ''
         if rejected:
             told.append(f'{rejected} frames rejected, the last: {drive.rejected_text}; check for '
-                        f'a second station with the same number')
+                        f'a second station with the same number, or answers that come too late')
         return told
 
     def _how_to_arm(self) -> str:

@@ -2,13 +2,14 @@
 """What all sessions share, shown with a session that does nothing of its own."""
 
 import math
+from typing import Any
 
 from builders import CONTROL, drive, GAIN, parameter, read, SPEED, STATUS, WORD
 import pytest
 
 from drive_can_bridge.core.control import ControlAction, ControlTicket, ProfileControl
 from drive_can_bridge.core.errors import ValueRefused
-from drive_can_bridge.core.events import RequestCompleted
+from drive_can_bridge.core.events import RequestCompleted, StationLost
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.requests import Failure, Request
 from drive_can_bridge.core.session import DriveState, Session
@@ -21,17 +22,25 @@ class Idle(Session):
     offline_advice = ''
     stopped = True
 
-    def activate(self, now: float) -> None:
-        self.active = True
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self.done: list[str] = []
 
     def deactivate(self, now: float) -> None:
         self.active = False
 
-    def bus_up(self, now: float) -> None:
-        self.bus_available = True
+    def _begin(self, now: float) -> None:
+        self.done.append(f'begin at {now:g}, {self._advice}')
+        self.online = True
 
-    def bus_down(self, now: float, reason: str) -> None:
-        self.bus_available = False
+    def _go_idle(self, advice: str) -> None:
+        self.done.append(f'idle: {advice}')
+
+    def _withdraw(self, reason: str, now: float) -> None:
+        self.done.append(f'withdraw: {reason}')
+
+    def _fail_requests(self, reason: str) -> None:
+        self.done.append(f'fail: {reason}')
 
     def time_lost(self, now: float) -> None:
         raise NotImplementedError
@@ -57,6 +66,32 @@ def session(**options: object) -> Idle:
     table = configuration.profile.control
     control = ProfileControl(table, timeout=2.0) if table is not None else None
     return Idle(configuration, control)
+
+
+def test_begins_when_bus_and_activity_are_there_in_any_order() -> None:
+    for order in ('activate', 'bus_up'), ('bus_up', 'activate'):
+        made = session()
+        made.ever_online = True
+        for now, call in enumerate(order):
+            assert made.done == []
+            getattr(made, call)(float(now))
+        assert made.done == ['begin at 1, being looked for']
+        assert not made.ever_online
+
+
+def test_loss_of_the_bus() -> None:
+    made = session()
+    made.bus_up(1.0)
+    made.activate(2.0)
+    made.receive_frame(Frame(1, b'', False), 3.0)
+    made.done.clear()
+    made.bus_down(4.0, 'unplugged')
+    assert made.done == ['fail: bus down', 'withdraw: bus down: unplugged',
+                         'idle: bus down: unplugged']
+    assert made.take_events() == [StationLost('bus down: unplugged')]
+    assert made.take_frames() == []
+    made.submit(read(GAIN), 5.0)
+    assert [event.outcomes for event in made.take_events()] == [(Failure('bus down'),)]
 
 
 def test_refusals_in_order() -> None:

@@ -16,6 +16,7 @@ from drive_can_bridge.protocols.cannord.channel import Ask, Procedure, Reply
 from drive_can_bridge.protocols.cannord.parameter_frame import (
     error_text, ParameterFrame, Response, Task, WRITE_TASKS,
 )
+from drive_can_bridge.protocols.patience import Patience
 
 WRONG_INDEX = 3
 PROCESS_DATA_ONLY = 'exists in process data only'
@@ -25,27 +26,16 @@ _DOUBLE = (Response.DOUBLE, Response.ARRAY_DOUBLE)
 
 
 @dataclass(frozen=True)
-class Conditions:
+class Conditions(Patience):
     """
     What the procedures need to know of their drive.
 
-    :param offline: tells whether nobody is there; then one unanswered task ends the request.
     :param last_value: (parameter name) -> raw integer last received in process data, or None.
     :param persist: write to EEPROM where the profile does not say where.
     """
 
-    offline: Callable[[], bool]
     last_value: Callable[[str], int | None]
-    timeout: float
-    attempts: int
     persist: bool
-
-    def no_answer(self, attempts: int) -> Failure:
-        """Say that nobody answered."""
-        if self.offline():
-            return Failure(NO_ANSWER_OFFLINE)
-        noun = 'attempt' if attempts == 1 else 'attempts'
-        return Failure(f'no answer in {self.timeout:g} s, {attempts} {noun}')
 
 
 def of_request(request: Request, conditions: Conditions) -> Procedure:
@@ -135,7 +125,7 @@ def write_parameter(parameter: Parameter, raw: int, conditions: Conditions,
             reply.contrary.value if double else reply.contrary.word)
         return Failure(f'read back {_text(parameter.value_from_raw(found))} '
                        f'instead of {_text(parameter.value_from_raw(raw))}')
-    return conditions.no_answer(1)
+    return conditions.unanswered(1)
 
 
 def write_together(items: Sequence[tuple[Parameter, int]], conditions: Conditions,
@@ -155,7 +145,7 @@ def _read(parameter: Parameter, conditions: Conditions,
     task = Task.READ if parameter.subindex is None else Task.READ_ARRAY
     reply = yield Ask(task, parameter.number or 0, parameter.subindex or 0)
     if reply.response is None:
-        return conditions.no_answer(conditions.attempts)
+        return conditions.unanswered()
     if reply.response.identifier == Response.REFUSED:
         refusal = yield from _refusal(parameter, reply.response)
         return refusal

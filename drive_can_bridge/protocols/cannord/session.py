@@ -26,7 +26,7 @@ from drive_can_bridge.core.events import (
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Access, Parameter
 from drive_can_bridge.core.requests import (
-    BRIDGE_INACTIVE, BUS_DOWN, Failure, Outcome, ReadValue, Request, WriteRequest,
+    BRIDGE_INACTIVE, Failure, Outcome, ReadValue, Request, WriteRequest,
     Written,
 )
 from drive_can_bridge.core.session import Session, STOP_CYCLES
@@ -45,7 +45,6 @@ from drive_can_bridge.protocols.cannord.states import is_faulted, STATUS_BITS, S
 
 #: longest pause between the neutral cycles of a stop, however long the period is
 STOP_SPACING_MAX = 0.1
-LOOKING = 'being looked for'
 NO_ANSWER = 'no answer to process data'
 
 STATUS_PARAMETER = Parameter(
@@ -111,13 +110,6 @@ class CannordSession(Session):
 
     # -- life cycle -------------------------------------------------------------------------------
 
-    def activate(self, now: float) -> None:
-        self.active = True
-        self.ever_online = False
-        if self.bus_available:
-            self._advice = LOOKING
-            self._begin(now)
-
     def deactivate(self, now: float) -> None:
         self.active = False
         self._fail_requests(BRIDGE_INACTIVE)
@@ -134,19 +126,6 @@ class CannordSession(Session):
     @property
     def stopped(self) -> bool:
         return not self._cycling
-
-    def bus_up(self, now: float) -> None:
-        self.bus_available = True
-        if self.active:
-            self._advice = LOOKING
-            self._begin(now)
-
-    def bus_down(self, now: float, reason: str) -> None:
-        self.bus_available = False
-        self._fail_requests(BUS_DOWN)
-        self._lose(f'bus down: {reason}', now)
-        self._go_idle(f'bus down: {reason}')
-        self._frames.clear()
 
     def time_lost(self, now: float) -> None:
         if not self._cycling or self._stopping:
@@ -174,12 +153,6 @@ class CannordSession(Session):
         self._stop_awaiting()
         self._advice = advice
         self._be_offline(advice)
-
-    def _lose(self, reason: str, now: float) -> None:
-        """Make the drive offline, if it is not."""
-        self._withdraw(reason, now)
-        self._advice = reason
-        self._be_offline(reason)
 
     def _be_offline(self, reason: str) -> None:
         self._held = None

@@ -20,38 +20,27 @@ from drive_can_bridge.protocols.canopen_pkw.mailbox import (
     Answered, Read, Refused, Reply, Silence, Step, Write,
 )
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address
+from drive_can_bridge.protocols.patience import Patience
 
 NOT_TOGETHER = ('cannot be written in one frame, nothing was written: two 16-bit parameters in '
                 'adjacent registers fit, or one of 32 bits')
 
 
 @dataclass(frozen=True)
-class Conditions:
+class Conditions(Patience):
     """
     What the procedures need to know of their drive.
 
-    :param offline: tells whether nobody is there; then one name that nobody answered ends the
-        request.
     :param addressing: how listed parameters are reached.
     :param word_order: of 32-bit values.
     """
 
-    offline: Callable[[], bool]
-    timeout: float
-    attempts: int
     addressing: str
     word_order: str
 
     def span(self, parameter: Parameter) -> Span:
         """Return what a parameter takes."""
         return addresses.span_of(parameter, self.addressing)
-
-    def unanswered(self, attempts: int) -> Failure:
-        """Say that nobody answered."""
-        if self.offline():
-            return Failure(NO_ANSWER_OFFLINE)
-        noun = 'attempt' if attempts == 1 else 'attempts'
-        return Failure(f'no answer in {self.timeout:g} s, {attempts} {noun}')
 
 
 # -- parameters of users --------------------------------------------------------------------------
@@ -86,7 +75,7 @@ def read_parameters(parameters: Sequence[Parameter], conditions: Conditions,
         if isinstance(reply, Silence) and conditions.offline():
             break
         pending[:0] = _parts(span, spans)
-        failures[span] = conditions.unanswered(conditions.attempts) if isinstance(
+        failures[span] = conditions.unanswered() if isinstance(
             reply, Silence) else Failure(reply.text)
 
     def outcome(parameter: Parameter, span: Span) -> Outcome:
@@ -94,7 +83,7 @@ def read_parameters(parameters: Sequence[Parameter], conditions: Conditions,
             return ReadValue(addresses.raw_from_words(
                 parameter, [words[address] for address in span.addresses],
                 conditions.word_order))
-        return failures.get(span) or conditions.unanswered(conditions.attempts)
+        return failures.get(span) or conditions.unanswered()
 
     return tuple(map(outcome, parameters, spans))
 
@@ -152,7 +141,7 @@ def _write(address: Address, words: tuple[int, ...], conditions: Conditions,
             return Failure(reply.text)
         if reply.sent:
             return conditions.unanswered(1)
-    return conditions.unanswered(conditions.attempts)
+    return conditions.unanswered()
 
 
 # -- the exchange ---------------------------------------------------------------------------------

@@ -31,8 +31,8 @@ from drive_can_bridge.core.events import (
 )
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.core.requests import BRIDGE_INACTIVE, BUS_DOWN, Failure, Request
-from drive_can_bridge.core.session import Session
+from drive_can_bridge.core.requests import BRIDGE_INACTIVE, Failure, Request
+from drive_can_bridge.core.session import LOOKING, Session
 from drive_can_bridge.protocols.canopen_pkw import addresses, network, pkw, procedures
 from drive_can_bridge.protocols.canopen_pkw.addresses import Span
 from drive_can_bridge.protocols.canopen_pkw.channel import Channel, Lane
@@ -47,7 +47,6 @@ from drive_can_bridge.protocols.polling import Beat
 #: how often, and for how long (s, all together), a drive is told to stand still
 STOP_ATTEMPTS = 3
 STOP_TIME = 0.4
-LOOKING = 'being looked for'
 SILENT = ('no complete round of reads: drive silent, not operational, or other COB-IDs than '
           'configured')
 
@@ -104,12 +103,6 @@ class PkwSession(Session):
 
     # -- life cycle -------------------------------------------------------------------------------
 
-    def activate(self, now: float) -> None:
-        self.active = True
-        self.ever_online = False
-        if self.bus_available:
-            self._begin(now)
-
     def deactivate(self, now: float) -> None:
         was_running = self._phase is Phase.RUNNING and self.ever_online
         self.active = False
@@ -132,29 +125,19 @@ class PkwSession(Session):
     def stopped(self) -> bool:
         return self._phase is Phase.IDLE
 
-    def bus_up(self, now: float) -> None:
-        self.bus_available = True
-        if self.active:
-            self._begin(now)
-
     def bus_down(self, now: float, reason: str) -> None:
-        self.bus_available = False
-        self._fail_requests(BUS_DOWN)
-        text = f'bus down: {reason}'
-        self._withdraw(text, now)
         self._node.forget()
-        self._go_idle(text)
-        self._frames.clear()
+        super().bus_down(now, reason)
 
     def time_lost(self, now: float) -> None:
         if self._phase is not Phase.RUNNING:
             return
-        self._be_lost('the bridge stood still', now)
+        self._lose('the bridge stood still', now)
         self._begin(now)
 
     def _begin(self, now: float) -> None:
         """Start over: nothing is known of the drive."""
-        self._be_lost('the drive is being reconnected', now)
+        self._lose('the drive is being reconnected', now)
         self._advice = LOOKING
         self._phase = Phase.RUNNING
         self._channel.cancel(Lane.CONTROL)  # of a stop that was under way
@@ -189,7 +172,7 @@ class PkwSession(Session):
         self._control_changed(now)
         self._setpoint_writer.look(now)
 
-    def _be_lost(self, reason: str, now: float) -> None:
+    def _lose(self, reason: str, now: float) -> None:
         """Make the drive offline, if it is not."""
         self._withdraw(reason, now)
         self._advice = reason
@@ -207,10 +190,10 @@ class PkwSession(Session):
             self.control.withdraw(reason, now)
             self._tell_notes()
 
-    def _lose(self, reason: str, now: float) -> None:
+    def _leave_alone(self, reason: str, now: float) -> None:
         """Handle a drive that is silent, but may be listening: it has to stand still."""
         was_online = self.online
-        self._be_lost(reason, now)
+        self._lose(reason, now)
         self._node.offline(now)
         self._frames += self._node.take_frames()
         writes = self._neutral_writes()
@@ -219,7 +202,7 @@ class PkwSession(Session):
 
     def _cut_off(self, reason: str, answer: str, now: float) -> None:
         """Handle a node that takes no PDOs: nothing that was sent is answered any more."""
-        self._be_lost(reason, now)
+        self._lose(reason, now)
         self._channel.clear()
         self._fail_requests(answer)
 
@@ -313,7 +296,8 @@ class PkwSession(Session):
         if self._missed_in_row < self.drive.missed_limit:
             return
         if self.online:
-            self._lose(f'no complete round of reads for {self.drive.missed_limit} periods', now)
+            limit = self.drive.missed_limit
+            self._leave_alone(f'no complete round of reads for {limit} periods', now)
         elif not self._node.heartbeat_lost:
             self._advice = SILENT
 
@@ -390,7 +374,7 @@ class PkwSession(Session):
         if self._phase is Phase.RUNNING:
             if now >= self._node.next_timer():
                 if self._node.handle_timer(now) is Change.HEARTBEAT_LOST:
-                    self._lose(f'no heartbeat for {self._node.heartbeat_timeout:g} s', now)
+                    self._leave_alone(f'no heartbeat for {self._node.heartbeat_timeout:g} s', now)
                 self._frames += self._node.take_frames()
             if self.control is not None and now >= self.control.next_timer():
                 self.control.handle_timer(now)

@@ -112,12 +112,6 @@ class DataModelSession(Session):
 
     # -- for the families -------------------------------------------------------------------------
 
-    def _lose(self, reason: str, now: float) -> None:
-        """Make the drive offline, if it is not."""
-        self._withdraw(reason, now)
-        self._advice = reason
-        self._be_offline(reason)
-
     def _withdraw(self, reason: str, now: float) -> None:
         """Go neutral, and back to ``disable``."""
         self.setpoints.disarm()

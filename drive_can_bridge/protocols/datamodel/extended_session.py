@@ -24,7 +24,7 @@ from drive_can_bridge.core.events import (
     Event, ForeignMasterSeen, MappingDiffered, ProcessDataReceived, SetpointsExpired, StationFound,
 )
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.core.requests import BRIDGE_INACTIVE, BUS_DOWN
+from drive_can_bridge.core.requests import BRIDGE_INACTIVE
 from drive_can_bridge.core.session import DriveState, STOP_CYCLES
 from drive_can_bridge.protocols.datamodel import extended
 from drive_can_bridge.protocols.datamodel.base_session import DataModelSession, STOP_SPACING_MAX
@@ -33,7 +33,6 @@ from drive_can_bridge.protocols.datamodel.process_words import (
     unpack_unusual, wire_numbers, words_struct,
 )
 
-LOOKING = 'being looked for'
 #: direction and station of an identifier
 FROM_WHOM = extended.DIR | extended.STATION_MASK
 
@@ -87,13 +86,6 @@ class ExtendedSession(DataModelSession):
 
     # -- life cycle -------------------------------------------------------------------------------
 
-    def activate(self, now: float) -> None:
-        self.active = True
-        self.ever_online = False
-        if self.bus_available:
-            self._advice = LOOKING
-            self._begin(now)
-
     def deactivate(self, now: float) -> None:
         self.active = False
         self._fail_requests(BRIDGE_INACTIVE)
@@ -111,19 +103,6 @@ class ExtendedSession(DataModelSession):
     @property
     def stopped(self) -> bool:
         return self._phase is Phase.IDLE
-
-    def bus_up(self, now: float) -> None:
-        self.bus_available = True
-        if self.active:
-            self._advice = LOOKING
-            self._begin(now)
-
-    def bus_down(self, now: float, reason: str) -> None:
-        self.bus_available = False
-        self._fail_requests(BUS_DOWN)
-        self._lose(f'bus down: {reason}', now)
-        self._go_idle(f'bus down: {reason}')
-        self._frames.clear()
 
     def time_lost(self, now: float) -> None:
         if self._phase is Phase.IDLE or self._stopping:

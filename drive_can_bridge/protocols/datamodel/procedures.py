@@ -5,7 +5,7 @@ What takes more than one acyclic frame: reading and writing parameters, checking
 Every function here is a generator for :class:`.channel.AcyclicChannel`.
 """
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Union
 
@@ -17,6 +17,7 @@ from drive_can_bridge.core.requests import (
 from drive_can_bridge.protocols.datamodel.channel import Procedure, Read, Step, Words, Write
 from drive_can_bridge.protocols.datamodel.extended import CYCLIC_PARAMETER, SLOTS
 from drive_can_bridge.protocols.datamodel.mapping import effective, padded
+from drive_can_bridge.protocols.patience import Patience
 
 Reply = Union[Words, None]
 
@@ -24,28 +25,17 @@ NOT_WRITABLE = f'parameter {CYCLIC_PARAMETER} is never written: its number marks
 
 
 @dataclass(frozen=True)
-class Conditions:
+class Conditions(Patience):
     """
     What the procedures need to know of their drive.
 
-    :param offline: tells whether nobody is there; then one unanswered read ends the request.
     :param offset: added to every parameter number that goes over the wire.
     :param together: parameters that fit one write frame.
     """
 
-    offline: Callable[[], bool]
-    timeout: float
-    attempts: int
     verify: bool
     offset: int
     together: int = SLOTS
-
-    def no_answer(self) -> Failure:
-        """Say that nobody answered."""
-        if self.offline():
-            return Failure(NO_ANSWER_OFFLINE)
-        noun = 'attempt' if self.attempts == 1 else 'attempts'
-        return Failure(f'no answer in {self.timeout:g} s, {self.attempts} {noun}')
 
     def wire_number(self, parameter: Parameter) -> int:
         """Return the parameter's number on the wire."""
@@ -101,13 +91,13 @@ def read_parameters(parameters: Sequence[Parameter], conditions: Conditions,
             # one bad number makes the drive ignore the whole frame: ask for each alone
             pending[:0] = [[number] for number in run]
         else:
-            failures[run[0]] = conditions.no_answer()
+            failures[run[0]] = conditions.unanswered()
 
     def outcome(parameter: Parameter) -> Outcome:
         number = conditions.wire_number(parameter)
         if number in words:
             return ReadValue(parameter.raw_from_word(words[number]))
-        return failures.get(number) or conditions.no_answer()
+        return failures.get(number) or conditions.unanswered()
 
     return tuple(map(outcome, parameters))
 
@@ -141,7 +131,7 @@ def write_parameter(parameter: Parameter, raw: int, conditions: Conditions,
     if eeprom and parameter.readable:
         reply = yield Read(number)
         if reply is None:
-            return conditions.no_answer()
+            return conditions.unanswered()
         if reply[0] == word:
             return Written()
     yield Write(number, (word,), eeprom)
@@ -149,7 +139,7 @@ def write_parameter(parameter: Parameter, raw: int, conditions: Conditions,
         return Written(SENT_UNACKNOWLEDGED)
     reply = yield Read(number)
     if reply is None:
-        return conditions.no_answer()
+        return conditions.unanswered()
     return _compare(parameter, parameter.raw_from_word(reply[0]), raw)
 
 
@@ -170,7 +160,7 @@ def write_together(items: Sequence[tuple[Parameter, int]], conditions: Condition
         return (Written(SENT_UNACKNOWLEDGED),) * len(items)
     reply = yield Read(first, len(words))
     if reply is None:
-        return (conditions.no_answer(),) * len(items)
+        return (conditions.unanswered(),) * len(items)
     return tuple(
         _compare(parameter, parameter.raw_from_word(
             reply[conditions.wire_number(parameter) - first]), raw)

@@ -19,7 +19,7 @@ from drive_can_bridge.core.events import (
     ForeignMasterSeen, ProcessDataReceived, SetpointsExpired, StationFound,
 )
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.core.requests import BRIDGE_INACTIVE, BUS_DOWN
+from drive_can_bridge.core.requests import BRIDGE_INACTIVE
 from drive_can_bridge.core.session import STOP_CYCLES
 from drive_can_bridge.protocols.datamodel import standard
 from drive_can_bridge.protocols.datamodel.base_session import DataModelSession, STOP_SPACING_MAX
@@ -27,7 +27,7 @@ from drive_can_bridge.protocols.datamodel.channel import Polling, Procedure, Rea
 from drive_can_bridge.protocols.datamodel.standard_round import places, reads
 from drive_can_bridge.protocols.polling import Beat, Round, WriteSchedule
 
-LOOKING = 'no answer to reads: drive silent, wrong station, bit rate or identifier mode'
+SILENT = 'no answer to reads: drive silent, wrong station, bit rate or identifier mode'
 
 
 class Phase(Enum):
@@ -74,12 +74,6 @@ class StandardSession(DataModelSession):
 
     # -- life cycle -------------------------------------------------------------------------------
 
-    def activate(self, now: float) -> None:
-        self.active = True
-        self.ever_online = False
-        if self.bus_available:
-            self._begin(now)
-
     def deactivate(self, now: float) -> None:
         self.active = False
         told = self.online or self._farewells > 0
@@ -97,18 +91,6 @@ class StandardSession(DataModelSession):
     def stopped(self) -> bool:
         return self._phase is Phase.IDLE
 
-    def bus_up(self, now: float) -> None:
-        self.bus_available = True
-        if self.active:
-            self._begin(now)
-
-    def bus_down(self, now: float, reason: str) -> None:
-        self.bus_available = False
-        self._fail_requests(BUS_DOWN)
-        self._lose(f'bus down: {reason}', now)
-        self._go_idle(f'bus down: {reason}')
-        self._frames.clear()
-
     def time_lost(self, now: float) -> None:
         if self._phase is Phase.POLLING:
             self._lose('the bridge stood still', now)
@@ -118,7 +100,7 @@ class StandardSession(DataModelSession):
     def _begin(self, now: float) -> None:
         """Start over: nothing is known of the drive."""
         self._lose('the drive is being reconnected', now)
-        self._advice = LOOKING
+        self._advice = SILENT
         self._phase = Phase.POLLING
         self._missed_in_row = 0
         self._beat.start(now)
@@ -293,7 +275,7 @@ class StandardSession(DataModelSession):
         if self.online and self._missed_in_row >= self.drive.missed_limit:
             self._lose(f'no complete round of reads for {self.drive.missed_limit} periods', now)
         elif not self.online:
-            self._advice = LOOKING
+            self._advice = SILENT
 
     # -- frames from the drive --------------------------------------------------------------------
 
