@@ -18,11 +18,9 @@ import threading
 from typing import Any
 
 from lifecycle_msgs.msg import State
-from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
 from rclpy.executors import Executor
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
-from rclpy.timer import Timer
 
 from drive_can_bridge.configuration.load import configuration_from_overrides
 from drive_can_bridge.configuration.model import BridgeConfiguration
@@ -34,6 +32,7 @@ from drive_can_bridge.ros.diagnostics import Diagnostics
 from drive_can_bridge.ros.drive_node import DriveNode
 from drive_can_bridge.ros.mailbox import Mailbox
 from drive_can_bridge.ros.node_parameters import NodeParameters
+from drive_can_bridge.ros.periodic_thread import PeriodicThread
 from drive_can_bridge.ros.transition_guard import guard_transitions
 from drive_can_bridge.transport import adapters
 from drive_can_bridge.transport.link import steady_now
@@ -61,9 +60,8 @@ class BridgeNode(LifecycleNode):
         self._fatal = fatal
         self._transition_lock = threading.RLock()
         self._mailbox = Mailbox(self)
-        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._diagnostics: Diagnostics | None = None
-        self._diagnostics_timer: Timer | None = None
+        self._diagnostics_thread: PeriodicThread | None = None
         self._configuring = False
         self._ending = False
         self._misconfigured: list[str] = []
@@ -95,8 +93,8 @@ class BridgeNode(LifecycleNode):
         return not any(name.startswith(('buses.', 'drives.')) for name in self.overrides)
 
     def _parameter_changed(self, name: str, value: Any) -> None:
-        if name == 'diagnostics_period' and self._diagnostics_timer is not None:
-            self._start_diagnostics_timer(float(value))
+        if name == 'diagnostics_period' and self._diagnostics_thread is not None:
+            self._diagnostics_thread.set_period(float(value))
             return
         prefix, _, key = name.rpartition('.')
         drive = self.drives.get(prefix.removeprefix('drives.'))
@@ -197,7 +195,10 @@ class BridgeNode(LifecycleNode):
         self.get_logger().info(self._priority)
         self._diagnostics = Diagnostics(self, list(self.exchanges.values()),
                                         list(self.drives.values()))
-        self._start_diagnostics_timer(configuration.diagnostics_period)
+        self._diagnostics_thread = PeriodicThread(
+            'diagnostics', configuration.diagnostics_period, self._diagnostics.publish,
+            lambda text: self.get_logger().error(f'diagnostics: {text}'))
+        self._diagnostics_thread.start()
 
     def _activate(self) -> None:
         for exchange in self.exchanges.values():
@@ -226,9 +227,9 @@ class BridgeNode(LifecycleNode):
                                 f'sent: {reason}')
 
     def _clean_up(self) -> None:
-        if self._diagnostics_timer is not None:
-            self.destroy_timer(self._diagnostics_timer)
-            self._diagnostics_timer = None
+        if self._diagnostics_thread is not None:
+            self._diagnostics_thread.stop()
+            self._diagnostics_thread = None
         if self._diagnostics is not None:
             self._diagnostics.destroy()
             self._diagnostics = None
@@ -271,7 +272,7 @@ class BridgeNode(LifecycleNode):
             try:
                 self._stop_drives()
                 if self._diagnostics is not None:
-                    self._diagnostics.conclude(steady_now())
+                    self._diagnostics.conclude()
             finally:
                 self._transition_lock.release()
 
@@ -292,16 +293,6 @@ class BridgeNode(LifecycleNode):
     def diagnostics(self) -> Diagnostics | None:
         """What reports on buses and drives, from configure to cleanup."""
         return self._diagnostics
-
-    def _start_diagnostics_timer(self, period: float) -> None:
-        if self._diagnostics_timer is not None:
-            self.destroy_timer(self._diagnostics_timer)
-        self._diagnostics_timer = self.create_timer(period, self._publish_diagnostics,
-                                                    clock=self._steady)
-
-    def _publish_diagnostics(self) -> None:
-        if self._diagnostics is not None:
-            self._diagnostics.publish(steady_now())
 
     # -- from the exchanges (BusListener) ---------------------------------------------------------
 

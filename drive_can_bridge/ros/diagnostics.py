@@ -3,6 +3,7 @@
 
 from dataclasses import dataclass, field
 import math
+import threading
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
@@ -15,6 +16,7 @@ from drive_can_bridge.ros.drive_node import DriveNode
 from drive_can_bridge.ros.quality import overriding
 from drive_can_bridge.ros.values import value_text
 from drive_can_bridge.transport.error_frames import ADVICE_DISTURBED, BUS_OFF, BusError
+from drive_can_bridge.transport.link import steady_now
 
 #: bus load above which a bus is never OK
 LOAD_WARNING = 70.0
@@ -196,6 +198,30 @@ class DriveReporter:
         return f'not armed: publish {" and ".join(wanted)}'
 
 
+class StatusMessage:
+    """
+    The message of one report, filled anew each time.
+
+    Making twenty messages with twenty entries each, once a second, takes longer than filling them,
+    and the exchange wants the interpreter meanwhile.
+    """
+
+    def __init__(self, name: str, hardware_id: str) -> None:
+        self.status = DiagnosticStatus(name=name, hardware_id=hardware_id)
+        self._entries: dict[str, KeyValue] = {}
+
+    def fill(self, report: Report) -> DiagnosticStatus:
+        """Return the message with what the report says."""
+        status, entries = self.status, self._entries
+        status.level, status.message = report.level, report.message
+        if entries.keys() != report.facts.keys():
+            self._entries = entries = {key: KeyValue(key=key) for key in report.facts}
+            status.values = list(entries.values())
+        for key, value in report.facts.items():
+            entries[key].value = value
+        return status
+
+
 class Diagnostics:
     """Publishes the reports of a bridge."""
 
@@ -208,23 +234,32 @@ class Diagnostics:
             qos_overriding_options=overriding(node, '/diagnostics'))
         self.buses = [BusReporter(exchange) for exchange in exchanges]
         self.drives = [DriveReporter(drive) for drive in drives]
+        self._lock = threading.Lock()  # the last message comes from another thread
+        self._message = DiagnosticArray()
+        self._statuses: dict[str, StatusMessage] = {}
 
-    def publish(self, now: float) -> None:
+    def publish(self) -> None:
         """Publish one status per bus and per drive."""
-        message = DiagnosticArray()
-        message.header.stamp = self._node.get_clock().now().to_msg()
-        for report in self.reports(now):
-            message.status.append(DiagnosticStatus(
-                level=report.level, name=f'{self._prefix}: {report.name}',
-                message=report.message, hardware_id=report.name.split()[-1],
-                values=[KeyValue(key=key, value=value) for key, value in report.facts.items()]))
-        self._publisher.publish(message)
+        if not self._node.context.ok():  # shut down by somebody else: nobody is left to be told
+            return
+        message = self._message
+        with self._lock:
+            message.header.stamp = self._node.get_clock().now().to_msg()
+            message.status = [self._status(report) for report in self.reports(steady_now())]
+            self._publisher.publish(message)
 
-    def conclude(self, now: float) -> None:
+    def _status(self, report: Report) -> DiagnosticStatus:
+        found = self._statuses.get(report.name)
+        if found is None:
+            found = self._statuses[report.name] = StatusMessage(
+                f'{self._prefix}: {report.name}', report.name.split()[-1])
+        return found.fill(report)
+
+    def conclude(self) -> None:
         """Publish for the last time: the drives have been stopped, and the process ends."""
         for drive in self.drives:
             drive.inactive = 'bridge ended: start it again'
-        self.publish(now)
+        self.publish()
 
     def reports(self, now: float) -> list[Report]:
         """Return all reports, buses first."""

@@ -51,7 +51,7 @@ def parameters(*, buses: dict[str, Any] | None = None, **drives: dict[str, Any])
         'diagnostics_period': 0.1,
         'buses': buses or {'main': {'interface': 'virtual', 'bitrate': 1_000_000,
                                     'reconnect_period': 0.1}},
-        'drives': drives or {'conveyor': CONVEYOR}}
+        'drives': {name: dict(keys) for name, keys in (drives or {'conveyor': CONVEYOR}).items()}}
 
 
 class Bridge:
