@@ -8,6 +8,7 @@ import threading
 import time
 from typing import Any
 
+from acquaintance import acquaint
 from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.msg import (
@@ -158,22 +159,37 @@ class Client:
 
     # -- services ---------------------------------------------------------------------------------
 
-    def service(self, name: str, service_type: Any) -> Any:
-        """Return a client of a service that is there."""
-        if name not in self._services:
-            self._services[name] = self.node.create_client(
+    def service(self, name: str, service_type: Any, host: str = '') -> Any:
+        """Return a client of a service that is there; of the node ``host`` if it was renamed."""
+        found = self._services.get(name)
+        if found is None:
+            found = self._services[name] = self.node.create_client(
                 service_type, name, qos_profile=qos_profile_parameters)
-        wait_until(self._services[name].service_is_ready, what=f'the service {name}')
-        return self._services[name]
+            wait_until(found.service_is_ready, what=f'the service {name}')
+            self._acquaint(name, host)
+        wait_until(found.service_is_ready, what=f'the service {name}')
+        return found
 
-    def ask(self, name: str, service_type: Any, request: Any = None) -> Any:
+    def _acquaint(self, name: str, host: str) -> None:
+        deadline = time.monotonic() + patience(60.0)
+
+        def wait(condition: Callable[[], bool], seconds: float) -> bool:
+            end = time.monotonic() + seconds
+            while not condition() and time.monotonic() < end:
+                assert time.monotonic() < deadline, f'no answer from the node of {name}'
+                time.sleep(0.002)
+            return condition()
+        acquaint(self.node, name, wait, host)
+
+    def ask(self, name: str, service_type: Any, request: Any = None, *, host: str = '') -> Any:
         """Call a service; return the future."""
-        return self.service(name, service_type).call_async(request or service_type.Request())
+        return self.service(name, service_type, host).call_async(
+            request or service_type.Request())
 
-    def call(self, name: str, service_type: Any, request: Any = None,
-             timeout: float = 30.0) -> Any:
+    def call(self, name: str, service_type: Any, request: Any = None, *,
+             timeout: float = 30.0, host: str = '') -> Any:
         """Call a service; return the answer."""
-        future = self.ask(name, service_type, request)
+        future = self.ask(name, service_type, request, host=host)
         wait_until(future.done, timeout, f'the answer of {name}')
         return future.result()
 

@@ -74,7 +74,8 @@ def test_topics_and_services_of_a_drive_are_remapped(bridge: StartBridge,
         client.publish('/belt/setpoint', Float64(data=0.0))
         client.publish('/belt/setpoint', Float64(data=2.0))
         wait_until(lambda: recorder.words()[:1] == (20,))
-    assert client.call('/lift_on', SetBool, SetBool.Request(data=True)).success
+    assert client.call('/lift_on', SetBool, SetBool.Request(data=True),
+                       host='/lift').success
     topics = dict(client.node.get_topic_names_and_types())
     assert '/lift/actual_speed' in topics
     assert not {'/conveyor/actual_speed', '/conveyor/command/speed_setpoint'} & set(topics)

@@ -19,6 +19,7 @@ import math
 import sys
 import time
 
+from acquaintance import acquaint
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import GetParameters, SetParameters
 import rclpy
@@ -31,8 +32,8 @@ PATIENCE = 600.0
 ABSURD = (math.nan, math.inf, -math.inf, 1e308, -1e308, 5e-324, 3000.1, -1e9, 2.0 ** 63)
 
 
-def until(node, condition):
-    deadline = time.monotonic() + PATIENCE
+def until(node, condition, patience=PATIENCE):
+    deadline = time.monotonic() + patience
     while not condition() and time.monotonic() < deadline:
         rclpy.spin_once(node, timeout_sec=0.05)
     return condition()
@@ -41,6 +42,7 @@ def until(node, condition):
 def service(node, kind, name):
     client = node.create_client(kind, name, qos_profile=qos_profile_parameters)
     client.wait_for_service(PATIENCE)
+    acquaint(node, name, lambda condition, seconds: until(node, condition, seconds))
     return client
 
 

@@ -32,8 +32,8 @@ def command_line(name: str) -> list[str]:
 
 
 def environment() -> dict[str, str]:
-    """Return the environment of started processes: this tree first, English, unbuffered."""
-    paths = [str(ROOT), *filter(None, [os.environ.get('PYTHONPATH')])]
+    """Return the environment of started processes: this tree, English, unbuffered."""
+    paths = [str(ROOT), str(ROOT / 'test'), *filter(None, [os.environ.get('PYTHONPATH')])]
     return {**os.environ, 'PYTHONPATH': os.pathsep.join(paths), 'PYTHONUNBUFFERED': '1',
             'LC_ALL': 'C.UTF-8', 'COLUMNS': '99'}
 

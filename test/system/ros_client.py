@@ -14,6 +14,7 @@ import sys
 import threading
 import time
 
+from acquaintance import acquaint
 from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.srv import ChangeState
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
@@ -25,9 +26,6 @@ from std_msgs.msg import Bool, Float64, Int64
 from std_srvs.srv import SetBool, Trigger
 
 TYPES = {'Float64': Float64, 'Int64': Int64}
-#: s after which a request that found a dying server is sent again
-PATIENCE = 5.0
-
 
 class Failed(Exception):
     """What was asked for did not happen."""
@@ -131,6 +129,17 @@ class Client:
             self.services[name] = self.node.create_client(kind, name, **options)
         service = self.services[name]
         self.until(service.service_is_ready, timeout, f'the service {name}')
+        # before each call: the bridge may be another process than last time
+        deadline = time.monotonic() + timeout
+
+        def wait(condition, seconds):
+            end = time.monotonic() + seconds
+            while not condition() and time.monotonic() < end:
+                if time.monotonic() > deadline:
+                    raise Failed(f'waited {timeout:g} s for any answer of the node of {name}')
+                self.spin(0.02)
+            return condition()
+        acquaint(self.node, name, wait)
         future = service.call_async(request)
         self.until(future.done, timeout, f'the answer of {name}')
         return future.result()
