@@ -20,6 +20,7 @@ from rcl_interfaces.srv import (
 import rclpy
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node, NodeNameNonExistentError
 from rclpy.qos import (
     DurabilityPolicy, qos_profile_parameters, QoSProfile, ReliabilityPolicy,
 )
@@ -127,6 +128,22 @@ class Client:
         """Return the full names of all nodes in the graph."""
         return [f'{namespace.rstrip("/")}/{name}'
                 for name, namespace in self.node.get_node_names_and_namespaces()]
+
+    def find(self, bridge: Node, *names: str) -> None:
+        """Wait until this node has found everything that nodes beside the bridge offer."""
+        for name in names:
+            for look in (Node.get_publisher_names_and_types_by_node,
+                         Node.get_subscriber_names_and_types_by_node,
+                         Node.get_service_names_and_types_by_node):
+                wait_until(lambda name=name, look=look: self._sees(look, bridge, name),
+                           what=f'all of {name}')
+
+    def _sees(self, look: Callable[[Node, str, str], Any], bridge: Node, name: str) -> bool:
+        try:
+            found = look(self.node, name, bridge.get_namespace())
+        except NodeNameNonExistentError:
+            return False
+        return bool(found == look(bridge, name, bridge.get_namespace()))
 
     # -- topics -----------------------------------------------------------------------------------
 

@@ -96,7 +96,7 @@ def test_every_family_has_a_row() -> None:
 def test_topics_and_services(start: Start, client: Client, facts: Facts) -> None:
     one = start()
     node = client.node
-    wait_until(lambda: DRIVE in client.nodes())
+    client.find(one.node, 'conveyor')
     expected = {
         '/parameter_events': ['rcl_interfaces/msg/ParameterEvent'],
         f'{DRIVE}/response': ['rcl_interfaces/msg/ParameterEvent'],
@@ -267,8 +267,9 @@ def test_control(start: Start, client: Client, facts: Facts) -> None:
     drive = one.played['conveyor']
     enabled, disabled = facts.states
     topic = client.latched(f'{DRIVE}/status_word/enabled', Bool)
-    assert trigger(client, 'quick_stop') == trigger(client, 'reset_fault')
-    assert trigger(client, 'reset_fault')[0]
+    # an inverter leaves 'switch-on disabled' with the first control word
+    wait_until(lambda: trigger(client, 'reset_fault') == (True, disabled))
+    assert trigger(client, 'quick_stop') == (True, disabled)
     assert enable(client) == (True, enabled)
     wait_until(lambda: topic.values[-1:] == [True])
     assert enable(client) == (True, enabled)

@@ -46,14 +46,15 @@ def test_enable_and_disable(bridge: StartBridge, client: Client, lift: dict[str,
 
 
 def test_the_control_word_has_no_topic(bridge: StartBridge, client: Client) -> None:
-    bridge(parameters(lift=LIFT, conveyor={**LIFT, 'station': 3, 'profile': 'datamodel_example',
-                                           'cyclic_request': ['speed_setpoint']}))
+    one = bridge(parameters(
+        lift=LIFT, conveyor={**LIFT, 'station': 3, 'profile': 'datamodel_example',
+                             'cyclic_request': ['speed_setpoint']}))
+    client.find(one.node, 'lift', 'conveyor')
     topics = dict(client.node.get_topic_names_and_types())
-    wait_until(lambda: '/lift/command/speed_setpoint' in dict(
-        client.node.get_topic_names_and_types()))
+    assert '/lift/command/speed_setpoint' in topics
     assert '/lift/command/control_word' not in topics
     services = dict(client.node.get_service_names_and_types())
-    wait_until(lambda: '/lift/enable' in dict(client.node.get_service_names_and_types()))
+    assert '/lift/enable' in services
     assert '/conveyor/enable' not in services
 
 

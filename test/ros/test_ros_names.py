@@ -76,6 +76,7 @@ def test_topics_and_services_of_a_drive_are_remapped(bridge: StartBridge,
         wait_until(lambda: recorder.words()[:1] == (20,))
     assert client.call('/lift_on', SetBool, SetBool.Request(data=True),
                        host='/lift').success
+    client.find(one.node, 'conveyor', 'lift')
     topics = dict(client.node.get_topic_names_and_types())
     assert '/lift/actual_speed' in topics
     assert not {'/conveyor/actual_speed', '/conveyor/command/speed_setpoint'} & set(topics)
@@ -113,6 +114,7 @@ def test_every_quality_can_be_overridden(bridge: StartBridge, client: Client) ->
                   'qos_overrides': overrides})
     one.online()
     node = client.node
+    client.find(one.node, 'conveyor', 'drive_can_bridge')
     for topic in (*(f'/conveyor/{name}' for name in EVERYTHING['publisher']), '/diagnostics'):
         [info] = node.get_publishers_info_by_topic(topic)
         assert info.qos_profile.reliability is ReliabilityPolicy.BEST_EFFORT, topic
@@ -142,7 +144,7 @@ OVERRIDES = {
 def test_quality_can_be_overridden(bridge: StartBridge, client: Client, key: str) -> None:
     one = bridge({**parameters(), 'qos_overrides': OVERRIDES}, key=key)
     one.online()
-    wait_until(lambda: client.node.get_publishers_info_by_topic('/conveyor/actual_speed'))
+    client.find(one.node, 'conveyor')
     [info] = client.node.get_publishers_info_by_topic('/conveyor/actual_speed')
     assert info.qos_profile.reliability is ReliabilityPolicy.BEST_EFFORT
     [info] = client.node.get_publishers_info_by_topic('/conveyor/motor_current')

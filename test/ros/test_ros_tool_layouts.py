@@ -9,7 +9,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 from bridges import StartBridge
-from clients import Client, wait_until
+from clients import Client
 import pytest
 
 CONFIG = Path(__file__).parents[2] / 'config'
@@ -22,7 +22,7 @@ def _topics(bridge: StartBridge, client: Client) -> dict[str, str]:
     text = (CONFIG / 'demo.yaml').read_text(encoding='utf-8')
     one = bridge(text.replace('channel: demo', 'channel: ros_test_layouts'))
     one.online()
-    wait_until(lambda: {'/conveyor', '/lift', '/turntable'} <= set(client.nodes()))
+    client.find(one.node, *one.node.drives)
     return {name: types[0] for drive in one.node.drives
             for name, types in client.node.get_publisher_names_and_types_by_node(drive, '/')}
 

@@ -48,6 +48,7 @@ def test_types_follow_the_one_rule(bridge: StartBridge, client: Client, tmp_path
         ('actual_speed', 3), ('actual_counts', 2), ('braked', 1), ('hours', 3)]
     assert sample.changed_parameters[0].value.double_value == pytest.approx(-12.3)
     assert sample.changed_parameters[1].value.integer_value == 65535
+    client.find(one.node, 'conveyor')
     types = dict(client.node.get_topic_names_and_types())
     assert types['/conveyor/command/speed_setpoint'] == ['std_msgs/msg/Float64']
     assert types['/conveyor/command/counts'] == ['std_msgs/msg/Int64']

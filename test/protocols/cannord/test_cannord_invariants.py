@@ -6,14 +6,16 @@ The observer knows the protocol's bytes and the contract, nothing of the session
 """
 
 import math
+from typing import Any
 
+from any_order import AnyOrder, Observer, PATIENCE, SETTINGS, SLACK
 from builders import drive
 from cannord_session_builders import (
     ACCELERATION, ACCELERATION_2, ACTUAL, COUNTER, CURRENT, FAULT_NUMBER, FLAG, FOURTH, FREQUENCY,
     INPUTS, inverter, MONITORING, OFFSET, PARAMETERS, POSITION, SECOND, THIRD, VALUE_4,
 )
 from hypothesis import given, settings, strategies as st
-from hypothesis.stateful import initialize, invariant, precondition, rule, RuleBasedStateMachine
+from hypothesis.stateful import initialize, precondition, rule
 import pytest
 
 from drive_can_bridge.core.control import ControlAction
@@ -23,68 +25,40 @@ from drive_can_bridge.core.events import (
 )
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter, ParameterType
-from drive_can_bridge.core.requests import (
-    BUSY, Failure, ReadRequest, ReadValue, WriteRequest, Written,
-)
-from drive_can_bridge.core.setpoints import CommandOutcome
+from drive_can_bridge.core.requests import Failure, ReadRequest, ReadValue, Written
 from drive_can_bridge.protocols.families import FAMILIES
 
-#: more than rounding errors, less than anything that matters
-SLACK = 1e-7
 TIMEOUT = 0.1
 RAW = Parameter('p310', ParameterType.UINT32, 310, listed=False, width_known=False)
-READABLE = (*PARAMETERS, RAW, ACTUAL, FREQUENCY)
-WRITABLE = (ACCELERATION, ACCELERATION_2, OFFSET, COUNTER, RAW, ACTUAL)
 WRITES = (2, 3, 7, 8, 11, 12, 13, 14)
 #: states that a drive may tell: ready, enabled, fault, disabled, quick stop, nonsense
 STATUS = (0x0B31, 0x0F37, 0x0B38, 0x0B70, 0x0B17, 0x0B21, 0x0B3F)
 
 
-class Observer:
+class CannordObserver(Observer):
     """Checks every frame that the session sends."""
 
     def __init__(self, *, period: float, timeout: float, immediate: bool, extra: bool) -> None:
+        super().__init__(timeout=timeout, immediate=immediate)
         self.period = period
-        self.timeout = timeout
-        self.immediate = immediate
         self.extra = extra
-        self.active = False
-        self.bus = False
-        self.online = False
         self.farewell = 0
         self.cycled_at = -math.inf
         self.extra_due = False
         self.may_run = False
-        self.asked: tuple[bytes, float] | None = None
         self.written: set[bytes] = set()
         self.acknowledged: set[int] = set()
-        self.raws = [0, 0]
-        self.since = [-math.inf, -math.inf]
-        self.armed = [False, False]
 
     def doubt(self) -> None:
-        """Start over: whatever was known counts no more."""
-        self.online = False
+        super().doubt()
         self.may_run = False
-        self.armed = [False, False]
-        self.raws = [0, 0]
 
-    def commanded(self, index: int, raw: int, outcome: CommandOutcome, now: float) -> None:
-        if not self.online or not self.active:
-            assert outcome is CommandOutcome.NOT_ARMED
-            return
-        if not self.armed[index] and not self.immediate and abs(raw) > 1:
-            assert outcome is CommandOutcome.NOT_ARMED
-            return
-        assert outcome is (CommandOutcome.ACCEPTED if self.armed[index] else CommandOutcome.ARMED)
-        self.armed[index], self.raws[index], self.since[index] = True, raw, now
-
-    def expected(self, now: float) -> list[int]:
-        """Return the setpoints that a cycle has to carry now."""
-        for index in range(2):
-            if self.armed[index] and 0 < self.timeout < now - self.since[index]:
-                self.armed[index], self.raws[index] = False, 0
-        return [raw & 0xFFFF for raw in self.raws]
+    def deactivated(self, session: Any) -> None:
+        online = self.online
+        self.doubt()
+        self.online = online
+        self.farewell = 0 if session.stopped else 3
+        self.asked = None
 
     def sees(self, sent: Frame, now: float) -> None:
         identifier, data, is_extended = sent
@@ -151,8 +125,11 @@ class Observer:
         return True
 
 
-class SessionMachine(RuleBasedStateMachine):
+class SessionMachine(AnyOrder):
     """Everything that may happen to a session."""
+
+    readable = (*PARAMETERS, RAW, ACTUAL, FREQUENCY)
+    writable = (ACCELERATION, ACCELERATION_2, OFFSET, COUNTER, RAW, ACTUAL)
 
     @initialize(period=st.sampled_from([0.02, 0.005, 0.3]), timeout=st.sampled_from([0.0, 0.05]),
                 immediate=st.booleans(), extra=st.booleans(), monitored=st.booleans(),
@@ -161,51 +138,30 @@ class SessionMachine(RuleBasedStateMachine):
               monitored: bool, persist: bool) -> None:
         table = (FREQUENCY, SECOND, THIRD, FOURTH, ACTUAL, CURRENT, INPUTS, VALUE_4, *PARAMETERS)
         response = (ACTUAL, CURRENT, INPUTS, VALUE_4)
-        self.session = FAMILIES['cannord'].make_session(drive(
+        session = FAMILIES['cannord'].make_session(drive(
             'cannord', period=period, command_timeout=timeout, rearm_immediate=immediate,
             request=(FREQUENCY, SECOND), response=response[:4 if extra else 3],
             table=(*table, MONITORING) if monitored else table, extra_setpoints=extra,
             persist_writes=persist))
-        self.observer = Observer(
-            period=period, timeout=timeout, immediate=immediate, extra=extra)
-        self.now = 1000.0
-        self.open: list[ReadRequest | WriteRequest] = []
-        self.tickets: list[object] = []
+        self.start(session, CannordObserver(
+            period=period, timeout=timeout, immediate=immediate, extra=extra))
         self.status = 0x0B31
         self.next_value = 1
-        self.unanswered: list[Frame] = []
         self.heard: set[int] = set()
 
-    # -- looking ----------------------------------------------------------------------------------
+    def happened(self, event: Any) -> None:
+        if isinstance(event, StationLost):
+            self.observer.doubt()
+        elif isinstance(event, StationFound):
+            assert self.observer.active
+            self.observer.online = True
+        elif isinstance(event, ProcessDataReceived):
+            assert self.observer.online
+            assert set(event.raws[:1]) <= self.heard, 'no value that did not arrive'
+            assert len(event.raws) <= 5
 
-    def look(self) -> None:
-        """Fetch and check everything that the session gives out."""
-        for event in self.session.take_events():
-            if isinstance(event, StationLost):
-                self.observer.doubt()
-            elif isinstance(event, StationFound):
-                assert self.observer.active
-                self.observer.online = True
-            elif isinstance(event, ProcessDataReceived):
-                assert self.observer.online
-                assert set(event.raws[:1]) <= self.heard, 'no value that did not arrive'
-                assert len(event.raws) <= 5
-            elif isinstance(event, RequestCompleted):
-                assert event.request in self.open, 'one answer per request'
-                self.open.remove(event.request)
-                self.check_outcomes(event)
-        for outcome in self.session.take_control_outcomes():
-            assert outcome.ticket in self.tickets, 'one answer per control request'
-            self.tickets.remove(outcome.ticket)
-        for sent in self.session.take_frames():
-            self.observer.sees(sent, self.now)
-            self.unanswered.append(sent)
-            del self.unanswered[:-4]
-        assert not self.observer.extra_due
-
-    def check_outcomes(self, event: RequestCompleted) -> None:
+    def completed(self, event: RequestCompleted) -> None:
         request = event.request
-        assert len(event.outcomes) == len(request)
         if isinstance(request, ReadRequest):
             assert all(isinstance(outcome, (Failure, ReadValue)) for outcome in event.outcomes)
             return
@@ -214,31 +170,12 @@ class SessionMachine(RuleBasedStateMachine):
                 assert parameter is not ACTUAL
                 assert raw & 0xFFFF in self.observer.acknowledged, 'the drive acknowledged it'
 
-    # -- the passage of time ----------------------------------------------------------------------
+    def apply(self, sent: Frame) -> None:
+        self.unanswered.append(sent)
+        del self.unanswered[:-4]
 
-    @rule(steps=st.integers(1, 30))
-    def time_passes_well(self, steps: int) -> None:
-        self.time_passes_in_time(steps, True)
-
-    @rule(steps=st.integers(1, 12), answering=st.booleans())
-    def time_passes_in_time(self, steps: int, answering: bool) -> None:
-        for _ in range(steps):
-            due = self.session.next_timer()
-            if due > self.now + 2.0:
-                self.now += 0.01
-                return
-            self.now = max(self.now, due)
-            self.session.handle_timer(self.now)
-            self.look()
-            while answering and self.unanswered:
-                self.now += 0.0002
-                self.drive_answers(0)
-
-    @rule(pause=st.sampled_from([0.0, 0.0001, 0.003, 0.017, 0.06, 0.4, 0.99]))
-    def time_passes_late(self, pause: float) -> None:
-        self.now += pause
-        self.session.handle_timer(self.now)
-        self.look()
+    def looked(self, sent: bool) -> None:
+        assert not self.observer.extra_due
 
     # -- the drive --------------------------------------------------------------------------------
 
@@ -309,135 +246,24 @@ class SessionMachine(RuleBasedStateMachine):
         self.observer.commanded(index, math.floor(value / scale + 0.5), outcome, self.now)
         self.look()
 
-    @rule(parameters=st.lists(st.sampled_from(READABLE), max_size=5), times=st.integers(1, 80))
-    def users_read(self, parameters: list[Parameter], times: int) -> None:
-        for _ in range(times):
-            self.submit(ReadRequest(tuple(parameters)))
+    def raw_to_write(self, raw: int) -> int:
+        self.next_value += 1    # each value is written once: so repetitions are seen
+        return self.next_value & 0x7FFF
 
-    @rule(parameters=st.lists(st.sampled_from(WRITABLE), max_size=3), atomic=st.booleans())
-    def users_write(self, parameters: list[Parameter], atomic: bool) -> None:
-        items = []
-        for parameter in parameters:
-            self.next_value += 1    # each value is written once: so repetitions are seen
-            items.append((parameter, self.next_value & 0x7FFF))
-        self.submit(WriteRequest(tuple(items), atomic))
+    def wanted(self, action: ControlAction) -> None:
+        if action is ControlAction.ENABLE:
+            self.observer.may_run = True
+        elif action is not ControlAction.RESET_FAULT:
+            self.observer.may_run = False
 
-    def submit(self, request: ReadRequest | WriteRequest) -> None:
-        waiting = len(self.open)
-        self.open.append(request)
-        self.session.submit(request, self.now)
-        refused = any(
-            isinstance(event, RequestCompleted) and event.request is request
-            and Failure(BUSY) in event.outcomes for event in self.session._events)
-        if refused:
-            assert self.observer.active
-            assert self.observer.bus
-            assert waiting in (64, 65)
-        self.look()
-        assert len(self.open) <= 65
-
-    @rule(action=st.sampled_from(ControlAction))
-    def control(self, action: ControlAction) -> None:
-        ticket = self.session.request_control(action, self.now)
-        if isinstance(ticket, str):
-            assert ticket
-        else:
-            assert self.observer.active
-            self.tickets.append(ticket)
-            if action is ControlAction.ENABLE:
-                self.observer.may_run = True
-            elif action is not ControlAction.RESET_FAULT:
-                self.observer.may_run = False
-        self.look()
-
-    # -- the life of a session --------------------------------------------------------------------
-
-    @rule(kind=st.integers(0, 5))
-    def upset(self, kind: int) -> None:
-        (self.bus_goes_up, self.bus_goes_down, self.activate, self.deactivate,
-         self.deactivate_to_the_end, self.time_is_lost)[kind]()
-
-    @precondition(lambda self: not self.session.online)
-    @rule()
-    def all_is_well(self) -> None:
-        """Bring the drive online."""
+    def drive_is_well(self) -> None:
         self.status = 0x0B31
-        if not self.observer.bus:
-            self.bus_goes_up()
-        if not self.observer.active:
-            self.activate()
-        for _ in range(3):
-            self.time_passes_in_time(8, True)
-
-    def time_is_lost(self) -> None:
-        self.now += 1.0
-        self.session.time_lost(self.now)
-        self.look()
-
-    def bus_goes_up(self) -> None:
-        self.observer.bus = True
-        if self.observer.active:
-            self.observer.doubt()
-        self.session.bus_up(self.now)
-        self.look()
-
-    def bus_goes_down(self) -> None:
-        self.observer.doubt()
-        self.session.bus_down(self.now, 'unplugged')
-        self.observer.asked = None
-        self.observer.bus = False
-        self.look()
-        assert not self.open
-        assert self.session.next_timer() == math.inf
-
-    def activate(self) -> None:
-        self.observer.active = True
-        self.observer.doubt()
-        self.session.activate(self.now)
-        self.look()
-
-    def deactivate(self) -> None:
-        self.observer.active = False
-        online = self.observer.online
-        self.observer.doubt()
-        self.observer.online = online
-        self.observer.farewell = 0 if self.session.stopped else 3
-        self.observer.asked = None
-        self.session.deactivate(self.now)
-        self.look()
-        assert not self.open
-
-    def deactivate_to_the_end(self) -> None:
-        self.deactivate()
-        end = self.now + 1.0
-        while self.session.next_timer() <= end:
-            self.now = max(self.now, self.session.next_timer())
-            self.session.handle_timer(self.now)
-            self.look()
-        assert self.session.stopped
-        assert self.session.next_timer() == math.inf
-        assert not self.tickets
-        assert not self.session.online
-
-    # -- always -----------------------------------------------------------------------------------
-
-    @invariant()
-    def counts_are_right(self) -> None:
-        if not hasattr(self, 'session'):
-            return
-        assert self.session._waiting_requests() <= 64
-        assert self.session.online == self.observer.online or not self.observer.active
-        if not self.observer.bus:
-            assert not self.session.online
-            assert self.session.stopped
-        assert not self.session.take_frames()
-        if not self.session.online:
-            assert not any(item.armed for item in self.session.setpoints.items)
+        super().drive_is_well()
 
 
 TestSession = SessionMachine.TestCase
-TestSession.settings = settings(max_examples=150, stateful_step_count=50, deadline=None)
-pytestmark = pytest.mark.timeout(600)
+TestSession.settings = SETTINGS
+pytestmark = pytest.mark.timeout(PATIENCE)
 
 
 @settings(deadline=None)

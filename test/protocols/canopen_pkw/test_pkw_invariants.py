@@ -8,10 +8,12 @@ nothing.
 """
 
 import math
+from typing import Any
 
+from any_order import AnyOrder, Observer, PATIENCE, SETTINGS
 from builders import frame, read
-from hypothesis import given, settings, strategies as st
-from hypothesis.stateful import initialize, invariant, precondition, rule, RuleBasedStateMachine
+from hypothesis import given, strategies as st
+from hypothesis.stateful import initialize, invariant, precondition, rule
 from pkw_builders import (
     CLASS, configuration, CONTROL, CURRENT, FLC, FLC_2, KEY, LEVEL, POSITION, SPEED, STATUS,
     STATUS_2, TORQUE,
@@ -22,16 +24,13 @@ from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.events import RequestCompleted, StationFound, StationLost
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.core.requests import BUSY, Failure, ReadRequest, WriteRequest, Written
+from drive_can_bridge.core.requests import WriteRequest, Written
 from drive_can_bridge.protocols.families import FAMILIES
 
 FAMILY = FAMILIES['canopen_pkw']
 TIMEOUT = 0.1
 READS = {0x25, 0x26}
 WRITES = {0x2A, 0x2B}
-READABLE = (STATUS, LEVEL, CURRENT, FLC, FLC_2, CLASS, POSITION)
-WRITABLE = (FLC, FLC_2, CLASS, POSITION, KEY)
 SETPOINTS = {710: 0, 712: 1}
 WORD = 704
 
@@ -78,20 +77,36 @@ class Device:
         self.function = 0
 
 
-class Observer:
+class PkwObserver(Observer):
     """Checks every frame that the session sends."""
 
     def __init__(self, *, nmt_start: bool) -> None:
+        super().__init__()
         self.nmt_start = nmt_start
-        self.active = False
-        self.bus = False
         self.stopping = False
         self.blocked_until = -math.inf      # a heartbeat has said: not operational
-        self.asked: tuple[bytes, float] | None = None
         self.toggle: int | None = None
-        self.armed = [False, False]
-        self.raws = [0, 0]
-        self.online = False
+
+    def bus_went_up(self) -> None:
+        self.disarm()
+
+    def bus_went_down(self) -> None:
+        self.asked = None
+        self.stopping = False
+        self.blocked_until = -math.inf
+
+    def activated(self) -> None:
+        self.stopping = False
+        self.disarm()
+
+    def deactivated(self, session: Any) -> None:
+        self.stopping = True
+        self.disarm()
+        self.asked = None
+
+    def time_was_lost(self, session: Any) -> None:
+        if self.active:
+            self.disarm()
 
     def sees(self, sent: Frame, now: float) -> None:
         identifier, data, extended = sent
@@ -139,56 +154,38 @@ class Observer:
             assert self.active, 'nothing but what makes it stand still'
 
 
-class SessionMachine(RuleBasedStateMachine):
+class SessionMachine(AnyOrder):
     """Everything that may happen to a session."""
+
+    readable = (STATUS, LEVEL, CURRENT, FLC, FLC_2, CLASS, POSITION)
+    writable = (FLC, FLC_2, CLASS, POSITION)
+    stop_takes = 0.41
 
     @initialize(period=st.sampled_from([0.02, 0.3]), nmt_start=st.booleans(),
                 control=st.booleans(), refresh=st.sampled_from([0.0, 0.05]),
                 heartbeat_timeout=st.sampled_from([0.0, 0.5]))
     def begin(self, period: float, nmt_start: bool, control: bool, refresh: float,
               heartbeat_timeout: float) -> None:
-        self.session = FAMILY.make_session(configuration(
+        session = FAMILY.make_session(configuration(
             period=period, nmt_start=nmt_start, control=CONTROL if control else None,
             request=(SPEED, TORQUE), response=(STATUS, STATUS_2, LEVEL), command_timeout=0.0,
             refresh_interval=refresh, heartbeat_timeout=heartbeat_timeout,
             parameter_timeout=TIMEOUT))
-        self.observer = Observer(nmt_start=nmt_start)
+        self.start(session, PkwObserver(nmt_start=nmt_start))
         self.device = Device()
         self.device.operational = not nmt_start
-        self.now = 1000.0
-        self.open: list[ReadRequest | WriteRequest] = []
-        self.tickets: list[object] = []
-        self.answers: list[Frame] = []
         self.key_values = 0
         self.lossy = False
 
-    # -- looking ----------------------------------------------------------------------------------
+    def happened(self, event: Any) -> None:
+        if isinstance(event, StationLost):
+            assert event.reason
+            self.observer.disarm()
+        elif isinstance(event, StationFound):
+            assert not self.observer.online
+            self.observer.online = True
 
-    def look(self) -> None:
-        """Fetch and check everything that the session gives out."""
-        sent = self.session.take_frames()
-        for event in self.session.take_events():
-            if isinstance(event, StationLost):
-                assert event.reason
-                self.disarm()
-            elif isinstance(event, StationFound):
-                assert not self.observer.online
-                self.observer.online = True
-            elif isinstance(event, RequestCompleted):
-                assert event.request in self.open, 'one answer per request'
-                self.open.remove(event.request)
-                assert len(event.outcomes) == len(event.request)
-                self.check_key(event)
-        for outcome in self.session.take_control_outcomes():
-            assert outcome.ticket in self.tickets, 'one answer per control request'
-            self.tickets.remove(outcome.ticket)
-        for entry in sent:
-            self.observer.sees(entry, self.now)
-            if not self.lossy:
-                self.answers += self.device.takes(entry)
-            del self.answers[:-3]
-
-    def check_key(self, event: RequestCompleted) -> None:
+    def completed(self, event: RequestCompleted) -> None:
         """Look for a write that was executed twice, or never although it was confirmed."""
         request = event.request
         if not isinstance(request, WriteRequest):
@@ -200,25 +197,12 @@ class SessionMachine(RuleBasedStateMachine):
                 if isinstance(outcome, Written):
                     assert times == 1
 
-    def disarm(self) -> None:
-        self.observer.armed = [False, False]
-        self.observer.online = False
+    def apply(self, sent: Frame) -> None:
+        if not self.lossy:
+            self.unanswered += self.device.takes(sent)
+        del self.unanswered[:-3]
 
-    # -- the passage of time ----------------------------------------------------------------------
-
-    @rule(steps=st.integers(1, 30), answering=st.sampled_from([True, True, False]))
-    def time_passes_in_time(self, steps: int, answering: bool) -> None:
-        for _ in range(steps):
-            due = self.session.next_timer()
-            if due > self.now + 2.0:
-                self.now += 0.01
-                return
-            self.now = max(self.now, due)
-            self.session.handle_timer(self.now)
-            self.look()
-            while answering and self.answers:
-                self.now += 0.0002
-                self.device_answers(0)
+    # -- frames that get lost ---------------------------------------------------------------------
 
     @rule(steps=st.integers(1, 4))
     def requests_get_lost(self, steps: int) -> None:
@@ -240,28 +224,15 @@ class SessionMachine(RuleBasedStateMachine):
         self.command(index, raw)
         self.time_passes_in_time(steps, False)
         self.lossy = False
-        self.answers.clear()
+        self.unanswered.clear()
         self.device_ends_up_as_told()
-
-    @rule(pause=st.sampled_from([0.0, 0.0001, 0.003, 0.017, 0.06, 0.4, 0.99]))
-    def time_passes_late(self, pause: float) -> None:
-        self.now += pause
-        self.session.handle_timer(self.now)
-        self.look()
-
-    def time_is_lost(self) -> None:
-        self.now += 1.0
-        self.session.time_lost(self.now)
-        if self.observer.active:
-            self.disarm()
-        self.look()
 
     # -- the device -------------------------------------------------------------------------------
 
-    @precondition(lambda self: self.answers)
+    @precondition(lambda self: self.unanswered)
     @rule(choice=st.integers(0, 2))
-    def device_answers(self, choice: int) -> None:
-        answer = self.answers.pop(min(choice, len(self.answers) - 1))
+    def drive_answers(self, choice: int) -> None:
+        answer = self.unanswered.pop(min(choice, len(self.unanswered) - 1))
         if self.observer.bus:
             asked = self.observer.asked
             if asked is not None and (
@@ -279,14 +250,14 @@ class SessionMachine(RuleBasedStateMachine):
     @rule()
     def device_restarts(self) -> None:
         self.device.restarts()
-        self.answers.clear()
+        self.unanswered.clear()
         self.observer.asked = None
         self.disarm_before(Frame(0x705, b'\x00', False))
 
     @rule()
     def device_restarts_unheard(self) -> None:
         self.device.restarts()
-        self.answers.clear()
+        self.unanswered.clear()
 
     @precondition(lambda self: self.observer.bus)
     @rule(state=st.sampled_from([0x04, 0x05, 0x05, 0x7F]))
@@ -340,58 +311,14 @@ class SessionMachine(RuleBasedStateMachine):
         with pytest.raises(ValueRefused):
             self.session.command(0, value, self.now)
 
-    @rule(parameters=st.lists(st.sampled_from(READABLE), max_size=5), times=st.integers(1, 70))
-    def users_read(self, parameters: list[Parameter], times: int) -> None:
-        for _ in range(times):
-            self.submit(ReadRequest(tuple(parameters)))
-
-    @rule(items=st.lists(st.tuples(st.sampled_from(WRITABLE[:-1]), st.integers(0, 1)),
-                         max_size=3), atomic=st.booleans())
-    def users_write(self, items: list[tuple[Parameter, int]], atomic: bool) -> None:
-        self.submit(WriteRequest(tuple(items), atomic))
-
     @rule()
     def users_turn_the_key(self) -> None:
         self.key_values += 1    # every write has its own value: it can be counted
         self.submit(WriteRequest(((KEY, self.key_values),)))
 
-    def submit(self, request: ReadRequest | WriteRequest) -> None:
-        waiting = len(self.open)
-        self.open.append(request)
-        self.session.submit(request, self.now)
-        refused = any(
-            isinstance(event, RequestCompleted) and event.request is request
-            and Failure(BUSY) in event.outcomes for event in self.session._events)
-        if refused:
-            assert waiting in (64, 65)
-        self.look()
-        assert len(self.open) <= 65
-
-    @rule(action=st.sampled_from(ControlAction))
-    def control(self, action: ControlAction) -> None:
-        ticket = self.session.request_control(action, self.now)
-        if isinstance(ticket, str):
-            assert ticket
-        else:
-            assert self.observer.active
-            self.tickets.append(ticket)
-        self.look()
-
     # -- the life of a session --------------------------------------------------------------------
 
-    @rule(kind=st.integers(0, 5))
-    def upset(self, kind: int) -> None:
-        (self.bus_goes_up, self.bus_goes_down, self.activate, self.deactivate,
-         self.deactivate_to_the_end, self.time_is_lost)[kind]()
-
-    @precondition(lambda self: not self.session.online)
-    @rule()
-    def all_is_well(self) -> None:
-        """Bring the drive online."""
-        if not self.observer.bus:
-            self.bus_goes_up()
-        if not self.observer.active:
-            self.activate()
+    def drive_is_well(self) -> None:
         self.heartbeat(5)
         end = self.now + 2.0
         while not self.session.online and self.now < end:
@@ -416,74 +343,23 @@ class SessionMachine(RuleBasedStateMachine):
         assert [registers[710], registers[712]] == [
             item.raw for item in self.session.setpoints.items]
 
-    def bus_goes_up(self) -> None:
-        self.observer.bus = True
-        self.session.bus_up(self.now)
-        self.disarm()
-        self.look()
-
     def bus_goes_down(self) -> None:
-        self.session.bus_down(self.now, 'unplugged')
-        self.look()
-        self.observer.asked = None
-        self.observer.bus = False
-        self.observer.stopping = False
-        self.observer.blocked_until = -math.inf
-        self.answers.clear()
-        assert not self.open
-        assert self.session.next_timer() == math.inf
-
-    def activate(self) -> None:
-        self.observer.active, self.observer.stopping = True, False
-        self.session.activate(self.now)
-        self.disarm()
-        self.look()
-
-    def deactivate(self) -> None:
-        self.observer.active, self.observer.stopping = False, True
-        self.disarm()
-        self.observer.asked = None
-        self.session.deactivate(self.now)
-        self.look()
-        assert not self.open
-        self.disarm()
+        super().bus_goes_down()
+        self.unanswered.clear()
 
     def deactivate_to_the_end(self) -> None:
-        self.deactivate()
-        end = self.now + 0.41
-        while self.session.next_timer() <= end:
-            self.now = max(self.now, self.session.next_timer())
-            self.session.handle_timer(self.now)
-            self.look()
-        assert self.session.stopped
-        assert self.session.next_timer() == math.inf
-        assert not self.tickets
-        assert not self.session.online
+        super().deactivate_to_the_end()
         self.observer.stopping = False
 
-    # -- always -----------------------------------------------------------------------------------
-
     @invariant()
-    def counts_are_right(self) -> None:
-        if not hasattr(self, 'session'):
-            return
-        assert self.session._waiting_requests() <= 64
-        assert self.session.online == self.observer.online or not self.observer.active
-        if not self.observer.bus:
-            assert not self.session.online
-            assert self.session.stopped
-        assert not self.session.take_frames()
-        if not self.session.online:
-            assert not any(item.armed for item in self.session.setpoints.items)
-        if self.session.online:
-            assert self.session.offline_advice == ''
-        else:
-            assert self.session.offline_advice
+    def whoever_is_offline_gets_advice(self) -> None:
+        if self.session is not None:
+            assert bool(self.session.offline_advice) is not self.session.online
 
 
 TestSession = SessionMachine.TestCase
-TestSession.settings = settings(max_examples=150, stateful_step_count=50, deadline=None)
-pytestmark = pytest.mark.timeout(600)
+TestSession.settings = SETTINGS
+pytestmark = pytest.mark.timeout(PATIENCE)
 
 
 @given(frames=st.lists(st.tuples(st.integers(0, 0x7FF), st.binary(max_size=8), st.booleans()),

@@ -8,81 +8,54 @@ its own books: which maps were read, which commands went through, when an EEPROM
 
 from collections.abc import Callable
 import math
+from typing import Any
 
+from any_order import AnyOrder, Observer, PATIENCE, SETTINGS, SLACK
 from builders import (
     CONTROL, DAMPING, drive, FLAG, frame, GAIN, LIMIT, MAXIMUM, ORDER, parameter, RAMP, SPEED,
     STATUS, WORD,
 )
-from hypothesis import given, settings, strategies as st
-from hypothesis.stateful import initialize, invariant, precondition, rule, RuleBasedStateMachine
+from hypothesis import given, strategies as st
+from hypothesis.stateful import initialize, precondition, rule
 import pytest
 
-from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.errors import ValueRefused
-from drive_can_bridge.core.events import RequestCompleted, StationFound, StationLost
+from drive_can_bridge.core.events import StationFound, StationLost
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.core.requests import BUSY, Failure, ReadRequest, WriteRequest
-from drive_can_bridge.core.setpoints import CommandOutcome
 from drive_can_bridge.protocols.families import FAMILIES
 
-#: more than rounding errors, less than anything that matters
-SLACK = 1e-7
 CYCLIC = 0x003FFFF0
 RAW = parameter('p600', 600, listed=False)
-READABLE = (GAIN, DAMPING, FLAG, RAMP, MAXIMUM, STATUS, RAW)
 WRITABLE = (GAIN, DAMPING, FLAG, RAMP, MAXIMUM, ORDER, RAW)
 EEPROMS = {30, 31, 44, 600, *range(122, 130)}
 
 
-class Observer:
+class ExtendedObserver(Observer):
     """Checks every frame that the session sends."""
 
     def __init__(self, *, mapping: str, period: float, timeout: float, immediate: bool) -> None:
+        super().__init__(timeout=timeout, immediate=immediate)
         self.mapping = mapping
         self.period = period
-        self.timeout = timeout
-        self.immediate = immediate
-        self.active = False
-        self.bus = False
-        self.online = False
         self.verified = False
         self.request_map_read = False
         self.farewell = 0          # neutral cycles that may still be sent without a verified map
         self.cycled_at = -math.inf
         self.eeprom_at = -math.inf
-        self.asked: tuple[int, int, float] | None = None
-        self.raws = [0, 0]
-        self.since = [-math.inf, -math.inf]
-        self.armed = [False, False]
-        self.cycles = 0
 
     def doubt(self) -> None:
-        """Start over: whatever was known counts no more."""
+        super().doubt()
         self.verified = self.request_map_read = False
         self.farewell = 0
+
+    def deactivated(self, session: Any) -> None:
         self.disarm()
+        self.farewell = 0 if session.stopped else 3
+        self.asked = None
 
-    def disarm(self) -> None:
-        self.online = False
-        self.armed = [False, False]
-        self.raws = [0, 0]
-
-    def commanded(self, index: int, raw: int, outcome: CommandOutcome, now: float) -> None:
-        if not self.online or not self.active:
-            assert outcome is CommandOutcome.NOT_ARMED
-            return
-        if not self.armed[index] and not self.immediate and abs(raw) > 1:
-            assert outcome is CommandOutcome.NOT_ARMED
-            return
-        assert outcome is (CommandOutcome.ACCEPTED if self.armed[index] else CommandOutcome.ARMED)
-        self.armed[index], self.raws[index], self.since[index] = True, raw, now
-
-    def expected(self, now: float) -> list[int]:
-        """Return the words that a cyclic request has to carry now."""
-        for index in range(2):
-            if self.armed[index] and 0 < self.timeout < now - self.since[index]:
-                self.armed[index], self.raws[index] = False, 0
-        return [raw & 0xFFFF for raw in self.raws]
+    def time_was_lost(self, session: Any) -> None:
+        if self.active:
+            self.doubt()
 
     def sees(self, sent: Frame, now: float) -> None:
         identifier, data, is_extended = sent
@@ -106,7 +79,6 @@ class Observer:
             self.asked = number, count, now
 
     def sees_cycle(self, data: bytes, now: float) -> None:
-        self.cycles += 1
         assert now >= self.cycled_at + 0.5 * min(self.period, 0.1) - SLACK, 'a burst'
         self.cycled_at = now
         if not self.active:
@@ -139,8 +111,11 @@ class Observer:
             assert count == 1
 
 
-class SessionMachine(RuleBasedStateMachine):
+class SessionMachine(AnyOrder):
     """Everything that may happen to a session."""
+
+    readable = (GAIN, DAMPING, FLAG, RAMP, MAXIMUM, STATUS, RAW)
+    writable = WRITABLE
 
     @initialize(mapping=st.sampled_from(['verify', 'configure', 'assume']),
                 period=st.sampled_from([0.02, 0.005, 0.3]),
@@ -149,45 +124,26 @@ class SessionMachine(RuleBasedStateMachine):
     def begin(self, mapping: str, period: float, timeout: float, immediate: bool,
               control: bool, strict: bool) -> None:
         table = (SPEED, LIMIT, STATUS, WORD, *WRITABLE)
-        self.session = FAMILIES['datamodel_extended'].make_session(drive(
+        session = FAMILIES['datamodel_extended'].make_session(drive(
             mapping=mapping, period=period, command_timeout=timeout, rearm_immediate=immediate,
             control=CONTROL if control else None, table=table, response=(STATUS,),
             length_policy='strict' if strict else 'lenient'))
-        self.observer = Observer(
-            mapping=mapping, period=period, timeout=timeout, immediate=immediate)
-        self.now = 1000.0
-        self.open: list[ReadRequest | WriteRequest] = []
-        self.tickets: list[object] = []
+        self.start(session, ExtendedObserver(
+            mapping=mapping, period=period, timeout=timeout, immediate=immediate))
         self.registers = dict.fromkeys((30, 31, 40, 41, 42, 43, 44, 52, 211, 600), 0)
         self.registers.update(zip(range(122, 130), (50, 51, 0, 0, 211, 0, 0, 0)))
         self.registers[211] = 1
-        self.unanswered: list[Frame] = []
 
-    # -- looking ----------------------------------------------------------------------------------
-
-    def look(self) -> None:
-        """Fetch and check everything that the session gives out."""
-        for event in self.session.take_events():
-            if isinstance(event, StationLost):
-                self.observer.disarm()
-                if 'no cyclic response' in event.reason and self.observer.mapping != 'assume':
-                    self.observer.verified = self.observer.request_map_read = False
-                    self.observer.farewell = 3
-            elif isinstance(event, StationFound):
-                self.observer.online = True
-            elif isinstance(event, RequestCompleted):
-                assert event.request in self.open, 'one answer per request'
-                self.open.remove(event.request)
-                assert len(event.outcomes) == len(event.request)
-        for outcome in self.session.take_control_outcomes():
-            assert outcome.ticket in self.tickets, 'one answer per control request'
-            self.tickets.remove(outcome.ticket)
-        for sent in self.session.take_frames():
-            self.observer.sees(sent, self.now)
-            self.apply(sent)
+    def happened(self, event: Any) -> None:
+        if isinstance(event, StationLost):
+            self.observer.disarm()
+            if 'no cyclic response' in event.reason and self.observer.mapping != 'assume':
+                self.observer.verified = self.observer.request_map_read = False
+                self.observer.farewell = 3
+        elif isinstance(event, StationFound):
+            self.observer.online = True
 
     def apply(self, sent: Frame) -> None:
-        """Do what a drive does with a frame; its answers wait until somebody hands them over."""
         identifier, data, _ = sent
         number, count = identifier >> 4 & 0xFFFF, identifier & 0xF
         if identifier != CYCLIC and identifier & 0x100000:
@@ -197,40 +153,6 @@ class SessionMachine(RuleBasedStateMachine):
         else:
             self.unanswered.append(sent)
             del self.unanswered[:-3]
-
-    # -- the passage of time ----------------------------------------------------------------------
-
-    @rule(steps=st.integers(1, 30))
-    def time_passes_well(self, steps: int) -> None:
-        self.time_passes_in_time(steps, True)
-
-    @rule(steps=st.integers(1, 12), answering=st.booleans())
-    def time_passes_in_time(self, steps: int, answering: bool) -> None:
-        for _ in range(steps):
-            due = self.session.next_timer()
-            if due > self.now + 2.0:
-                self.now += 0.01
-                return
-            self.now = max(self.now, due)
-            self.session.handle_timer(self.now)
-            self.look()
-            while answering and self.unanswered:
-                self.now += 0.0002
-                self.drive_answers(0)
-
-    @rule(pause=st.sampled_from([0.0, 0.0001, 0.003, 0.017, 0.06, 0.4, 0.99]))
-    def time_passes_late(self, pause: float) -> None:
-        self.now += pause
-        self.session.handle_timer(self.now)
-        self.look()
-
-    def time_is_lost(self) -> None:
-        self.now += 1.0
-        stopping = not self.observer.active
-        if not stopping:
-            self.observer.doubt()
-        self.session.time_lost(self.now)
-        self.look()
 
     # -- the drive --------------------------------------------------------------------------------
 
@@ -307,120 +229,14 @@ class SessionMachine(RuleBasedStateMachine):
         self.observer.commanded(index, round(10 * value), outcome, self.now)
         self.look()
 
-    @rule(parameters=st.lists(st.sampled_from(READABLE), max_size=5), times=st.integers(1, 80))
-    def users_read(self, parameters: list[object], times: int) -> None:
-        for _ in range(times):
-            self.submit(ReadRequest(tuple(parameters)))
-
-    @rule(items=st.lists(st.tuples(st.sampled_from(WRITABLE), st.integers(0, 1)), max_size=3),
-          atomic=st.booleans())
-    def users_write(self, items: list[tuple[object, int]], atomic: bool) -> None:
-        self.submit(WriteRequest(tuple(items), atomic))
-
-    def submit(self, request: ReadRequest | WriteRequest) -> None:
-        waiting = len(self.open)
-        self.open.append(request)
-        self.session.submit(request, self.now)
-        refused = any(
-            isinstance(event, RequestCompleted) and event.request is request
-            and Failure(BUSY) in event.outcomes for event in self.session._events)
-        possible = self.observer.active and self.observer.bus and len(request) > 0
-        if refused or possible and waiting == 65:   # 64 wait; one more may be under way
-            assert refused and possible and waiting in (64, 65)
-        self.look()
-        assert len(self.open) <= 65
-
-    @rule(action=st.sampled_from(ControlAction))
-    def control(self, action: ControlAction) -> None:
-        ticket = self.session.request_control(action, self.now)
-        if isinstance(ticket, str):
-            assert ticket
-        else:
-            assert self.observer.active
-            self.tickets.append(ticket)
-        self.look()
-
-    # -- the life of a session --------------------------------------------------------------------
-
-    @rule(kind=st.integers(0, 5))
-    def upset(self, kind: int) -> None:
-        (self.bus_goes_up, self.bus_goes_down, self.activate, self.deactivate,
-         self.deactivate_to_the_end, self.time_is_lost)[kind]()
-
-    @precondition(lambda self: not self.session.online)
-    @rule()
-    def all_is_well(self) -> None:
-        """Bring the drive online."""
+    def drive_is_well(self) -> None:
         self.map_is_repaired()
-        if not self.observer.bus:
-            self.bus_goes_up()
-        if not self.observer.active:
-            self.activate()
-        for _ in range(3):
-            self.time_passes_in_time(8, True)
-
-    def bus_goes_up(self) -> None:
-        self.observer.bus = True
-        if self.observer.active:
-            self.observer.doubt()
-        self.session.bus_up(self.now)
-        self.look()
-
-    def bus_goes_down(self) -> None:
-        self.observer.doubt()
-        self.session.bus_down(self.now, 'unplugged')
-        self.observer.asked = None
-        self.observer.bus = False
-        self.look()
-        assert not self.open
-        assert self.session.next_timer() == math.inf
-
-    def activate(self) -> None:
-        self.observer.active = True
-        self.observer.doubt()
-        self.session.activate(self.now)
-        self.look()
-
-    def deactivate(self) -> None:
-        self.observer.active = False
-        self.observer.disarm()
-        self.observer.farewell = 0 if self.session.stopped else 3
-        self.observer.asked = None
-        self.session.deactivate(self.now)
-        self.look()
-        assert not self.open
-
-    def deactivate_to_the_end(self) -> None:
-        self.deactivate()
-        end = self.now + 1.0
-        while self.session.next_timer() <= end:
-            self.now = max(self.now, self.session.next_timer())
-            self.session.handle_timer(self.now)
-            self.look()
-        assert self.session.stopped
-        assert self.session.next_timer() == math.inf
-        assert not self.tickets
-        assert not self.session.online
-
-    # -- always -----------------------------------------------------------------------------------
-
-    @invariant()
-    def counts_are_right(self) -> None:
-        if not hasattr(self, 'session'):
-            return
-        assert self.session._waiting_requests() <= 64
-        assert self.session.online == self.observer.online or not self.observer.active
-        if not self.observer.bus:
-            assert not self.session.online
-            assert self.session.stopped
-        assert not self.session.take_frames()
-        if not self.session.online:
-            assert not any(item.armed for item in self.session.setpoints.items)
+        super().drive_is_well()
 
 
 TestSession = SessionMachine.TestCase
-TestSession.settings = settings(max_examples=150, stateful_step_count=50, deadline=None)
-pytestmark = pytest.mark.timeout(600)
+TestSession.settings = SETTINGS
+pytestmark = pytest.mark.timeout(PATIENCE)
 
 
 @given(frames=st.lists(st.tuples(st.integers(0, 0x1FFFFFFF), st.binary(max_size=8),

@@ -7,30 +7,26 @@ its own books: which read is open, until when there has to be silence, which com
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+from any_order import AnyOrder, Observer, PATIENCE, SETTINGS, SLACK
 from builders import (
     ACTUAL, CONTROL, CURRENT, DAMPING, drive, FLAG, frame, GAIN, KEY, LIMIT, MAXIMUM, ORDER,
     parameter, RAMP, RO, SPEED, STATUS, WORD,
 )
 from hypothesis import example, given, settings, strategies as st
-from hypothesis.stateful import initialize, invariant, precondition, rule, RuleBasedStateMachine
+from hypothesis.stateful import initialize, invariant, precondition, rule
 import pytest
 from standard_builders import ANSWER
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.errors import RemoteProtocolError, ValueRefused
-from drive_can_bridge.core.events import (
-    ProcessDataReceived, RequestCompleted, StationFound, StationLost,
-)
+from drive_can_bridge.core.events import ProcessDataReceived, StationFound, StationLost
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.core.requests import BUSY, Failure, ReadRequest, WriteRequest
 from drive_can_bridge.core.setpoints import CommandOutcome
 from drive_can_bridge.protocols.datamodel import standard
 from drive_can_bridge.protocols.families import FAMILIES
 
-#: more than rounding errors, less than anything that matters
-SLACK = 1e-7
 TIMEOUT = 0.1
 QUARANTINE = 0.1
 #: between an answer and the next read
@@ -38,7 +34,6 @@ PAUSE = 0.001
 GAP = 0.02
 FAR = parameter('heat', 300, access=RO)
 RAW = parameter('p600', 600, listed=False)
-READABLE = (GAIN, DAMPING, FLAG, RAMP, MAXIMUM, STATUS, FAR, RAW)
 WRITABLE = (GAIN, DAMPING, FLAG, RAMP, MAXIMUM, ORDER, KEY, KEY, RAW)
 #: in EEPROM, or nobody knows
 EEPROMS = {30, 31, 44, 600}
@@ -109,22 +104,16 @@ class Asked(NamedTuple):
     at: float
 
 
-class Observer:
+class StandardObserver(Observer):
     """Checks every frame that the session sends."""
 
     def __init__(self, *, period: float, timeout: float, immediate: bool, strict: bool) -> None:
+        super().__init__(timeout=timeout, immediate=immediate)
         self.period = period
-        self.timeout = timeout
-        self.immediate = immediate
         self.strict = strict
-        self.active = self.bus = self.online = False
         self.farewell = 0          # setpoints that a drive may still get which is not online
-        self.asked: Asked | None = None
         self.quiet_until = -math.inf
         self.eeprom_at = -math.inf
-        self.raws = [0, 0]
-        self.since = [-math.inf, -math.inf]
-        self.armed = [False, False]
         self.enabling = False
         #: what the words could have been before the call that is being looked at
         self.before: list[set[int]] = [{0}, {0}, {0}]
@@ -139,17 +128,28 @@ class Observer:
         return [*words, {0, 1, 2, 0x80} if self.enabling else {0, 2, 0x80}]
 
     def disarm(self) -> None:
-        self.online = self.enabling = False
-        self.armed = [False, False]
+        super().disarm()
+        self.enabling = False
+
+    def doubt(self) -> None:
+        """Wait for the event: until then, the drive is there."""
 
     def lost(self) -> None:
         self.disarm()
         # three times each, and what was due when it happened
         self.farewell = 4 * 3
 
-    def cleared(self) -> None:
-        """Take note that the session wants no answer any more; silence is kept all the same."""
-        self.asked = None
+    def deactivated(self, session: Any) -> None:
+        if session.online or self.farewell:
+            self.lost()  # what it was being told already begins anew
+        self.disarm()
+        self.online = session.online  # until the event says otherwise
+        self.before = self.possible()
+        self.asked = None  # silence is kept all the same
+
+    def time_was_lost(self, session: Any) -> None:
+        self.disarm()
+        self.online = session.online  # until the event says otherwise
 
     def commanded(self, index: int, raw: int, outcome: CommandOutcome, now: float) -> None:
         if outcome is CommandOutcome.NOT_ARMED:
@@ -225,8 +225,12 @@ class Observer:
             self.asked = None
 
 
-class SessionMachine(RuleBasedStateMachine):
+class SessionMachine(AnyOrder):
     """Everything that may happen to a session."""
+
+    readable = (GAIN, DAMPING, FLAG, RAMP, MAXIMUM, STATUS, FAR, RAW)
+    writable = WRITABLE
+    stop_takes = 2.0
 
     @initialize(period=st.sampled_from([0.02, 0.02, 0.3]), timeout=st.sampled_from([0.0, 0.05]),
                 immediate=st.booleans(), control=st.sampled_from(['', 'listed', 'by hand']),
@@ -234,60 +238,41 @@ class SessionMachine(RuleBasedStateMachine):
     def begin(self, period: float, timeout: float, immediate: bool, control: str, strict: bool,
               refresh: float) -> None:
         setpoints = (SPEED, LIMIT, WORD) if control == 'listed' else (SPEED, LIMIT)
-        self.session = FAMILIES['datamodel_standard'].make_session(drive(
+        session = FAMILIES['datamodel_standard'].make_session(drive(
             'datamodel_standard', period=period, command_timeout=timeout,
             rearm_immediate=immediate, control=CONTROL if control else None,
             table=(SPEED, LIMIT, WORD, ACTUAL, CURRENT, STATUS, FAR, *WRITABLE[:-2]),
             request=setpoints, response=(ACTUAL, CURRENT, STATUS, FAR), parameter_timeout=TIMEOUT,
             quarantine=QUARANTINE, refresh_interval=refresh,
             length_policy='strict' if strict else 'lenient'))
-        self.observer = Observer(period=period, timeout=timeout, immediate=immediate,
-                                 strict=strict)
-        self.now = 1000.0
-        self.open: list[ReadRequest | WriteRequest] = []
-        self.tickets: list[object] = []
+        self.start(session, StandardObserver(
+            period=period, timeout=timeout, immediate=immediate, strict=strict))
         self.registers = dict.fromkeys(REGISTERS, 0)
         self.registers[211] = 1
-        self.unanswered: list[Frame] = []
         self.samples = 0
 
-    # -- looking ----------------------------------------------------------------------------------
-
-    def look(self, *, silent: bool = False) -> None:
-        """Fetch and check everything that the session gives out."""
+    def happened(self, event: Any) -> None:
         observer = self.observer
-        for event in self.session.take_events():
-            if isinstance(event, StationLost):
-                assert observer.online, 'lost, but it was not there'
-                observer.lost()
-            elif isinstance(event, StationFound):
-                assert not observer.online
-                assert observer.active
-                assert observer.bus
-                observer.online = True
-            elif isinstance(event, ProcessDataReceived):
-                assert self.session.active
-                assert len(event.raws) == 4
-                assert event.received_at <= self.now
-                self.samples += 1
-            elif isinstance(event, RequestCompleted):
-                assert event.request in self.open, 'one answer per request'
-                self.open.remove(event.request)
-                assert len(event.outcomes) == len(event.request)
-        for outcome in self.session.take_control_outcomes():
-            assert outcome.ticket in self.tickets, 'one answer per control request'
-            self.tickets.remove(outcome.ticket)
-        sent = self.session.take_frames()
-        assert not (silent and sent)
-        for entry in sent:
-            observer.sees(entry, self.now)
-            self.apply(entry)
+        if isinstance(event, StationLost):
+            assert observer.online, 'lost, but it was not there'
+            observer.lost()
+        elif isinstance(event, StationFound):
+            assert not observer.online
+            assert observer.active
+            assert observer.bus
+            observer.online = True
+        elif isinstance(event, ProcessDataReceived):
+            assert self.session.active
+            assert len(event.raws) == 4
+            assert event.received_at <= self.now
+            self.samples += 1
+
+    def looked(self, sent: bool) -> None:
         if sent:
             self.session.frames_left(self.now)
-        observer.call_begins()
+        self.observer.call_begins()
 
     def apply(self, sent: Frame) -> None:
-        """Do what a drive does with a frame; its answers wait until somebody hands them over."""
         number = sent.data[1] + 256 * sent.data[2]
         if sent.data[0] == 6:
             self.registers[number] = sent.data[3] + 256 * sent.data[4]
@@ -305,38 +290,6 @@ class SessionMachine(RuleBasedStateMachine):
             if self.session.next_timer() > self.now:
                 return
         raise AssertionError('the timer spins')
-
-    # -- the passage of time ----------------------------------------------------------------------
-
-    @rule(steps=st.integers(1, 30))
-    def time_passes_well(self, steps: int) -> None:
-        self.time_passes_in_time(steps, True)
-
-    @rule(steps=st.integers(1, 12), answering=st.booleans())
-    def time_passes_in_time(self, steps: int, answering: bool) -> None:
-        for _ in range(steps):
-            due = self.session.next_timer()
-            if due > self.now + 2.0:
-                self.now += 0.01
-                return
-            self.now = max(self.now, due)
-            self.timer()
-            while answering and self.unanswered:
-                self.now += 0.0002
-                self.drive_answers(0)
-
-    @rule(pause=st.sampled_from([0.0, 0.0001, 0.003, 0.017, 0.06, 0.101, 0.4, 0.99]))
-    def time_passes_late(self, pause: float) -> None:
-        self.now += pause
-        self.timer()
-
-    def time_is_lost(self) -> None:
-        self.now += 1.0
-        self.observer.disarm()
-        if self.session.online:
-            self.observer.online = True  # until the event says otherwise
-        self.session.time_lost(self.now)
-        self.look()
 
     # -- the drive --------------------------------------------------------------------------------
 
@@ -389,48 +342,9 @@ class SessionMachine(RuleBasedStateMachine):
         self.command(index, value)
         self.time_passes_in_time(40, True)
 
-    @rule(parameters=st.lists(st.sampled_from(READABLE), max_size=5), times=st.integers(1, 80))
-    def users_read(self, parameters: list[object], times: int) -> None:
-        for _ in range(times):
-            self.submit(ReadRequest(tuple(parameters)))
-
-    @rule(items=st.lists(st.tuples(st.sampled_from(WRITABLE), st.integers(0, 1)), max_size=3),
-          atomic=st.booleans())
-    def users_write(self, items: list[tuple[object, int]], atomic: bool) -> None:
-        self.submit(WriteRequest(tuple(items), atomic))
-
-    def submit(self, request: ReadRequest | WriteRequest) -> None:
-        waiting = len(self.open)
-        self.open.append(request)
-        self.session.submit(request, self.now)
-        refused = any(
-            isinstance(event, RequestCompleted) and event.request is request
-            and Failure(BUSY) in event.outcomes for event in self.session._events)
-        possible = self.observer.active and self.observer.bus and len(request) > 0
-        if refused or possible and waiting == 65:   # 64 wait; one more may be under way
-            assert refused and possible and waiting in (64, 65)
-        self.look()
-        # a request may have been what noticed the time-out
-        assert len(self.open) <= 65
-
-    @rule(action=st.sampled_from(ControlAction))
-    def control(self, action: ControlAction) -> None:
-        if action is ControlAction.ENABLE and self.session.online:
+    def wanted(self, action: ControlAction) -> None:
+        if action is ControlAction.ENABLE:
             self.observer.enabling = True
-        ticket = self.session.request_control(action, self.now)
-        if isinstance(ticket, str):
-            assert ticket
-        else:
-            assert self.observer.active
-            self.tickets.append(ticket)
-        self.look()
-
-    # -- the life of a session --------------------------------------------------------------------
-
-    @rule(kind=st.integers(0, 5))
-    def upset(self, kind: int) -> None:
-        (self.bus_goes_up, self.bus_goes_down, self.activate, self.deactivate,
-         self.deactivate_to_the_end, self.time_is_lost)[kind]()
 
     @rule(bus=st.booleans(), steps=st.integers(0, 3))
     def restart(self, bus: bool, steps: int) -> None:
@@ -444,87 +358,27 @@ class SessionMachine(RuleBasedStateMachine):
             self.activate()
         self.time_passes_in_time(2, False)
 
-    @precondition(lambda self: not self.session.online)
-    @rule()
-    def all_is_well(self) -> None:
-        """Bring the drive online."""
-        if not self.observer.bus:
-            self.bus_goes_up()
-        if not self.observer.active:
-            self.activate()
-        for _ in range(3):
-            self.time_passes_in_time(8, True)
-
-    def bus_goes_up(self) -> None:
-        self.observer.bus = True
-        self.session.bus_up(self.now)
-        self.look()
-
-    def bus_goes_down(self) -> None:
-        self.session.bus_down(self.now, 'unplugged')
-        self.observer.cleared()
-        self.observer.bus = False
-        self.look(silent=True)
-        assert not self.open
-        assert not self.tickets
-        assert self.session.stopped
-        assert self.session.next_timer() == math.inf
-
-    def activate(self) -> None:
-        self.observer.active = True
-        self.session.activate(self.now)
-        self.look()
-
     def deactivate(self) -> None:
-        self.observer.active = False
-        if self.session.online or self.observer.farewell:
-            self.observer.lost()  # what it was being told already begins anew
-        self.observer.online = self.session.online  # until the event says otherwise
-        self.observer.enabling = False
-        self.observer.armed = [False, False]
-        self.observer.before = self.observer.possible()
-        self.observer.cleared()
-        self.session.deactivate(self.now)
-        self.look()
-        assert not self.open
+        super().deactivate()
         assert not self.tickets
-
-    def deactivate_to_the_end(self) -> None:
-        self.deactivate()
-        end = self.now + 2.0
-        while self.session.next_timer() <= end:
-            self.now = max(self.now, self.session.next_timer())
-            self.timer()
-        assert self.session.stopped
-        assert self.session.next_timer() == math.inf
-        assert not self.session.online
-
-    # -- always -----------------------------------------------------------------------------------
 
     @invariant()
-    def counts_are_right(self) -> None:
-        if not hasattr(self, 'session'):
+    def polling_goes_on(self) -> None:
+        if self.session is None:
             return
-        assert self.session._waiting_requests() <= 64
         assert self.session.online == self.observer.online
-        if not self.observer.bus:
-            assert not self.session.online
-            assert self.session.stopped
-        assert not self.session.take_frames()
         assert self.session.statistics.exchanges == self.samples
-        if not self.session.online:
-            assert not any(item.armed for item in self.session.setpoints.items)
         if self.observer.active and self.observer.bus:
-            assert self.session.next_timer() < math.inf, 'polling goes on'
+            assert self.session.next_timer() < math.inf
 
     def teardown(self) -> None:
-        if hasattr(self, 'session'):
+        if self.session is not None:
             self.deactivate_to_the_end()
 
 
 TestSession = SessionMachine.TestCase
-TestSession.settings = settings(max_examples=150, stateful_step_count=50, deadline=None)
-pytestmark = pytest.mark.timeout(600)
+TestSession.settings = SETTINGS
+pytestmark = pytest.mark.timeout(PATIENCE)
 
 
 @settings(deadline=None)  # machines may be busy

@@ -1,0 +1,316 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+A session under anything that may happen, in any order: what is the same for every family.
+
+A family adds its drive (what it does with a frame, and says) and an observer, who sees nothing but
+frames and knows the protocol's bytes and the contract, nothing of the session's inside.
+"""
+
+from collections.abc import Sequence
+import math
+from typing import Any, ClassVar
+
+from hypothesis import settings, strategies as st
+from hypothesis.stateful import invariant, precondition, rule, RuleBasedStateMachine
+
+from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.events import RequestCompleted
+from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.requests import BUSY, Failure, ReadRequest, WriteRequest
+from drive_can_bridge.core.setpoints import CommandOutcome
+
+#: more than rounding errors, less than anything that matters
+SLACK = 1e-7
+#: for the state machine of every family
+SETTINGS = settings(max_examples=150, stateful_step_count=50, deadline=None)
+#: s for all its examples
+PATIENCE = 600
+
+
+class Observer:
+    """
+    Keeps books of what a session was told and may send.
+
+    :param timeout: command_timeout in s.
+    :param immediate: whether any command arms.
+    """
+
+    def __init__(self, *, timeout: float = 0.0, immediate: bool = False) -> None:
+        self.timeout = timeout
+        self.immediate = immediate
+        self.active = self.bus = self.online = False
+        self.asked: Any = None      # what the session waits for an answer to
+        self.raws = [0, 0]
+        self.since = [-math.inf, -math.inf]
+        self.armed = [False, False]
+
+    def sees(self, sent: Frame, now: float) -> None:
+        """Check a frame that the session sends."""
+        raise NotImplementedError
+
+    def disarm(self) -> None:
+        """Take note that no command counts any more, nor the drive's being there."""
+        self.online = False
+        self.armed = [False, False]
+        self.raws = [0, 0]
+
+    def doubt(self) -> None:
+        """Start over: whatever was known counts no more."""
+        self.disarm()
+
+    def bus_went_up(self) -> None:
+        if self.active:
+            self.doubt()
+
+    def bus_went_down(self) -> None:
+        self.doubt()
+        self.asked = None
+
+    def activated(self) -> None:
+        self.doubt()
+
+    def deactivated(self, session: Any) -> None:
+        """Take note that the session is about to be told to stop."""
+        raise NotImplementedError
+
+    def time_was_lost(self, session: Any) -> None:
+        """Take note that the session is about to be told that time was lost."""
+
+    def commanded(self, index: int, raw: int, outcome: CommandOutcome, now: float) -> None:
+        if not self.online or not self.active:
+            assert outcome is CommandOutcome.NOT_ARMED
+            return
+        if not self.armed[index] and not self.immediate and abs(raw) > 1:
+            assert outcome is CommandOutcome.NOT_ARMED
+            return
+        assert outcome is (CommandOutcome.ACCEPTED if self.armed[index] else CommandOutcome.ARMED)
+        self.armed[index], self.raws[index], self.since[index] = True, raw, now
+
+    def expected(self, now: float) -> list[int]:
+        """Return the setpoints that a cycle has to carry now."""
+        for index in range(2):
+            if self.armed[index] and 0 < self.timeout < now - self.since[index]:
+                self.armed[index], self.raws[index] = False, 0
+        return [raw & 0xFFFF for raw in self.raws]
+
+
+class AnyOrder(RuleBasedStateMachine):
+    """Everything that may happen to a session of any family."""
+
+    #: what users read and write
+    readable: ClassVar[Sequence[Parameter]]
+    writable: ClassVar[Sequence[Parameter]]
+    #: s after which a session that was told to stop has stopped
+    stop_takes: ClassVar[float] = 1.0
+
+    session: Any = None
+    observer: Any
+
+    def start(self, session: Any, observer: Observer) -> None:
+        """Begin with a session that was told nothing yet."""
+        self.session = session
+        self.observer = observer
+        self.now = 1000.0
+        self.open: list[ReadRequest | WriteRequest] = []
+        self.tickets: list[object] = []
+        self.unanswered: list[Frame] = []
+
+    # -- what a family says -----------------------------------------------------------------------
+
+    def happened(self, event: Any) -> None:
+        """Take note of an event that is not the end of a request."""
+        raise NotImplementedError
+
+    def completed(self, event: RequestCompleted) -> None:
+        """Check the outcomes of a request."""
+
+    def apply(self, sent: Frame) -> None:
+        """Do what a drive does with a frame; its answers wait in ``unanswered``."""
+        raise NotImplementedError
+
+    def drive_answers(self, choice: int) -> None:
+        """Hand over one of the answers that wait."""
+        raise NotImplementedError
+
+    # -- looking ----------------------------------------------------------------------------------
+
+    def look(self, *, silent: bool = False) -> None:
+        """Fetch and check everything that the session gives out."""
+        for event in self.session.take_events():
+            if isinstance(event, RequestCompleted):
+                assert event.request in self.open, 'one answer per request'
+                self.open.remove(event.request)
+                assert len(event.outcomes) == len(event.request)
+                self.completed(event)
+            else:
+                self.happened(event)
+        for outcome in self.session.take_control_outcomes():
+            assert outcome.ticket in self.tickets, 'one answer per control request'
+            self.tickets.remove(outcome.ticket)
+        sent = self.session.take_frames()
+        assert not (silent and sent)
+        for entry in sent:
+            self.observer.sees(entry, self.now)
+            self.apply(entry)
+        self.looked(bool(sent))
+
+    def looked(self, sent: bool) -> None:
+        """Check what is to be checked after each look; ``sent``: whether there were frames."""
+
+    # -- the passage of time ----------------------------------------------------------------------
+
+    def timer(self) -> None:
+        self.session.handle_timer(self.now)
+        self.look()
+
+    @rule(steps=st.integers(1, 30))
+    def time_passes_well(self, steps: int) -> None:
+        self.time_passes_in_time(steps, True)
+
+    @rule(steps=st.integers(1, 12), answering=st.booleans())
+    def time_passes_in_time(self, steps: int, answering: bool) -> None:
+        for _ in range(steps):
+            due = self.session.next_timer()
+            if due > self.now + 2.0:
+                self.now += 0.01
+                return
+            self.now = max(self.now, due)
+            self.timer()
+            while answering and self.unanswered:
+                self.now += 0.0002
+                self.drive_answers(0)
+
+    @rule(pause=st.sampled_from([0.0, 0.0001, 0.003, 0.017, 0.06, 0.101, 0.4, 0.99]))
+    def time_passes_late(self, pause: float) -> None:
+        self.now += pause
+        self.timer()
+
+    def time_is_lost(self) -> None:
+        self.now += 1.0
+        self.observer.time_was_lost(self.session)
+        self.session.time_lost(self.now)
+        self.look()
+
+    # -- users ------------------------------------------------------------------------------------
+
+    @rule(choices=st.lists(st.integers(0, 99), max_size=5), times=st.integers(1, 80))
+    def users_read(self, choices: list[int], times: int) -> None:
+        for _ in range(times):
+            self.submit(ReadRequest(tuple(
+                self.readable[choice % len(self.readable)] for choice in choices)))
+
+    @rule(choices=st.lists(st.tuples(st.integers(0, 99), st.integers(0, 1)), max_size=3),
+          atomic=st.booleans())
+    def users_write(self, choices: list[tuple[int, int]], atomic: bool) -> None:
+        self.submit(WriteRequest(tuple(
+            (self.writable[choice % len(self.writable)], self.raw_to_write(raw))
+            for choice, raw in choices), atomic))
+
+    def raw_to_write(self, raw: int) -> int:
+        """Return what is written instead of 0 or 1."""
+        return raw
+
+    def submit(self, request: ReadRequest | WriteRequest) -> None:
+        waiting = len(self.open)
+        self.open.append(request)
+        self.session.submit(request, self.now)
+        refused = any(
+            isinstance(event, RequestCompleted) and event.request is request
+            and Failure(BUSY) in event.outcomes for event in self.session._events)
+        possible = self.observer.active and self.observer.bus and len(request) > 0
+        if refused or possible and waiting == 65:   # 64 wait; one more may be under way
+            assert refused and possible and waiting in (64, 65)
+        self.look()
+        # a request may have been what noticed a time-out
+        assert len(self.open) <= 65
+
+    @rule(action=st.sampled_from(ControlAction))
+    def control(self, action: ControlAction) -> None:
+        ticket = self.session.request_control(action, self.now)
+        if isinstance(ticket, str):
+            assert ticket
+        else:
+            assert self.observer.active
+            self.tickets.append(ticket)
+            self.wanted(action)
+        self.look()
+
+    def wanted(self, action: ControlAction) -> None:
+        """Take note of something that the session agreed to try."""
+
+    # -- the life of a session --------------------------------------------------------------------
+
+    @rule(kind=st.integers(0, 5))
+    def upset(self, kind: int) -> None:
+        (self.bus_goes_up, self.bus_goes_down, self.activate, self.deactivate,
+         self.deactivate_to_the_end, self.time_is_lost)[kind]()
+
+    @precondition(lambda self: not self.session.online)
+    @rule()
+    def all_is_well(self) -> None:
+        """Bring the drive online."""
+        if not self.observer.bus:
+            self.bus_goes_up()
+        if not self.observer.active:
+            self.activate()
+        self.drive_is_well()
+
+    def drive_is_well(self) -> None:
+        for _ in range(3):
+            self.time_passes_in_time(8, True)
+
+    def bus_goes_up(self) -> None:
+        self.observer.bus = True
+        self.observer.bus_went_up()
+        self.session.bus_up(self.now)
+        self.look()
+
+    def bus_goes_down(self) -> None:
+        self.session.bus_down(self.now, 'unplugged')
+        self.observer.bus_went_down()
+        self.observer.bus = False
+        self.look(silent=True)
+        assert not self.open
+        assert not self.tickets
+        assert self.session.stopped
+        assert self.session.next_timer() == math.inf
+
+    def activate(self) -> None:
+        self.observer.active = True
+        self.observer.activated()
+        self.session.activate(self.now)
+        self.look()
+
+    def deactivate(self) -> None:
+        self.observer.active = False
+        self.observer.deactivated(self.session)
+        self.session.deactivate(self.now)
+        self.look()
+        assert not self.open
+
+    def deactivate_to_the_end(self) -> None:
+        self.deactivate()
+        end = self.now + self.stop_takes
+        while self.session.next_timer() <= end:
+            self.now = max(self.now, self.session.next_timer())
+            self.timer()
+        assert self.session.stopped
+        assert self.session.next_timer() == math.inf
+        assert not self.tickets
+        assert not self.session.online
+
+    # -- always -----------------------------------------------------------------------------------
+
+    @invariant()
+    def counts_are_right(self) -> None:
+        if self.session is None:
+            return
+        assert self.session._waiting_requests() <= 64
+        assert self.session.online == self.observer.online or not self.observer.active
+        if not self.observer.bus:
+            assert not self.session.online
+            assert self.session.stopped
+        assert not self.session.take_frames()
+        if not self.session.online:
+            assert not any(item.armed for item in self.session.setpoints.items)
