@@ -16,7 +16,7 @@ from drive_can_bridge.configuration.model import BridgeConfiguration, DriveConfi
 from drive_can_bridge.configuration.overrides import tree_from_overrides
 from drive_can_bridge.configuration.parameter_file import read_parameter_file
 from drive_can_bridge.configuration.problems import (
-    hint, nearest, Path, Problem, report, show, suggestion, Tree,
+    hint, Path, Problem, report, show, suggestion, Tree,
 )
 from drive_can_bridge.configuration.profiles import ProfileStore
 from drive_can_bridge.configuration.schema import defaults, definition, parameter_file_schema
@@ -105,6 +105,9 @@ def _configuration(tree: Tree, problems: list[Problem], adapters: Adapters | Non
     for name in buses:
         problems.extend(misfits(tree, [drive for drive in placed if drive.bus == name
                                        and drive in paced]))
+    for name in tree.data.get('drives', {}):
+        if name not in drives and not problems:  # whatever it is: no drive gets lost in silence
+            problems.append(tree.problem(('drives', name), 'cannot be used, nobody knows why'))
     if not drive_count and not tree.is_damaged(('drives',)):
         warnings.append(tree.problem(('drives',), 'no drive is configured'))
     if problems:
@@ -142,7 +145,7 @@ class _Override:
             return 'set by the bridge itself, allowed is to leave it out'
         if path[:1] != ('drives',) or len(path) != 3:
             return None
-        if path[2] == 'protocol':
+        if path[2] == 'protocol' and keyword != 'required':
             return _unknown_protocol(value) if keyword == 'enum' else ''
         protocol = self._tree.data['drives'][path[1]].get('protocol')
         if keyword == 'not':
@@ -159,9 +162,10 @@ class _Override:
                   if not any(name in other.options_schema for other in FAMILIES.values())]
         if family is not None:
             return f'unknown key, {suggestion(key, [*common, *family.options_schema])}'
-        # It may be a key of the family that is not known either, unless it looks like ours.
-        match = nearest(key, common)
-        return f"unknown key, did you mean '{match}'?" if match else ''
+        options = {name for other in FAMILIES.values() for name in other.options_schema}
+        if key in options:      # perhaps of the family that is meant
+            return ''
+        return f'unknown key, {suggestion(key, common)}'
 
 
 def _unknown_protocol(value: Any) -> str:

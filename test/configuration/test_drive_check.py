@@ -35,6 +35,18 @@ CASES = [
      ["f.yaml:11: drives.conveyor.bus: 'other' is unknown, allowed: main"]),
     ('        bus: main\n', '',
      ['f.yaml:10: drives.conveyor.bus: missing, allowed is a string']),
+    ('        protocol: datamodel_extended\n', '',
+     ['f.yaml:10: drives.conveyor.protocol: missing, allowed is datamodel_extended, '
+      'datamodel_standard, cannord or canopen_pkw']),
+    ('        protocol: datamodel_extended\n', '        xyz: 1\n',
+     ['f.yaml:10: drives.conveyor.protocol: missing, allowed is datamodel_extended, '
+      'datamodel_standard, cannord or canopen_pkw',
+      'f.yaml:12: drives.conveyor.xyz: unknown key, allowed: bus, protocol, station, profile, '
+      'period, cyclic_request, cyclic_response, missed_limit, command_timeout, rearm, '
+      'parameter_timeout, control_timeout, parameter_retries, verify_writes, joint']),
+    ('        protocol: datamodel_extended\n', '        mapping: verify\n',  # of some family
+     ['f.yaml:10: drives.conveyor.protocol: missing, allowed is datamodel_extended, '
+      'datamodel_standard, cannord or canopen_pkw']),
     ('period: 0.02', 'period: 0.004',
      ['f.yaml:15: drives.conveyor.period: 0.004 s is too fast, allowed is at least 0.005 s '
       'unless allow_fast_cycle is true']),
@@ -179,13 +191,16 @@ CASES = [
       "'actual'?"]),
     ('conveyor:', 'Conveyor:',
      ["f.yaml:10: drives.Conveyor: 'Conveyor' is wrong, allowed is a name of a-z, 0-9 and _ "
-      'that begins with a letter, at most 100 characters']),
+      'that begins with a letter and has no __, at most 100 characters']),
+    ('conveyor:', 'conv__eyor:',  # rcl cannot parse a remap rule for such a node
+     ["f.yaml:10: drives.conv__eyor: 'conv__eyor' is wrong, allowed is a name of a-z, 0-9 and "
+      '_ that begins with a letter and has no __, at most 100 characters']),
     ('conveyor:', '"1a":',
      ["f.yaml:10: drives.1a: '1a' is wrong, allowed is a name of a-z, 0-9 and _ that begins "
-      'with a letter, at most 100 characters']),
+      'with a letter and has no __, at most 100 characters']),
     ('conveyor:', '"a\\n":',
      ["f.yaml:10: drives.a?: 'a?' is wrong, allowed is a name of a-z, 0-9 and _ that begins "
-      'with a letter, at most 100 characters']),
+      'with a letter and has no __, at most 100 characters']),
     ('conveyor:', 'drive_can_bridge:',
      ["f.yaml:10: drives.drive_can_bridge: 'drive_can_bridge' is the name of the bridge "
       'itself, allowed is any other']),
