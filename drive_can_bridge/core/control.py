@@ -46,6 +46,12 @@ is ``disable`` in any case.
 is all the confirmation there is, and the answer says so. A quick stop then keeps its word for the
 whole time-out, although it is answered at once: ``disable`` right after it would end the braking
 before it began. A drive that does not report faults gets the reset pulse in any case.
+
+*A drive that takes no notice.* A word that is written when it changes may get lost on the way.
+:attr:`~ControlMachine.unconfirmed` tells the session that the drive, by what it reports since,
+does not do as the word says: then the word is written again. A drive that goes on running for more
+than a second under ``disable`` is told of (:attr:`~ControlMachine.disregard`). One that says that
+it refuses the word (:meth:`~ControlMachine.word_refused`) ends what is under way, with its reason.
 """
 
 from abc import ABC, abstractmethod
@@ -64,6 +70,9 @@ class ControlAction(Enum):
     QUICK_STOP = 'quick_stop'
     RESET_FAULT = 'reset_fault'
 
+
+#: s that a drive may go on running under ``disable``, a ramp included, until that is told
+RUNNING_ON_MAX = 1.0
 
 _STOPS = (ControlAction.DISABLE, ControlAction.QUICK_STOP)
 
@@ -121,6 +130,16 @@ class ControlMachine(ABC):
     def pending(self) -> bool:
         """A request, or a quick stop that is answered already, is under way."""
 
+    @property
+    @abstractmethod
+    def unconfirmed(self) -> bool:
+        """The drive has reported since the current word left, but not what the word wants."""
+
+    @property
+    @abstractmethod
+    def disregard(self) -> str:
+        """How the drive goes on running although it shall not, in words; '' if it does not."""
+
     @abstractmethod
     def request(self, action: ControlAction, now: float) -> ControlTicket:
         """Ask for something; the outcome may be there when this returns."""
@@ -133,6 +152,14 @@ class ControlMachine(ABC):
         Call it each time the word is sent, before the response can arrive; where a write is
         acknowledged, at the acknowledgement. A word that meanwhile is not the current one any
         more does not count.
+        """
+
+    @abstractmethod
+    def word_refused(self, word: int, reason: str, now: float) -> None:
+        """
+        Take note that the drive refused a control word: what is under way fails.
+
+        :param reason: what the drive says, in words.
         """
 
     @abstractmethod
@@ -203,6 +230,8 @@ class ProfileControl(ControlMachine):
         self._answer: int | None = None         # the last one since the current word left
         self._fault: bool | None = None         # None: not known
         self._reached = False                   # enabled was confirmed for this enable word
+        self._runs_on_since = math.inf          # under disable; told when it lasts
+        self._disregard = ''
         self._operation: _Operation | None = None
         self._completed: list[ControlCompleted] = []
         self._notes: list[str] = []
@@ -247,6 +276,18 @@ class ProfileControl(ControlMachine):
     @property
     def pending(self) -> bool:
         return self._operation is not None
+
+    @property
+    def unconfirmed(self) -> bool:
+        if not self._sent or self._answer is None:
+            return False
+        if self._sending is ControlAction.DISABLE:
+            return self._table.enabled is not None and not self._confirmed_off()
+        return self.pending
+
+    @property
+    def disregard(self) -> str:
+        return self._disregard
 
     def take_completed(self) -> list[ControlCompleted]:
         completed, self._completed = self._completed, []
@@ -297,6 +338,12 @@ class ProfileControl(ControlMachine):
             self._watch_fault(raw)
             self._watch_enabled(raw)
             self._advance()
+            self._watch_disabled(now)
+
+    def word_refused(self, word: int, reason: str, now: float) -> None:
+        self.handle_timer(now)
+        if word == self.word and self._operation is not None:
+            self._end(False, f'control word {word:04X}h {reason}')
 
     def handle_timer(self, now: float) -> None:
         if now >= self.next_timer():
@@ -312,6 +359,7 @@ class ProfileControl(ControlMachine):
         self._end(False, reason)
         self._sent = False
         self._raw = self._answer = None
+        self._runs_on_since, self._disregard = math.inf, ''
         if not self._fault:         # a known fault stands until the drive says otherwise
             self._fault = None
 
@@ -385,6 +433,17 @@ class ProfileControl(ControlMachine):
             self._notes.append(f'{text}; only ~/enable starts the drive again')
             self._end(False, text)
 
+    def _watch_disabled(self, now: float) -> None:
+        """Tell of a drive that runs on although its control word is ``disable``."""
+        if self._sending is not ControlAction.DISABLE or not self.unconfirmed:
+            self._runs_on_since, self._disregard = math.inf, ''
+            return
+        self._runs_on_since = min(self._runs_on_since, now)
+        if not self._disregard and now - self._runs_on_since > RUNNING_ON_MAX:
+            self._disregard = (f'still {self.state} ({self._status_text}) although its control '
+                               f'word is disable ({self.word:04X}h)')
+            self._notes.append(f'{self._disregard}: stop it by other means')
+
     @property
     def _may_run(self) -> bool:
         """Whether a stop has anything to do, as far as is known."""
@@ -416,6 +475,7 @@ class ProfileControl(ControlMachine):
         if self._words[action] != self.word:
             self._sent = False
             self._answer = None
+            self._runs_on_since, self._disregard = math.inf, ''
         self._sending = action
         self._reached = self._reached and action is ControlAction.ENABLE
 

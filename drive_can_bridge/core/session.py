@@ -39,6 +39,8 @@ from drive_can_bridge.core.statistics import DriveStatistics
 WAITING_REQUESTS_MAX = 64
 #: cyclic frames with neutral setpoints that are sent before a drive is left alone
 STOP_CYCLES = 3
+#: s of pause between them at most, however long the period is
+STOP_SPACING_MAX = 0.1
 #: advice until more is known
 LOOKING = 'being looked for'
 
@@ -119,6 +121,11 @@ class Session(ABC):
     @abstractmethod
     def stopped(self) -> bool:
         """Nothing more will be sent until the next ``activate``."""
+
+    @property
+    def longest_stop(self) -> float:
+        """Return how many s a stop takes at most."""
+        return STOP_CYCLES * min(self.drive.period, STOP_SPACING_MAX)
 
     def bus_up(self, now: float) -> None:
         """Begin to use the bus: it was opened."""
@@ -356,4 +363,4 @@ class Session(ABC):
         """Tell what the control machine noted."""
         if self.control is not None:
             for note in self.control.take_notes():
-                self._events.append(Noted(note))
+                self._events.append(Noted(note, warning=True))

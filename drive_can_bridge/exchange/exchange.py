@@ -170,8 +170,8 @@ class BusExchange:
                 member.session.deactivate(now)
                 self._pump(member, now)
         self._alarm.ring()
-        end = now + STOP_MARGIN + 3 * min(
-            max((session.drive.period for session in self._sessions), default=0.0), 0.1)
+        end = now + STOP_MARGIN + max(
+            (session.longest_stop for session in self._sessions), default=0.0)
         while not self._stopped():
             if self._clock() > end:
                 return False

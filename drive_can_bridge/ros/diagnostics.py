@@ -164,6 +164,9 @@ class DriveReporter:
                     *self._warnings(rejected)]
             return DiagnosticStatus.ERROR, '; '.join(told)
         told = self._warnings(rejected)
+        if session.control is not None and session.control.disregard:
+            return DiagnosticStatus.ERROR, '; '.join((
+                f'{session.control.disregard}: stop it by other means', *told))
         if state is DriveState.NOT_ARMED:
             told.append(self._how_to_arm())
         if told:

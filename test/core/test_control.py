@@ -73,6 +73,98 @@ def faulted(table: ControlTable = FULL) -> ProfileControl:
     return control
 
 
+# -- drives that take no notice -------------------------------------------------------------------
+
+def test_a_drive_that_has_not_answered_since_is_not_unconfirmed() -> None:
+    control = enabled()
+    assert not control.unconfirmed
+    control.request(DISABLE, 1.0)
+    assert not control.unconfirmed
+    control.status_received(ENABLED, 1.01)      # older than the word
+    assert not control.unconfirmed
+    control.word_sent(1.02)
+    assert not control.unconfirmed
+    control.status_received(ENABLED, 1.03)
+    assert control.unconfirmed
+    control.status_received(READY, 1.04)
+    assert not control.unconfirmed
+
+
+@pytest.mark.parametrize(('action', 'word', 'raw', 'done'), [
+    (ENABLE, RUN, READY, ENABLED), (QUICK_STOP, STOP, ENABLED, READY),
+    (RESET_FAULT, RESET, FAULT, READY)])
+def test_a_word_is_unconfirmed_until_the_drive_follows(action: ControlAction, word: int, raw: int,
+                                                       done: int) -> None:
+    control = {ENABLE: machine, QUICK_STOP: enabled, RESET_FAULT: faulted}[action]()
+    cycle(control, {ENABLE: READY, QUICK_STOP: ENABLED, RESET_FAULT: FAULT}[action], 0.9)
+    control.request(action, 1.0)
+    assert control.word == word
+    assert not control.unconfirmed
+    cycle(control, raw, 1.01)
+    assert control.unconfirmed
+    cycle(control, done, 1.03)
+    assert not control.unconfirmed
+
+
+def test_nothing_is_unconfirmed_where_nothing_is_reported() -> None:
+    control = machine(BARE)
+    cycle(control, None, 0.0)
+    control.request(ENABLE, 0.1)
+    cycle(control, None, 0.2)
+    assert not control.unconfirmed
+
+
+def test_running_on_under_disable_is_told_once() -> None:
+    control = enabled()
+    control.request(DISABLE, 1.0)
+    for step in range(1, 11):
+        cycle(control, ENABLED, 1.0 + 0.1 * step)
+        assert control.disregard == ''
+    control.take_notes()
+    for step in range(11, 40):
+        cycle(control, ENABLED, 1.0 + 0.1 * step + 0.01)
+        assert control.disregard == (
+            'still enabled (status word 0003h) although its control word is disable (0000h)')
+    assert control.take_notes() == [f'{control.disregard}: stop it by other means']
+    cycle(control, READY, 6.0)
+    assert control.disregard == ''
+    assert control.take_notes() == []
+
+
+def test_a_new_word_and_a_loss_end_the_running_on() -> None:
+    for end in (lambda control: control.request(QUICK_STOP, 4.0),
+                lambda control: control.withdraw('gone', 4.0)):
+        control = enabled()
+        control.request(DISABLE, 1.0)
+        cycle(control, ENABLED, 1.1)
+        cycle(control, ENABLED, 3.9)
+        assert control.disregard
+        end(control)
+        assert control.disregard == ''
+
+
+@pytest.mark.parametrize(('action', 'word'), [(ENABLE, RUN), (QUICK_STOP, STOP), (DISABLE, OFF)])
+def test_a_refused_word_ends_what_is_under_way(action: ControlAction, word: int) -> None:
+    control = machine() if action is ENABLE else enabled()
+    cycle(control, READY if action is ENABLE else ENABLED, 0.9)
+    control.request(action, 1.0)
+    assert control.word == word
+    control.word_refused(word ^ 0x4000, 'not meant', 1.1)
+    assert outcomes(control) == []
+    control.word_refused(word, 'refused by the drive: 08000021h', 1.1)
+    assert outcomes(control) == [
+        (action, False, f'control word {word:04X}h refused by the drive: 08000021h')]
+    assert control.word == OFF
+    assert not control.pending
+
+
+def test_a_refusal_that_nobody_waits_for_changes_nothing() -> None:
+    control = enabled()
+    control.word_refused(RUN, 'refused', 1.0)
+    assert control.word == RUN
+    assert outcomes(control) == []
+
+
 # -- the start ------------------------------------------------------------------------------------
 
 def test_starts_with_disable_and_knows_nothing() -> None:

@@ -142,6 +142,7 @@ class GroupControl(CannordControl):
         self._watch_fault(raw)
         self._watch_enabled(raw)
         self._advance()
+        self._watch_disabled(now)
 
     def request(self, action: ControlAction, now: float) -> ControlTicket:
         if action is ControlAction.ENABLE:

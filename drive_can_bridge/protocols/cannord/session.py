@@ -29,7 +29,7 @@ from drive_can_bridge.core.requests import (
     BRIDGE_INACTIVE, Failure, Outcome, ReadValue, Request, WriteRequest,
     Written,
 )
-from drive_can_bridge.core.session import Session, STOP_CYCLES
+from drive_can_bridge.core.session import Session, STOP_CYCLES, STOP_SPACING_MAX
 from drive_can_bridge.protocols.cannord import procedures
 from drive_can_bridge.protocols.cannord.channel import TaskChannel
 from drive_can_bridge.protocols.cannord.control import CannordControl
@@ -43,8 +43,6 @@ from drive_can_bridge.protocols.cannord.process_data import (
 )
 from drive_can_bridge.protocols.cannord.states import is_faulted, STATUS_BITS, STATUS_WORD
 
-#: longest pause between the neutral cycles of a stop, however long the period is
-STOP_SPACING_MAX = 0.1
 NO_ANSWER = 'no answer to process data'
 
 STATUS_PARAMETER = Parameter(

@@ -6,6 +6,10 @@ It is written when it changes. Whether the drive got it, its answer says; when t
 ``disable`` is simply written again. Any other word might be executed twice: so it is read back
 first, and written again only if it is not there. Where it cannot be read back it is not repeated,
 and the control machine gives up by itself.
+
+A word that the drive refuses ends what the user wanted, with the reason that the drive gives. A
+refused ``disable`` is tried again and again: a device under local control, say, takes it as soon
+as it is back under remote control.
 """
 
 from collections.abc import Callable, Generator
@@ -14,11 +18,14 @@ import math
 from drive_can_bridge.core.control import ControlMachine
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.canopen_pkw import addresses
-from drive_can_bridge.protocols.canopen_pkw.addresses import Span
 from drive_can_bridge.protocols.canopen_pkw.channel import Channel, Lane
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
     Answered, Read, Refused, Reply, Silence, Step, Write,
 )
+from drive_can_bridge.protocols.canopen_pkw.procedures import LastWrite
+
+#: s until a ``disable`` that was refused is written again
+RETRY_AFTER = 0.25
 
 
 class ControlWriter:
@@ -27,43 +34,49 @@ class ControlWriter:
 
     :param word: parameter of the control word.
     :param changed: called after anything that may have changed the control word.
+    :param refused: takes what the drive says to a word that it refuses, in words.
     :param disable: the word that may be written any number of times.
     :param refresh: s after which an unchanged word is written again; 0: never.
     :ivar refusal: what the drive says to a word that it refused; '' if it does not.
     """
 
     def __init__(self, channel: Channel, control: ControlMachine, word: Parameter,
-                 changed: Callable[[float], None], *, disable: int, addressing: str,
-                 word_order: str, refresh: float) -> None:
+                 changed: Callable[[float], None], refused: Callable[[str], None], *,
+                 disable: int, addressing: str, word_order: str, refresh: float) -> None:
         self.refusal = ''
         self._channel = channel
         self._control = control
         self._parameter = word
         self._changed = changed
+        self._refused = refused
         self._disable = disable
         self._word_order = word_order
         self._span = addresses.span_of(word, addressing)
         self._refresh = refresh
         self._settled: int | None = None    # the drive has it, or has refused it
         self._settled_at = -math.inf
+        self._retry_at = math.inf           # a refused disable
         self._doubtful: int | None = None   # sent, but not answered
 
     def forget(self) -> None:
         """Take note that nothing is known of the drive."""
         self._settled = self._doubtful = None
+        self._retry_at = math.inf
         self.refusal = ''
 
     def update(self, now: float) -> None:
         """Write the word if the drive does not have it, or not lately."""
-        fresh = self._refresh <= 0.0 or now < self._settled_at + self._refresh
+        fresh = now < self._retry_at and (
+            self._refresh <= 0.0 or now < self._settled_at + self._refresh)
         if self._settled == self._control.word and fresh:
             return
         if self._channel.is_idle(Lane.CONTROL):
             self._channel.run(Lane.CONTROL, self._write(), lambda _: None, now)
 
-    def disable_write(self) -> tuple[Span, tuple[int, ...]]:
+    def disable_write(self) -> LastWrite:
         """Return what writes ``disable``."""
-        return self._span, self._words(self._disable)
+        return LastWrite(f'{self._parameter.name} {self._disable:04X}h', self._span,
+                         self._words(self._disable))
 
     def _words(self, word: int) -> tuple[int, ...]:
         return addresses.words_from_raw(self._parameter, word, self._word_order)
@@ -89,9 +102,9 @@ class ControlWriter:
                 if word == self._control.word:
                     return
                 continue
+            self._retry_at = math.inf
             if isinstance(reply, Refused):
-                self.refusal = f'{self._parameter.name} {word:04X}h {reply.text}'
-                self._settled, self._settled_at = word, self._channel.now
+                self._take_refusal(word, reply.text)
             else:
                 self.refusal = ''
                 self._settle(word)
@@ -109,6 +122,19 @@ class ControlWriter:
             self._parameter, reply.words[:self._span.count], self._word_order)
         self._doubtful = None
         return self._parameter.word_from_raw(found) == self._parameter.word_from_raw(word)
+
+    def _take_refusal(self, word: int, reason: str) -> None:
+        now = self._channel.now
+        text = f'{self._parameter.name} {word:04X}h {reason}'
+        if text != self.refusal:
+            self._refused(f'write of {text}')
+        self.refusal = text
+        self._doubtful = None
+        self._settled, self._settled_at = word, now
+        if word == self._disable:
+            self._retry_at = now + RETRY_AFTER
+        self._control.word_refused(word, reason, now)
+        self._changed(now)
 
     def _settle(self, word: int) -> None:
         """Take note that the drive has a word."""

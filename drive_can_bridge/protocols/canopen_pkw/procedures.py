@@ -7,7 +7,7 @@ Every function here is a generator for :class:`.channel.Channel`.
 
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
-from typing import Union
+from typing import NamedTuple, Union
 
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.requests import (
@@ -149,7 +149,20 @@ def _write(address: Address, words: tuple[int, ...], conditions: Conditions,
 
 #: what a round of reads brought: the words of all registers; None: something was not answered
 RoundResult = Union[dict[Address, int], None]
-Farewell = Generator[Step, Reply, None]
+#: what became of the last writes: why which one may not have been executed
+Farewell = Generator[Step, Reply, list[str]]
+
+
+class LastWrite(NamedTuple):
+    """
+    Something that makes a drive stand still.
+
+    :param name: of the parameter.
+    """
+
+    name: str
+    span: Span
+    words: tuple[int, ...]
 
 
 def read_round(spans: Sequence[Span], answered: Callable[[Span, tuple[int, ...]], None],
@@ -178,16 +191,25 @@ def read_round(spans: Sequence[Span], answered: Callable[[Span, tuple[int, ...]]
     return words
 
 
-def write_until_answered(writes: Sequence[tuple[Span, tuple[int, ...]]], attempts: int,
-                         timeout: float) -> Farewell:
+def write_until_answered(writes: Sequence[LastWrite], attempts: int, timeout: float) -> Farewell:
     """
     Tell a drive to stand still, each thing until it is answered or was tried ``attempts`` times.
 
     It may be executed twice: that does no harm. As the toggle is inverted with every attempt, not
     even an unknown function byte of the device keeps it from taking notice.
+
+    :param timeout: s for each attempt.
+    :return: what failed, in words.
     """
-    for span, words in writes:
+    failed = []
+    for name, span, words in writes:
+        reply: Reply = Silence()
         for _ in range(attempts):
             reply = yield Write(span.address, words, blind=True, timeout=timeout)
             if not isinstance(reply, Silence):
                 break
+        if isinstance(reply, Refused):
+            failed.append(f'{name} {reply.text}')
+        elif isinstance(reply, Silence):
+            failed.append(f'{name} not acknowledged in {attempts} attempts')
+    return failed

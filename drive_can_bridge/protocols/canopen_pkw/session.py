@@ -44,9 +44,11 @@ from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Layout, Message
 from drive_can_bridge.protocols.canopen_pkw.setpoint_writer import SetpointWriter
 from drive_can_bridge.protocols.polling import Beat
 
-#: how often, and for how long (s, all together), a drive is told to stand still
+#: how often a drive is told to stand still
 STOP_ATTEMPTS = 3
-STOP_TIME = 0.4
+#: s that this may take all together: of a drive that answers, and of one that has fallen silent
+STOP_TIME = 3.0
+STOP_TIME_SILENT = 0.4
 SILENT = ('no complete round of reads: drive silent, not operational, or other COB-IDs than '
           'configured')
 
@@ -86,7 +88,7 @@ class PkwSession(Session):
         if control is not None and table is not None:
             word = drive.profile.parameters[table.parameter]
             self._control_writer = ControlWriter(
-                self._channel, control, word, self._control_changed,
+                self._channel, control, word, self._control_changed, self._warn,
                 disable=table.disable, addressing=self._addressing,
                 word_order=self._word_order,
                 refresh=options['refresh_interval'] if word in drive.cyclic_request else 0.0)
@@ -118,12 +120,25 @@ class PkwSession(Session):
             self._go_idle('deactivated')
             return
         self._phase = Phase.STOPPING
-        self._channel.run(Lane.CONTROL, self._farewell(writes),
-                          lambda _: self._go_idle('deactivated'), now)
+        self._channel.run(Lane.CONTROL, self._farewell(writes, self._stop_time),
+                          self._farewell_ended, now)
+
+    def _farewell_ended(self, failed: list[str]) -> None:
+        if failed:
+            self._warn(f'told to stop, but {"; ".join(failed)}: it may still be running')
+        self._go_idle('deactivated')
 
     @property
     def stopped(self) -> bool:
         return self._phase is Phase.IDLE
+
+    @property
+    def longest_stop(self) -> float:
+        return self._stop_time if self._phase is Phase.STOPPING else 0.0
+
+    @property
+    def _stop_time(self) -> float:
+        return STOP_TIME if self.online else STOP_TIME_SILENT
 
     def bus_down(self, now: float, reason: str) -> None:
         self._node.forget()
@@ -198,7 +213,8 @@ class PkwSession(Session):
         self._frames += self._node.take_frames()
         writes = self._neutral_writes()
         if was_online and writes:
-            self._channel.run(Lane.CONTROL, self._farewell(writes), lambda _: None, now)
+            self._channel.run(Lane.CONTROL, self._farewell(writes, STOP_TIME_SILENT),
+                              lambda _: None, now)
 
     def _cut_off(self, reason: str, answer: str, now: float) -> None:
         """Handle a node that takes no PDOs: nothing that was sent is answered any more."""
@@ -206,16 +222,16 @@ class PkwSession(Session):
         self._channel.clear()
         self._fail_requests(answer)
 
-    def _neutral_writes(self) -> list[tuple[Span, tuple[int, ...]]]:
+    def _neutral_writes(self) -> list[procedures.LastWrite]:
         """Return what makes a drive stand still."""
         writes = [] if self._control_writer is None else [self._control_writer.disable_write()]
         return writes + self._setpoint_writer.neutral_writes()
 
-    def _farewell(self, writes: Sequence[tuple[Span, tuple[int, ...]]],
+    def _farewell(self, writes: Sequence[procedures.LastWrite], time: float,
                   ) -> procedures.Farewell:
         return procedures.write_until_answered(
             writes, STOP_ATTEMPTS,
-            min(self.drive.parameter_timeout, STOP_TIME / (STOP_ATTEMPTS * len(writes))))
+            min(self.drive.parameter_timeout, time / (STOP_ATTEMPTS * len(writes))))
 
     # -- the round --------------------------------------------------------------------------------
 
@@ -262,7 +278,7 @@ class PkwSession(Session):
         names = ', '.join(parameter.name for parameter in self.drive.cyclic_response
                           if addresses.span_of(parameter, self._addressing) == span)
         if span not in self._refusals:
-            self._events.append(Noted(f'read {names or span.address}: {refused.text}'))
+            self._warn(f'read {names or span.address}: {refused.text}')
         self._refusals[span] = f'{names or span.address} {refused.text}'
         return ()
 
@@ -330,7 +346,8 @@ class PkwSession(Session):
             elif identifier == identifiers.emergency:
                 text = self._node.receive_emergency(network.decode_emergency(data))
                 if text:
-                    self._events.append(Noted(text))
+                    self._events.append(Noted(
+                        text, warning=self._node.emergency is not None))
             elif identifier == identifiers.request:
                 self._events.append(ForeignMasterSeen(
                     f'another master sends PKW requests to node {self.drive.station}: {frame}'))
@@ -400,6 +417,9 @@ class PkwSession(Session):
         self._tell_notes()
         if self._control_writer is not None and self.online:
             self._control_writer.update(now)
+
+    def _warn(self, text: str) -> None:
+        self._events.append(Noted(text, warning=True))
 
     # -- users ------------------------------------------------------------------------------------
 

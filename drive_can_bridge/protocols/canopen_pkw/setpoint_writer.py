@@ -5,11 +5,11 @@ from collections.abc import Generator
 
 from drive_can_bridge.core.setpoints import Setpoints
 from drive_can_bridge.protocols.canopen_pkw import addresses
-from drive_can_bridge.protocols.canopen_pkw.addresses import Span
 from drive_can_bridge.protocols.canopen_pkw.channel import Channel, Lane
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
     Answered, Reply, Silence, Step, Write,
 )
+from drive_can_bridge.protocols.canopen_pkw.procedures import LastWrite
 from drive_can_bridge.protocols.polling import WriteSchedule
 
 
@@ -44,10 +44,10 @@ class SetpointWriter:
         if self._schedule.waiting and self._channel.is_idle(Lane.SETPOINTS):
             self._channel.run(Lane.SETPOINTS, self._write(), lambda _: None, now)
 
-    def neutral_writes(self) -> list[tuple[Span, tuple[int, ...]]]:
+    def neutral_writes(self) -> list[LastWrite]:
         """Return what writes the neutral value of every setpoint."""
-        return [(span, addresses.words_from_raw(setpoint.parameter, setpoint.neutral,
-                                                self._word_order))
+        return [LastWrite(setpoint.parameter.name, span, addresses.words_from_raw(
+                    setpoint.parameter, setpoint.neutral, self._word_order))
                 for setpoint, span in zip(self._setpoints.items, self._spans)]
 
     def _write(self) -> Generator[Step, Reply, None]:

@@ -2,9 +2,11 @@
 """
 The control word of a drive that does not get it cyclically, or does not answer cyclically.
 
-The control word is written when it changes, before everything else that waits. The status word is
-read twice a second, and twenty times while a request is under way. What has its slot in the cyclic
-telegrams is none of this module's business.
+The control word is written when it changes, before everything else that waits. Nothing
+acknowledges that: as long as the status says that the drive takes no notice, the word is written
+again, less and less often; what is kept in an EEPROM (or may be) only a few times. The status word
+is read twice a second, and twenty times while a request is under way. What has its slot in the
+cyclic telegrams is none of this module's business.
 """
 
 from collections.abc import Callable
@@ -18,6 +20,11 @@ from drive_can_bridge.protocols.datamodel.channel import AcyclicChannel, Procedu
 #: s between two looks at the status word, while a request is under way and otherwise
 STATUS_PERIOD_PENDING = 0.05
 STATUS_PERIOD = 0.5
+#: s until a word that the drive takes no notice of is written again: at first, and at most
+REPEAT_FIRST = 0.2
+REPEAT_LAST = 2.0
+#: how often at most where each write wears an EEPROM
+EEPROM_REPEATS = 3
 
 
 class AcyclicControl:
@@ -42,6 +49,8 @@ class AcyclicControl:
         self._offset = offset
         self._changed = changed
         self._written: int | None = None
+        self._repeat_at = math.inf
+        self._repeats = 0
         self._reading = False
         self._outdated = False  # what is being read was asked before the word left
         self._watching = False
@@ -64,11 +73,18 @@ class AcyclicControl:
         self._reading = False
 
     def update(self, now: float) -> None:
-        """Write the control word if it changed."""
+        """Write the control word if it changed, or if the drive takes no notice of it."""
         word = self._control.word
-        if self._word is None or word == self._written:
+        if self._word is None:
+            return
+        if word != self._written:
+            self._repeats = 0
+        elif self._may_repeat(self._word, now):
+            self._repeats += 1
+        else:
             return
         self._written = word
+        self._repeat_at = math.inf      # until it left
         self._channel.write_first(self._write(self._word, word), self._sent, now)
         if self._watching and self._status is not None:
             self.look_at = now
@@ -92,12 +108,18 @@ class AcyclicControl:
 
     # -- inside -----------------------------------------------------------------------------------
 
+    def _may_repeat(self, parameter: Parameter, now: float) -> bool:
+        return now >= self._repeat_at and self._control.unconfirmed and (
+            parameter.storage is Storage.RAM or self._repeats < EEPROM_REPEATS)
+
     def _write(self, parameter: Parameter, word: int) -> Write:
         return Write((parameter.number or 0) + self._offset, (word,),
                      parameter.storage is not Storage.RAM)
 
     def _sent(self) -> None:
         self._outdated = self._reading
+        self._repeat_at = self._channel.now + min(
+            REPEAT_FIRST * 2 ** min(self._repeats, 10), REPEAT_LAST)
         self._control.word_sent(self._channel.now)
         self._changed(self._channel.now)
 

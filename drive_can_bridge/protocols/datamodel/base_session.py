@@ -17,9 +17,6 @@ from drive_can_bridge.protocols.datamodel.channel import AcyclicChannel, Lane, P
 from drive_can_bridge.protocols.datamodel.extended import SLOTS
 from drive_can_bridge.protocols.datamodel.process_words import slot_of
 
-#: longest pause between the neutral cycles of a stop, however long the period is
-STOP_SPACING_MAX = 0.1
-
 
 class DataModelSession(Session):
     """

@@ -25,9 +25,9 @@ from drive_can_bridge.core.events import (
 )
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.requests import BRIDGE_INACTIVE
-from drive_can_bridge.core.session import DriveState, STOP_CYCLES
+from drive_can_bridge.core.session import DriveState, STOP_CYCLES, STOP_SPACING_MAX
 from drive_can_bridge.protocols.datamodel import extended
-from drive_can_bridge.protocols.datamodel.base_session import DataModelSession, STOP_SPACING_MAX
+from drive_can_bridge.protocols.datamodel.base_session import DataModelSession
 from drive_can_bridge.protocols.datamodel.map_supervision import MapSupervision, Verdict
 from drive_can_bridge.protocols.datamodel.process_words import (
     unpack_unusual, wire_numbers, words_struct,

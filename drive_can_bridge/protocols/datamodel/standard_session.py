@@ -20,9 +20,9 @@ from drive_can_bridge.core.events import (
 )
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.requests import BRIDGE_INACTIVE
-from drive_can_bridge.core.session import STOP_CYCLES
+from drive_can_bridge.core.session import STOP_CYCLES, STOP_SPACING_MAX
 from drive_can_bridge.protocols.datamodel import standard
-from drive_can_bridge.protocols.datamodel.base_session import DataModelSession, STOP_SPACING_MAX
+from drive_can_bridge.protocols.datamodel.base_session import DataModelSession
 from drive_can_bridge.protocols.datamodel.channel import Polling, Procedure, Read, Write
 from drive_can_bridge.protocols.datamodel.standard_round import places, reads
 from drive_can_bridge.protocols.polling import Beat, Round, WriteSchedule

@@ -120,7 +120,7 @@ def test_a_fault_told_unasked_disables_with_the_next_frame() -> None:
     talk.hears(FAULT, 10.065)
     assert talk.session.state is DriveState.FAULT
     assert talk.events(Noted) == [
-        Noted('fault (status word 0B38h); only ~/enable starts the drive again')]
+        Noted('fault (status word 0B38h); only ~/enable starts the drive again', warning=True)]
     assert words(talk, 10.08, FAULT) == ['7E04']
     talk.asks(ENABLE, 10.09)
     assert talk.control_outcomes() == [('enable', False, 'fault: reset it first')]

@@ -279,7 +279,8 @@ def test_a_fault_told_unasked_is_a_sample_at_once() -> None:
     talk = online()
     talk.hears('003#380B0010', 10.011)
     assert talk.events() == [
-        Noted('fault (status word 0B38h)'), ProcessDataReceived((0x0B38, 0x1000), 10.011)]
+        Noted('fault (status word 0B38h)', warning=True),
+        ProcessDataReceived((0x0B38, 0x1000), 10.011)]
     assert talk.session.state is DriveState.FAULT
     statistics = talk.session.statistics
     assert (statistics.exchanges, statistics.rejected, statistics.missed) == (1, 0, 0)

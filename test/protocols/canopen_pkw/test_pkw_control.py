@@ -94,7 +94,7 @@ def test_reset_of_a_trip() -> None:
     talk.until(10.0901)
     talk.hears(TRIPPED_0, 10.091)
     assert talk.session.state is DriveState.FAULT
-    assert talk.events(Noted) == [Noted('fault (status word 0044h)')]
+    assert talk.events(Noted) == [Noted('fault (status word 0044h)', warning=True)]
     assert talk.asks(ControlAction.RESET_FAULT, 10.095) == ['505#C00200AA08000000']
     assert talk.hears('485#C00200AA00000000', 10.096) == []
     assert talk.until(10.1101) == [(10.11, READ_0)]
@@ -217,16 +217,92 @@ def test_unsent_word_waits_for_the_mailbox() -> None:
 # -- refusals -------------------------------------------------------------------------------------
 
 
-def test_refused_word_is_shown_and_not_repeated() -> None:
+LOCAL = 'refused by the drive: 08000021h (data cannot be stored because of local control)'
+
+
+def test_refused_enable_fails_with_the_reason_of_the_drive() -> None:
     talk = ready()
     assert talk.asks(ControlAction.ENABLE, 10.075) == [ENABLE_0]
-    assert talk.hears('485#C002004E21000008', 10.076) == []
+    assert talk.hears('485#C002004E21000008', 10.076) == [DISABLE_1], 'it is withdrawn'
+    assert talk.control_outcomes() == [('enable', False, f'control word 0001h {LOCAL}')]
+    assert talk.events(Noted) == [
+        Noted(f'write of control_register_1 0001h {LOCAL}', warning=True)]
     assert talk.session.warning == (
-        'write of control_register_1 0001h refused by the drive: 08000021h (data cannot be '
-        'stored because of local control): look at the device')
-    assert talk.until(10.0901) == [(10.09, READ_1)]
-    talk.hears(ANSWER_1, 10.091)
-    assert talk.until(10.1101) == [(10.11, READ_0)]
+        f'write of control_register_1 0001h {LOCAL}: look at the device')
+    assert talk.hears(DISABLED_1, 10.077) == []
+    assert talk.session.warning == ''
+    assert talk.until(10.0901) == [(10.09, READ_0)]
+    talk.hears(ANSWER_0, 10.091)
+    assert talk.until(10.1101) == [(10.11, READ_1)], 'and that is all'
+
+
+def rounds(talk: Conversation, begin: float, end: float, status: str,
+           ) -> list[tuple[float, str]]:
+    """Answer each round after 1 ms until something else is sent; return that, and when."""
+    now = begin
+    while now < end:
+        for at, text in talk.until(now):
+            if text[10:12] not in ('26', 'A6'):
+                return [(at, text)]
+            sent = talk.hears(f'485#C70100{text[10:12]}{status}', at + 0.001)
+            if sent:
+                return [(at + 0.001, sent[0])]
+        now += 0.005
+    return []
+
+
+def settle(talk: Conversation, reply: str, now: float, status: str) -> None:
+    """Answer a write, and the read that it held up."""
+    for text in talk.hears(reply, now):
+        assert talk.hears(f'485#C70100{text[10:12]}{status}', now + 0.001) == []
+
+
+def test_refused_disable_is_tried_again_until_the_drive_takes_it() -> None:
+    """A motor that runs and does not take its stop: nobody leaves it at that."""
+    talk = running()
+    assert talk.asks(ControlAction.DISABLE, 10.095) == ['505#C002002A00000000']
+    assert talk.hears('485#C002004E22000008', 10.096) == []
+    (action, success, message), = talk.control_outcomes()
+    assert (action, success) == ('disable', False)
+    assert message.startswith('control word 0000h refused by the drive: 08000022h')
+    assert 'control_register_1 0000h refused by the drive: 08000022h' in talk.session.warning
+    (at, text), = rounds(talk, 10.1, 12.0, '81000000')
+    assert text[:10] == '505#C00200' and text[12:] == '00000000'
+    assert 10.34 < at < 10.38
+    refused = '485#C002004E22000008' if text[10:12] == '2A' else '485#C00200CE22000008'
+    settle(talk, refused, at + 0.001, '81000000')
+    (again, text), = rounds(talk, at + 0.002, 12.0, '81000000')
+    assert 0.24 < again - at < 0.3
+    settle(talk, text.replace('505#', '485#'), again + 0.001, '41000000')
+    assert talk.session.warning == ''
+    assert rounds(talk, again + 0.002, again + 1.0, '41000000') == []
+
+
+def test_a_new_request_after_a_refusal_is_tried() -> None:
+    talk = running()
+    talk.asks(ControlAction.DISABLE, 10.095)
+    talk.hears('485#C002004E22000008', 10.096)
+    assert talk.control_outcomes()[0][:2] == ('disable', False)
+    talk.asks(ControlAction.DISABLE, 10.097)
+    (at, text), = rounds(talk, 10.1, 12.0, '81000000')
+    settle(talk, text.replace('505#', '485#'), at + 0.001, '41000000')
+    assert rounds(talk, at + 0.002, at + 0.1, '41000000') == []
+    assert talk.control_outcomes() == [('disable', True, 'ready')]
+
+
+def test_a_drive_that_runs_on_under_disable_is_told_of() -> None:
+    talk = running()
+    assert talk.asks(ControlAction.DISABLE, 10.095) == ['505#C002002A00000000']
+    talk.hears('485#C002002A00000000', 10.096)
+    assert rounds(talk, 10.1, 11.09, '81000000') == []
+    assert talk.session.control is not None
+    assert talk.session.control.disregard == ''
+    rounds(talk, 11.09, 11.3, '81000000')
+    text = ('still enabled (status word 0081h) although its control word is disable (0000h)')
+    assert talk.session.control.disregard == text
+    assert Noted(f'{text}: stop it by other means', warning=True) in talk.events(Noted)
+    rounds(talk, 11.3, 11.4, '41000000')
+    assert talk.session.control.disregard == ''
 
 
 # -- restart and loss -----------------------------------------------------------------------------

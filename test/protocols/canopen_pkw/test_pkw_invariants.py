@@ -159,7 +159,7 @@ class SessionMachine(AnyOrder):
 
     readable = (STATUS, LEVEL, CURRENT, FLC, FLC_2, CLASS, POSITION)
     writable = (FLC, FLC_2, CLASS, POSITION)
-    stop_takes = 0.41
+    stop_takes = 3.01
 
     @initialize(period=st.sampled_from([0.02, 0.3]), nmt_start=st.booleans(),
                 control=st.booleans(), refresh=st.sampled_from([0.0, 0.05]),

@@ -238,7 +238,8 @@ def test_refused_poll_is_an_answer_but_shown() -> None:
         'poll of thermal_level refused by the drive: 06020000h (no such register or object): '
         'correct cyclic_response or the profile')
     assert talk.events() == [
-        Noted('read thermal_level: refused by the drive: 06020000h (no such register or object)'),
+        Noted('read thermal_level: refused by the drive: 06020000h (no such register or object)',
+              warning=True),
         StationFound()]
     # told once; gone when it is answered
     talk.until(10.0701)

@@ -11,7 +11,7 @@ from pkw_builders import (
 )
 import pytest
 
-from drive_can_bridge.core.events import SetpointsExpired, StationLost
+from drive_can_bridge.core.events import Noted, SetpointsExpired, StationLost
 from drive_can_bridge.core.session import DriveState
 from drive_can_bridge.core.setpoints import CommandOutcome
 
@@ -200,15 +200,44 @@ def test_stop_is_acknowledged_and_then_silent() -> None:
 
 
 def test_stop_is_tried_three_times() -> None:
-    """Within 0.4 s all together: the exchange does not wait much longer."""
+    """Each attempt has the time that any request has: a slow device is no silent one."""
     talk = armed(control=CONTROL)
     cycle(talk, 10.07)
     sent = [(10.075, *talk.deactivate(10.075)), *talk.until(20.0)]
     assert [text for _, text in sent] == [
         '505#C002002A00000000', '505#C00200AA00000000', '505#C002002A00000000',
         STILL_1, STILL_0, STILL_1]
-    assert [round(now - 10.075, 3) for now, _ in sent] == [0.0, 0.067, 0.133, 0.2, 0.267, 0.333]
+    assert [round(now - 10.075, 3) for now, _ in sent] == [0.0, 0.5, 1.0, 1.5, 2.0, 2.5]
     assert talk.session.stopped
+    assert talk.events(Noted) == [Noted(
+        'told to stop, but control_register_1 0000h not acknowledged in 3 attempts; speed not '
+        'acknowledged in 3 attempts: it may still be running', warning=True)]
+
+
+def test_stop_of_many_setpoints_has_its_limit() -> None:
+    """3 s all together."""
+    talk = armed(request=(SPEED, TORQUE), control=CONTROL)
+    cycle(talk, 10.07)
+    talk.deactivate(10.075)
+    assert talk.session.longest_stop == 3.0
+    talk.until(13.07)
+    assert not talk.session.stopped
+    talk.until(13.08)
+    assert talk.session.stopped
+    assert talk.session.longest_stop == 0.0
+
+
+def test_slow_device_acknowledges_each_stop_once() -> None:
+    """It takes 0.3 s for each answer."""
+    talk = armed(control=CONTROL)
+    cycle(talk, 10.07)
+    assert talk.deactivate(10.075) == ['505#C002002A00000000']
+    assert talk.until(10.374) == []
+    assert talk.hears('485#C002002A00000000', 10.375) == [STILL_1]
+    assert talk.until(10.674) == []
+    assert talk.hears('485#C60200AA00000000', 10.675) == []
+    assert talk.session.stopped
+    assert talk.events(Noted) == []
 
 
 def test_stop_does_not_wait_for_a_request_under_way() -> None:
@@ -223,6 +252,10 @@ def test_refused_stop_is_an_answer() -> None:
     assert talk.deactivate(10.061) == [STILL_1]
     assert talk.hears('485#C60200CE22000008', 10.062) == []
     assert talk.session.stopped
+    note, = talk.events(Noted)
+    assert note.warning
+    assert note.text.startswith('told to stop, but speed refused by the drive: 08000022h')
+    assert note.text.endswith('it may still be running')
 
 
 def test_nothing_to_stop() -> None:

@@ -182,6 +182,67 @@ def test_enable_is_written_on_change() -> None:
     assert talk.control_outcomes() == [('quick_stop', True, 'ready')]
 
 
+def cycles(talk: Conversation, first: int, last: int, answer: str) -> list[tuple[int, str]]:
+    """
+    Let cycles pass, each answered after 2 ms; return what was written.
+
+    :param first: number of the first cycle, one of 20 ms each since 10 s; the last counts, too.
+    :return: the cycle after whose answer it was, and the frame.
+    """
+    return [(number, text) for number in range(first, last + 1)
+            for text in at_once(talk, 10.0 + 0.02 * number, answer)[1:]]
+
+
+def test_word_that_got_lost_is_written_again() -> None:
+    """Nothing acknowledges a write; the status tells that the drive took no notice."""
+    talk = beside()
+    exchange(talk, 10.02, READY)
+    assert talk.asks(ControlAction.ENABLE, 10.025) == [ENABLE]     # lost
+    # after 0.2 s, and then after 0.4 s
+    assert cycles(talk, 2, 40, READY) == [(12, ENABLE), (32, ENABLE)]
+    assert cycles(talk, 41, 60, ENABLED) == []
+    assert talk.control_outcomes() == [('enable', True, 'enabled')]
+    assert talk.asks(ControlAction.DISABLE, 11.205) == [DISABLE]   # lost
+    assert cycles(talk, 61, 72, ENABLED) == [(71, DISABLE)]
+    assert cycles(talk, 73, 90, READY) == []
+    assert talk.control_outcomes() == [('disable', True, 'ready')]
+
+
+def test_disable_that_gets_lost_when_a_drive_comes_back_is_written_again() -> None:
+    talk = beside()
+    exchange(talk, 10.02, READY)
+    talk.asks(ControlAction.ENABLE, 10.025)
+    cycles(talk, 2, 3, ENABLED)
+    talk.until(10.16 + TICK)       # silence
+    assert talk.session.state is DriveState.OFFLINE
+    talk.events()
+    assert talk.hears(ENABLED, 10.162) == [DISABLE]                # lost
+    written = cycles(talk, 9, 200, ENABLED)
+    assert {text for _, text in written} == {DISABLE}
+    # 0.2, 0.4, 0.8, 1.6 s: less and less often
+    assert [number for number, _ in written] == [18, 38, 78, 158]
+    assert talk.session.control is not None
+    assert talk.session.control.disregard == (
+        'still enabled (status word 0003h) although its control word is disable (0000h)')
+    assert [note.text for note in talk.events(Noted)] == [
+        'still enabled (status word 0003h) although its control word is disable (0000h): stop it '
+        'by other means']
+    assert cycles(talk, 201, 400, READY) == []
+    assert talk.session.control.disregard == ''
+
+
+def test_word_in_an_eeprom_is_written_again_three_times_only() -> None:
+    kept = parameter('control_word', 52)     # nobody said that it is RAM
+    table = (*(entry for entry in TABLE if entry is not WORD), kept)
+    talk = beside(table=table)
+    exchange(talk, 10.02, READY)
+    talk.asks(ControlAction.ENABLE, 10.025)
+    cycles(talk, 2, 3, ENABLED)
+    assert talk.control_outcomes() == [('enable', True, 'enabled')]
+    assert talk.asks(ControlAction.DISABLE, 10.065) == [DISABLE]
+    assert len(cycles(talk, 4, 600, ENABLED)) == 3
+
+
 def test_written_word_waits_for_the_cyclic_response() -> None:
     talk = beside()
     exchange(talk, 10.02)

@@ -537,6 +537,22 @@ def test_enable_with_the_word_by_hand() -> None:
     assert talk.control_outcomes() == [('enable', True, 'enabled')]
 
 
+def test_a_word_by_hand_that_got_lost_is_written_again() -> None:
+    talk = polling(request=(SPEED,), control=CONTROL, refresh_interval=60.0)
+    talk.hears(READY, 10.002)
+    talk.until(10.01)
+    talk.asks(ControlAction.ENABLE, 10.01)
+    written = []
+    for number in range(1, 45):
+        begin = 10.0 + 0.02 * number
+        round_of(talk, begin, READY)
+        written += [number for _, text in talk.until(begin + 0.01) if text == ENABLE_WORD]
+    # lost; then after 0.2 s and 0.4 s
+    assert len(written) == 3
+    assert 10 <= written[1] - written[0] <= 11
+    assert 20 <= written[2] - written[1] <= 21
+
+
 def test_the_stop_disables() -> None:
     talk = controlled()
     talk.asks(ControlAction.ENABLE, 10.01)
