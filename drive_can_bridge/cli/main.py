@@ -12,6 +12,7 @@ import argparse
 from collections.abc import Sequence
 import importlib
 import os
+import signal
 import sys
 from typing import Any
 
@@ -29,6 +30,8 @@ SUBCOMMANDS: dict[str, tuple[str, str]] = {
     'demo': ('drive_can_bridge.cli.demo',
              'run a bridge and simulated drives in one process'),
 }
+#: what runs until a signal comes: that is no failure
+ENDLESS = ('simulate', 'demo')
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -39,6 +42,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     :return: exit code.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
+    endless = _wanted(arguments) in ENDLESS
+    if argv is None and endless:  # until the subcommand looks after signals itself
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         code = _run(arguments)
         sys.stdout.flush()
@@ -48,7 +54,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except KeyboardInterrupt:
-        return _fail('interrupted')
+        return 0 if endless else _fail('interrupted')
     except DriveCanError as error:
         print(error, file=sys.stderr)
         return 1
@@ -61,8 +67,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _fail(f'internal error, please report it: {type(error).__name__}: {error}')
 
 
+def _wanted(arguments: list[str]) -> str | None:
+    return next((word for word in arguments if not word.startswith('-')), None)
+
+
 def _run(arguments: list[str]) -> int:
-    wanted = next((word for word in arguments if not word.startswith('-')), None)
+    wanted = _wanted(arguments)
     parser = argparse.ArgumentParser(
         prog=PROGRAM, description='Tools of drive_can_bridge, the bridge from motor drives on '
                                   'CAN buses to ROS 2.')

@@ -11,13 +11,14 @@ everything heavy is imported inside functions here.
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+import gc
 import os
 import sys
 import tempfile
 from typing import TYPE_CHECKING
 
 from drive_can_bridge.process.scheduling import be_punctual
-from drive_can_bridge.process.signals import SignalWatcher
+from drive_can_bridge.process.signals import leave, SignalWatcher
 
 if TYPE_CHECKING:
     from drive_can_bridge.ros.bridge_node import BridgeNode
@@ -33,7 +34,10 @@ def main(args: Sequence[str] | None = None) -> int:
     be_punctual()
     # in a process of our own, signals are looked after to the very end
     with SignalWatcher(keep=args is None) as watcher:
-        return watcher.exit_code(_main(watcher, arguments))
+        code = watcher.exit_code(_main(watcher, arguments))
+        if args is None:
+            leave(code)
+        return code
 
 
 def _main(watcher: SignalWatcher, arguments: list[str]) -> int:
@@ -67,6 +71,9 @@ def _main(watcher: SignalWatcher, arguments: list[str]) -> int:
         return 0
     finally:
         rclpy.try_shutdown()
+        # what is left of the nodes holds shared memory of the middleware
+        rclpy.get_default_context().destroy()
+        gc.collect()
 
 
 def _run(watcher: SignalWatcher, arguments: Sequence[str]) -> int:

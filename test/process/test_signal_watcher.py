@@ -1,6 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """What counts as a second signal."""
 
+import os
 import signal
 import subprocess
 import sys
@@ -34,7 +35,7 @@ def run(*numbers: int, line: str = 'ready') -> int:
         return process.wait(timeout=20)
 
 
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_one_signal(number: int) -> None:
     assert run(number) == 0
 
@@ -58,3 +59,33 @@ def test_a_second_signal_later_ends_at_once() -> None:
             process.wait(timeout=0.2)
         process.send_signal(signal.SIGTERM)
         assert process.wait(timeout=20) == 128 + signal.SIGTERM
+
+
+def test_whoever_ignores_the_end_of_its_terminal_goes_on() -> None:
+    with subprocess.Popen(['nohup', sys.executable, '-c', PROGRAM], stdout=subprocess.PIPE,
+                          stderr=subprocess.DEVNULL, text=True) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == 'ready\n'
+        process.send_signal(signal.SIGHUP)
+        with pytest.raises(subprocess.TimeoutExpired):
+            process.wait(timeout=0.3)
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(timeout=20) == 0
+
+
+#: ends without what Python does on its way out
+LEAVING = """
+import atexit
+from drive_can_bridge.process.signals import leave, SignalWatcher
+atexit.register(print, "this is never said")
+with SignalWatcher(keep=True) as watcher:
+    print('done', flush=True)
+    print('flushed', end='')
+    leave(watcher.exit_code(3))
+"""
+
+
+def test_leaving_is_immediate_and_loses_no_output() -> None:
+    done = subprocess.run([sys.executable, '-c', LEAVING], capture_output=True, text=True,
+                          check=False, timeout=20, env={**os.environ, 'PYTHONUNBUFFERED': ''})
+    assert (done.returncode, done.stdout, done.stderr) == (3, 'done\nflushed', '')

@@ -1,5 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""SIGINT, SIGTERM, SIGSTOP and SIGKILL of the bridge, whatever it is doing."""
+"""SIGINT, SIGTERM, SIGHUP, SIGSTOP and SIGKILL of the bridge, whatever it is doing."""
 
 from collections.abc import Iterator
 import os
@@ -24,7 +24,8 @@ def looks_after_signals(process: Process) -> bool:
     return bool(int(caught.split()[1], 16) & 1 << signal.SIGTERM - 1)
 
 
-@BOTH
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP],
+                         ids=['SIGINT', 'SIGTERM', 'SIGHUP'])
 def test_while_active(processes: Processes, client: Client, namespace: str, tmp_path: Path,
                       number: int) -> None:
     file = bridge_file(tmp_path)
