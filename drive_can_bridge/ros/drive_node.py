@@ -171,7 +171,6 @@ class DriveNode:
         elif isinstance(event, StationFound):
             self._online.publish(Bool(data=True))
             self._throttle.reset()
-            self.rejected_text = ''
             self._logger.info(f'{self.name}: online')
         elif isinstance(event, StationLost):
             self._online.publish(Bool(data=False))

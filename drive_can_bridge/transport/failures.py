@@ -34,12 +34,19 @@ def is_misconfiguration(error: BaseException) -> bool:
     cause: BaseException | None = error
     while cause is not None:
         if isinstance(cause, OSError):
-            return False
+            return _is_missing_library(cause)
         if isinstance(cause, (NotImplementedError, ImportError, NameError, ValueError,
                               TypeError)):
             return True
         cause = cause.__cause__
     return False
+
+
+def _is_missing_library(error: OSError) -> bool:
+    """Tell whether a vendor's library is not installed: told in words, not by the kernel."""
+    text = str(error).lower()
+    return error.errno is None and any(words in text for words in (
+        'library not found', 'cannot open shared object file', 'could not find module'))
 
 
 def is_full_queue(error: BaseException) -> bool:

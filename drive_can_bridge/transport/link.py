@@ -226,7 +226,7 @@ class Link:
         receive = port.receive
         listener = self._listener.frame_received
         closing = self._closing
-        malformed = 0
+        rejected = 0
         while not closing.is_set():
             frame = receive(RECEIVE_TIMEOUT)
             if self._loss is not None:
@@ -237,9 +237,9 @@ class Link:
                 self._heard = True
                 self.frames_received += 1
                 listener(frame, port.age)
-            elif port.malformed_frames != malformed:
-                self._listener.frames_rejected += port.malformed_frames - malformed
-                malformed = port.malformed_frames
+            elif port.rejected_frames != rejected:
+                self._listener.frames_rejected += port.rejected_frames - rejected
+                rejected = port.rejected_frames
 
     def _sit_out(self, port: Port, reason: str) -> None:
         """

@@ -54,8 +54,9 @@ class Port:
     :ivar error_frames: error frames seen.
     :ivar last_error: the last of them that asks for something to be done; None: there was none.
     :ivar controller: state of the controller as far as it tells, '' while all is well.
-    :ivar malformed_frames: what arrived and is no data frame: a serial adapter's line with bytes
-        lost; remote and CAN FD frames, for which no protocol here has a use.
+    :ivar rejected_frames: what arrived and is of no use: of other identifiers (where the adapter
+        does not keep them away); remote and CAN FD frames, which no protocol here has; a serial
+        adapter's line with bytes lost.
     """
 
     def __init__(self, bus: can.BusABC, *, kernel_errors: bool = False) -> None:
@@ -73,7 +74,7 @@ class Port:
         self._malformed_in_row = 0
         self.age = 0.0
         self.error_frames = 0
-        self.malformed_frames = 0
+        self.rejected_frames = 0
         self.last_error: BusError | None = None
         self.controller = ERROR_ACTIVE
         self.bus_off_count = 0
@@ -101,9 +102,10 @@ class Port:
             self._error_frame(message)
             return None
         if not (filtered or self._matches(message)):
+            self.rejected_frames += 1
             return None
         if message.is_remote_frame or message.is_fd:
-            self.malformed_frames += 1
+            self.rejected_frames += 1
             return None
         data = bytes(message.data)
         highest = EXTENDED_IDENTIFIER_MAX if message.is_extended_id else STANDARD_IDENTIFIER_MAX
@@ -184,7 +186,7 @@ class Port:
                 pass
 
     def _malformed(self) -> None:
-        self.malformed_frames += 1
+        self.rejected_frames += 1
         self._malformed_in_row += 1
         if self._malformed_in_row >= _MALFORMED_MAX:
             self._lost = True

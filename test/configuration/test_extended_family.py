@@ -55,7 +55,7 @@ def test_load(drive: DriveConfiguration, period: float, mapping: str, bits: floa
 
 
 @pytest.mark.parametrize(('name', 'number'), [
-    ('p0', 0), ('p30', 30), ('p030', 30), ('p65535', 65535)])
+    ('p0', 0), ('p30', 30), ('p030', 30), ('p65534', 65534)])
 def test_raw_names(drive: DriveConfiguration, name: str, number: int) -> None:
     parameter = FAMILY.raw_parameter(drive, name)
     assert parameter is not None
@@ -79,8 +79,9 @@ def test_raw_names_with_an_offset(drive: DriveConfiguration) -> None:
     assert parameter is not None
     assert parameter.number == 1
     moved = with_options(drive, parameter_offset=1)
-    assert FAMILY.raw_parameter(moved, 'p65535') is None
-    assert FAMILY.raw_parameter(moved, 'p65534') is not None
+    # on the wire it would be the number that marks cyclic telegrams
+    assert FAMILY.raw_parameter(moved, 'p65534') is None
+    assert FAMILY.raw_parameter(moved, 'p65533') is not None
 
 
 def test_nothing_to_complain_about(drive: DriveConfiguration) -> None:

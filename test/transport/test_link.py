@@ -42,7 +42,7 @@ class FakePort:
         self.closed = False
         self.age = 0.0
         self.error_frames = self.bus_off_count = self.overflowed_frames = 0
-        self.malformed_frames = 0
+        self.rejected_frames = 0
         self.last_error: BusError | None = None
         self.controller = ''
 
@@ -347,10 +347,10 @@ def test_figures_outlive_a_port(make: Callable[..., Bench]) -> None:
     assert bench.link.last_bus_error == BusError('bus-off', 'bus-off', 'check the cable')
 
 
-def test_malformed_frames_count_as_rejected(make: Callable[..., Bench]) -> None:
+def test_rejected_frames_count_as_rejected(make: Callable[..., Bench]) -> None:
     bench = make()
     bench.opened()
-    bench.port.malformed_frames = 3
+    bench.port.rejected_frames = 3
     wait_for(lambda: bench.listener.frames_rejected == 3)
 
 

@@ -77,6 +77,7 @@ def test_filters_of_adapters_that_have_none(bus: FakeBus) -> None:
     assert port.receive(0.0) is None
     assert port.error_frames == 1
     assert port.receive(0.0) == Frame(0x123, b'', False)
+    assert port.rejected_frames == 1
 
 
 @pytest.mark.parametrize('step', [-3600.0, 3600.0], ids=['back', 'forward'])
@@ -293,5 +294,5 @@ def test_what_is_no_data_frame_is_counted(bus: FakeBus) -> None:
     bus.coming += [can.Message(arbitration_id=0x003FFFF0, is_remote_frame=True, dlc=8),
                    can.Message(arbitration_id=0x003FFFF0, is_fd=True, data=bytes(8))]
     assert [port.receive(0.0), port.receive(0.0)] == [None, None]
-    assert port.malformed_frames == 2
+    assert port.rejected_frames == 2
     assert port.error_frames == 0

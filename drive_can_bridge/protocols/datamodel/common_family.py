@@ -76,13 +76,17 @@ class DataModelFamily(Family):
         yield from self._check_profile(drive)
 
     def raw_parameter(self, drive: DriveConfiguration, name: str) -> Parameter | None:
-        """Resolve ``p<number>``: an unsigned 16-bit parameter of unknown storage."""
+        """
+        Resolve ``p<number>``: an unsigned 16-bit parameter of unknown storage.
+
+        Nobody has a parameter 65535: that number marks cyclic telegrams.
+        """
         match = _RAW_NAME.fullmatch(name)
         if match is None:
             return None
         number = int(match.group(1))
         wire = number + drive.family_options['parameter_offset']
-        if number > NUMBER_MAX or not 0 <= wire <= NUMBER_MAX:
+        if number > NUMBER_MAX or not 0 <= wire < CYCLIC_PARAMETER:
             return None
         return Parameter(name=name, number=number, listed=False)
 

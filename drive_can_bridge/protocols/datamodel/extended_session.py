@@ -21,7 +21,8 @@ import math
 from drive_can_bridge.configuration.model import DriveConfiguration
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.events import (
-    Event, ForeignMasterSeen, MappingDiffered, ProcessDataReceived, SetpointsExpired, StationFound,
+    Event, ForeignMasterSeen, MappingDiffered, Noted, ProcessDataReceived, SetpointsExpired,
+    StationFound,
 )
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.requests import BRIDGE_INACTIVE
@@ -33,6 +34,8 @@ from drive_can_bridge.protocols.datamodel.process_words import (
     unpack_unusual, wire_numbers, words_struct,
 )
 
+#: so many looks at the maps in a row may go unanswered until that is told
+SILENT_LOOKS = 3
 #: direction and station of an identifier
 FROM_WHOM = extended.DIR | extended.STATION_MASK
 
@@ -74,6 +77,7 @@ class ExtendedSession(DataModelSession):
             emit=self._maps_reported, judged=self._maps_judged)
         self._phase = Phase.IDLE
         self._cycles_left = -1  # cycles still to be sent in LEAVING or before a stop; -1: no end
+        self._silent_looks = 0
         self._stopping = False
         self._frame: Frame | None = None
         self._sent_word: int | None = None
@@ -141,6 +145,7 @@ class ExtendedSession(DataModelSession):
     # -- maps -------------------------------------------------------------------------------------
 
     def _maps_judged(self, verdict: Verdict, text: str, now: float) -> None:
+        self._silent_looks = self._silent_looks + 1 if verdict is Verdict.SILENT else 0
         if verdict is Verdict.AGREE:
             if self._phase is not Phase.CYCLIC:
                 self._start_cycling(now)
@@ -151,7 +156,10 @@ class ExtendedSession(DataModelSession):
             self._stop_awaiting()
         elif self._phase is Phase.LEAVING:
             self._maps.look_at = math.inf  # that comes after the last neutral cycle
-        elif self._phase is not Phase.CYCLIC:  # there, the cyclic answers tell who is there
+        elif self._phase is Phase.CYCLIC:  # there, the cyclic answers tell who is there
+            if self._silent_looks == SILENT_LOOKS:
+                self._events.append(Noted(self._maps_unknown, warning=True))
+        else:
             self._phase = Phase.CHECKING
             self._advice = ('no answer to mapping read: drive silent, wrong station, bit rate '
                             'or identifier mode')
@@ -346,6 +354,17 @@ class ExtendedSession(DataModelSession):
         if self._by_hand is not None and not self._stopping and (
                 self.online or self._phase is Phase.CYCLIC):
             self._by_hand.update(now)
+
+    @property
+    def warning(self) -> str:
+        if self._phase is Phase.CYCLIC and self._silent_looks >= SILENT_LOOKS:
+            return self._maps_unknown
+        return ''
+
+    @property
+    def _maps_unknown(self) -> str:
+        return (f'no answer to {self._silent_looks} mapping reads in a row, although cyclic '
+                f'requests are answered: nobody knows whether the maps are still right')
 
     @property
     def state(self) -> DriveState:

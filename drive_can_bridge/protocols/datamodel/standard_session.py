@@ -25,7 +25,7 @@ from drive_can_bridge.protocols.datamodel import standard
 from drive_can_bridge.protocols.datamodel.base_session import DataModelSession
 from drive_can_bridge.protocols.datamodel.channel import Polling, Procedure, Read, Write
 from drive_can_bridge.protocols.datamodel.standard_round import places, reads
-from drive_can_bridge.protocols.polling import Beat, Round, WriteSchedule
+from drive_can_bridge.protocols.polling import Beat, Chunk, Round, WriteSchedule
 
 SILENT = 'no answer to reads: drive silent, wrong station, bit rate or identifier mode'
 
@@ -71,6 +71,7 @@ class StandardSession(DataModelSession):
         self._received_at = -math.inf
         self._expected = False  # the answer of a read that nobody wants any more may come
         self._missed_in_row = 0
+        self._silence = SILENT  # what the last incomplete round says
 
     # -- life cycle -------------------------------------------------------------------------------
 
@@ -100,7 +101,7 @@ class StandardSession(DataModelSession):
     def _begin(self, now: float) -> None:
         """Start over: nothing is known of the drive."""
         self._lose('the drive is being reconnected', now)
-        self._advice = SILENT
+        self._advice = self._silence = SILENT
         self._phase = Phase.POLLING
         self._missed_in_row = 0
         self._beat.start(now)
@@ -226,6 +227,9 @@ class StandardSession(DataModelSession):
         for chunk in self._reads:
             words = yield Read(chunk.address, chunk.size, attempts=1)
             if words is None:
+                self._silence = (SILENT if chunk is self._reads[0] else
+                                 f'no answer to the read of {self._names(chunk)}, though others '
+                                 f'are answered: does this drive have it')
                 return None
             if chunk is self._status_read:
                 self._status_asked_at = self._channel.asked_at
@@ -233,6 +237,13 @@ class StandardSession(DataModelSession):
         return tuple(
             parameter.raw_from_word(word)
             for parameter, (word,) in zip(self.drive.cyclic_response, result.words()))
+
+    def _names(self, chunk: Chunk) -> str:
+        """Name what a read is for."""
+        numbers = range(chunk.address, chunk.address + chunk.size)
+        return ', '.join(f'{parameter.name} ({parameter.address})'
+                         for parameter, place in zip(self.drive.cyclic_response, self._places)
+                         if place.address in numbers)
 
     def _round_done(self, raws: tuple[int, ...] | None) -> None:
         now = self._channel.now
@@ -273,9 +284,10 @@ class StandardSession(DataModelSession):
         self.statistics.missed += 1
         self._missed_in_row += 1
         if self.online and self._missed_in_row >= self.drive.missed_limit:
-            self._lose(f'no complete round of reads for {self.drive.missed_limit} periods', now)
+            reason = f'no complete round of reads for {self.drive.missed_limit} periods'
+            self._lose(reason if self._silence == SILENT else f'{reason}: {self._silence}', now)
         elif not self.online:
-            self._advice = SILENT
+            self._advice = self._silence
 
     # -- frames from the drive --------------------------------------------------------------------
 

@@ -11,7 +11,7 @@ from extended_builders import (
 import pytest
 
 from drive_can_bridge.core.events import (
-    FrameRejected, MappingDiffered, MappingWritten, ProcessDataReceived, StationFound,
+    FrameRejected, MappingDiffered, MappingWritten, Noted, ProcessDataReceived, StationFound,
     StationLost,
 )
 from drive_can_bridge.core.session import DriveState
@@ -47,6 +47,32 @@ def test_maps_agree() -> None:
     assert talk.session.ever_online
     assert talk.session.offline_advice == ''
     assert talk.session.state is DriveState.NOT_ARMED
+
+
+def test_looks_that_nobody_answers_are_told_while_cycling() -> None:
+    talk = online()
+    number = looks = 0
+
+    def cycle() -> list[str]:
+        nonlocal number
+        number += 1
+        sent = [text for _, text in talk.until(10.0 + 0.02 * number + TICK)]
+        return [text for text in sent + talk.hears(ANSWER, 10.002 + 0.02 * number)
+                if text != NEUTRAL]
+
+    while not talk.session.warning and number < 1000:
+        looks += cycle().count(ASK_REQUEST_MAP)
+    assert looks == 3
+    text = ('no answer to 3 mapping reads in a row, although cyclic requests are answered: nobody '
+            'knows whether the maps are still right')
+    assert talk.session.warning == text
+    assert talk.events(Noted) == [Noted(text, warning=True)]
+    assert talk.session.online, 'it drives on: it answers'
+    while cycle() != [ASK_REQUEST_MAP]:
+        assert number < 1000
+    checked(talk, 10.002 + 0.02 * number)
+    assert talk.session.warning == ''
+    assert talk.events(Noted) == []
 
 
 def test_bus_comes_after_activation() -> None:

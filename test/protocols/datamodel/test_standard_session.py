@@ -475,6 +475,20 @@ def test_a_process_that_stood_still_sends_nothing_stale() -> None:
     assert sent.count(SPEED_ZERO) == 3
 
 
+def test_a_parameter_that_nobody_has_is_named() -> None:
+    """The others are answered: that is no wrong station, and no wrong bit rate."""
+    far = parameter('heat', 300, access=RO)
+    talk = polling(response=(ACTUAL, CURRENT, STATUS, far), table=(*TABLE, far))
+    for number in range(8):
+        sent = talk.hears(ANSWER, 10.002 + 0.25 * number)
+        sent += [text for _, text in talk.until(10.24 + 0.25 * number)]
+        assert '3F1#032C010100000000' in sent
+    assert talk.session.state is DriveState.OFFLINE
+    assert talk.session.offline_advice == (
+        'no answer to the read of heat (P300), though others are answered: does this drive have '
+        'it')
+
+
 # -- control --------------------------------------------------------------------------------------
 
 READY, ENABLED, FAULT = ('7F1#E803FA0001000000', '7F1#E803FA0003000000', '7F1#E803FA0009000000')

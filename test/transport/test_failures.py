@@ -1,0 +1,37 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Which failures of an adapter are worth another attempt."""
+
+import errno
+
+import can
+import pytest
+
+from drive_can_bridge.transport.failures import is_misconfiguration
+
+
+def wrapped(cause: Exception) -> Exception:
+    """Return an error as python-can wraps it."""
+    error = can.CanInitializationError('could not open')
+    error.__cause__ = cause
+    return error
+
+
+@pytest.mark.parametrize('error', [
+    ImportError('no module'), NameError('uptime'), NotImplementedError(), ValueError('bitrate'),
+    # PCAN-Basic, Kvaser's canlib and their like, where they are not installed
+    OSError('pcanbasic library not found.'),
+    OSError('libcanlib.so: cannot open shared object file: No such file or directory'),
+], ids=str)
+def test_what_will_never_work(error: Exception) -> None:
+    assert is_misconfiguration(error)
+    assert is_misconfiguration(wrapped(error))
+
+
+@pytest.mark.parametrize('error', [
+    OSError(errno.ENODEV, 'No such device'), FileNotFoundError(errno.ENOENT, 'no such file'),
+    PermissionError(errno.EACCES, 'denied'), OSError('the device is busy'),
+    can.CanInitializationError('channel taken'),
+], ids=str)
+def test_what_may_work_later(error: Exception) -> None:
+    assert not is_misconfiguration(error)
+    assert not is_misconfiguration(wrapped(error))
