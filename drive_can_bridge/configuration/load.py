@@ -16,7 +16,7 @@ from drive_can_bridge.configuration.model import BridgeConfiguration, DriveConfi
 from drive_can_bridge.configuration.overrides import tree_from_overrides
 from drive_can_bridge.configuration.parameter_file import read_parameter_file
 from drive_can_bridge.configuration.problems import (
-    hint, Path, Problem, report, show, suggestion, Tree,
+    describe_type, hint, Path, Problem, report, show, suggestion, Tree,
 )
 from drive_can_bridge.configuration.profiles import ProfileStore
 from drive_can_bridge.configuration.schema import defaults, definition, parameter_file_schema
@@ -63,6 +63,7 @@ def configuration_from_overrides(overrides: Mapping[str, object], *,
 
 def _configuration(tree: Tree, problems: list[Problem], adapters: Adapters | None,
                    ) -> BridgeConfiguration:
+    problems = [*problems, *_standard_switches(tree)]
     for key in [key for key in tree.data if key.split('.')[0] in STANDARD_PARAMETERS]:
         del tree.data[key]
     bus_names, drive_count = _names(tree, 'buses'), len(_names(tree, 'drives'))
@@ -117,6 +118,14 @@ def _configuration(tree: Tree, problems: list[Problem], adapters: Adapters | Non
         diagnostics_period=float(values['diagnostics_period']),
         buses=buses, drives=drives, profile_directories=directories,
         warnings=tuple(report(warnings)))
+
+
+def _standard_switches(tree: Tree) -> list[Problem]:
+    """Look at what rclpy accepts as a bool only."""
+    return [tree.problem((key,), f'{show(tree.data[key])} is {describe_type(tree.data[key])}, '
+                                 f'allowed is true or false')
+            for key in ('use_sim_time', 'start_type_description_service')
+            if key in tree.data and not isinstance(tree.data[key], bool)]
 
 
 def _names(tree: Tree, key: str) -> list[str]:

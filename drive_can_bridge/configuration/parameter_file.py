@@ -124,6 +124,11 @@ class FileReader:
             self.problems.extend(reader.problems)
 
 
+def _sections_with(reader: FileReader, key: str) -> list[Section]:
+    return [section for section in reader.sections
+            if any(str(place[0]).split('.')[0] == key for place in section.tree.lines if place)]
+
+
 def read_parameter_file(path: FilePath) -> tuple[Tree | None, list[Problem]]:
     """
     Read the bridge's section of a parameter file.
@@ -137,8 +142,8 @@ def read_parameter_file(path: FilePath) -> tuple[Tree | None, list[Problem]]:
     problems = reader.problems
     if reader.broken:
         return None, problems
-    ours = [section for section in reader.sections
-            if any(str(place[0]).split('.')[0] == MARK for place in section.tree.lines if place)]
+    # one with drives, but without buses, is meant for us, too: what is wrong with it can be told
+    ours = _sections_with(reader, MARK) or _sections_with(reader, 'drives')
     for section in ours:
         problems.extend(section.garbled)
     if len(ours) == 1:

@@ -302,13 +302,16 @@ class ProfileControl(ControlMachine):
     def request(self, action: ControlAction, now: float) -> ControlTicket:
         self.handle_timer(now)
         ticket = ControlTicket(action)
+        if action not in self._words and self._nothing_to_do(action):
+            self._complete(ticket, True, self.state)
+            return ticket
         refusal = self._refusal(action)
         if refusal is not None:
             self._complete(ticket, False, refusal)
             return ticket
         under_way = self._operation
         if under_way is None or under_way.action is not action:
-            if action is ControlAction.RESET_FAULT and self._fault is False and (
+            if action is ControlAction.RESET_FAULT and self._nothing_to_do(action) and (
                     under_way is None or under_way.action in _STOPS):
                 self._complete(ticket, True, self.state)
                 return ticket
@@ -364,6 +367,12 @@ class ProfileControl(ControlMachine):
             self._fault = None
 
     # -- rules ------------------------------------------------------------------------------------
+
+    def _nothing_to_do(self, action: ControlAction) -> bool:
+        """Tell whether the drive is known to be where an action would bring it."""
+        if action is ControlAction.QUICK_STOP:
+            return not self._may_run
+        return action is ControlAction.RESET_FAULT and self._fault is False
 
     def _refusal(self, action: ControlAction) -> str | None:
         """Return why a request cannot be taken, in words."""

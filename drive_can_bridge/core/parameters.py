@@ -196,7 +196,7 @@ class Parameter:
         self.check_limits(value)
         if not self.scaled:
             if isinstance(value, float) and not value.is_integer():
-                raise ValueRefused(f'{value:g} is not an integer')
+                raise ValueRefused(f'{value:.12g} is not an integer')
             raw = int(value)
         else:
             steps = (value - self.offset) / self.scale
@@ -206,8 +206,8 @@ class Parameter:
         if not low <= raw <= high:
             ends = sorted((low * self.scale + self.offset, high * self.scale + self.offset))
             raise ValueRefused(
-                f'{value:g} is not representable: {self.type.value} carries '
-                f'{ends[0]:g} to {ends[1]:g}{self._unit_suffix}')
+                f'{value:.12g} is not representable: {self.type.value} carries '
+                f'{ends[0]:.12g} to {ends[1]:.12g}{self._unit_suffix}')
         return raw
 
     def check_limits(self, value: float) -> None:
@@ -220,7 +220,7 @@ class Parameter:
         below = self.minimum is not None and value < self.minimum - slack
         above = self.maximum is not None and value > self.maximum + slack
         if below or above:
-            raise ValueRefused(f'{value:g} is out of range: {self.range_text}')
+            raise ValueRefused(f'{value:.12g} is out of range: {self.range_text}')
 
     @property
     def range_text(self) -> str:
@@ -228,12 +228,12 @@ class Parameter:
         if self.minimum is None and self.maximum is None:
             low, high = self.type.raw_range
             ends = sorted((low * self.scale + self.offset, high * self.scale + self.offset))
-            return f'{ends[0]:g} to {ends[1]:g}{self._unit_suffix}'
+            return f'{ends[0]:.12g} to {ends[1]:.12g}{self._unit_suffix}'
         if self.minimum is None:
-            return f'at most {self.maximum:g}{self._unit_suffix}'
+            return f'at most {self.maximum:.12g}{self._unit_suffix}'
         if self.maximum is None:
-            return f'at least {self.minimum:g}{self._unit_suffix}'
-        return f'{self.minimum:g} to {self.maximum:g}{self._unit_suffix}'
+            return f'at least {self.minimum:.12g}{self._unit_suffix}'
+        return f'{self.minimum:.12g} to {self.maximum:.12g}{self._unit_suffix}'
 
     @property
     def _unit_suffix(self) -> str:

@@ -204,7 +204,8 @@ class BridgeNode(LifecycleNode):
         for exchange in self.exchanges.values():
             exchange.activate()
         self.get_logger().info(
-            f'active: {len(self.drives)} drives on {len(self.exchanges)} buses')
+            f'active: {_count(len(self.drives), "drive", "drives")} on '
+            f'{_count(len(self.exchanges), "bus", "buses")}')
 
     def _stop_drives(self) -> None:
         # every bus at the same time: the slowest one decides, not the sum
@@ -319,3 +320,7 @@ class BridgeNode(LifecycleNode):
         else:
             self.get_logger().fatal(text)
             self._fatal(text)
+
+
+def _count(number: int, one: str, many: str) -> str:
+    return f'{number} {one if number == 1 else many}'

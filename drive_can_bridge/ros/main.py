@@ -121,9 +121,18 @@ def _nothing_configured(bridge: 'BridgeNode', arguments: Sequence[str]) -> str:
                 content = yaml.safe_load(file)
         except (OSError, yaml.YAMLError):
             continue
-        names = ', '.join(map(str, content)) if isinstance(content, dict) else 'no node'
-        text += f'; {path} is for {names}'
+        text += f'; {path} is for {", ".join(_node_names(content)) or "no node"}'
     return text
+
+
+def _node_names(content: object, above: str = '') -> list[str]:
+    """Return the names of the nodes that a parameter file has sections for."""
+    if not isinstance(content, dict):
+        return []
+    if above and 'ros__parameters' in content:
+        return [above]
+    return [name for key, below in content.items()
+            for name in _node_names(below, f'{above}/{key}' if above else str(key))]
 
 
 def _parameter_files(arguments: Sequence[str]) -> list[str]:

@@ -55,7 +55,7 @@ def value_of(message: ParameterValue) -> object:
 
 def value_text(value: Value) -> str:
     """Write a value as one would publish it: ``0``, ``12.5``, ``false``."""
-    return str(value).lower() if isinstance(value, bool) else f'{value:g}'
+    return str(value).lower() if isinstance(value, bool) else f'{value:.12g}'
 
 
 def descriptor(name: str, parameter: Parameter, *, unreadable: bool = False,
@@ -92,10 +92,15 @@ def descriptor(name: str, parameter: Parameter, *, unreadable: bool = False,
         return message
     if kind is ValueKind.DOUBLE:
         message.floating_point_range = [FloatingPointRange(
-            from_value=float(low), to_value=float(high), step=abs(parameter.scale))]
+            from_value=_tidy(low), to_value=_tidy(high), step=abs(parameter.scale))]
     elif kind is ValueKind.INTEGER and high <= SLIDER_MAX:
         message.integer_range = [IntegerRange(from_value=int(low), to_value=int(high), step=1)]
     return message
+
+
+def _tidy(value: float) -> float:
+    """Take the binary noise from a product: 3276.7, not 3276.7000000000003."""
+    return float(f'{value:.12g}')
 
 
 def _range(parameter: Parameter) -> tuple[float, float]:

@@ -198,6 +198,30 @@ def test_no_section_of_a_bridge(tmp_path: Path, text: str, found: str) -> None:
         '/**/drive_can_bridge: {ros__parameters: {buses: …}}' + found])
 
 
+def test_section_whose_buses_are_misspelled(tmp_path: Path) -> None:
+    """It is meant for the bridge: then the problem can be told where it is."""
+    (tmp_path / 'f.yaml').write_text(
+        'drive_can_bridge:\n  ros__parameters:\n    busses: {main: {channel: c0}}\n'
+        '    drives: {lift: {station: 1}}\n',
+        encoding='utf-8')
+    with pytest.raises(ConfigurationError) as caught:
+        configuration_from_file(tmp_path / 'f.yaml')
+    lines = [line.removeprefix(f'{tmp_path}/') for line in str(caught.value).splitlines()]
+    assert 'f.yaml:2: buses: missing, allowed is a mapping' in lines
+    assert "f.yaml:3: busses: unknown key, did you mean 'buses'?" in lines
+
+
+@pytest.mark.parametrize('key', ['use_sim_time', 'start_type_description_service'])
+def test_standard_switches_are_bools(tmp_path: Path, key: str) -> None:
+    text = ('drive_can_bridge:\n  ros__parameters:\n    KEY: no way\n    buses:\n      main:\n'
+            '        interface: virtual\n        channel: c0\n')
+    (tmp_path / 'f.yaml').write_text(text.replace('KEY', key), encoding='utf-8')
+    with pytest.raises(ConfigurationError) as caught:
+        configuration_from_file(tmp_path / 'f.yaml')
+    assert str(caught.value).removeprefix(f'{tmp_path}/') == (
+        f"f.yaml:3: {key}: 'no way' is a string, allowed is true or false")
+
+
 def test_several_sections_of_bridges(tmp_path: Path) -> None:
     text = HEAD + BUSES + '/b/drive_can_bridge:\n  ros__parameters:\n' + BUSES
     assert read(tmp_path, text) == (None, [

@@ -73,6 +73,30 @@ def faulted(table: ControlTable = FULL) -> ProfileControl:
     return control
 
 
+# -- words that a profile does not have -----------------------------------------------------------
+
+def test_what_is_reached_already_needs_no_word() -> None:
+    """Like with a word: a quick stop while disabled and a reset without a fault succeed."""
+    control = machine(replace(FULL, quick_stop=None, reset_fault=None))
+    cycle(control, READY, 0.0)
+    control.request(QUICK_STOP, 0.1)
+    control.request(RESET_FAULT, 0.1)
+    assert outcomes(control) == [(QUICK_STOP, True, 'ready'), (RESET_FAULT, True, 'ready')]
+    control.request(ENABLE, 0.2)
+    cycle(control, READY, 0.21)
+    cycle(control, ENABLED, 0.3)
+    outcomes(control)
+    control.request(QUICK_STOP, 0.4)
+    (action, success, message), = outcomes(control)
+    assert (action, success) == (QUICK_STOP, False)
+    assert message.startswith('no quick stop: the profile has no quick_stop word')
+    assert control.word == RUN
+    cycle(control, FAULT, 0.5)
+    control.request(RESET_FAULT, 0.6)
+    assert outcomes(control) == [
+        (RESET_FAULT, False, 'no fault reset: the profile has no reset_fault word')]
+
+
 # -- drives that take no notice -------------------------------------------------------------------
 
 def test_a_drive_that_has_not_answered_since_is_not_unconfirmed() -> None:

@@ -176,7 +176,7 @@ def test_log_level_by_service(bridge: StartBridge, client: Client) -> None:
     assert 'bus main: open' not in client.logged(0, name)
     level(LoggerLevel.LOG_LEVEL_INFO)
     assert client.transition(3, node=node)
-    client.wait_logged('active: 1 drives on 1 buses')
+    client.wait_logged('active: 1 drive on 1 bus')
 
 
 @pytest.mark.parametrize(('level', 'told'), [('info', True), ('warn', False)])
@@ -198,5 +198,5 @@ def test_log_level_by_argument(client: Client, tmp_path: Path, level: str, told:
         process.send_signal(signal.SIGINT)
         lines = process.communicate(timeout=patience(60.0))[1]
     assert process.returncode == 0
-    assert ('active: 1 drives on 1 buses' in lines) is told
+    assert ('active: 1 drive on 1 bus' in lines) is told
     wait_until(lambda: node not in client.nodes())

@@ -75,6 +75,15 @@ def test_file_for_another_node(processes: Processes, namespace: str, tmp_path: P
     assert str(file) in text
 
 
+def test_file_with_a_namespace_of_its_own(processes: Processes, namespace: str,
+                                          tmp_path: Path) -> None:
+    file = tmp_path / 'nested.yaml'
+    file.write_text('cell:\n  can_bridge:\n    ros__parameters: {a: 1}\n'
+                    'other: {ros__parameters: {b: 1}}\n', encoding='utf-8')
+    text, = problems(processes.bridge(file, namespace))
+    assert f'{file} is for cell/can_bridge, other' in text
+
+
 def test_no_file_at_all(processes: Processes, namespace: str) -> None:
     text, = problems(processes.bridge(None, namespace))
     assert f'/{namespace}/drive_can_bridge got neither buses nor drives' in text

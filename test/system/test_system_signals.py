@@ -51,7 +51,7 @@ def test_while_active(processes: Processes, client: Client, namespace: str, tmp_
 def test_while_the_bus_is_absent(processes: Processes, namespace: str, tmp_path: Path,
                                  number: int) -> None:
     bridge = processes.bridge(bridge_file(tmp_path, channel='/dev/no_such_adapter'), namespace)
-    bridge.error('active: 1 drives on 1 buses')
+    bridge.error('active: 1 drive on 1 bus')
     assert bridge.end(number) == 0
     text, = [line for line in bridge.errors if 'bus main' in line]
     assert '/dev/no_such_adapter' in text
@@ -119,7 +119,7 @@ def test_second_signal_ends_at_once(processes: Processes, client: Client, namesp
     bridge = processes.bridge(
         bridge_file(tmp_path, channel=terminal, bus={'sleep_after_open': 600.0}), namespace)
     # its reader hangs in an open that never ends; the node is there all the same
-    bridge.error('active: 1 drives on 1 buses')
+    bridge.error('active: 1 drive on 1 bus')
     facts = client.diagnostics(f'{namespace}/drive_can_bridge: bus main', state='opening')
     assert facts['level'] == '2'
     bridge.send(signal.SIGINT)

@@ -448,6 +448,8 @@ class PkwSession(Session):
             for other in self.drive.profile.parameters.values():
                 if mine & addresses.keys(other):
                     if other.type.bits != parameter.type.bits:
+                        if not other.writable:
+                            return f'read-only: one half of {other.name}'
                         return f'one half of {other.name}: set that'
                     return super().write_refusal(other)
         return super().write_refusal(parameter)

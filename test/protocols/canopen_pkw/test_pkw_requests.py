@@ -336,6 +336,8 @@ def test_register_and_object_are_one_even_if_the_profile_gives_one_of_them() -> 
     ('p720', 'one half of position: set that'), ('p721', 'one half of position: set that'),
     ('x2008.16', 'one half of position: set that'), ('p722', ''), ('p9999', ''),
     ('p704', ''), ('x3000.1', ''),
+    ('p500', 'read-only: one half of average_current'),
+    ('p501', 'read-only: one half of average_current'),
 ])
 def test_write_refusals(name: str, refusal: str) -> None:
     talk = online(request=(SPEED,))
