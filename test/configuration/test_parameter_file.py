@@ -207,7 +207,7 @@ def test_section_whose_buses_are_misspelled(tmp_path: Path) -> None:
     with pytest.raises(ConfigurationError) as caught:
         configuration_from_file(tmp_path / 'f.yaml')
     lines = [line.removeprefix(f'{tmp_path}/') for line in str(caught.value).splitlines()]
-    assert 'f.yaml:2: buses: missing, allowed is a mapping' in lines
+    assert 'f.yaml:3: buses: missing, allowed is a mapping' in lines
     assert "f.yaml:3: busses: unknown key, did you mean 'buses'?" in lines
 
 
