@@ -13,7 +13,7 @@ from pathlib import Path as FilePath
 import re
 
 from drive_can_bridge.configuration.problems import Path, Problem, show, suggestion, Tree
-from drive_can_bridge.configuration.reader import BrokenYaml, Events, Rules, TreeReader
+from drive_can_bridge.configuration.reader import BrokenYaml, DUPLICATE, Events, Rules, TreeReader
 
 PARAMETERS_KEY = 'ros__parameters'
 #: tells the section of a bridge from those of other nodes
@@ -127,6 +127,28 @@ class FileReader:
 def _sections_with(reader: FileReader, key: str) -> list[Section]:
     return [section for section in reader.sections
             if any(str(place[0]).split('.')[0] == key for place in section.tree.lines if place)]
+
+
+def duplicate_keys(path: FilePath, node: str) -> list[Problem]:
+    """
+    Look for keys that a parameter file gives twice to a node.
+
+    rcl takes the last of them without a word: a node that only sees what is left cannot tell.
+
+    :param node: full name of the node.
+    :raises OSError: the file cannot be read.
+    """
+    reader = FileReader(str(path))
+    reader.read(path.read_bytes())
+    return [problem for section in reader.sections if _is_for(section.name, node)
+            for problem in section.garbled if problem.message.startswith(DUPLICATE)]
+
+
+def _is_for(section: str, node: str) -> bool:
+    """Tell whether rcl takes a section for a node: ``*`` is one token, ``**`` are any."""
+    pattern = re.escape(f'/{section.removeprefix("/")}')
+    pattern = pattern.replace(r'/\*\*', '(/[^/]+)*').replace(r'\*', '[^/]+')
+    return re.fullmatch(pattern, node) is not None
 
 
 def read_parameter_file(path: FilePath) -> tuple[Tree | None, list[Problem]]:

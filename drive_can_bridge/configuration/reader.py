@@ -21,6 +21,8 @@ _LOADER = getattr(yaml, 'CLoader', yaml.Loader)
 
 _DEPTH_MAX = 32
 _OPENED = ('while scanning a quoted scalar', 'while parsing a flow')
+#: how the problem of a key that stands twice begins
+DUPLICATE = 'duplicate key'
 #: stands for a value that could not be read
 UNREADABLE = object()
 
@@ -138,7 +140,7 @@ class TreeReader:
             first = self.tree.lines.get(here)
             if first is not None:
                 self.garbled.append(self.tree.problem(
-                    here, f'duplicate key, allowed is one (the first is in line {first})',
+                    here, f'{DUPLICATE}, allowed is one (the first is in line {first})',
                 )._replace(line=line))
                 events.skip()
                 continue

@@ -13,7 +13,8 @@ shutdown   deactivate and cleanup as far as needed
 ========== ====================================================================================
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from pathlib import Path
 import threading
 from typing import Any
 
@@ -24,6 +25,8 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 
 from drive_can_bridge.configuration.load import configuration_from_overrides
 from drive_can_bridge.configuration.model import BridgeConfiguration
+from drive_can_bridge.configuration.parameter_file import duplicate_keys
+from drive_can_bridge.configuration.problems import report
 from drive_can_bridge.core.errors import ConfigurationError
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.process.scheduling import raise_priority
@@ -51,13 +54,16 @@ class BridgeNode(LifecycleNode):
 
     :param executor: serves this node and all drive nodes.
     :param fatal: takes the reason when the bridge cannot go on; from any thread.
+    :param files: the parameter files that were given to this process.
     """
 
     def __init__(self, executor: Executor, fatal: Callable[[str], None], *,
-                 context: Context | None = None, **options: Any) -> None:
+                 context: Context | None = None, files: Sequence[str] = (),
+                 **options: Any) -> None:
         super().__init__(NODE_NAME, context=context, enable_logger_service=True, **options)
         self._spinner = executor
         self._fatal = fatal
+        self._files = files
         self._transition_lock = threading.RLock()
         self._mailbox = Mailbox(self)
         self._diagnostics: Diagnostics | None = None
@@ -147,9 +153,25 @@ class BridgeNode(LifecycleNode):
             return TransitionCallbackReturn.ERROR
         return SUCCESS
 
+    def _checked_configuration(self) -> BridgeConfiguration:
+        """
+        Check everything.
+
+        :raises ConfigurationError: with all problems.
+        """
+        problems = [problem for file in self._files
+                    for problem in duplicate_keys(Path(file), self.get_fully_qualified_name())]
+        try:
+            configuration = configuration_from_overrides(self._node_parameters.current,
+                                                         adapters=adapters)
+        except ConfigurationError as error:
+            raise ConfigurationError([*report(problems), *error.problems]) from None
+        if problems:
+            raise ConfigurationError(report(problems))
+        return configuration
+
     def _configure(self) -> None:
-        configuration = configuration_from_overrides(self._node_parameters.current,
-                                                     adapters=adapters)
+        configuration = self._checked_configuration()
         if self.get_name() in configuration.drives:
             raise ConfigurationError([f'drives.{self.get_name()}: the name of the bridge itself '
                                       f'(remapped), allowed is another one'])

@@ -7,7 +7,7 @@ from configuration_builders import FILE
 import pytest
 
 from drive_can_bridge.configuration.load import configuration_from_file
-from drive_can_bridge.configuration.parameter_file import read_parameter_file
+from drive_can_bridge.configuration.parameter_file import duplicate_keys, read_parameter_file
 from drive_can_bridge.core.errors import ConfigurationError
 
 HEAD = '/**/drive_can_bridge:\n  ros__parameters:\n'
@@ -253,3 +253,17 @@ def test_lines_are_those_of_the_file(tmp_path: Path) -> None:
     with pytest.raises(ConfigurationError) as caught:
         configuration_from_file(path)
     assert f'{path}:20: drives.conveyor.rearm: ' in str(caught.value)
+
+
+@pytest.mark.parametrize(('section', 'node', 'meant'), [
+    ('drive_can_bridge', '/drive_can_bridge', True), ('/**', '/a/b', True), ('/**', '/b', True),
+    ('/**/drive_can_bridge', '/cell/drive_can_bridge', True),
+    ('/**/drive_can_bridge', '/drive_can_bridge', True), ('/*/x', '/a/x', True),
+    ('/*/x', '/a/b/x', False), ('/cell/x', '/cell/x', True), ('/cell/x', '/x', False),
+    ('x', '/cell/x', False), ('/**/drive_can_bridge', '/other', False)])
+def test_duplicate_keys_of_a_node(tmp_path: Path, section: str, node: str, meant: bool) -> None:
+    file = tmp_path / 'f.yaml'
+    file.write_text(f'{section}:\n  ros__parameters:\n    a.b: 1\n    period: 1\n    period: 2\n',
+                    encoding='utf-8')
+    found = [(problem.line, problem.key) for problem in duplicate_keys(file, node)]
+    assert found == ([(5, 'period')] if meant else [])

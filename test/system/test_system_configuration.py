@@ -67,6 +67,20 @@ def test_same_text_from_the_configure_transition(processes: Processes, client: C
     assert bridge.end() == 0
 
 
+def test_key_that_stands_twice(processes: Processes, namespace: str, tmp_path: Path) -> None:
+    """The values that rcl hands over do not show it."""
+    file = bridge_file(tmp_path)
+    lines = file.read_text(encoding='utf-8').splitlines(keepends=True)
+    place, = [number for number, line in enumerate(lines) if line.strip().startswith('period:')]
+    lines.insert(place + 1, lines[place].replace('0.02', '0.5'))
+    # the other section is none of this node's business
+    lines += ['other:\n', '  ros__parameters:\n', '    a: 1\n', '    a: 2\n']
+    file.write_text(''.join(lines), encoding='utf-8')
+    assert problems(processes.bridge(file, namespace)) == [
+        f'{file}:{place + 2}: drives.conveyor.period: duplicate key, allowed is one (the first is '
+        f'in line {place + 1})']
+
+
 def test_file_for_another_node(processes: Processes, namespace: str, tmp_path: Path) -> None:
     file = bridge_file(tmp_path, node='/other/can_bridge')
     text, = problems(processes.bridge(file, namespace))
