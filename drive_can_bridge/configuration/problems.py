@@ -121,6 +121,8 @@ def describe_type(value: Any) -> str:
         return 'a mapping'
     if isinstance(value, (list, tuple)):
         return 'a list' if value else 'an empty list'
+    if value is None:
+        return 'no value'
     return f'a {type(value).__name__}'
 
 

@@ -96,7 +96,10 @@ class ParameterDirectory:
             return value  # how many bits its two's complement has, the drive tells
         word = parameter.word_from_raw(value)
         for twin in self.twins(parameter):
-            twin.check_limits(twin.value_from_raw(twin.raw_from_word(word)))
+            try:
+                twin.check_limits(twin.value_from_raw(twin.raw_from_word(word)))
+            except ValueRefused as error:
+                raise ValueRefused(f'raw {value} of {twin.name}: {error}') from None
         return word
 
 

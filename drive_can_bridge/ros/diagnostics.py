@@ -115,6 +115,7 @@ class DriveReporter:
     def __init__(self, drive: DriveNode) -> None:
         self._drive = drive
         self._rejected = 0
+        self._latencies = 0, 0.0        # how many, and their sum
         self.inactive = 'bridge inactive: activate it'
 
     def report(self, now: float) -> Report:
@@ -125,6 +126,7 @@ class DriveReporter:
         rejected = statistics.rejected - self._rejected
         self._rejected = statistics.rejected
         level, message = self._judge(state, rejected)
+        self._latencies = statistics.latency.count, statistics.latency.total
         facts = {
             'state': state.value,
             'exchanges': str(statistics.exchanges),
@@ -179,6 +181,9 @@ class DriveReporter:
         told = []
         if session.warning:
             told.append(session.warning)
+        slow = self._slowness()
+        if slow:
+            told.append(slow)
         if drive.foreign_text:
             told.append(f'{drive.foreign_text}: there must be one master only')
             drive.foreign_text = ''
@@ -186,6 +191,19 @@ class DriveReporter:
             told.append(f'{rejected} frames rejected, the last: {drive.rejected_text}; check for '
                         f'a second station with the same number, or answers that come too late')
         return told
+
+    def _slowness(self) -> str:
+        """Tell of rounds of polling that take longer than the period allows."""
+        session = self._drive.session
+        count, total = self._latencies
+        latency, period = session.statistics.latency, session.drive.period
+        if latency.count == count:
+            return ''
+        mean = (latency.total - total) / (latency.count - count)
+        if mean <= period:
+            return ''
+        return (f'an exchange takes {1e3 * mean:.0f} ms, the period is {1e3 * period:g} ms: the '
+                f'drive is slow; choose a longer period or a shorter cyclic_response')
 
     def _how_to_arm(self) -> str:
         drive, session = self._drive, self._drive.session

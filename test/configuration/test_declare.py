@@ -84,7 +84,7 @@ def test_what_was_declared_configures_the_same(tmp_path: Path) -> None:
      "'imediate' is unknown (did you mean 'immediate'?), allowed is neutral or immediate"),
     ('drives.conveyor.parameter_timeout', 0.2, None),
     ('drives.conveyor.parameter_timeout', None,
-     'a NoneType, allowed is a number of 0.001 to 60'),
+     'no value, allowed is a number of 0.001 to 60'),
     ('drives.conveyor.station', 2, 'drives.conveyor.station cannot change while the node runs; '
                                    'change the parameter file and restart'),
     ('autostart', False, 'autostart cannot change while the node runs; change the parameter file '

@@ -78,6 +78,18 @@ def test_offline_says_where_to_look(bridge: StartBridge, client: Client) -> None
     assert int(status['missed_exchanges']) >= 5
 
 
+def test_a_drive_slower_than_its_period_is_told(bridge: StartBridge, client: Client) -> None:
+    one = bridge(parameters(conveyor={
+        **CONVEYOR, 'protocol': 'datamodel_standard', 'period': 0.1, 'parameter_timeout': 0.5}))
+    one.online()
+    one.played['conveyor'].fault('late=0.2')
+    status = client.diagnostics(DRIVE, lambda drive: 'an exchange takes' in drive['message'])
+    assert status['level'] == 'WARN'
+    assert 'the period is 100 ms: the drive is slow' in status['message']
+    one.played['conveyor'].fault('ok')
+    client.diagnostics(DRIVE, lambda drive: 'an exchange takes' not in drive['message'])
+
+
 def test_strangers_are_counted_and_told(bridge: StartBridge, client: Client) -> None:
     one = bridge()
     one.online()

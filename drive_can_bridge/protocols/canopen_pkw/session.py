@@ -81,7 +81,7 @@ class PkwSession(Session):
             self._send, order=options['abort_code_order'], timeout=drive.parameter_timeout))
         self._conditions = self._make_conditions()
         self._setpoint_writer = SetpointWriter(
-            self._channel, self.setpoints, addressing=self._addressing,
+            self._channel, self.setpoints, self._warn, addressing=self._addressing,
             word_order=self._word_order, refresh=options['refresh_interval'])
         self._control_writer: ControlWriter | None = None
         self._status: Parameter | None = None

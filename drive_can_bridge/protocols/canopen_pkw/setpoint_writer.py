@@ -1,8 +1,9 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Setpoints on their way through the mailbox: on change, and again after a while."""
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 
+from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.setpoints import Setpoints
 from drive_can_bridge.protocols.canopen_pkw import addresses
 from drive_can_bridge.protocols.canopen_pkw.channel import Channel, Lane
@@ -18,14 +19,16 @@ class SetpointWriter:
     Writes setpoints; each at most once for every look.
 
     :param refresh: s after which an unchanged one is written again; 0: never.
+    :param refused: takes what the drive says to a setpoint that it refuses, in words.
     :ivar refusals: what the drive says to setpoints that it refused, by name.
     """
 
-    def __init__(self, channel: Channel, setpoints: Setpoints, *, addressing: str,
-                 word_order: str, refresh: float) -> None:
+    def __init__(self, channel: Channel, setpoints: Setpoints, refused: Callable[[str], None], *,
+                 addressing: str, word_order: str, refresh: float) -> None:
         self.refusals: dict[str, str] = {}
         self._channel = channel
         self._setpoints = setpoints
+        self._refused = refused
         self._word_order = word_order
         self._spans = [addresses.span_of(setpoint.parameter, addressing)
                        for setpoint in setpoints.items]
@@ -64,4 +67,9 @@ class SetpointWriter:
             elif isinstance(reply, Answered):
                 self.refusals.pop(parameter.name, None)
             else:
-                self.refusals[parameter.name] = f'{parameter.name} {reply.text}'
+                self._take_refusal(parameter, f'{parameter.name} {reply.text}')
+
+    def _take_refusal(self, parameter: Parameter, text: str) -> None:
+        if self.refusals.get(parameter.name) != text:
+            self._refused(f'write of {text}')
+        self.refusals[parameter.name] = text

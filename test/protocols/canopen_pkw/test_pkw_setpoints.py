@@ -151,6 +151,8 @@ def test_refused_setpoint_is_shown_until_one_is_taken() -> None:
     assert talk.session.warning == (
         'write of speed refused by the drive: 06090030h (value out of range): correct '
         'cyclic_request, the command or the profile')
+    assert talk.events(Noted) == [Noted(
+        'write of speed refused by the drive: 06090030h (value out of range)', warning=True)]
     assert talk.session.online
     assert cycle(talk, 10.09) == [], 'not repeated before the refresh'
     talk.commands(0, 5.0, 10.1)
