@@ -113,7 +113,8 @@ def test_set_raw(bridge: StartBridge, client: Client) -> None:
     assert client.get('/conveyor', 'p62') == [0x10000 - 100]
     # the rules of the listed twin
     assert client.set('/conveyor', p62=5000, p209=1, p50=1, p30=0, p62__1=3) == [
-        (False, 'raw 5000 of jog_speed: 500 is out of range: -300 to 300 rpm'), (False, 'read-only'),
+        (False, 'raw 5000 of jog_speed: 500 is out of range: -300 to 300 rpm'),
+        (False, 'read-only'),
         (False, 'sent cyclically: publish ~/command/speed_setpoint'),
         (False, 'raw 0 of ramp_time: 0 is out of range: 0.01 to 60 s'),
         (False, 'unknown parameter p62.1')]
