@@ -426,9 +426,11 @@ class AcyclicChannel:
     def _ready_at(self, queue: _Queue) -> float:
         """Return when the step of a queue may be done."""
         step = queue.step
-        if isinstance(step, Write):
-            return self._writable_at(step)
+        # "20 ms between one write and the next", says the manual of writes to the EEPROM, not that
+        # the next has to go there, too. Setpoints and control words do not wait.
         ready = max(self._held_until, self._not_before, self._eeprom_free_at)
+        if isinstance(step, Write):
+            return ready
         if self._quarantined(queue):
             return max(ready, self._quarantine.ready_at(self._key(step)))
         return ready
