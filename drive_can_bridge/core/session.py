@@ -360,7 +360,7 @@ class Session(ABC):
         self._events.append(FrameRejected(text))
 
     def _tell_notes(self) -> None:
-        """Tell what the control machine noted."""
+        """Tell what the control machine noted; during a stop, it is what everybody expects."""
         if self.control is not None:
             for note in self.control.take_notes():
-                self._events.append(Noted(note, warning=True))
+                self._events.append(Noted(note, warning=self.active))

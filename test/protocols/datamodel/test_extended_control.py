@@ -122,6 +122,18 @@ def test_loss_puts_the_word_back() -> None:
                for note in talk.events(Noted))
 
 
+def test_a_stop_that_was_wanted_is_no_warning() -> None:
+    talk = inside()
+    talk.asks(ControlAction.ENABLE, 10.003)
+    exchange(talk, 10.02, READY)
+    exchange(talk, 10.04, ENABLED)
+    talk.events()
+    talk.deactivate(10.05)
+    note, = talk.events(Noted)
+    assert note.text.startswith('enable withdrawn: bridge inactive')
+    assert not note.warning
+
+
 def test_time_out_of_a_request() -> None:
     talk = inside(control_timeout=0.05)
     talk.asks(ControlAction.ENABLE, 10.003)
