@@ -136,10 +136,13 @@ def duplicate_keys(path: FilePath, node: str) -> list[Problem]:
     rcl takes the last of them without a word: a node that only sees what is left cannot tell.
 
     :param node: full name of the node.
-    :raises OSError: the file cannot be read.
+    :return: nothing where the file has gone since: launch removes those that it wrote.
     """
     reader = FileReader(str(path))
-    reader.read(path.read_bytes())
+    try:
+        reader.read(path.read_bytes())
+    except OSError:
+        return []
     return [problem for section in reader.sections if _is_for(section.name, node)
             for problem in section.garbled if problem.message.startswith(DUPLICATE)]
 

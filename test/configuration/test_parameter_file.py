@@ -267,3 +267,7 @@ def test_duplicate_keys_of_a_node(tmp_path: Path, section: str, node: str, meant
                     encoding='utf-8')
     found = [(problem.line, problem.key) for problem in duplicate_keys(file, node)]
     assert found == ([(5, 'period')] if meant else [])
+
+
+def test_duplicate_keys_of_a_file_that_has_gone(tmp_path: Path) -> None:
+    assert duplicate_keys(tmp_path / 'gone.yaml', '/drive_can_bridge') == []
