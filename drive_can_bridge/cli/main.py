@@ -65,6 +65,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _fail(f'this needs a Python module that is not installed: {error.name or error}')
     except Exception as error:  # noqa: BLE001  no traceback ever reaches a user
         return _fail(f'internal error, please report it: {type(error).__name__}: {error}')
+    finally:
+        if argv is None and endless:  # all is done; Python takes a moment to leave
+            for number in (signal.SIGINT, signal.SIGTERM):
+                signal.signal(number, signal.SIG_IGN)
 
 
 def _wanted(arguments: list[str]) -> str | None:

@@ -143,8 +143,10 @@ def duplicate_keys(path: FilePath, node: str) -> list[Problem]:
         reader.read(path.read_bytes())
     except OSError:
         return []
-    return [problem for section in reader.sections if _is_for(section.name, node)
-            for problem in section.garbled if problem.message.startswith(DUPLICATE)]
+    found = [problem for section in reader.sections if _is_for(section.name, node)
+             for problem in section.garbled]
+    found += [problem for problem in reader.problems if _is_for(problem.key, node)]
+    return [problem for problem in found if problem.message.startswith(DUPLICATE)]
 
 
 def _is_for(section: str, node: str) -> bool:

@@ -49,9 +49,10 @@ before it began. A drive that does not report faults gets the reset pulse in any
 
 *A drive that takes no notice.* A word that is written when it changes may get lost on the way.
 :attr:`~ControlMachine.unconfirmed` tells the session that the drive, by what it reports since,
-does not do as the word says: then the word is written again. A drive that goes on running for more
-than a second under ``disable`` is told of (:attr:`~ControlMachine.disregard`). One that says that
-it refuses the word (:meth:`~ControlMachine.word_refused`) ends what is under way, with its reason.
+does not do as the word says: then the word is written again. A drive that goes on running under
+``disable`` for longer than a request may take is told of (:attr:`~ControlMachine.disregard`). One
+that says that it refuses the word (:meth:`~ControlMachine.word_refused`) ends what is under way,
+with its reason.
 """
 
 from abc import ABC, abstractmethod
@@ -71,7 +72,7 @@ class ControlAction(Enum):
     RESET_FAULT = 'reset_fault'
 
 
-#: s that a drive may go on running under ``disable``, a ramp included, until that is told
+#: s that a drive may go on running under ``disable`` at least until that is told
 RUNNING_ON_MAX = 1.0
 
 _STOPS = (ControlAction.DISABLE, ControlAction.QUICK_STOP)
@@ -282,8 +283,11 @@ class ProfileControl(ControlMachine):
         if not self._sent or self._answer is None:
             return False
         if self._sending is ControlAction.DISABLE:
-            return self._table.enabled is not None and not self._confirmed_off()
-        return self.pending
+            return self._still_on()
+        # what the drive does not report at all, it cannot confirm
+        telling = (self._table.fault if self._sending is ControlAction.RESET_FAULT
+                   else self._table.enabled)
+        return self.pending and telling is not None
 
     @property
     def disregard(self) -> str:
@@ -303,6 +307,10 @@ class ProfileControl(ControlMachine):
         self.handle_timer(now)
         ticket = ControlTicket(action)
         if action not in self._words and self._nothing_to_do(action):
+            under_way = self._operation
+            if action is ControlAction.QUICK_STOP and under_way is not None and (
+                    under_way.action not in _STOPS):
+                self._end(False, 'replaced by quick_stop')  # what stands is to stay so
             self._complete(ticket, True, self.state)
             return ticket
         refusal = self._refusal(action)
@@ -444,11 +452,14 @@ class ProfileControl(ControlMachine):
 
     def _watch_disabled(self, now: float) -> None:
         """Tell of a drive that runs on although its control word is ``disable``."""
-        if self._sending is not ControlAction.DISABLE or not self.unconfirmed:
+        if (self._sending is not ControlAction.DISABLE or not self._sent or self._fault
+                or not self._still_on()):
             self._runs_on_since, self._disregard = math.inf, ''
             return
         self._runs_on_since = min(self._runs_on_since, now)
-        if not self._disregard and now - self._runs_on_since > RUNNING_ON_MAX:
+        # whoever asked for the stop waits for so long, ramps included
+        longest = max(RUNNING_ON_MAX, self._timeout)
+        if not self._disregard and now - self._runs_on_since > longest:
             self._disregard = (f'still {self.state} ({self._status_text}) although its control '
                                f'word is disable ({self.word:04X}h)')
             self._notes.append(f'{self._disregard}: stop it by other means')
@@ -472,6 +483,11 @@ class ProfileControl(ControlMachine):
     def _confirmed_off(self) -> bool:
         """Tell whether the drive, knowing the current word, reports that it does not run."""
         return self._confirmed(self._table.enabled, False)
+
+    def _still_on(self) -> bool:
+        """Tell whether the drive, knowing the current word, reports that it runs."""
+        return (self._table.enabled is not None and self._answer is not None
+                and not self._confirmed_off())
 
     def _confirmed_resettable(self) -> bool:
         """Tell whether the drive, knowing ``disable``, reports a fault that can be reset."""

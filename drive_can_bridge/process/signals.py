@@ -53,7 +53,8 @@ class SignalWatcher:
     def __enter__(self) -> 'SignalWatcher':
         self._old_fd = signal.set_wakeup_fd(self._write.fileno(), warn_on_full_buffer=False)
         self._old = [(number, signal.signal(number, _ignore)) for number in SIGNALS
-                     if signal.getsignal(number) is not signal.SIG_IGN]
+                     if number != signal.SIGHUP
+                     or signal.getsignal(number) is not signal.SIG_IGN]
         threading.Thread(target=self._watch, name='signals', daemon=True).start()
         return self
 

@@ -63,7 +63,9 @@ class BridgeNode(LifecycleNode):
         super().__init__(NODE_NAME, context=context, enable_logger_service=True, **options)
         self._spinner = executor
         self._fatal = fatal
-        self._files = files
+        # now: later on, somebody may have edited or removed them
+        self._duplicates = [problem for file in files for problem in duplicate_keys(
+            Path(file), self.get_fully_qualified_name())]
         self._transition_lock = threading.RLock()
         self._mailbox = Mailbox(self)
         self._diagnostics: Diagnostics | None = None
@@ -159,15 +161,14 @@ class BridgeNode(LifecycleNode):
 
         :raises ConfigurationError: with all problems.
         """
-        problems = [problem for file in self._files
-                    for problem in duplicate_keys(Path(file), self.get_fully_qualified_name())]
+        problems = report(self._duplicates)
         try:
             configuration = configuration_from_overrides(self._node_parameters.current,
                                                          adapters=adapters)
         except ConfigurationError as error:
-            raise ConfigurationError([*report(problems), *error.problems]) from None
+            raise ConfigurationError([*problems, *error.problems]) from None
         if problems:
-            raise ConfigurationError(report(problems))
+            raise ConfigurationError(problems)
         return configuration
 
     def _configure(self) -> None:
@@ -291,7 +292,7 @@ class BridgeNode(LifecycleNode):
     def stop(self) -> None:
         """Stop the drives and publish a last diagnostic message; for the end of the process."""
         self._ending = True
-        if self._transition_lock.acquire(timeout=2.0):
+        if self._transition_lock.acquire(timeout=5.0):
             try:
                 self._stop_drives()
                 if self._diagnostics is not None:

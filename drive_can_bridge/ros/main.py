@@ -70,9 +70,10 @@ def _main(watcher: SignalWatcher, arguments: list[str]) -> int:
     except ExternalShutdownException:
         return 0
     finally:
+        context = rclpy.get_default_context()  # the next call makes a new one
         rclpy.try_shutdown()
         # what is left of the nodes holds shared memory of the middleware
-        rclpy.get_default_context().destroy()
+        context.destroy()
         gc.collect()
 
 
@@ -119,7 +120,7 @@ def _nothing_configured(bridge: 'BridgeNode', arguments: Sequence[str]) -> str:
         try:
             with open(path, encoding='utf-8') as file:
                 content = yaml.safe_load(file)
-        except (OSError, yaml.YAMLError):
+        except (OSError, ValueError, yaml.YAMLError):  # a date, or bytes, that do not exist
             continue
         text += f'; {path} is for {", ".join(_node_names(content)) or "no node"}'
     return text

@@ -271,3 +271,12 @@ def test_duplicate_keys_of_a_node(tmp_path: Path, section: str, node: str, meant
 
 def test_duplicate_keys_of_a_file_that_has_gone(tmp_path: Path) -> None:
     assert duplicate_keys(tmp_path / 'gone.yaml', '/drive_can_bridge') == []
+
+
+def test_section_that_stands_twice(tmp_path: Path) -> None:
+    file = tmp_path / 'f.yaml'
+    section = '/**/drive_can_bridge:\n  ros__parameters: {a: 1}\n'
+    file.write_text(section + section, encoding='utf-8')
+    found = duplicate_keys(file, '/drive_can_bridge')
+    assert [(problem.line, problem.key) for problem in found] == [(3, '/**/drive_can_bridge')]
+    assert duplicate_keys(file, '/other') == []

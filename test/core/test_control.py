@@ -97,6 +97,21 @@ def test_what_is_reached_already_needs_no_word() -> None:
         (RESET_FAULT, False, 'no fault reset: the profile has no reset_fault word')]
 
 
+def test_a_quick_stop_without_a_word_ends_an_enable_that_waits() -> None:
+    """What stands, stays: the drive must not start when it becomes ready."""
+    control = machine(replace(FULL, quick_stop=None))
+    cycle(control, NOT_READY, 0.0)
+    control.request(ENABLE, 0.1)
+    cycle(control, NOT_READY, 0.2)
+    assert control.pending
+    control.request(QUICK_STOP, 0.3)
+    assert outcomes(control) == [
+        (ENABLE, False, 'replaced by quick_stop'), (QUICK_STOP, True, 'not ready')]
+    for step in range(5):
+        assert cycle(control, READY, 0.4 + 0.1 * step) == OFF
+    assert control.word == OFF
+
+
 # -- drives that take no notice -------------------------------------------------------------------
 
 def test_a_drive_that_has_not_answered_since_is_not_unconfirmed() -> None:
@@ -139,13 +154,14 @@ def test_nothing_is_unconfirmed_where_nothing_is_reported() -> None:
 
 
 def test_running_on_under_disable_is_told_once() -> None:
+    """A ramp may take as long as a request; whoever runs on after that takes no notice."""
     control = enabled()
     control.request(DISABLE, 1.0)
-    for step in range(1, 11):
+    for step in range(1, 21):
         cycle(control, ENABLED, 1.0 + 0.1 * step)
         assert control.disregard == ''
     control.take_notes()
-    for step in range(11, 40):
+    for step in range(21, 40):
         cycle(control, ENABLED, 1.0 + 0.1 * step + 0.01)
         assert control.disregard == (
             'still enabled (status word 0003h) although its control word is disable (0000h)')
@@ -153,6 +169,38 @@ def test_running_on_under_disable_is_told_once() -> None:
     cycle(control, READY, 6.0)
     assert control.disregard == ''
     assert control.take_notes() == []
+
+
+def test_a_long_ramp_is_nothing_to_tell() -> None:
+    control = enabled()
+    control.request(DISABLE, 1.0)
+    for step in range(19):
+        cycle(control, ENABLED, 1.05 + 0.1 * step)
+    cycle(control, READY, 2.98)
+    assert outcomes(control) == [(DISABLE, True, 'ready')]
+    assert control.take_notes() == []
+    assert control.disregard == ''
+
+
+def test_a_faulted_drive_is_told_of_as_such() -> None:
+    control = enabled()
+    for step in range(40):
+        cycle(control, ENABLED | FAULT, 1.0 + 0.1 * step)
+    assert control.disregard == ''
+    assert len(control.take_notes()) == 1
+
+
+def test_a_quick_stop_that_nothing_can_confirm_is_not_unconfirmed() -> None:
+    control = machine(ONLY_FAULT)
+    cycle(control, READY, 0.0)
+    control.request(ENABLE, 0.1)
+    cycle(control, READY, 0.2)
+    cycle(control, READY, 0.3)
+    control.request(QUICK_STOP, 0.4)
+    assert control.word == STOP
+    cycle(control, READY, 0.5)
+    assert control.pending
+    assert not control.unconfirmed
 
 
 def test_a_new_word_and_a_loss_end_the_running_on() -> None:

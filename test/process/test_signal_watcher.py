@@ -13,9 +13,9 @@ PROGRAM = """
 import sys, time
 from drive_can_bridge.process.signals import SignalWatcher
 with SignalWatcher() as watcher:
-    print('ready', flush=True)
+    print("ready", flush=True)
     watcher.wait()
-    print('stopping', flush=True)
+    print("stopping", flush=True)
     time.sleep(1.0)
     sys.exit(watcher.exit_code(0))
 """
@@ -89,3 +89,13 @@ def test_leaving_is_immediate_and_loses_no_output() -> None:
     done = subprocess.run([sys.executable, '-c', LEAVING], capture_output=True, text=True,
                           check=False, timeout=20, env={**os.environ, 'PYTHONUNBUFFERED': ''})
     assert (done.returncode, done.stdout, done.stderr) == (3, 'done\nflushed', '')
+
+
+def test_a_script_that_starts_it_in_the_background_can_stop_it_by_sigint() -> None:
+    """A shell without job control has its background processes ignore SIGINT."""
+    with subprocess.Popen(['sh', '-c', f'trap "" INT; exec {sys.executable} -c \'{PROGRAM}\''],
+                          stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == 'ready\n'
+        process.send_signal(signal.SIGINT)
+        assert process.wait(timeout=20) == 0

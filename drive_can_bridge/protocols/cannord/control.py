@@ -205,6 +205,11 @@ class GroupControl(CannordControl):
     def _confirmed_off(self) -> bool:
         return self._all(lambda answer: not answer & OUTPUT_ON)
 
+    def _still_on(self) -> bool:
+        # they answer in turn: who has not answered yet says nothing
+        return any(status.answer is not None and status.answer & OUTPUT_ON
+                   for status in self._present.values())
+
     def _confirmed_resettable(self) -> bool:
         return (self._confirmed(self._table.fault, True)
                 and self._all(lambda answer: state_of(answer) is not State.FAULT_REACTION))

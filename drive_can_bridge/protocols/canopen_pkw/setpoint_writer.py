@@ -29,6 +29,7 @@ class SetpointWriter:
         self._channel = channel
         self._setpoints = setpoints
         self._refused = refused
+        self._told: dict[str, str] = {}
         self._word_order = word_order
         self._spans = [addresses.span_of(setpoint.parameter, addressing)
                        for setpoint in setpoints.items]
@@ -38,6 +39,7 @@ class SetpointWriter:
         """Take note that nothing is known of the drive."""
         self._schedule.forget()
         self.refusals.clear()
+        self._told.clear()
 
     def look(self, now: float) -> None:
         """Write what is due."""
@@ -70,6 +72,6 @@ class SetpointWriter:
                 self._take_refusal(parameter, f'{parameter.name} {reply.text}')
 
     def _take_refusal(self, parameter: Parameter, text: str) -> None:
-        if self.refusals.get(parameter.name) != text:
+        if self._told.get(parameter.name) != text:  # once: commands may go to and fro
             self._refused(f'write of {text}')
-        self.refusals[parameter.name] = text
+        self._told[parameter.name] = self.refusals[parameter.name] = text

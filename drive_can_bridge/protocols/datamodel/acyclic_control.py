@@ -4,9 +4,10 @@ The control word of a drive that does not get it cyclically, or does not answer 
 
 The control word is written when it changes, before everything else that waits. Nothing
 acknowledges that: as long as the status says that the drive takes no notice, the word is written
-again, less and less often; what is kept in an EEPROM (or may be) only a few times. The status word
-is read twice a second, and twenty times while a request is under way. What has its slot in the
-cyclic telegrams is none of this module's business.
+again, less and less often. Where that wears an EEPROM (or may), only a drive that runs on although
+it shall not gets its word again, a few times. The status word is read twice a second, and twenty
+times while a request is under way. What has its slot in the cyclic telegrams is none of this
+module's business.
 """
 
 from collections.abc import Callable
@@ -109,8 +110,11 @@ class AcyclicControl:
     # -- inside -----------------------------------------------------------------------------------
 
     def _may_repeat(self, parameter: Parameter, now: float) -> bool:
-        return now >= self._repeat_at and self._control.unconfirmed and (
-            parameter.storage is Storage.RAM or self._repeats < EEPROM_REPEATS)
+        if now < self._repeat_at:
+            return False
+        if parameter.storage is Storage.RAM:
+            return self._control.unconfirmed
+        return self._control.disregard != '' and self._repeats < EEPROM_REPEATS
 
     def _write(self, parameter: Parameter, word: int) -> Write:
         return Write((parameter.number or 0) + self._offset, (word,),

@@ -294,14 +294,14 @@ def test_a_drive_that_runs_on_under_disable_is_told_of() -> None:
     talk = running()
     assert talk.asks(ControlAction.DISABLE, 10.095) == ['505#C002002A00000000']
     talk.hears('485#C002002A00000000', 10.096)
-    assert rounds(talk, 10.1, 11.09, '81000000') == []
+    assert rounds(talk, 10.1, 12.09, '81000000') == []
     assert talk.session.control is not None
     assert talk.session.control.disregard == ''
-    rounds(talk, 11.09, 11.3, '81000000')
+    rounds(talk, 12.09, 12.3, '81000000')
     text = ('still enabled (status word 0081h) although its control word is disable (0000h)')
     assert talk.session.control.disregard == text
     assert Noted(f'{text}: stop it by other means', warning=True) in talk.events(Noted)
-    rounds(talk, 11.3, 11.4, '41000000')
+    rounds(talk, 12.3, 12.4, '41000000')
     assert talk.session.control.disregard == ''
 
 
