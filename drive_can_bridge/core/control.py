@@ -139,7 +139,7 @@ class ControlMachine(ABC):
     @property
     @abstractmethod
     def disregard(self) -> str:
-        """How the drive goes on running although it shall not, in words; '' if it does not."""
+        """How the drive goes on running although it shall not, and what to do; '' if not."""
 
     @abstractmethod
     def request(self, action: ControlAction, now: float) -> ControlTicket:
@@ -461,8 +461,9 @@ class ProfileControl(ControlMachine):
         longest = max(RUNNING_ON_MAX, self._timeout)
         if not self._disregard and now - self._runs_on_since > longest:
             self._disregard = (f'still {self.state} ({self._status_text}) although its control '
-                               f'word is disable ({self.word:04X}h)')
-            self._notes.append(f'{self._disregard}: stop it by other means')
+                               f'word is disable ({self.word:04X}h): stop it by other means, or '
+                               f'set a control_timeout longer than its ramp')
+            self._notes.append(self._disregard)
 
     @property
     def _may_run(self) -> bool:

@@ -169,8 +169,7 @@ class DriveReporter:
             return DiagnosticStatus.ERROR, '; '.join(told)
         told = self._warnings(rejected)
         if session.control is not None and session.control.disregard:
-            return DiagnosticStatus.ERROR, '; '.join((
-                f'{session.control.disregard}: stop it by other means', *told))
+            return DiagnosticStatus.ERROR, '; '.join((session.control.disregard, *told))
         if state is DriveState.NOT_ARMED:
             told.append(self._how_to_arm())
         if told:

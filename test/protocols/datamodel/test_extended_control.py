@@ -234,11 +234,10 @@ def test_disable_that_gets_lost_when_a_drive_comes_back_is_written_again() -> No
     # 0.2, 0.4, 0.8, 1.6 s: less and less often
     assert [number for number, _ in written] == [18, 38, 78, 158]
     assert talk.session.control is not None
-    assert talk.session.control.disregard == (
-        'still enabled (status word 0003h) although its control word is disable (0000h)')
-    assert [note.text for note in talk.events(Noted)] == [
-        'still enabled (status word 0003h) although its control word is disable (0000h): stop it '
-        'by other means']
+    text = ('still enabled (status word 0003h) although its control word is disable (0000h): stop '
+            'it by other means, or set a control_timeout longer than its ramp')
+    assert talk.session.control.disregard == text
+    assert [note.text for note in talk.events(Noted)] == [text]
     assert cycles(talk, 201, 400, READY) == []
     assert talk.session.control.disregard == ''
 
