@@ -9,6 +9,8 @@ import pytest
 from std_msgs.msg import Float64
 from std_srvs.srv import SetBool, Trigger
 
+from drive_can_bridge.core.control import ProfileControl
+
 DRIVE = 'drive_can_bridge: drive lift'
 #: the control word has a slot, or is written on change
 WITH_SLOT = LIFT
@@ -43,6 +45,16 @@ def test_enable_and_disable(bridge: StartBridge, client: Client, lift: dict[str,
     assert success, message
     assert not int(drive.value('status_word')) & 2
     assert drive.value('control_word') == 0
+
+
+def test_a_drive_that_runs_on_under_disable_is_an_error(
+        bridge: StartBridge, client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    one = bridge(parameters(lift=LIFT))
+    one.online()
+    monkeypatch.setattr(ProfileControl, 'disregard', 'still enabled: stop it by other means')
+    status = client.diagnostics(DRIVE, lambda drive: 'still enabled' in drive['message'])
+    assert status['level'] == 'ERROR'
+    assert status['message'].startswith('still enabled: stop it by other means')
 
 
 def test_the_control_word_has_no_topic(bridge: StartBridge, client: Client) -> None:
