@@ -392,7 +392,7 @@ def test_set(start: Start, client: Client, facts: Facts) -> None:
         'actual_ramp': (1.0, 'read-only'),
         'flag': (1, 'wrong type: integer, expected bool'),
         'p110': (1.0, 'wrong type: double, expected integer'),
-        'p102': (0, '0 is out of range: 0.01 to 60 s'),
+        'p102': (0, 'raw 0 of ramp_time: 0 is out of range: 0.01 to 60 s'),
         'gian': (1, 'unknown parameter gian, did you mean gain?'),
         'speed_setpoint': (1.0, 'sent cyclically: publish ~/command/speed_setpoint')}
     assert client.set(DRIVE, **{name: value for name, (value, _) in refused.items()}) == [
