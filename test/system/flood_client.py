@@ -8,7 +8,7 @@ at its end. Started by the tests in this directory.
 ========================= =====================================================================
 calls DRIVE COUNT         so many calls of GetParameters in flight at the same time
 commands TOPIC SECONDS    publishes as fast as it can, about 10,000 times a second; ends with 25.0
-numbers TOPIC             publishes what is no setpoint: not finite, absurd
+numbers TOPIC STATUS      publishes what is no setpoint: not finite, absurd
 parameters DRIVE SECONDS  writes and reads parameters, each call as soon as the last is answered
 requests DRIVE            parameter requests that make no sense
 ========================= =====================================================================
@@ -20,6 +20,7 @@ import sys
 import time
 
 from acquaintance import acquaint
+from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import GetParameters, SetParameters
 import rclpy
@@ -29,7 +30,9 @@ from std_msgs.msg import Float64
 #: s after which an answer will not come any more
 PATIENCE = 600.0
 #: no double, or none that any drive could want
-ABSURD = (math.nan, math.inf, -math.inf, 1e308, -1e308, 5e-324, 3000.1, -1e9, 2.0 ** 63)
+ABSURD = (math.nan, math.inf, -math.inf, 1e308, -1e308, 3000.1, -1e9, 2.0 ** 63)
+#: a value like any other: it rounds to 0
+TINY = 5e-324
 
 
 def until(node, condition, patience=PATIENCE):
@@ -94,13 +97,26 @@ def commands(node, topic, seconds):
     return {'published': count}
 
 
-def numbers(node, topic):
+def numbers(node, topic, status):
+    """Publish each until it is counted: a bridge that stands still for a moment loses some."""
+    refused = [0]
+
+    def look(message):
+        for entry in message.status:
+            if entry.name == status:
+                refused[0] = int(next(
+                    pair.value for pair in entry.values if pair.key == 'commands_refused'))
+    node.create_subscription(DiagnosticArray, '/diagnostics', look, QoSProfile(depth=50))
     publisher = publisher_of(node, topic)
+    publisher.publish(Float64(data=TINY))
+    repeated = 0
     for value in ABSURD:
+        before = refused[0]
         publisher.publish(Float64(data=value))
-        time.sleep(0.02)
-    time.sleep(0.5)
-    return {'published': len(ABSURD)}
+        while not until(node, lambda before=before: refused[0] > before, 5.0):
+            repeated += 1
+            publisher.publish(Float64(data=value))
+    return {'refused': len(ABSURD), 'repeated': repeated}
 
 
 def requests(node, drive):
@@ -114,7 +130,7 @@ def requests(node, drive):
                get.call_async(GetParameters.Request(names=['nothing'] * 20_000)),
                get.call_async(GetParameters.Request(names=[]))]
     values = [ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=value)
-              for value in ABSURD]
+              for value in (*ABSURD, TINY)]
     values += [ParameterValue(type=ParameterType.PARAMETER_INTEGER, integer_value=value)
                for value in (-2 ** 63, 2 ** 63 - 1)]
     values += [ParameterValue(), ParameterValue(type=200),
