@@ -16,7 +16,7 @@ from drive_can_bridge.configuration.model import BridgeConfiguration, DriveConfi
 from drive_can_bridge.configuration.overrides import tree_from_overrides
 from drive_can_bridge.configuration.parameter_file import read_parameter_file
 from drive_can_bridge.configuration.problems import (
-    describe_type, hint, Path, Problem, report, show, suggestion, Tree,
+    hint, Path, Problem, report, show, suggestion, Tree,
 )
 from drive_can_bridge.configuration.profiles import ProfileStore
 from drive_can_bridge.configuration.schema import defaults, definition, parameter_file_schema
@@ -27,10 +27,6 @@ from drive_can_bridge.protocols.families import FAMILIES
 
 __all__ = ['check_dynamic', 'configuration_from_file', 'configuration_from_overrides',
            'declared_parameters']
-
-#: parameters that ROS itself puts beside ours
-STANDARD_PARAMETERS = frozenset((
-    'use_sim_time', 'qos_overrides', 'start_type_description_service'))
 
 
 def configuration_from_file(path: str | FilePath, *, adapters: Adapters | None = None,
@@ -63,9 +59,6 @@ def configuration_from_overrides(overrides: Mapping[str, object], *,
 
 def _configuration(tree: Tree, problems: list[Problem], adapters: Adapters | None,
                    ) -> BridgeConfiguration:
-    problems = [*problems, *_standard_switches(tree)]
-    for key in [key for key in tree.data if key.split('.')[0] in STANDARD_PARAMETERS]:
-        del tree.data[key]
     bus_names, drive_count = _names(tree, 'buses'), len(_names(tree, 'drives'))
     tree, found = check_schema(tree, parameter_file_schema(), 'bridge', override=_Override(tree))
     problems = [*problems, *found]
@@ -118,14 +111,6 @@ def _configuration(tree: Tree, problems: list[Problem], adapters: Adapters | Non
         diagnostics_period=float(values['diagnostics_period']),
         buses=buses, drives=drives, profile_directories=directories,
         warnings=tuple(report(warnings)))
-
-
-def _standard_switches(tree: Tree) -> list[Problem]:
-    """Look at what rclpy accepts as a bool only."""
-    return [tree.problem((key,), f'{show(tree.data[key])} is {describe_type(tree.data[key])}, '
-                                 f'allowed is true or false')
-            for key in ('use_sim_time', 'start_type_description_service')
-            if key in tree.data and not isinstance(tree.data[key], bool)]
 
 
 def _names(tree: Tree, key: str) -> list[str]:

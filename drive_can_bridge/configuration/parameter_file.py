@@ -81,7 +81,7 @@ class FileReader:
                 self._note(line, here, f'stands beside {PARAMETERS_KEY} (rcl refuses or garbles '
                                        'the file), allowed is a section of its own')
             if here in seen:
-                self._note(line, here, f'duplicate key, allowed is one (the first is in line '
+                self._note(line, here, f'{DUPLICATE}, allowed is one (the first is in line '
                                        f'{seen[here]})')
                 events.skip()
                 continue
@@ -127,6 +127,17 @@ class FileReader:
 def _sections_with(reader: FileReader, key: str) -> list[Section]:
     return [section for section in reader.sections
             if any(str(place[0]).split('.')[0] == key for place in section.tree.lines if place)]
+
+
+def section_names(path: FilePath) -> list[str]:
+    """
+    Return the names of the nodes that a parameter file has sections for.
+
+    :raises OSError: the file cannot be read.
+    """
+    reader = FileReader(str(path))
+    reader.read(path.read_bytes())
+    return [section.name for section in reader.sections]
 
 
 def duplicate_keys(path: FilePath, node: str) -> list[Problem]:

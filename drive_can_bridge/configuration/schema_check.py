@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from copy import deepcopy
 from dataclasses import replace
 import math
+import re
 from typing import Any
 
 from jsonschema import Draft202012Validator
@@ -100,8 +101,9 @@ def _sentences(error: ValidationError, tree: Tree) -> Iterator[tuple[Path, str, 
                 yield here, f'missing, allowed is {allowed(option)}', here
     elif error.validator == 'additionalProperties':
         known = error.schema.get('properties', {})
+        patterns = error.schema.get('patternProperties', ())
         for key in error.instance:
-            if key not in known:
+            if key not in known and not any(re.search(pattern, key) for pattern in patterns):
                 yield (*path, key), f'unknown key, {suggestion(str(key), known)}', (*path, key)
     elif 'propertyNames' in error.relative_schema_path:
         here = (*path, error.instance)

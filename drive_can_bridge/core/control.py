@@ -370,7 +370,7 @@ class ProfileControl(ControlMachine):
         self._end(False, reason)
         self._sent = False
         self._raw = self._answer = None
-        self._runs_on_since, self._disregard = math.inf, ''
+        self._forget_disregard()
         if not self._fault:         # a known fault stands until the drive says otherwise
             self._fault = None
 
@@ -454,7 +454,7 @@ class ProfileControl(ControlMachine):
         """Tell of a drive that runs on although its control word is ``disable``."""
         if (self._sending is not ControlAction.DISABLE or not self._sent or self._fault
                 or not self._still_on()):
-            self._runs_on_since, self._disregard = math.inf, ''
+            self._forget_disregard()
             return
         self._runs_on_since = min(self._runs_on_since, now)
         # whoever asked for the stop waits for so long, ramps included
@@ -464,6 +464,10 @@ class ProfileControl(ControlMachine):
                                f'word is disable ({self.word:04X}h): stop it by other means, or '
                                f'set a control_timeout longer than its ramp')
             self._notes.append(self._disregard)
+
+    def _forget_disregard(self) -> None:
+        """Forget that the drive ran on."""
+        self._runs_on_since, self._disregard = math.inf, ''
 
     @property
     def _may_run(self) -> bool:
@@ -501,7 +505,7 @@ class ProfileControl(ControlMachine):
         if self._words[action] != self.word:
             self._sent = False
             self._answer = None
-            self._runs_on_since, self._disregard = math.inf, ''
+            self._forget_disregard()
         self._sending = action
         self._reached = self._reached and action is ControlAction.ENABLE
 

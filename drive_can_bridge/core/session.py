@@ -125,7 +125,7 @@ class Session(ABC):
     @property
     def longest_stop(self) -> float:
         """Return how many s a stop takes at most."""
-        return STOP_CYCLES * min(self.drive.period, STOP_SPACING_MAX)
+        return STOP_CYCLES * self._stop_spacing
 
     def bus_up(self, now: float) -> None:
         """Begin to use the bus: it was opened."""
@@ -347,6 +347,11 @@ class Session(ABC):
         return self._advice
 
     # -- for the families -------------------------------------------------------------------------
+
+    @property
+    def _stop_spacing(self) -> float:
+        """Return how many s lie between two neutral cycles of a stop."""
+        return min(self.drive.period, STOP_SPACING_MAX)
 
     def _be_offline(self, reason: str) -> None:
         """Tell that the drive is offline, if it was not."""

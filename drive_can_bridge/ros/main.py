@@ -13,6 +13,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 import gc
 import os
+from pathlib import Path
 import sys
 import tempfile
 from typing import TYPE_CHECKING
@@ -112,28 +113,17 @@ def _run(watcher: SignalWatcher, arguments: Sequence[str]) -> int:
 
 
 def _nothing_configured(bridge: 'BridgeNode', arguments: Sequence[str]) -> str:
-    import yaml
+    from drive_can_bridge.configuration.parameter_file import section_names
 
     text = (f'node {bridge.get_fully_qualified_name()} got neither buses nor drives: give a '
             f'parameter file with --ros-args --params-file FILE')
     for path in _parameter_files(arguments):
         try:
-            with open(path, encoding='utf-8') as file:
-                content = yaml.safe_load(file)
-        except (OSError, ValueError, yaml.YAMLError):  # a date, or bytes, that do not exist
+            names = section_names(Path(path))
+        except OSError:
             continue
-        text += f'; {path} is for {", ".join(_node_names(content)) or "no node"}'
+        text += f'; {path} is for {", ".join(names) or "no node"}'
     return text
-
-
-def _node_names(content: object, above: str = '') -> list[str]:
-    """Return the names of the nodes that a parameter file has sections for."""
-    if not isinstance(content, dict):
-        return []
-    if above and 'ros__parameters' in content:
-        return [above]
-    return [name for key, below in content.items()
-            for name in _node_names(below, f'{above}/{key}' if above else str(key))]
 
 
 def _parameter_files(arguments: Sequence[str]) -> list[str]:

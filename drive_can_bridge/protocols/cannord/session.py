@@ -29,7 +29,7 @@ from drive_can_bridge.core.requests import (
     BRIDGE_INACTIVE, Failure, Outcome, ReadValue, Request, WriteRequest,
     Written,
 )
-from drive_can_bridge.core.session import Session, STOP_CYCLES, STOP_SPACING_MAX
+from drive_can_bridge.core.session import Session, STOP_CYCLES
 from drive_can_bridge.protocols.cannord import procedures
 from drive_can_bridge.protocols.cannord.channel import TaskChannel
 from drive_can_bridge.protocols.cannord.control import CannordControl
@@ -118,8 +118,7 @@ class CannordSession(Session):
         self._stopping = True
         self._in_pace = False
         self._cycles_left = STOP_CYCLES
-        spacing = min(self.drive.period, STOP_SPACING_MAX)
-        self._next_cycle = min(self._next_cycle, max(now, self._sent_at + spacing))
+        self._next_cycle = min(self._next_cycle, max(now, self._sent_at + self._stop_spacing))
 
     @property
     def stopped(self) -> bool:
@@ -214,7 +213,7 @@ class CannordSession(Session):
 
     def _count_down(self, now: float) -> None:
         """Handle the last cycles before silence."""
-        self._next_cycle = now + min(self.drive.period, STOP_SPACING_MAX)
+        self._next_cycle = now + self._stop_spacing
         self._cycles_left -= 1
         if self._cycles_left == 0:
             self._go_idle('deactivated')

@@ -101,8 +101,7 @@ class ExtendedSession(DataModelSession):
         self._withdraw(BRIDGE_INACTIVE, now)
         self._in_pace = False
         self._cycles_left = STOP_CYCLES
-        spacing = min(self.drive.period, STOP_SPACING_MAX)
-        self._next_cycle = min(self._next_cycle, max(now, self._sent_at + spacing))
+        self._next_cycle = min(self._next_cycle, max(now, self._sent_at + self._stop_spacing))
 
     @property
     def stopped(self) -> bool:
@@ -216,7 +215,7 @@ class ExtendedSession(DataModelSession):
 
     def _count_down(self, now: float) -> None:
         """Handle the last cycles before silence."""
-        self._next_cycle = now + min(self.drive.period, STOP_SPACING_MAX)
+        self._next_cycle = now + self._stop_spacing
         if self._stopping and self._by_hand is not None:
             written = self._by_hand.write_at_once(now)
             self._frames += self._channel.take_frames()

@@ -71,7 +71,7 @@ class StandardSession(DataModelSession):
         self._received_at = -math.inf
         self._expected = False  # the answer of a read that nobody wants any more may come
         self._missed_in_row = 0
-        self._silence = SILENT  # what the last incomplete round says
+        self._gap = ''  # what the last round asked for in vain, though others were answered
 
     # -- life cycle -------------------------------------------------------------------------------
 
@@ -101,7 +101,7 @@ class StandardSession(DataModelSession):
     def _begin(self, now: float) -> None:
         """Start over: nothing is known of the drive."""
         self._lose('the drive is being reconnected', now)
-        self._advice = self._silence = SILENT
+        self._advice, self._gap = SILENT, ''
         self._phase = Phase.POLLING
         self._missed_in_row = 0
         self._beat.start(now)
@@ -155,7 +155,7 @@ class StandardSession(DataModelSession):
                     tuple(setpoint.parameter.name for setpoint in expired)))
             self._writes.look(self._raws(), now)
         if self._phase is Phase.STOPPING:
-            self._beat.due = now + min(self.drive.period, STOP_SPACING_MAX)
+            self._beat.due = now + self._stop_spacing
             return
         error = self._beat.begun(now)
         if not self._in_round:
@@ -227,9 +227,9 @@ class StandardSession(DataModelSession):
         for chunk in self._reads:
             words = yield Read(chunk.address, chunk.size, attempts=1)
             if words is None:
-                self._silence = (SILENT if chunk is self._reads[0] else
-                                 f'no answer to the read of {self._names(chunk)}, though others '
-                                 f'are answered: does this drive have it')
+                self._gap = '' if chunk is self._reads[0] else (
+                    f'no answer to the read of {self._names(chunk)}, though others are answered: '
+                    f'does this drive have it')
                 return None
             if chunk is self._status_read:
                 self._status_asked_at = self._channel.asked_at
@@ -285,9 +285,9 @@ class StandardSession(DataModelSession):
         self._missed_in_row += 1
         if self.online and self._missed_in_row >= self.drive.missed_limit:
             reason = f'no complete round of reads for {self.drive.missed_limit} periods'
-            self._lose(reason if self._silence == SILENT else f'{reason}: {self._silence}', now)
+            self._lose(f'{reason}: {self._gap}' if self._gap else reason, now)
         elif not self.online:
-            self._advice = self._silence
+            self._advice = self._gap or SILENT
 
     # -- frames from the drive --------------------------------------------------------------------
 
