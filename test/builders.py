@@ -4,8 +4,8 @@
 from collections.abc import Iterable
 from typing import Any
 
-from drive_can_bridge.configuration.model import DriveConfiguration
 from drive_can_bridge.configuration.schema import family_defaults
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import Event, ProcessDataReceived, RequestCompleted
 from drive_can_bridge.core.frame import Frame

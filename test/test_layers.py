@@ -19,28 +19,24 @@ CHECKOUT = Path(__file__).resolve().parent.parent
 PACKAGE = CHECKOUT / 'drive_can_bridge'
 
 #: Layer: the layers that it may import, besides itself. '' is the package's own __init__.
-#: ``configuration.model`` (plain data) is a layer of its own, below the checks that fill it;
 #: ``ros.demo`` is one above ros, because it joins both ends of the bus in one process.
 INTERNAL: dict[str, set[str]] = {
     '': set(),
     'resources': {''},
     'process': {''},
-    'core': {'', 'configuration.model'},
-    'configuration.model': {'', 'core'},
-    'protocols': {'', 'core', 'configuration.model'},
-    'configuration': {'', 'core', 'configuration.model', 'protocols', 'resources'},
-    'transport': {'', 'core', 'configuration.model'},
-    'exchange': {'', 'core', 'configuration.model', 'protocols', 'transport'},
-    'simulation': {
-        '', 'core', 'configuration.model', 'configuration', 'protocols', 'resources', 'transport'},
+    'core': {''},
+    'protocols': {'', 'core'},
+    'configuration': {'', 'core', 'protocols', 'resources'},
+    'transport': {'', 'core'},
+    'exchange': {'', 'core', 'protocols', 'transport'},
+    'simulation': {'', 'core', 'configuration', 'protocols', 'resources', 'transport'},
     'ros': {
-        '', 'core', 'configuration.model', 'configuration', 'protocols', 'resources', 'transport',
-        'exchange', 'process'},
+        '', 'core', 'configuration', 'protocols', 'resources', 'transport', 'exchange', 'process'},
     'ros.demo': {
-        '', 'core', 'configuration.model', 'configuration', 'protocols', 'resources', 'transport',
+        '', 'core', 'configuration', 'protocols', 'resources', 'transport',
         'exchange', 'process', 'simulation', 'ros'},
     'cli': {
-        '', 'core', 'configuration.model', 'configuration', 'protocols', 'resources', 'transport',
+        '', 'core', 'configuration', 'protocols', 'resources', 'transport',
         'exchange', 'process', 'simulation', 'ros', 'ros.demo'},
 }
 
@@ -65,7 +61,7 @@ EXTERNAL: dict[str, set[str]] = {
 LAZY = {('cli', 'ros'), ('cli', 'ros.demo')}
 
 #: No clock, no thread, no log, no input or output in here: time and frames are arguments.
-SANS_IO = {'core', 'configuration.model', 'protocols'}
+SANS_IO = {'core', 'protocols'}
 IMPURE = {
     'asyncio', 'concurrent', 'datetime', 'logging', 'multiprocessing', 'os', 'pathlib', 'queue',
     'random', 'select', 'selectors', 'signal', 'socket', 'subprocess', 'threading', 'time',
@@ -183,11 +179,7 @@ def test_simulated_drives_share_no_session_with_the_bridge(source: Path) -> None
 
 
 def test_tables_have_no_cycle() -> None:
-    # core and configuration.model are one foundation: the session reads a drive's configuration
-    foundation = {'core', 'configuration.model'}
-    remaining = {
-        layer: {other for other in others if not {layer, other} <= foundation}
-        for layer, others in INTERNAL.items()}
+    remaining = {layer: set(others) for layer, others in INTERNAL.items()}
     while remaining:
         free = {layer for layer, others in remaining.items() if not others & remaining.keys()}
         assert free, f'cycle among {sorted(remaining)}'

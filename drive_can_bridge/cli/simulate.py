@@ -19,7 +19,7 @@ import threading
 import time
 from typing import Any, TextIO
 
-from drive_can_bridge.configuration.model import BridgeConfiguration, BusConfiguration
+from drive_can_bridge.core.configuration import BridgeConfiguration, BusConfiguration
 from drive_can_bridge.core.errors import ConfigurationError, TransportError, ValueRefused
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.simulation.console import Console, describe, help_lines, LineReader

@@ -4,9 +4,9 @@
 from collections.abc import Iterator
 from typing import Any, Protocol
 
-from drive_can_bridge.configuration.model import BusConfiguration
 from drive_can_bridge.configuration.problems import hint, nearest, Problem, show, Tree
 from drive_can_bridge.configuration.schema import defaults, definition
+from drive_can_bridge.core.configuration import BusConfiguration
 
 #: how much a key has to look like one of ours to be taken for a slip of the pen
 _SLIP = 0.8

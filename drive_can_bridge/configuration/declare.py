@@ -4,11 +4,11 @@
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
-from drive_can_bridge.configuration.model import (
-    BridgeConfiguration, BusConfiguration, DriveConfiguration, JointConfiguration,
-)
 from drive_can_bridge.configuration.schema import definition
 from drive_can_bridge.configuration.schema_check import check_value
+from drive_can_bridge.core.configuration import (
+    BridgeConfiguration, BusConfiguration, DriveConfiguration, JointConfiguration,
+)
 from drive_can_bridge.protocols.families import FAMILIES
 
 #: keys of a drive that may change while the bridge runs

@@ -11,11 +11,11 @@ from dataclasses import replace
 from typing import Any
 
 from drive_can_bridge.configuration.joint_check import JointChecker
-from drive_can_bridge.configuration.model import DriveConfiguration
 from drive_can_bridge.configuration.problems import Path, Problem, show, suggestion, Tree
 from drive_can_bridge.configuration.profile_check import LoadedProfile
 from drive_can_bridge.configuration.profiles import ProfileStore
 from drive_can_bridge.configuration.schema import defaults, family_defaults
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import Access, Parameter, Storage
 from drive_can_bridge.core.profile import Profile

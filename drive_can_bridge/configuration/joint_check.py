@@ -3,11 +3,11 @@
 
 from typing import Any
 
-from drive_can_bridge.configuration.model import DriveConfiguration, JointConfiguration
 from drive_can_bridge.configuration.problems import (
     nearest, Path, Problem, show, suggestion, Tree,
 )
 from drive_can_bridge.configuration.schema import defaults
+from drive_can_bridge.core.configuration import DriveConfiguration, JointConfiguration
 from drive_can_bridge.core.parameters import Parameter, ValueKind
 from drive_can_bridge.core.units import (
     convertible_units, ELECTRICAL_FREQUENCY, Quantity, si_factor,

@@ -12,7 +12,6 @@ from typing import Any
 from drive_can_bridge.configuration.bus_check import Adapters, BusChecker
 from drive_can_bridge.configuration.declare import check_dynamic, declared_parameters
 from drive_can_bridge.configuration.drive_check import DriveChecker
-from drive_can_bridge.configuration.model import BridgeConfiguration, DriveConfiguration
 from drive_can_bridge.configuration.overrides import tree_from_overrides
 from drive_can_bridge.configuration.parameter_file import read_parameter_file
 from drive_can_bridge.configuration.problems import (
@@ -22,6 +21,7 @@ from drive_can_bridge.configuration.profiles import ProfileStore
 from drive_can_bridge.configuration.schema import defaults, definition, parameter_file_schema
 from drive_can_bridge.configuration.schema_check import check_schema
 from drive_can_bridge.configuration.traffic_check import collisions, misfits, overloads, too_fast
+from drive_can_bridge.core.configuration import BridgeConfiguration, DriveConfiguration
 from drive_can_bridge.core.errors import ConfigurationError
 from drive_can_bridge.protocols.families import FAMILIES
 

@@ -4,8 +4,8 @@
 from collections.abc import Iterable, Iterator
 import math
 
-from drive_can_bridge.configuration.model import BusConfiguration, DriveConfiguration
 from drive_can_bridge.configuration.problems import Problem, Tree
+from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration
 from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.protocols.family import Claim, Family
 

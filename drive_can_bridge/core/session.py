@@ -20,7 +20,7 @@ from abc import ABC, abstractmethod
 from dataclasses import replace
 from enum import Enum
 
-from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import (
     ControlAction, ControlCompleted, ControlMachine, ControlTicket,
 )

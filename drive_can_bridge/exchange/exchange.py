@@ -18,7 +18,7 @@ import threading
 import time
 from typing import Any, Protocol
 
-from drive_can_bridge.configuration.model import BusConfiguration
+from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlTicket
 from drive_can_bridge.core.events import Event, ProcessDataReceived
 from drive_can_bridge.core.frame import Frame, Route

@@ -3,7 +3,7 @@
 
 from collections.abc import Sequence
 
-from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.cannord.family import Cannord
 from drive_can_bridge.protocols.canopen_pkw.family import CanopenPkw

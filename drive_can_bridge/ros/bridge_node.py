@@ -24,9 +24,9 @@ from rclpy.executors import Executor
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
 from drive_can_bridge.configuration.load import configuration_from_overrides
-from drive_can_bridge.configuration.model import BridgeConfiguration
 from drive_can_bridge.configuration.parameter_file import duplicate_keys
 from drive_can_bridge.configuration.problems import report
+from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.errors import ConfigurationError
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.process.scheduling import raise_priority

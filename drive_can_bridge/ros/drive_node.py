@@ -15,7 +15,7 @@ from rclpy.parameter import Parameter as NodeParameter
 from rclpy.task import Future
 from std_msgs.msg import Bool
 
-from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlTicket
 from drive_can_bridge.core.directory import ParameterDirectory
 from drive_can_bridge.core.events import (

@@ -15,7 +15,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from drive_can_bridge.configuration.load import check_dynamic, declared_parameters
-from drive_can_bridge.configuration.model import BridgeConfiguration
+from drive_can_bridge.core.configuration import BridgeConfiguration
 
 _OURS = ('drives.', 'buses.')
 _OURS_ALONE = ('diagnostics_period', 'autostart')

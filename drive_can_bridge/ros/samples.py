@@ -18,7 +18,7 @@ from rclpy.publisher import Publisher
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 
-from drive_can_bridge.configuration.model import DriveConfiguration, JointConfiguration
+from drive_can_bridge.core.configuration import DriveConfiguration, JointConfiguration
 from drive_can_bridge.core.parameters import Parameter, Value, ValueKind
 from drive_can_bridge.ros.prepared import PreparedMessage
 from drive_can_bridge.ros.quality import latched_quality, overriding, state_quality

@@ -8,7 +8,7 @@ refused access changes nothing and carries an SDO abort code.
 
 from typing import NamedTuple
 
-from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.parameters import Parameter, Storage
 from drive_can_bridge.protocols.canopen_pkw import abort_codes

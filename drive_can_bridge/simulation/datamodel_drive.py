@@ -3,7 +3,7 @@
 
 from collections.abc import Sequence
 
-from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.core.parameters import Value

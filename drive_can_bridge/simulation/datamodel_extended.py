@@ -9,7 +9,7 @@ not define. Unused bytes of a response hold junk, since the manual calls them un
 
 from collections.abc import Sequence
 
-from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.protocols.datamodel import extended

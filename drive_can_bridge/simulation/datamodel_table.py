@@ -9,7 +9,7 @@ numbers here are those of the wire; the offset of the configuration is in them a
 from collections.abc import Callable, Sequence
 import math
 
-from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import Parameter, Storage
 from drive_can_bridge.protocols.datamodel.extended import SLOTS

@@ -3,7 +3,7 @@
 
 from collections.abc import Mapping
 
-from drive_can_bridge.configuration.model import BridgeConfiguration
+from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.errors import ConfigurationError
 from drive_can_bridge.simulation.cannord import SimulatedCannordInverter
 from drive_can_bridge.simulation.canopen_pkw import SimulatedPkwDrive

@@ -6,7 +6,7 @@ import threading
 import time
 from typing import Protocol
 
-from drive_can_bridge.configuration.model import BusConfiguration
+from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, TransportError
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.simulation.drive import SimulatedDrive

@@ -18,7 +18,7 @@ import threading
 import time
 from typing import Any
 
-from drive_can_bridge.configuration.model import BridgeConfiguration, BusConfiguration
+from drive_can_bridge.core.configuration import BridgeConfiguration, BusConfiguration
 from drive_can_bridge.core.parameters import Value
 from drive_can_bridge.simulation.drive import EEPROM_TIME, SimulatedDrive
 from drive_can_bridge.simulation.drives import make_drives

@@ -18,7 +18,7 @@ import threading
 import time
 from typing import Protocol
 
-from drive_can_bridge.configuration.model import BusConfiguration
+from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, TransportError
 from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.transport.error_frames import ADVICE_ALONE, BUS_OFF, BusError

@@ -15,7 +15,7 @@ from typing import Any
 
 import can
 
-from drive_can_bridge.configuration.model import BusConfiguration
+from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, TransportError
 from drive_can_bridge.core.frame import (
     EXTENDED_IDENTIFIER_MAX, Frame, Route, STANDARD_IDENTIFIER_MAX,

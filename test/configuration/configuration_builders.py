@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from drive_can_bridge.configuration.load import configuration_from_file
-from drive_can_bridge.configuration.model import BridgeConfiguration
+from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.errors import ConfigurationError
 
 #: a good file; tests change a line of it. The line numbers in tests count from here.

@@ -7,7 +7,7 @@ from pathlib import Path
 from configuration_builders import load
 import pytest
 
-from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Access, ParameterType, ValueKind
 from drive_can_bridge.protocols.datamodel.extended import (

@@ -7,7 +7,7 @@ from pathlib import Path
 from configuration_builders import changed, load, problems
 import pytest
 
-from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import ParameterType
 from drive_can_bridge.protocols.canopen_pkw.family import CanopenPkw
 

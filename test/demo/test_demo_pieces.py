@@ -12,7 +12,7 @@ import pytest
 from waiting import wait_for
 
 from drive_can_bridge.configuration.load import configuration_from_file
-from drive_can_bridge.configuration.model import BridgeConfiguration, BusConfiguration
+from drive_can_bridge.core.configuration import BridgeConfiguration, BusConfiguration
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Access, Parameter, ParameterType
 from drive_can_bridge.process import environment

@@ -7,7 +7,7 @@ from typing import Any
 
 from builders import drive, frame
 
-from drive_can_bridge.configuration.model import BusConfiguration, DriveConfiguration
+from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration
 from drive_can_bridge.core.control import ControlCompleted
 from drive_can_bridge.core.events import Event, ProcessDataReceived
 from drive_can_bridge.core.frame import Frame, Route

@@ -8,7 +8,7 @@ from exchange_builders import all_routes, Bench, BusNotes
 import pytest
 from waiting import wait_for
 
-from drive_can_bridge.configuration.model import BusConfiguration
+from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlTicket
 from drive_can_bridge.core.events import RequestCompleted, StationFound, StationLost
 from drive_can_bridge.core.frame import Frame

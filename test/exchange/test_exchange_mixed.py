@@ -15,7 +15,7 @@ import can
 from exchange_builders import all_routes, Bench
 import pytest
 
-from drive_can_bridge.configuration.model import BusConfiguration
+from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.events import (
     ForeignMasterSeen, FrameRejected, RequestCompleted, StationFound,
 )

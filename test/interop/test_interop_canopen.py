@@ -14,10 +14,10 @@ from builders import drive, read, text_of, write
 import pytest
 from waiting import wait_for
 
-from drive_can_bridge.configuration.model import (
+from drive_can_bridge.configuration.profiles import read_profile
+from drive_can_bridge.core.configuration import (
     BridgeConfiguration, BusConfiguration, DriveConfiguration,
 )
-from drive_can_bridge.configuration.profiles import read_profile
 from drive_can_bridge.core.control import ControlAction, ControlCompleted
 from drive_can_bridge.core.events import Event, ProcessDataReceived, RequestCompleted
 from drive_can_bridge.core.requests import Request

@@ -17,7 +17,7 @@ from builders import (
 )
 import pytest
 
-from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.events import (
     FrameRejected, ProcessDataReceived, RequestCompleted, SetpointsExpired, StationFound,

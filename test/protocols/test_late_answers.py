@@ -13,7 +13,7 @@ import builders
 from builders import Conversation, EEPROM, INT16, parameter, RAM, RO
 import pytest
 
-from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.events import RequestCompleted
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.requests import (

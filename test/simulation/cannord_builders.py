@@ -6,7 +6,7 @@ from typing import Any
 
 from simulation_builders import EEPROM, frame, INT16, parameter, RAM, RO, WO
 
-from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.simulation.cannord import SimulatedCannordInverter

@@ -4,8 +4,8 @@
 from collections.abc import Iterable
 from typing import Any
 
-from drive_can_bridge.configuration.model import DriveConfiguration
 from drive_can_bridge.configuration.profiles import read_profile
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.profile import Profile

@@ -4,7 +4,7 @@
 from collections.abc import Iterable
 from typing import Any
 
-from drive_can_bridge.configuration.model import (
+from drive_can_bridge.core.configuration import (
     BridgeConfiguration, BusConfiguration, DriveConfiguration,
 )
 from drive_can_bridge.core.frame import Frame

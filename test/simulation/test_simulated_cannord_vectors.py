@@ -14,7 +14,7 @@ from cannord_builders import word
 import pytest
 from simulation_builders import INT16, parameter, RO
 
-from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import ParameterType
 from drive_can_bridge.core.profile import Profile

@@ -19,7 +19,7 @@ from simulation_builders import (
     MOTOR_CURRENT, parameter, RAM, SPEED_SETPOINT, STATUS_WORD, WO,
 )
 
-from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import LocalProtocolError, ValueRefused
 from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.core.parameters import Parameter

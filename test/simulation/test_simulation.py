@@ -13,7 +13,7 @@ import pytest
 from simulation_builders import bridge, configuration, frame
 from waiting import wait_for
 
-from drive_can_bridge.configuration.model import BusConfiguration
+from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import (
     BusMisconfigured, BusUnavailable, TransportError, ValueRefused,
 )

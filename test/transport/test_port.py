@@ -12,7 +12,7 @@ from typing import Any
 import can
 import pytest
 
-from drive_can_bridge.configuration.model import BusConfiguration
+from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusUnavailable, TransportError
 from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.transport import port as port_module

@@ -3,7 +3,7 @@
 
 from collections.abc import Sequence
 
-from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.protocols.cannord.identifiers import all_identifier, group_identifier
 
 

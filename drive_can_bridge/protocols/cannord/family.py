@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import re
 from typing import Any
 
-from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.cannord.broadcast import broadcast_identifier, groups

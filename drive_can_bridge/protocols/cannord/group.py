@@ -16,7 +16,7 @@ All sessions of a group live on one bus, under one lock, so that they may call e
 from collections.abc import Sequence
 import math
 
-from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlTicket
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter

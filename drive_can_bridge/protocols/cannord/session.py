@@ -18,7 +18,7 @@ data beside them: lower identifiers win on the bus.
 
 import math
 
-from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.events import (
     ForeignMasterSeen, Noted, ProcessDataReceived, SetpointsExpired, StationFound,

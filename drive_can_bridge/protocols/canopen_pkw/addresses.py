@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import re
 from typing import Union
 
-from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.canopen_pkw import object_map, pkw
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address

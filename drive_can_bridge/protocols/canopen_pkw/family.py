@@ -4,7 +4,7 @@
 from collections.abc import Iterator
 from typing import Any
 
-from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Route, STANDARD_IDENTIFIER_MAX
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.session import Session

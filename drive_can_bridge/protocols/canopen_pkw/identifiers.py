@@ -3,7 +3,7 @@
 
 from typing import NamedTuple
 
-from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.protocols.canopen_pkw import network
 
 

@@ -23,7 +23,7 @@ from collections.abc import Sequence
 from enum import Enum
 import math
 
-from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlMachine, ProfileControl
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.events import (

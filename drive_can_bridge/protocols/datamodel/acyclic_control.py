@@ -13,7 +13,7 @@ module's business.
 from collections.abc import Callable
 import math
 
-from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlMachine
 from drive_can_bridge.core.parameters import Parameter, Storage
 from drive_can_bridge.protocols.datamodel.channel import AcyclicChannel, Procedure, Read, Write

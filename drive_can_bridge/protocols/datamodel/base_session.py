@@ -5,7 +5,7 @@ from abc import abstractmethod
 from collections.abc import Callable
 import math
 
-from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlMachine, ProfileControl
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter

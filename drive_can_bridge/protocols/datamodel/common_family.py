@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import re
 from typing import Any
 
-from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.protocols.datamodel.extended import CYCLIC_PARAMETER, SLOTS
 from drive_can_bridge.protocols.datamodel.mapping import REQUEST_MAP_BASE, RESPONSE_MAP_BASE

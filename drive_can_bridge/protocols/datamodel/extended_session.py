@@ -18,7 +18,7 @@ frames beyond three with neutral setpoints, in case it only lost its voice. With
 from enum import Enum
 import math
 
-from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.events import (
     Event, ForeignMasterSeen, MappingDiffered, Noted, ProcessDataReceived, SetpointsExpired,

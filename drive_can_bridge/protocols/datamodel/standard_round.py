@@ -1,7 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """What a round of a DataModel drive with 11-bit identifiers reads, and how long it takes."""
 
-from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.protocols.datamodel.standard import SLOTS
 from drive_can_bridge.protocols.polling import Chunk, Place, plan_reads, round_time
 

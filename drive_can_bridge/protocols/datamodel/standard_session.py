@@ -13,7 +13,7 @@ Setpoints do not wait for answers: they go out while a read is under way, or in 
 from enum import Enum
 import math
 
-from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.events import (
     ForeignMasterSeen, ProcessDataReceived, SetpointsExpired, StationFound,

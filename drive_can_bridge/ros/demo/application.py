@@ -18,7 +18,7 @@ from rclpy.parameter import Parameter as NodeParameter
 from rclpy.signals import SignalHandlerOptions
 
 from drive_can_bridge.configuration.load import declared_parameters
-from drive_can_bridge.configuration.model import BridgeConfiguration
+from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.process.scheduling import be_punctual
 from drive_can_bridge.process.signals import SignalWatcher

@@ -6,7 +6,7 @@ from pathlib import Path
 import threading
 import time
 
-from drive_can_bridge.configuration.model import BusConfiguration
+from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import TransportError
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.transport.port import open_port, Port

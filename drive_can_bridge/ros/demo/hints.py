@@ -4,7 +4,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from drive_can_bridge.configuration.model import BridgeConfiguration, DriveConfiguration
+from drive_can_bridge.core.configuration import BridgeConfiguration, DriveConfiguration
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import Access, Parameter, Value, ValueKind
 from drive_can_bridge.protocols.families import FAMILIES

@@ -9,7 +9,7 @@ interpreter reads at once. A value may be one exchange older than its neighbour;
 from collections import deque
 import time
 
-from drive_can_bridge.configuration.model import BridgeConfiguration, DriveConfiguration
+from drive_can_bridge.core.configuration import BridgeConfiguration, DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.session import DriveState, Session
 from drive_can_bridge.core.statistics import Statistic

@@ -5,7 +5,7 @@ from typing import Any
 
 from builders import Conversation, drive, EEPROM, INT16, INT32, parameter, RAM, RO
 
-from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import ParameterType
 
 PERCENT = 100 / 16384

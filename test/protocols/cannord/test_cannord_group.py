@@ -10,7 +10,7 @@ from cannord_session_builders import (
 )
 import pytest
 
-from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import (
     Event, ForeignMasterSeen, Noted, ProcessDataReceived, RequestCompleted, StationFound,

@@ -5,7 +5,7 @@ from typing import Any
 
 from builders import Conversation, drive, INT32, parameter, RAM, RO, WO
 
-from drive_can_bridge.configuration.model import DriveConfiguration
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import ParameterType
 from drive_can_bridge.core.profile import ControlTable, StatusPattern
 
