@@ -13,7 +13,8 @@ export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 
 help:
 	@echo 'make demo    simulated drives and the bridge in one process; ARGS="..." goes to drive_can demo'
-	@echo 'make test    types and all tests; ARGS="..." goes to pytest'
+	@echo 'make test    types and all tests; ARGS="..." goes to pytest (-n 0: one after the other)'
+	@echo '             DRIVE_CAN_TEST_PROFILE=long: what is random looks longer, as in CI'
 	@echo 'make bench   measurements; ARGS="..." goes to bench/run.py'
 	@echo 'make lint    style'
 	@echo 'make setup   only the virtual environment that all of them use, in $(VENV)'
@@ -29,12 +30,8 @@ setup:
 demo: setup
 	@exec $(BIN)/python .ci/foreground $(BIN)/drive_can demo $(ARGS)
 
-# The tests run even when the types are wrong: one run shows everything.
 test: setup
-	@echo 'mypy:'; $(BIN)/python -m mypy; types=$$?; \
-	$(BIN)/python -m pytest $(ARGS); tests=$$?; \
-	[ $$types = 0 ] || echo 'mypy found errors, see above'; \
-	[ $$types = 0 ] && [ $$tests = 0 ]
+	@.ci/test '$(VENV)' $(ARGS)
 
 bench: setup
 	@exec $(BIN)/python .ci/foreground $(BIN)/python bench/run.py $(ARGS)

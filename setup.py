@@ -72,12 +72,13 @@ setup(
             'ros-common-interfaces==5.3.6',
         ],
         'test': [
-            # A CANopen stack to test against. No rosdep key: tests that need it skip without it.
+            # No rosdep keys for these two: the tests run without them, only fewer, or slower.
             'canopen>=2.3',
             'hypothesis',
             'mypy',
             'pytest',
             'pytest-timeout',
+            'pytest-xdist>=3.3',
             'setuptools',
         ],
     },

@@ -23,7 +23,7 @@ from drive_can_bridge.core.setpoints import CommandOutcome
 #: more than rounding errors, less than anything that matters
 SLACK = 1e-7
 #: for the state machine of every family
-SETTINGS = settings(max_examples=150, stateful_step_count=50, deadline=None)
+SETTINGS = settings(stateful_step_count=50)
 #: s for all its examples
 PATIENCE = 600
 

@@ -1,42 +1,196 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
+What all tests share: where they run, how long they look, and which of them run beside each other.
+
 Puts this directory on the path: every test may import ``builders``.
 
-Takes hypothesis' time limits away: how long an example takes says how busy the machine is.
+*Domains.* Nothing leaves this machine, and two test processes on it never meet: each takes ROS
+domains of its own, before anything of ROS is imported. Those of ``ros/`` are in another one than
+all others, because they look at who is in the graph, and a process that was killed stays there for
+a while. The locks end with the process.
 
-Gives the test run a ROS domain of its own, before anything of ROS is imported: nothing leaves this
-machine, and two test runs on it never meet. The lock ends with the process.
+*Profiles.* Whatever is random looks for a short time, unless DRIVE_CAN_TEST_PROFILE is ``long``.
+How long one example takes says how busy the machine is, and is no failure.
+
+*In parallel*, with pytest-xdist (``-n auto --dist loadscope``, as ``make test`` does): the tests
+of a module stay together, because they may share what is expensive to start; those that consist of
+waiting for processes of their own are spread. Long ones come first. What measures time has the
+mark ``alone``: nothing else of the test run happens meanwhile.
+
+*Signals.* Who runs us under ``nohup``, or in the background of a script, has us ignore some
+signals, and what is started here would inherit that.
 """
 
+from collections.abc import Iterator
 import fcntl
 import os
 from pathlib import Path
+import signal
 import tempfile
+from typing import Any
 
 from hypothesis import HealthCheck, settings
+import pytest
 
-settings.register_profile('patient', deadline=None, suppress_health_check=[HealthCheck.too_slow])
-settings.load_profile('patient')
+PROFILE = 'DRIVE_CAN_TEST_PROFILE'
+PATIENT = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.register_profile('short', PATIENT, max_examples=25)
+settings.register_profile('long', PATIENT, max_examples=150)
+settings.load_profile(os.environ.get(PROFILE, 'short'))
 
 DOMAINS = range(10, 90)
+#: the user's own domain, in which something may be running
+_AVOIDED = os.environ.setdefault('DRIVE_CAN_TEST_AVOIDED_DOMAIN',
+                                 os.environ.get('ROS_DOMAIN_ID', ''))
 
 
-def _own_domain() -> tuple[int, int]:
-    """Return a domain that no other test run has, and the descriptor of its lock."""
+def _own_domain() -> tuple[str, int]:
+    """Return a domain that no other test process has, and the descriptor of its lock."""
     folder = Path(tempfile.gettempdir())
     for domain in DOMAINS:
-        lock = os.open(folder / f'drive_can_bridge_test_domain_{domain}', os.O_CREAT | os.O_RDWR,
-                       0o666)
+        if str(domain) == _AVOIDED:
+            continue
+        try:
+            lock = os.open(folder / f'drive_can_bridge_test_domain_{domain}',
+                           os.O_CREAT | os.O_RDWR, 0o666)
+        except OSError:  # another user's
+            continue
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
             os.close(lock)
         else:
-            return domain, lock
+            return str(domain), lock
     # a file system without locks, or very many runs: any domain will do
-    return DOMAINS.start + os.getpid() % len(DOMAINS), -1
+    return str(DOMAINS.start + os.getpid() % len(DOMAINS)), -1
 
 
-_DOMAIN, _LOCK = _own_domain()
-os.environ['ROS_DOMAIN_ID'] = str(_DOMAIN)
+_OWN, _ROS = _own_domain(), _own_domain()
+os.environ['ROS_DOMAIN_ID'] = _OWN[0]
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+
+HERE = Path(__file__).parent
+#: directories and modules whose tests wait for processes of their own: each test by itself
+SPREAD = ('test/system/', 'test/demo/', 'test/simulation/test_simulate_command', 'test/process/')
+#: what comes first, because it takes longest
+FIRST = ('test/system/test_soak', 'test/system/', 'test/demo/', 'test/ros/', 'test/')
+#: processes for each core: most of the time they wait
+WORKERS_PER_CORE = 3
+
+
+def _directory(item: pytest.Item) -> str:
+    return item.path.relative_to(HERE).parts[0]
+
+
+# -- signals and domains --------------------------------------------------------------------------
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Let what is started here begin with the signals of a terminal's foreground."""
+    if config.getoption('dist', 'no') != 'no':
+        return  # only starts those who run the tests
+    for number in (signal.SIGHUP, signal.SIGINT, signal.SIGQUIT, signal.SIGTERM):
+        if signal.getsignal(number) is signal.SIG_IGN:
+            # ignored as before, but nobody inherits a handler
+            signal.signal(number, lambda *_: None)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Choose the domain of a test."""
+    os.environ['ROS_DOMAIN_ID'] = (_ROS if _directory(item) == 'ros' else _OWN)[0]
+
+
+# -- beside each other ----------------------------------------------------------------------------
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers() -> int:
+    """Return how many processes ``-n auto`` means."""
+    wanted = os.environ.get('PYTEST_XDIST_AUTO_NUM_WORKERS')
+    return int(wanted) if wanted else WORKERS_PER_CORE * len(os.sched_getaffinity(0))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_configure_node(node: Any) -> None:
+    """Tell each worker where the locks of this run are."""
+    folder = getattr(node.config, 'drive_can_locks', None)
+    if folder is None:
+        folder = node.config.drive_can_locks = tempfile.TemporaryDirectory()
+        node.config.add_cleanup(folder.cleanup)
+    node.workerinput['drive_can_locks'] = folder.name
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """Give whole modules to the workers, and single tests where these only wait."""
+    from xdist.scheduler import LoadScopeScheduling
+
+    class Scheduling(LoadScopeScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            return _unit(nodeid)
+
+    config.option.loadscopereorder = False
+    return Scheduling(config, log) if config.getoption('dist') == 'loadscope' else None
+
+
+def _unit(nodeid: str) -> str:
+    """Return the name of what stays together."""
+    module = nodeid.partition('::')[0]
+    return nodeid if module.startswith(SPREAD) else module
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Let begin what takes longest; in the usual order without xdist."""
+    if hasattr(config, 'workerinput'):
+        items.sort(key=_place)
+
+
+def _place(item: pytest.Item) -> int:
+    if item.get_closest_marker('alone'):
+        return -1
+    return next((place for place, start in enumerate(FIRST) if item.nodeid.startswith(start)),
+                len(FIRST))
+
+
+class _Room:
+    """
+    A room that many enter together or one enters alone; each test is a visit.
+
+    Everybody passes a gate, at which whoever wants to be alone keeps the others back: the room
+    becomes empty.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._gate, self._room = (os.open(folder / name, os.O_CREAT | os.O_RDWR, 0o666)
+                                  for name in ('gate', 'room'))
+
+    def enter(self, *, alone: bool) -> None:
+        how = fcntl.LOCK_EX if alone else fcntl.LOCK_SH
+        fcntl.flock(self._gate, how)
+        fcntl.flock(self._room, how)
+        if not alone:
+            fcntl.flock(self._gate, fcntl.LOCK_UN)
+
+    def leave(self) -> None:
+        fcntl.flock(self._room, fcntl.LOCK_UN)
+        fcntl.flock(self._gate, fcntl.LOCK_UN)
+
+
+_ROOM = pytest.StashKey[_Room]()
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Iterator[Any]:
+    """Let nothing else of this run happen during a test that wants to be alone."""
+    given = getattr(item.config, 'workerinput', {}).get('drive_can_locks')
+    if given is None:
+        return (yield)
+    if _ROOM not in item.config.stash:
+        item.config.stash[_ROOM] = _Room(Path(given))
+    room = item.config.stash[_ROOM]
+    room.enter(alone=item.get_closest_marker('alone') is not None)
+    try:
+        return (yield)
+    finally:
+        room.leave()

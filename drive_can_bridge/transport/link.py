@@ -11,6 +11,9 @@ queue can be looked at, the port stays open, so that what waits in it goes on co
 is back when there is room again; other adapters are closed and opened anew, which empties them.
 Both happen every ``reconnect_period``. While it is not known yet that somebody is there again, the
 first frame without room blocks the bus at once.
+
+An adapter whose other end has gone may well open once more, and fail when it is read. So a bus
+counts as open only after its first read.
 """
 
 from collections.abc import Callable, Sequence
@@ -30,6 +33,8 @@ RECEIVE_TIMEOUT = 0.02
 #: send time-outs, and s, that nothing may leave until the bus counts as blocked
 BLOCKED_TIMEOUTS = 4
 BLOCKED_AFTER = 0.05
+#: why nothing is sent through a port that is not known to work
+NOT_READ_YET = 'not read yet'
 
 
 class LinkListener(Protocol):
@@ -199,7 +204,9 @@ class Link:
         opened = False
         while not self._closing.is_set():
             try:
-                self._port = open_port(self.bus, self._routes, stations=self._stations)
+                self._loss = NOT_READ_YET
+                self._port = port = open_port(self.bus, self._routes, stations=self._stations)
+                frame = port.receive(RECEIVE_TIMEOUT)
                 self._loss = self._blocked = self._no_room_since = None
                 # after a loss nobody knows whether anybody is there before somebody was heard
                 self._heard = not opened
@@ -209,7 +216,7 @@ class Link:
                 reported = ''
                 self._listener.bus_opened()
                 self._first_attempt.set()
-                self._read(self._port)
+                self._read(port, frame)
             except BusUnavailable as error:
                 reason = in_words(error)
                 self.last_error = reason
@@ -222,13 +229,12 @@ class Link:
                 self._first_attempt.set()
             self._closing.wait(self.bus.reconnect_period)
 
-    def _read(self, port: Port) -> None:
+    def _read(self, port: Port, frame: Frame | None) -> None:
         receive = port.receive
         listener = self._listener.frame_received
         closing = self._closing
         rejected = 0
         while not closing.is_set():
-            frame = receive(RECEIVE_TIMEOUT)
             if self._loss is not None:
                 raise BusUnavailable(self._loss)
             if self._blocked is not None:
@@ -240,6 +246,7 @@ class Link:
             elif port.rejected_frames != rejected:
                 self._listener.frames_rejected += port.rejected_frames - rejected
                 rejected = port.rejected_frames
+            frame = receive(RECEIVE_TIMEOUT)
 
     def _sit_out(self, port: Port, reason: str) -> None:
         """

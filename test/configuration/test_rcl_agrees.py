@@ -6,7 +6,6 @@ One further process reads all documents with rclpy, each into a context and node
 """
 
 import json
-import os
 from pathlib import Path
 import subprocess
 import sys
@@ -86,10 +85,8 @@ def rcl(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
         path = folder / f'{number}.yaml'
         path.write_text(HEAD + document, encoding='utf-8')
         paths.append(str(path))
-    environment = {**os.environ, 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
-                   'ROS_DOMAIN_ID': '78'}
     done = subprocess.run([sys.executable, '-c', PROBE], input=json.dumps(paths), text=True,
-                          capture_output=True, env=environment, timeout=100, check=False)
+                          capture_output=True, timeout=100, check=False)
     assert done.returncode == 0, done.stderr
     return dict(zip(documents, json.loads(done.stdout.splitlines()[-1])))
 

@@ -1245,4 +1245,4 @@ class AnyConversation(RuleBasedStateMachine):
 
 
 TestAnyConversation = AnyConversation.TestCase
-TestAnyConversation.settings = settings(max_examples=150, stateful_step_count=40, deadline=None)
+TestAnyConversation.settings = settings(stateful_step_count=40)

@@ -12,7 +12,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, strategies as st
 import pytest
 from simulation_builders import (
     ACTUAL_SPEED, ask, bridge, configuration, CONTROL, CONTROL_WORD, EEPROM, EXAMPLE, frame,
@@ -295,7 +295,6 @@ def test_an_identifier_over_7ff_is_refused() -> None:
         drive(station=16)
 
 
-@settings(deadline=None)  # machines may be busy
 @given(st.integers(0, 0x1FFFFFFF), st.binary(max_size=8), st.booleans(), st.booleans())
 def test_anything(identifier: int, data: bytes, is_extended: bool, near: bool) -> None:
     made = drive()

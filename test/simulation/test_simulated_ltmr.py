@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, strategies as st
 from ltmr_builders import configuration, LTMR, Ltmr, NODE
 import pytest
 
@@ -552,7 +552,6 @@ class TestMotor:
             assert level * (1.0 - 2.718281828459045 ** (-trip_class / starter.time_constant)) \
                 == pytest.approx(100.0)
 
-    @settings(deadline=None)
     @given(st.lists(st.floats(0.0, 3.0), min_size=1, max_size=20))
     def test_it_hardly_matters_how_often_time_passes(self, steps: list[float]) -> None:
         coarse, fine = Ltmr().drive.plant.starter, Ltmr().drive.plant.starter
@@ -689,7 +688,6 @@ _ANY_FRAME = st.one_of(
               st.just(True)))
 
 
-@settings(deadline=None)
 @given(st.lists(st.tuples(st.floats(0.0, 0.6), _ANY_FRAME), max_size=40))
 def test_whatever_comes_it_stays_a_good_node(steps: list[tuple[float, Frame]]) -> None:
     made = Ltmr(started=False)

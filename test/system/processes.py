@@ -159,6 +159,7 @@ class Processes:
                                  *arguments)
         process.__class__ = Simulator
         assert isinstance(process, Simulator)
+        process.links = self.directory / 'links'
         process.line('^drive ')
         return process
 
@@ -188,6 +189,18 @@ class Processes:
 
 class Simulator(Process):
     """``drive_can simulate --log-frames``: also a witness of what was on the bus."""
+
+    links: Path
+
+    def kill(self) -> None:
+        """
+        End it at once, so that it cannot clean up behind itself.
+
+        Its links go first: another test's terminal may get the name that they point to.
+        """
+        for link in self.links.glob('*'):
+            link.unlink()
+        super().kill()
 
     def frames(self, pattern: str = '', since: int = 0) -> list[str]:
         """Return the logged frames, as ``003FFFF0#0000000000000000 R``; R: from the bridge."""
@@ -233,9 +246,10 @@ class Client:
         """Publish nothing any more."""
         self.ask('publish', topic=topic, value=None, rate=1.0)
 
-    def value(self, topic: str, low: float, high: float, *, kind: str = 'Float64') -> float:
+    def value(self, topic: str, low: float, high: float, *, kind: str = 'Float64',
+              timeout: float = DEADLINE) -> float:
         """Wait for a value within limits that arrives after this call."""
-        return float(self.ask('value', topic=topic, kind=kind, low=low, high=high))
+        return float(self.ask('value', timeout, topic=topic, kind=kind, low=low, high=high))
 
     def values(self, topic: str) -> list[float]:
         """Return the different values that have arrived since the last ``value``, sorted."""

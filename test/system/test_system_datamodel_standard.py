@@ -23,7 +23,9 @@ LONG = {**CONVEYOR, 'missed_limit': 250}
 #: the same station number, with 11 bits: 3F1h and 7F1h
 SHORT = {**CONVEYOR, 'protocol': 'datamodel_standard',
          # an answer that is later than both together cannot be told from the next one: generous
-         'parameter_timeout': 1.0, 'quarantine': 1.0}
+         'parameter_timeout': 1.0, 'quarantine': 1.0,
+         # longer than the drive needs: it begins to count when it gets round to it
+         'eeprom_write_gap': 0.2}
 #: Reg.209 to 211 in one read
 ASK = r'^3F1#03D1000300000000 R$'
 ANSWER = r'^7F1#.{12}A5A5 T$'

@@ -95,7 +95,7 @@ def test_out_of_file_descriptors(processes: Processes, client: Client, namespace
     # no further file can be opened, whatever is closed
     before = resource.prlimit(bridge.pid, resource.RLIMIT_NOFILE)
     resource.prlimit(bridge.pid, resource.RLIMIT_NOFILE, (3, before[1]))
-    simulator.send(signal.SIGKILL)
+    simulator.kill()
     client.online(drive, wanted=False)
     again = processes.simulator(file)
     bridge.error('bus main: .*Too many open files')

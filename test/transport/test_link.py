@@ -185,6 +185,46 @@ def test_loss_seen_by_the_reader(make: Callable[..., Bench]) -> None:
     assert bench.link.reconnections == 1
 
 
+class DeadPort(FakePort):
+    """Opens, and fails at its first read: a terminal whose other end has gone."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.coming.append(BusUnavailable('receive: gone'))
+        self.bus_off_count = 1
+
+
+def test_adapter_that_opens_and_fails_when_it_is_read(make: Callable[..., Bench]) -> None:
+    bench = make()
+    bench.opened()
+    bench.kind = DeadPort
+    bench.port.coming.append(BusUnavailable('receive: gone'))
+
+    def send() -> bool:
+        bench.link.send(FRAME)
+        return len(bench.ports) > 5
+    wait_for(send)
+    bench.kind = FakePort
+    bench.opened(2)
+    # it was never open, and the same loss is told once
+    assert bench.listener.told == ['opened', 'lost: receive: gone', 'opened']
+    assert bench.link.reconnections == 1
+    dead = [port for port in bench.ports if isinstance(port, DeadPort)]
+    assert all(port.closed and port.timeouts == [] for port in dead)
+    assert bench.link.bus_off_count == len(dead)
+
+
+def test_frame_that_is_there_before_the_bus_counts_as_open(make: Callable[..., Bench],
+                                                           ) -> None:
+    class ReadyPort(FakePort):
+        def __init__(self) -> None:
+            super().__init__()
+            self.coming.append(ANSWER)
+    bench = make(ReadyPort)
+    bench.opened()
+    wait_for(lambda: bench.listener.frames == [ANSWER])
+
+
 def test_loss_seen_by_a_sender(make: Callable[..., Bench]) -> None:
     bench = make()
     bench.opened()

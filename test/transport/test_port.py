@@ -3,8 +3,11 @@
 
 from collections import deque
 import errno
+import fcntl
 import os
 from pathlib import Path
+import sys
+import termios
 import time
 import tty
 from typing import Any
@@ -219,6 +222,10 @@ def test_controller_that_is_bus_off_is_not_opened(tmp_path: Path,
 # -- serial adapters ------------------------------------------------------------------------------
 
 
+#: bytes that a terminal keeps ready for its reader
+READ_BUFFER = 4095
+
+
 class FullTerminal:
     """A pseudo-terminal whose buffers are full: nobody reads."""
 
@@ -230,14 +237,19 @@ class FullTerminal:
 
     def fill(self, data: bytes = b'T003FFFF0805DC000000000000\r') -> None:
         """Write until nothing more is taken."""
-        quiet = 0
-        while quiet < 20:
+        while True:
+            # the kernel moves what it took from one buffer to the next, in its own time
+            no_further = self._waiting() >= READ_BUFFER
             try:
                 os.write(self.slave, data)
-                quiet = 0
             except BlockingIOError:
-                quiet += 1
-                time.sleep(0.005)  # the kernel moves what it took from one buffer to the next
+                if no_further:
+                    return
+                time.sleep(0.001)
+
+    def _waiting(self) -> int:
+        """Return how many bytes the far end could read."""
+        return int.from_bytes(fcntl.ioctl(self.master, termios.FIONREAD, bytes(4)), sys.byteorder)
 
     def close(self) -> None:
         os.close(self.master)

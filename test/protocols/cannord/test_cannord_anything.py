@@ -1,7 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The codecs of CANnord with anything that fits, and with anything at all."""
 
-from hypothesis import example, given, settings, strategies as st
+from hypothesis import example, given, strategies as st
 
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.protocols.cannord import identifiers, process_data, states
@@ -11,7 +11,6 @@ from drive_can_bridge.protocols.cannord.parameter_frame import ParameterFrame, P
 WORDS = st.integers(0, 0xFFFF)
 
 
-@settings(deadline=None)
 @given(st.sampled_from(MessageObject), st.integers(0, 255), st.booleans())
 def test_identifiers(kind: MessageObject, address: int, extended: bool) -> None:
     value = identifiers.identifier(kind, address, extended=extended)
@@ -21,7 +20,6 @@ def test_identifiers(kind: MessageObject, address: int, extended: bool) -> None:
         assert value == identifiers.identifier(kind, address) * 262144
 
 
-@settings(deadline=None)
 @given(st.integers(0, 0x1FFFFFFF), st.booleans())
 @example(0x400, False)
 @example(0x408, False)
@@ -45,7 +43,6 @@ def test_any_identifier(value: int, extended: bool) -> None:
         assert identifiers.identifier(kind, addresses[0], extended=extended) == value
 
 
-@settings(deadline=None)
 @given(WORDS, st.lists(WORDS, max_size=3), st.booleans())
 def test_main_frames(word: int, values: list[int], swap: bool) -> None:
     length = process_data.main_length(len(values))
@@ -57,7 +54,6 @@ def test_main_frames(word: int, values: list[int], swap: bool) -> None:
     assert not any(found.values[len(values):])
 
 
-@settings(deadline=None)
 @given(st.lists(WORDS, max_size=2))
 def test_additional_frames(values: list[int]) -> None:
     data = process_data.encode_extra(values)
@@ -66,7 +62,6 @@ def test_additional_frames(values: list[int]) -> None:
     assert list(process_data.decode_extra(data))[:len(values)] == values
 
 
-@settings(deadline=None)
 @given(st.integers(0, 15), st.integers(0, 2047), st.integers(0, 255),
        st.integers(-0x80000000, 0xFFFFFFFF), st.sampled_from(['high_first', 'low_first']),
        st.sampled_from(['low', 'high']))
@@ -80,7 +75,6 @@ def test_parameter_frames(identifier: int, number: int, index: int, value: int, 
     assert data[2:4].index(index) == (0 if index_byte == 'low' or not index else 1)
 
 
-@settings(deadline=None)
 @given(st.binary(max_size=8), st.sampled_from(['high_first', 'low_first']),
        st.sampled_from(['low', 'high']), st.booleans())
 def test_any_bytes(data: bytes, value_order: str, index_byte: str, swap: bool) -> None:
@@ -92,7 +86,6 @@ def test_any_bytes(data: bytes, value_order: str, index_byte: str, swap: bool) -
             assert str(error)
 
 
-@settings(deadline=None)
 @given(WORDS)
 def test_any_status_word(word: int) -> None:
     state = states.state_of(word)

@@ -14,7 +14,7 @@ from cannord_session_builders import (
     ACCELERATION, ACCELERATION_2, ACTUAL, COUNTER, CURRENT, FAULT_NUMBER, FLAG, FOURTH, FREQUENCY,
     INPUTS, inverter, MONITORING, OFFSET, PARAMETERS, POSITION, SECOND, THIRD, VALUE_4,
 )
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, strategies as st
 from hypothesis.stateful import initialize, precondition, rule
 import pytest
 
@@ -266,7 +266,6 @@ TestSession.settings = SETTINGS
 pytestmark = pytest.mark.timeout(PATIENCE)
 
 
-@settings(deadline=None)
 @given(frames=st.lists(st.tuples(st.integers(0, 0x1FFFFFFF), st.binary(max_size=8),
                                  st.booleans()), max_size=20),
        state=st.sampled_from(['inactive', 'starting', 'online', 'asking', 'stopping']),

@@ -14,7 +14,7 @@ from builders import (
     ACTUAL, CONTROL, CURRENT, DAMPING, drive, FLAG, frame, GAIN, KEY, LIMIT, MAXIMUM, ORDER,
     parameter, RAMP, RO, SPEED, STATUS, WORD,
 )
-from hypothesis import example, given, settings, strategies as st
+from hypothesis import example, given, strategies as st
 from hypothesis.stateful import initialize, invariant, precondition, rule
 import pytest
 from standard_builders import ANSWER
@@ -48,7 +48,6 @@ REGISTERS = (30, 31, 40, 41, 42, 43, 44, 50, 51, 52, 209, 210, 211, 300, 600)
 WORDS = st.lists(st.integers(0, 0xFFFF), min_size=1, max_size=4)
 
 
-@settings(deadline=None)  # machines may be busy
 @given(st.integers(0, 0x7FF), st.integers(0, 0xFFFF), st.integers(1, 4), st.integers(0, 0xFFFF),
        WORDS)
 def test_telegrams(identifier: int, number: int, count: int, word: int, words: list[int]) -> None:
@@ -65,7 +64,6 @@ def test_telegrams(identifier: int, number: int, count: int, word: int, words: l
         assert standard.decode_read_response(answer, wanted) == tuple(words[:wanted])
 
 
-@settings(deadline=None)  # machines may be busy
 @given(st.integers(0, 0x1FFFFFFF), st.binary(max_size=8), st.booleans(), st.integers(1, 4),
        st.booleans())
 @example(0x3F1, bytes.fromhex('03FFFF0200000000'), False, 1, False)
@@ -381,7 +379,6 @@ TestSession.settings = SETTINGS
 pytestmark = pytest.mark.timeout(PATIENCE)
 
 
-@settings(deadline=None)  # machines may be busy
 @given(frames=st.lists(st.tuples(st.integers(0, 0x1FFFFFFF), st.binary(max_size=8),
                                  st.booleans()), max_size=20),
        state=st.sampled_from(['inactive', 'looking', 'online', 'stopping']))
