@@ -28,6 +28,7 @@ from drive_can_bridge.core.events import (
     Event, FrameRejected, Noted, RequestCompleted, StationLost,
 )
 from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.last_sent import LastSent
 from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.requests import (
     BRIDGE_INACTIVE, BUS_DOWN, BUSY, Failure, Outcome, Request,
@@ -62,6 +63,7 @@ class Session(ABC):
     :ivar drive: the configuration.
     :ivar setpoints: every ``cyclic_request`` parameter but the control word, in slot order.
     :ivar control: the control and status word machine, or None.
+    :ivar sent: what the drive was told last.
     :ivar online: the drive exchanges process data.
     :ivar ever_online: it did so at least once since activation.
     :ivar phase: s, when in each period of the steady clock this drive has its turn, for drives
@@ -77,6 +79,7 @@ class Session(ABC):
             tuple(parameter for parameter in drive.cyclic_request
                   if parameter.name != self._control_name),
             timeout=drive.command_timeout, rearm_immediate=drive.rearm_immediate)
+        self.sent = LastSent(self.request_parameters)
         self.statistics = DriveStatistics()
         self.online = False
         self.ever_online = False
@@ -95,6 +98,13 @@ class Session(ABC):
         return ()
 
     @property
+    def request_parameters(self) -> tuple[Parameter, ...]:
+        """What the drive is told: ``cyclic_request``, and a control word without a slot."""
+        mapped = self.drive.cyclic_request
+        word = self.drive.profile.parameters.get(self._control_name)
+        return mapped if word is None or word in mapped else (*mapped, word)
+
+    @property
     def sample_parameters(self) -> tuple[Parameter, ...]:
         """
         The parameters of a sample, in the order of ``ProcessDataReceived.raws``.
@@ -109,6 +119,7 @@ class Session(ABC):
         """Begin to exchange (as soon as the bus is there)."""
         self.active = True
         self.ever_online = False
+        self.sent.clear()
         if self.bus_available:
             self._advice = LOOKING
             self._begin(now)

@@ -76,6 +76,8 @@ class LeaderSession(GroupSession):
 
     def _transmit(self, now: float) -> None:
         self._frames += self._framed(self._broadcast)
+        for member in self.members[1:]:
+            member.sent.raws = self.sent.raws
         count = len(self.members)
         # a stop reaches also those that do not listen to broadcasts
         for _ in range(math.ceil(count / STOP_CYCLES) if self._stopping else 1):

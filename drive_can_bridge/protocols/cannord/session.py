@@ -48,6 +48,8 @@ NO_ANSWER = 'no answer to process data'
 STATUS_PARAMETER = Parameter(
     name=STATUS_WORD, access=Access.READ_ONLY, bits=tuple(STATUS_BITS.items()),
     description='Status word of the inverter')
+CONTROL_PARAMETER = Parameter(
+    name='control_word', access=Access.WRITE_ONLY, description='Control word of the inverter')
 
 
 def values_needed(drive: DriveConfiguration) -> int:
@@ -105,6 +107,10 @@ class CannordSession(Session):
     @property
     def builtin_parameters(self) -> tuple[Parameter, ...]:
         return (STATUS_PARAMETER,)
+
+    @property
+    def request_parameters(self) -> tuple[Parameter, ...]:
+        return (CONTROL_PARAMETER, *self.drive.cyclic_request)
 
     # -- life cycle -------------------------------------------------------------------------------
 
@@ -205,6 +211,7 @@ class CannordSession(Session):
         words = [setpoint.parameter.word_from_raw(setpoint.raw)
                  for setpoint in self.setpoints.items]
         self.setpoints.changed = False
+        self.sent.take((self._sent_word, *words))
         payloads = [encode_main(self._sent_word, words[:MAIN_VALUES], length=self._length,
                                 swap=self._swap)]
         if self._extra:

@@ -95,6 +95,9 @@ class PkwSession(Session):
             self._status = drive.profile.parameters.get(table.status_parameter or '')
         self._response_spans = [addresses.span_of(parameter, self._addressing)
                                 for parameter in drive.cyclic_response]
+        self._request_places = {
+            addresses.span_of(parameter, self._addressing): place
+            for place, parameter in enumerate(self.sent.parameters)}
         self._plan = addresses.round_plan(drive)
         self._refusals: dict[Span, str] = {}
         self._beat = Beat(drive.period)
@@ -327,6 +330,13 @@ class PkwSession(Session):
     # -- frames -----------------------------------------------------------------------------------
 
     def _send(self, message: Message) -> None:
+        meaning = message.meaning
+        if meaning is not None and meaning.writes:
+            place = self._request_places.get(Span(message.address, meaning.count))
+            if place is not None:
+                self.sent.take((addresses.raw_from_words(
+                    self.sent.parameters[place], message.words[:meaning.count],
+                    self._word_order),), place)
         self._frames.append(Frame(self._identifiers.request, pkw.encode(message, self._layout),
                                   False))
 

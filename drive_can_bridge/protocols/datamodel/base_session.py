@@ -40,8 +40,13 @@ class DataModelSession(Session):
         self._offset: int = options['parameter_offset']
         self._request_base: int = options['request_map_base'] + self._offset
         self._response_base: int = options['response_map_base'] + self._offset
+        # where each of ``request_parameters`` is written by number
+        self._sent_by_number = {
+            (parameter.number or 0) + self._offset: place
+            for place, parameter in enumerate(self.sent.parameters)}
+        self._encode_write = encode_write
         self._channel = AcyclicChannel(
-            encode_read=encode_read, encode_write=encode_write,
+            encode_read=encode_read, encode_write=self._write,
             timeout=drive.parameter_timeout, attempts=drive.parameter_retries + 1,
             eeprom_gap=options['eeprom_write_gap'], polling=polling)
         self._together = together
@@ -61,6 +66,13 @@ class DataModelSession(Session):
 
     def frames_left(self, now: float) -> None:
         self._channel.frames_left(now)
+
+    def _write(self, number: int, words: Words) -> Frame:
+        """Make the frame of a write that leaves now."""
+        for place, word in enumerate(words, number):
+            if place in self._sent_by_number:
+                self.sent.take((word,), self._sent_by_number[place])
+        return self._encode_write(number, words)
 
     def facts(self) -> dict[str, str]:
         return {'short_frames': str(self.statistics.short)}
