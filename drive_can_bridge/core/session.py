@@ -33,6 +33,7 @@ from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.requests import (
     BRIDGE_INACTIVE, BUS_DOWN, BUSY, Failure, Outcome, Request,
 )
+from drive_can_bridge.core.roles import Cells, Role, Roles
 from drive_can_bridge.core.setpoints import CommandOutcome, Setpoints
 from drive_can_bridge.core.statistics import DriveStatistics
 
@@ -64,6 +65,7 @@ class Session(ABC):
     :ivar setpoints: every ``cyclic_request`` parameter but the control word, in slot order.
     :ivar control: the control and status word machine, or None.
     :ivar sent: what the drive was told last.
+    :ivar roles: what users may not write.
     :ivar online: the drive exchanges process data.
     :ivar ever_online: it did so at least once since activation.
     :ivar phase: s, when in each period of the steady clock this drive has its turn, for drives
@@ -80,6 +82,9 @@ class Session(ABC):
                   if parameter.name != self._control_name),
             timeout=drive.command_timeout, rearm_immediate=drive.rearm_immediate)
         self.sent = LastSent(self.request_parameters)
+        self.roles = Roles(
+            self.cells, control=drive.profile.parameters.get(self._control_name),
+            cyclic=drive.cyclic_request, maps=self.map_cells)
         self.statistics = DriveStatistics()
         self.online = False
         self.ever_online = False
@@ -88,7 +93,6 @@ class Session(ABC):
         self.phase: float | None = None
         self._frames: list[Frame] = []
         self._events: list[Event] = []
-        self._cyclic_names = {parameter.name for parameter in drive.cyclic_request}
         self._open_requests: list[Request] = []
         self._advice = 'not activated'
 
@@ -253,11 +257,38 @@ class Session(ABC):
 
     def write_refusal(self, parameter: Parameter) -> str:
         """Say why users may not write this parameter now; '' if they may."""
-        if self._control_name and parameter.name == self._control_name:
+        owner = self.roles.owner(parameter)
+        if owner is None:
+            return ''
+        role, own = owner
+        if role is Role.CONTROL:
             return 'use ~/enable'
-        if parameter.name in self._cyclic_names:
-            return f'sent cyclically: publish ~/command/{parameter.name}'
-        return ''
+        if role is Role.CYCLIC:
+            return self._cyclic_refusal(own)
+        return 'mapping parameter: not written while the bridge is active' if self.active else ''
+
+    def role(self, parameter: Parameter) -> Role | None:
+        """Say what the bridge uses a parameter for that users cannot set for that reason."""
+        owner = self.roles.owner(parameter)
+        if owner is not None:
+            return owner[0]
+        cells = self.cells(parameter)
+        received = not parameter.writable and any(
+            parameter == other or cells & self.cells(other)
+            for other in self.drive.cyclic_response)
+        return Role.CYCLIC if received else None
+
+    def cells(self, parameter: Parameter) -> Cells:
+        """Return what a parameter addresses on the drive; families with more than numbers say."""
+        return frozenset() if parameter.number is None else frozenset([parameter.number])
+
+    @property
+    def map_cells(self) -> Cells:
+        """What tells the drive how cyclic telegrams are to be read."""
+        return frozenset()
+
+    def _cyclic_refusal(self, parameter: Parameter) -> str:
+        return f'sent cyclically: publish ~/command/{parameter.name}'
 
     @abstractmethod
     def _enqueue(self, request: Request, now: float) -> None:

@@ -96,7 +96,7 @@ class DriveNode:
         directory = ParameterDirectory(drive.profile.parameters,
                                        lambda name: family.raw_parameter(drive, name))
         ParameterServices(self.node, directory, clock, submit=self._submit,
-                          write_refusal=session.write_refusal,
+                          write_refusal=session.write_refusal, role=session.role,
                           active=lambda: session.active, failed=self._parameter_failed)
         if session.control is not None:
             ControlServices(self.node, self._ask)

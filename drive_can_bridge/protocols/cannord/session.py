@@ -29,6 +29,7 @@ from drive_can_bridge.core.requests import (
     BRIDGE_INACTIVE, Failure, Outcome, ReadValue, Request, WriteRequest,
     Written,
 )
+from drive_can_bridge.core.roles import Cells
 from drive_can_bridge.core.session import Session, STOP_CYCLES
 from drive_can_bridge.protocols.cannord import procedures
 from drive_can_bridge.protocols.cannord.channel import TaskChannel
@@ -410,6 +411,11 @@ class CannordSession(Session):
     def _fail_requests(self, reason: str) -> None:
         self._channel.clear()
         self._fail_open_requests(reason)
+
+    def cells(self, parameter: Parameter) -> Cells:
+        # a task without sub-index acts on the first element
+        return (frozenset() if parameter.number is None
+                else frozenset([(parameter.number, parameter.subindex or 0)]))
 
     def write_refusal(self, parameter: Parameter) -> str:
         refusal = super().write_refusal(parameter)

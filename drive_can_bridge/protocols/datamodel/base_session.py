@@ -8,8 +8,8 @@ import math
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlMachine, ProfileControl
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.requests import Request
+from drive_can_bridge.core.roles import Cells
 from drive_can_bridge.core.session import DriveState, Session
 from drive_can_bridge.protocols.datamodel import procedures
 from drive_can_bridge.protocols.datamodel.acyclic_control import control_by_hand
@@ -112,12 +112,11 @@ class DataModelSession(Session):
             attempts=drive.parameter_retries + 1, verify=drive.verify_writes,
             offset=self._offset, together=self._together)
 
-    def write_refusal(self, parameter: Parameter) -> str:
-        number = (parameter.number or 0) + self._offset
-        if self.active and (self._request_base <= number < self._request_base + SLOTS
-                            or self._response_base <= number < self._response_base + SLOTS):
-            return 'mapping parameter: not written while the bridge is active'
-        return super().write_refusal(parameter)
+    @property
+    def map_cells(self) -> Cells:
+        options = self.drive.family_options     # numbers of the profile, as in ``cells``
+        return frozenset(options[base] + slot for base in ('request_map_base', 'response_map_base')
+                         for slot in range(SLOTS))
 
     # -- for the families -------------------------------------------------------------------------
 
