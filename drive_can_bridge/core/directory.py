@@ -46,7 +46,8 @@ class ParameterDirectory:
             access = {twin.access for twin in twins}
             storage = {twin.storage for twin in twins}
             raw = replace(raw, access=next(entry for entry in _ACCESS if entry in access),
-                          storage=next(entry for entry in _STORAGE if entry in storage))
+                          storage=next(entry for entry in _STORAGE if entry in storage),
+                          protected=any(twin.protected for twin in twins))
             if not raw.width_known:
                 wide = any(twin.type.bits == 32 for twin in twins)
                 raw = replace(raw, width_known=True,
@@ -57,9 +58,7 @@ class ParameterDirectory:
         """Return the listed parameters whose rules apply: itself, or those of its address."""
         if parameter.listed:
             return [parameter]
-        return [other for other in self.listed.values()
-                if (other.number, other.subindex, other.index)
-                == (parameter.number, parameter.subindex, parameter.index)]
+        return [other for other in self.listed.values() if _place(other) == _place(parameter)]
 
     def unknown(self, name: str) -> str:
         """Say that a name is unknown, with the nearest known one."""
@@ -101,6 +100,11 @@ class ParameterDirectory:
             except ValueRefused as error:
                 raise ValueRefused(f'raw {value} of {twin.name}: {error}') from None
         return word
+
+
+def _place(parameter: Parameter) -> tuple[int | None, int, int | None]:
+    # without a sub-index it is the first element
+    return parameter.number, parameter.subindex or 0, parameter.index
 
 
 def _type_name(value: object) -> str:

@@ -96,6 +96,7 @@ class Parameter:
     :param index: CANopen index.
     :param listed: stands in the profile; False for a parameter addressed by its raw name.
     :param word_order: 32-bit values: ``high_first`` or ``low_first``; None: as the drive says.
+    :param protected: a restored backup leaves it alone unless told otherwise.
     :param width_known: False for a raw name whose width only the drive knows; ``type`` is then the
         widest possible.
     """
@@ -118,6 +119,7 @@ class Parameter:
     word_order: str | None = None
     scaled: bool = False
     listed: bool = True
+    protected: bool = False
     width_known: bool = True
 
     @property

@@ -28,10 +28,12 @@ from drive_can_bridge.core.events import (
     Event, FrameRejected, Noted, RequestCompleted, StationLost,
 )
 from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.last_sent import LastSent
 from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.requests import (
     BRIDGE_INACTIVE, BUS_DOWN, BUSY, Failure, Outcome, Request,
 )
+from drive_can_bridge.core.roles import Cells, Role, Roles
 from drive_can_bridge.core.setpoints import CommandOutcome, Setpoints
 from drive_can_bridge.core.statistics import DriveStatistics
 
@@ -62,6 +64,8 @@ class Session(ABC):
     :ivar drive: the configuration.
     :ivar setpoints: every ``cyclic_request`` parameter but the control word, in slot order.
     :ivar control: the control and status word machine, or None.
+    :ivar sent: what the drive was told last.
+    :ivar roles: what users may not write.
     :ivar online: the drive exchanges process data.
     :ivar ever_online: it did so at least once since activation.
     :ivar phase: s, when in each period of the steady clock this drive has its turn, for drives
@@ -77,6 +81,10 @@ class Session(ABC):
             tuple(parameter for parameter in drive.cyclic_request
                   if parameter.name != self._control_name),
             timeout=drive.command_timeout, rearm_immediate=drive.rearm_immediate)
+        self.sent = LastSent(self.request_parameters)
+        self.roles = Roles(
+            self.cells, control=drive.profile.parameters.get(self._control_name),
+            cyclic=drive.cyclic_request, maps=self.map_cells)
         self.statistics = DriveStatistics()
         self.online = False
         self.ever_online = False
@@ -85,7 +93,6 @@ class Session(ABC):
         self.phase: float | None = None
         self._frames: list[Frame] = []
         self._events: list[Event] = []
-        self._cyclic_names = {parameter.name for parameter in drive.cyclic_request}
         self._open_requests: list[Request] = []
         self._advice = 'not activated'
 
@@ -93,6 +100,13 @@ class Session(ABC):
     def builtin_parameters(self) -> tuple[Parameter, ...]:
         """What every sample carries besides ``cyclic_response``; families that have it say so."""
         return ()
+
+    @property
+    def request_parameters(self) -> tuple[Parameter, ...]:
+        """What the drive is told: ``cyclic_request``, and a control word without a slot."""
+        mapped = self.drive.cyclic_request
+        word = self.drive.profile.parameters.get(self._control_name)
+        return mapped if word is None or word in mapped else (*mapped, word)
 
     @property
     def sample_parameters(self) -> tuple[Parameter, ...]:
@@ -109,6 +123,7 @@ class Session(ABC):
         """Begin to exchange (as soon as the bus is there)."""
         self.active = True
         self.ever_online = False
+        self.sent.clear()
         if self.bus_available:
             self._advice = LOOKING
             self._begin(now)
@@ -242,11 +257,38 @@ class Session(ABC):
 
     def write_refusal(self, parameter: Parameter) -> str:
         """Say why users may not write this parameter now; '' if they may."""
-        if self._control_name and parameter.name == self._control_name:
+        owner = self.roles.owner(parameter)
+        if owner is None:
+            return ''
+        role, own = owner
+        if role is Role.CONTROL:
             return 'use ~/enable'
-        if parameter.name in self._cyclic_names:
-            return f'sent cyclically: publish ~/command/{parameter.name}'
-        return ''
+        if role is Role.CYCLIC:
+            return self._cyclic_refusal(own)
+        return 'mapping parameter: not written while the bridge is active' if self.active else ''
+
+    def role(self, parameter: Parameter) -> Role | None:
+        """Say what the bridge uses a parameter for that users cannot set for that reason."""
+        owner = self.roles.owner(parameter)
+        if owner is not None:
+            return owner[0]
+        cells = self.cells(parameter)
+        received = not parameter.writable and any(
+            parameter == other or cells & self.cells(other)
+            for other in self.drive.cyclic_response)
+        return Role.CYCLIC if received else None
+
+    def cells(self, parameter: Parameter) -> Cells:
+        """Return what a parameter addresses on the drive; families with more than numbers say."""
+        return frozenset() if parameter.number is None else frozenset([parameter.number])
+
+    @property
+    def map_cells(self) -> Cells:
+        """What tells the drive how cyclic telegrams are to be read."""
+        return frozenset()
+
+    def _cyclic_refusal(self, parameter: Parameter) -> str:
+        return f'sent cyclically: publish ~/command/{parameter.name}'
 
     @abstractmethod
     def _enqueue(self, request: Request, now: float) -> None:

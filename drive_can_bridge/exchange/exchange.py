@@ -33,6 +33,8 @@ from drive_can_bridge.transport.link import Link, steady_now
 PASS_PERIOD = 0.25
 #: s without a pass after which nothing is believed any more: the process stood still
 LOST_TIME = 1.0
+#: s until what was last sent is told again
+REQUEST_PERIOD = 1.0
 #: s that a stop may take beyond its neutral cycles
 STOP_MARGIN = 0.5
 
@@ -53,6 +55,9 @@ class DriveListener(Protocol):
 
     def process_data(self, event: ProcessDataReceived) -> None:
         """Publish a sample. The fast path."""
+
+    def request_sent(self, now: float) -> None:
+        """Publish what the drive was told last: it changed, or a second has passed."""
 
     def handle_event(self, event: Event) -> None:
         """Publish or log anything else."""
@@ -80,14 +85,16 @@ class Member:
 
     :ivar due: when the session wants to be called; kept here, so that a pass over all drives costs
         a comparison each.
+    :ivar told: what the listener knows to have been sent.
     """
 
-    __slots__ = ('due', 'listener', 'session')
+    __slots__ = ('due', 'listener', 'session', 'told')
 
     def __init__(self, session: Session, listener: DriveListener) -> None:
         self.session = session
         self.listener = listener
         self.due = session.next_timer()
+        self.told = session.sent.raws
 
 
 class BusExchange:
@@ -121,6 +128,7 @@ class BusExchange:
         self._alarm = Alarm()
         self._wake_at = 0.0
         self._last_pass = 0.0
+        self._tell_at = 0.0
         self._closing = False
         self._thread = threading.Thread(target=self._run, name=f'exchange {bus.name}',
                                         daemon=True)
@@ -250,7 +258,9 @@ class BusExchange:
         """Serve every session that is due; return when the next one is."""
         now = self._clock()
         self._notice_lost_time(now)
-        soonest = now + PASS_PERIOD
+        if now >= self._tell_at:
+            self._tell_again(now)
+        soonest = min(now + PASS_PERIOD, self._tell_at)
         for member in self._members:
             if member.due <= now:
                 now = self._clock()  # the drives before took their time
@@ -260,6 +270,12 @@ class BusExchange:
             if member.due < soonest:
                 soonest = member.due
         return soonest
+
+    def _tell_again(self, now: float) -> None:
+        self._tell_at = now + REQUEST_PERIOD
+        if self.active:
+            for member in self._members:
+                member.listener.request_sent(now)
 
     def _notice_lost_time(self, now: float) -> None:
         gap = now - self._last_pass
@@ -335,6 +351,9 @@ class BusExchange:
                 if self.link.send(frame):
                     self.sent_bits += _bits(frame)
             session.frames_left(self._clock())
+        if session.sent.raws is not member.told:
+            member.told = session.sent.raws
+            member.listener.request_sent(now)
         for event in session.take_events():
             if type(event) is ProcessDataReceived:
                 member.listener.process_data(event)

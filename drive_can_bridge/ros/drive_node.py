@@ -29,6 +29,7 @@ from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.protocols.family import Family
 from drive_can_bridge.ros.commands import CommandIntake
 from drive_can_bridge.ros.control_services import ControlServices
+from drive_can_bridge.ros.event_topic import RequestTopic
 from drive_can_bridge.ros.mailbox import Mailbox
 from drive_can_bridge.ros.parameter_services import ParameterServices
 from drive_can_bridge.ros.quality import latched_quality, overriding, quality_overrides
@@ -85,8 +86,9 @@ class DriveNode:
     def _populate(self, clock: Clock, family: Family) -> None:
         """Make the topics and services."""
         drive, session = self.drive, self.session
-        self.samples = SamplePublisher(self.node, drive, session.sample_parameters,
-                                       Stamps(clock).at)
+        stamps = Stamps(clock)
+        self.samples = SamplePublisher(self.node, drive, session.sample_parameters, stamps.at)
+        self._request = RequestTopic(self.node, session.sent, stamps)
         self._online = self.node.create_publisher(
             Bool, '~/online', latched_quality(),
             qos_overriding_options=overriding(self.node, '~/online'))
@@ -94,7 +96,7 @@ class DriveNode:
         directory = ParameterDirectory(drive.profile.parameters,
                                        lambda name: family.raw_parameter(drive, name))
         ParameterServices(self.node, directory, clock, submit=self._submit,
-                          write_refusal=session.write_refusal,
+                          write_refusal=session.write_refusal, role=session.role,
                           active=lambda: session.active, failed=self._parameter_failed)
         if session.control is not None:
             ControlServices(self.node, self._ask)
@@ -154,6 +156,13 @@ class DriveNode:
         """Publish a sample."""
         try:
             self.samples.publish(event.raws, event.received_at)
+        except (InvalidHandle, RCLError) as error:
+            self._cannot_publish(error)
+
+    def request_sent(self, now: float) -> None:
+        """Publish what was sent."""
+        try:
+            self._request.publish(now)
         except (InvalidHandle, RCLError) as error:
             self._cannot_publish(error)
 

@@ -30,6 +30,7 @@ from drive_can_bridge.core.requests import (
     BRIDGE_INACTIVE, BUS_DOWN, BUSY, Failure, NO_ANSWER_OFFLINE, Outcome, ReadRequest, ReadValue,
     Request, WriteRequest, Written,
 )
+from drive_can_bridge.core.roles import Role
 from drive_can_bridge.ros.values import (
     descriptor, PARAMETER_TYPES, parameter_value, value_of,
 )
@@ -47,6 +48,7 @@ class ParameterServices:
     :param clock: for the stamps of what is announced.
     :param submit: hands a request to the drive's session; awaitable of one outcome per parameter.
     :param write_refusal: why users may not write a parameter now, or ''.
+    :param role: what the bridge itself uses a parameter for.
     :param active: tells whether the bridge is active; nothing is sent otherwise.
     :param failed: takes (what was tried, reason) for log and diagnostics, and how many parameters
         failed without having reached the session, which counts the others.
@@ -55,6 +57,7 @@ class ParameterServices:
     def __init__(self, node: Node, directory: ParameterDirectory, clock: Clock, *,
                  submit: Callable[[Request], Awaitable[tuple[Outcome, ...]]],
                  write_refusal: Callable[[Parameter], str],
+                 role: Callable[[Parameter], Role | None],
                  active: Callable[[], bool],
                  failed: Callable[[str, str, int], None]) -> None:
         self._node = node
@@ -62,6 +65,7 @@ class ParameterServices:
         self._clock = clock
         self._submit = submit
         self._write_refusal = write_refusal
+        self._role = role
         self._active = active
         self._failed = failed
         self._unreadable: set[str] = set()  # what the drive did not give when last asked
@@ -118,7 +122,8 @@ class ParameterServices:
         found = [(name, self._directory.find(name)) for name in request.names]
         response.descriptors = [
             ParameterDescriptor(name=name) if parameter is None
-            else descriptor(name, parameter, unreadable=name in self._unreadable)
+            else descriptor(name, parameter, role=self._role(parameter),
+                            unreadable=name in self._unreadable)
             for name, parameter in found]
         return response
 
@@ -191,10 +196,9 @@ class ParameterServices:
             raise ValueRefused(self._directory.unknown(message.name))
         if not self._active():
             raise ValueRefused(BRIDGE_INACTIVE)
-        for twin in self._directory.twins(parameter) or [parameter]:
-            refusal = self._write_refusal(twin)
-            if refusal:
-                raise ValueRefused(refusal)
+        refusal = self._write_refusal(parameter)
+        if refusal:
+            raise ValueRefused(refusal)
         return parameter, self._directory.raw_from_user(parameter, value_of(message.value))
 
     def _refused(self, name: str, reason: str) -> SetParametersResult:

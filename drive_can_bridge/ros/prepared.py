@@ -18,6 +18,8 @@ from typing import Any
 from rclpy.publisher import Publisher
 from rclpy.serialization import serialize_message
 
+from drive_can_bridge.core.parameters import ValueKind
+
 #: by struct code: a number whose bytes all differ, and from all others that are likely
 _MARKERS = {
     'd': struct.unpack('<d', bytes.fromhex('d17ae93b854f2240'))[0],
@@ -26,6 +28,8 @@ _MARKERS = {
     'I': 0x2C6BD8F3,
 }
 
+#: how a number of each kind stands in a message; a bool is no number
+NUMBER_CODES = {ValueKind.DOUBLE: 'd', ValueKind.INTEGER: 'q'}
 #: struct code of a number, and what puts it into the message
 Number = tuple[str, Callable[[Any], object]]
 

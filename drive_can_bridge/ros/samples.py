@@ -12,23 +12,21 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 from builtin_interfaces.msg import Time
-from rcl_interfaces.msg import Parameter as ParameterMessage, ParameterEvent
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 
 from drive_can_bridge.core.configuration import DriveConfiguration, JointConfiguration
-from drive_can_bridge.core.parameters import Parameter, Value, ValueKind
-from drive_can_bridge.ros.prepared import PreparedMessage
+from drive_can_bridge.core.parameters import Parameter, Value
+from drive_can_bridge.ros.event_topic import EventTopic
+from drive_can_bridge.ros.prepared import NUMBER_CODES, PreparedMessage
 from drive_can_bridge.ros.quality import latched_quality, overriding, state_quality
 from drive_can_bridge.ros.stamps import Stamp
-from drive_can_bridge.ros.values import parameter_value, TOPIC_TYPES, VALUE_FIELDS
+from drive_can_bridge.ros.values import converters, TOPIC_TYPES
 
 #: s between two looks at who subscribes
 COUNT_PERIOD = 0.1
-#: how a number of each kind stands in a message; a bool is no number
-_CODES = {ValueKind.DOUBLE: 'd', ValueKind.INTEGER: 'q'}
 
 
 class ValueTopic:
@@ -42,7 +40,7 @@ class ValueTopic:
             qos_overriding_options=overriding(node, topic))
         self.slot = slot
         self._message = message_type()
-        code = _CODES.get(parameter.kind)
+        code = NUMBER_CODES.get(parameter.kind)
         self._prepared = None if code is None else PreparedMessage.find(
             self.publisher, self._message, [(code, partial(setattr, self._message, 'data'))])
 
@@ -53,48 +51,6 @@ class ValueTopic:
             return
         self._message.data = value
         self.publisher.publish(self._message)
-
-
-class ResponseTopic:
-    """
-    ``~/response``: all mapped response parameters of one exchange, stamped.
-
-    :param first: slot of the first of them; what is built in stands before.
-    """
-
-    def __init__(self, node: Node, parameters: tuple[Parameter, ...], first: int) -> None:
-        self.publisher: Publisher = node.create_publisher(
-            ParameterEvent, '~/response', state_quality(),
-            qos_overriding_options=overriding(node, '~/response'))
-        self._entries = [
-            ParameterMessage(name=parameter.name, value=parameter_value(
-                parameter, parameter.value_from_raw(0))) for parameter in parameters]
-        self._fields = [(entry.value, VALUE_FIELDS[parameter.kind])
-                        for entry, parameter in zip(self._entries, parameters)]
-        self._message = ParameterEvent(node=node.get_fully_qualified_name(),
-                                       changed_parameters=self._entries)
-        self._first = first
-        self._prepared: PreparedMessage | None = None
-        if all(parameter.kind in _CODES for parameter in parameters):
-            stamp = self._message.stamp
-            self._prepared = PreparedMessage.find(self.publisher, self._message, [
-                ('i', partial(setattr, stamp, 'sec')), ('I', partial(setattr, stamp, 'nanosec')),
-                *((_CODES[parameter.kind], partial(setattr, entry, field))
-                  for parameter, (entry, field) in zip(parameters, self._fields))])
-
-    def publish(self, values: Sequence[Value], stamp: Stamp) -> None:
-        """Publish one sample; only what arrived."""
-        values = values[self._first:]
-        entries = self._entries
-        if self._prepared is not None and len(values) == len(entries):
-            self._prepared.publish((*stamp, *values))
-            return
-        message = self._message
-        message.stamp = Time(sec=stamp[0], nanosec=stamp[1])
-        for (entry, field), value in zip(self._fields, values):
-            setattr(entry, field, value)
-        message.changed_parameters = entries[:len(values)]
-        self.publisher.publish(message)
 
 
 class JointTopic:
@@ -182,21 +138,19 @@ class SamplePublisher:
                  stamp: Callable[[float], Stamp]) -> None:
         self._parameters = parameters
         self._stamp = stamp
-        self._converters = [
-            parameter.value_from_raw if not parameter.scaled
-            else _scaler(parameter.scale, parameter.offset) for parameter in parameters]
+        self._converters = converters(parameters)
         self._values = [ValueTopic(node, parameter, slot)
                         for slot, parameter in enumerate(parameters)]
         mapped = drive.cyclic_response
-        self._samples: list[ResponseTopic | JointTopic] = [
-            ResponseTopic(node, mapped, len(parameters) - len(mapped))]
+        self._samples: list[EventTopic | JointTopic] = [
+            EventTopic(node, '~/response', mapped, len(parameters) - len(mapped))]
         joint = drive.joint
         if joint is not None and (joint.position or joint.velocity or joint.effort):
             self._samples.append(JointTopic(node, joint, parameters))
         self._bits = [BitTopics(node, parameter, slot)
                       for slot, parameter in enumerate(parameters) if parameter.bits]
         self._wanted_values: list[ValueTopic] = []
-        self._wanted_samples: list[ResponseTopic | JointTopic] = []
+        self._wanted_samples: list[EventTopic | JointTopic] = []
         self._count_at = 0.0
         self._last_raws: tuple[int, ...] = ()
 
@@ -236,9 +190,3 @@ class SamplePublisher:
                                if topic.publisher.get_subscription_count()]
         self._wanted_samples = [topic for topic in self._samples
                                 if topic.publisher.get_subscription_count()]
-
-
-def _scaler(scale: float, offset: float) -> Callable[[int], float]:
-    if offset:
-        return lambda raw: raw * scale + offset
-    return lambda raw: raw * scale

@@ -1,6 +1,8 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Between drive parameters and ROS messages: one rule for types everywhere."""
 
+from collections.abc import Callable, Sequence
+import re
 from typing import Any
 
 from rcl_interfaces.msg import (
@@ -9,6 +11,7 @@ from rcl_interfaces.msg import (
 from std_msgs.msg import Bool, Float64, Int64
 
 from drive_can_bridge.core.parameters import Parameter, Value, ValueKind
+from drive_can_bridge.core.roles import Role
 
 TOPIC_TYPES: dict[ValueKind, Any] = {
     ValueKind.DOUBLE: Float64, ValueKind.INTEGER: Int64, ValueKind.BOOL: Bool,
@@ -44,6 +47,18 @@ def parameter_value(parameter: Parameter, value: Value) -> ParameterValue:
     return ParameterValue(type=PARAMETER_TYPES[kind], **{VALUE_FIELDS[kind]: value})
 
 
+def converters(parameters: Sequence[Parameter]) -> list[Callable[[int], Value]]:
+    """Return what makes values of raw integers, for the fast paths."""
+    return [_scaler(parameter.scale, parameter.offset) if parameter.scaled
+            else parameter.value_from_raw for parameter in parameters]
+
+
+def _scaler(scale: float, offset: float) -> Callable[[int], float]:
+    if offset:
+        return lambda raw: raw * scale + offset
+    return lambda raw: raw * scale
+
+
 def value_of(message: ParameterValue) -> object:
     """Return the Python value of a ParameterValue; None for NOT_SET."""
     field = _FIELDS_BY_TYPE.get(message.type)
@@ -58,8 +73,45 @@ def value_text(value: Value) -> str:
     return str(value).lower() if isinstance(value, bool) else f'{value:.12g}'
 
 
-def descriptor(name: str, parameter: Parameter, *, unreadable: bool = False,
-               ) -> ParameterDescriptor:
+def constraints(parameter: Parameter, role: Role | None) -> str:
+    """
+    Return what tools want to know of a parameter: ``unit="N m" number=209 type=int16 …``.
+
+    What does not apply is absent. ``shlex.split`` takes it apart.
+    """
+    by_object = parameter.index is not None
+    fields: dict[str, object] = {
+        'unit': parameter.unit or None,
+        'number': parameter.number,
+        'index': f'{parameter.index:#06x}' if parameter.index is not None else None,
+        'subindex': f'{parameter.subindex:#04x}' if by_object and parameter.subindex is not None
+                    else parameter.subindex,
+        'type': parameter.type.value if parameter.width_known else None,
+        'scale': _exact(parameter.scale) if parameter.scaled else None,
+        'offset': _exact(parameter.offset) if parameter.scaled else None,
+        'access': parameter.access.value,
+        'storage': None if parameter.storage is None else parameter.storage.value,
+        'protected': str(parameter.protected).lower(),
+        'role': None if role is None else role.value,
+    }
+    return ' '.join(f'{key}={_quoted(str(value))}' for key, value in fields.items()
+                    if value is not None)
+
+
+def _exact(value: float) -> str:
+    short = f'{value:g}'
+    return short if float(short) == value else repr(value)
+
+
+def _quoted(text: str) -> str:
+    if not re.search(r'[\s"\'\\]', text):
+        return text
+    escaped = text.replace('\\', '\\\\').replace('"', '\\"')
+    return f'"{escaped}"'
+
+
+def descriptor(name: str, parameter: Parameter, *, role: Role | None = None,
+               unreadable: bool = False) -> ParameterDescriptor:
     """
     Describe a parameter: type, unit, number, storage, access, range with step = scale.
 
@@ -67,6 +119,7 @@ def descriptor(name: str, parameter: Parameter, *, unreadable: bool = False,
     ``get_parameters``, and give up on the whole node where a typed parameter has no value. So what
     has no value to show has no type here either; the description names it.
 
+    :param role: what the bridge itself uses the parameter for.
     :param unreadable: there is no value to be had.
     """
     facts = [parameter.address]
@@ -86,7 +139,8 @@ def descriptor(name: str, parameter: Parameter, *, unreadable: bool = False,
     message = ParameterDescriptor(
         name=name, read_only=not parameter.writable,
         type=ParameterType.PARAMETER_NOT_SET if untyped else PARAMETER_TYPES[kind],
-        description=f'{text} ({", ".join(facts)})' if text else ', '.join(facts))
+        description=f'{text} ({", ".join(facts)})' if text else ', '.join(facts),
+        additional_constraints=constraints(parameter, role))
     low, high = _range(parameter)
     if low >= high:  # one value only: a slider of no length
         return message

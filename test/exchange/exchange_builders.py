@@ -50,6 +50,7 @@ class DriveNotes:
         self.events: list[Event] = []
         self.outcomes: list[ControlCompleted] = []
         self.commands: list[tuple[int, float]] = []
+        self.told: list[float] = []
         self.discarded = 0
         self.failing = False
 
@@ -59,6 +60,9 @@ class DriveNotes:
         for index, value in self.commands:
             self.session.command(index, value, now)
         self.commands.clear()
+
+    def request_sent(self, now: float) -> None:
+        self.told.append(now)
 
     def discard_commands(self) -> None:
         self.discarded += 1

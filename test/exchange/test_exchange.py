@@ -390,3 +390,21 @@ def test_close_without_open() -> None:
     bench = Bench(drive())
     bench.exchange.close()
     assert bench.link.stopped
+
+
+# -- what was last sent ---------------------------------------------------------------------------
+
+
+def test_what_was_sent_is_told_on_change_and_once_a_second() -> None:
+    bench = Bench(drive(name='first', station=1, command_timeout=0.0))
+    bench.online()
+    [notes] = bench.notes
+    notes.told.clear()
+    for step in range(1, 60):
+        bench.at(10.0 + 0.02 * step)
+        bench.hears(ANSWER, 10.002 + 0.02 * step)
+    assert notes.told == [pytest.approx(11.0)], 'nothing changed'
+    notes.told.clear()
+    notes.commands = [(0, 0.0), (0, 150.0)]
+    assert bench.at(11.3) == ['003FFFF0#05DC000000000000']
+    assert notes.told == [11.3]

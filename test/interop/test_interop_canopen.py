@@ -304,6 +304,9 @@ class Bridge:
     def take_commands(self, now: float) -> None:
         """Nothing to hand over: there are no setpoints."""
 
+    def request_sent(self, now: float) -> None:
+        """Nobody asks."""
+
     def discard_commands(self) -> None:
         """Nothing to throw away."""
 

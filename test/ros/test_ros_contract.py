@@ -12,7 +12,7 @@ import time
 from typing import Any
 
 from bridges import Bridge, parameters, StartBridge
-from clients import Client, ERROR, wait_until, WARN
+from clients import Client, ERROR, from_value, wait_until, WARN
 from families import Facts, FAMILIES, SETTINGS
 import pytest
 from rcl_interfaces.msg import ParameterEvent, ParameterType
@@ -100,6 +100,7 @@ def test_topics_and_services(start: Start, client: Client, facts: Facts) -> None
     expected = {
         '/parameter_events': ['rcl_interfaces/msg/ParameterEvent'],
         f'{DRIVE}/response': ['rcl_interfaces/msg/ParameterEvent'],
+        f'{DRIVE}/request': ['rcl_interfaces/msg/ParameterEvent'],
         f'{DRIVE}/joint_state': ['sensor_msgs/msg/JointState'],
         f'{DRIVE}/online': ['std_msgs/msg/Bool'],
         **{f'{DRIVE}/{name}': [kind] for name, (_, kind) in VALUES.items()},
@@ -259,6 +260,36 @@ def test_commands(start: Start, client: Client, facts: Facts) -> None:
     assert client.transition(4)  # on the way out: neutral
     wait_until(lambda: (drive.value('mode'), drive.value('brake')) == (0, False))
     assert drive.value('speed_setpoint') == 0.0
+    assert not drive.violations
+
+
+def test_what_was_last_sent(start: Start, client: Client, facts: Facts) -> None:
+    one = start()
+    drive = one.played['conveyor']
+    topic = client.topic(f'{DRIVE}/request', ParameterEvent)
+
+    def sent(message: ParameterEvent) -> dict[str, Any]:
+        return {entry.name: from_value(entry.value) for entry in message.changed_parameters}
+    # once a second without a change
+    first, second = topic.wait(), topic.wait()
+    neutral = {'speed_setpoint': 0.0, 'mode': 0, 'brake': False}
+    word = sent(first)['control_word']
+    assert sent(first) == sent(second) == {**neutral, 'control_word': word}
+    assert first.node == DRIVE and not first.new_parameters and not first.deleted_parameters
+    assert enable(client)[0]
+    running = wait_until(lambda: [
+        message for message in topic.messages if sent(message)['control_word'] != word])
+    assert {type(value) for value in sent(running[-1]).values()} == {float, int, bool}
+    command(client, speed_setpoint=0.0, mode=0, brake=False)
+    command(client, speed_setpoint=-250.0, mode=3, brake=True)
+    moving = wait_until(lambda: [message for message in topic.messages if sent(message) == {
+        'control_word': drive.value('control_word') if facts.status_mapped else 0x047F,
+        'speed_setpoint': pytest.approx(-250.0), 'mode': 3, 'brake': True}])
+    stamps = [message.stamp.sec + 1e-9 * message.stamp.nanosec for message in topic.messages]
+    assert stamps == sorted(stamps) and abs(stamps[-1] - time.time()) < 60.0
+    assert moving
+    assert client.transition(4)
+    wait_until(lambda: sent(topic.last) == {**neutral, 'control_word': word})
     assert not drive.violations
 
 

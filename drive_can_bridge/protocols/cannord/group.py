@@ -76,6 +76,8 @@ class LeaderSession(GroupSession):
 
     def _transmit(self, now: float) -> None:
         self._frames += self._framed(self._broadcast)
+        for member in self.members[1:]:
+            member.sent.raws = self.sent.raws
         count = len(self.members)
         # a stop reaches also those that do not listen to broadcasts
         for _ in range(math.ceil(count / STOP_CYCLES) if self._stopping else 1):
@@ -162,11 +164,9 @@ class MemberSession(GroupSession):
         return (f'{self._leader.drive.name} leads the broadcast group: call ~/{_SERVICES[action]} '
                 f'of {self._leader.drive.name}')
 
-    def write_refusal(self, parameter: Parameter) -> str:
-        if parameter.name in self._cyclic_names:
-            return (f'sent cyclically by the broadcast group: publish '
-                    f'{self._leader.drive.name}/command/{parameter.name}')
-        return super().write_refusal(parameter)
+    def _cyclic_refusal(self, parameter: Parameter) -> str:
+        return (f'sent cyclically by the broadcast group: publish '
+                f'{self._leader.drive.name}/command/{parameter.name}')
 
     def facts(self) -> dict[str, str]:
         return {'broadcast': f'led by {self._leader.drive.name}'}

@@ -29,6 +29,7 @@ from drive_can_bridge.core.requests import (
     BRIDGE_INACTIVE, Failure, Outcome, ReadValue, Request, WriteRequest,
     Written,
 )
+from drive_can_bridge.core.roles import Cells
 from drive_can_bridge.core.session import Session, STOP_CYCLES
 from drive_can_bridge.protocols.cannord import procedures
 from drive_can_bridge.protocols.cannord.channel import TaskChannel
@@ -48,6 +49,8 @@ NO_ANSWER = 'no answer to process data'
 STATUS_PARAMETER = Parameter(
     name=STATUS_WORD, access=Access.READ_ONLY, bits=tuple(STATUS_BITS.items()),
     description='Status word of the inverter')
+CONTROL_PARAMETER = Parameter(
+    name='control_word', access=Access.WRITE_ONLY, description='Control word of the inverter')
 
 
 def values_needed(drive: DriveConfiguration) -> int:
@@ -105,6 +108,10 @@ class CannordSession(Session):
     @property
     def builtin_parameters(self) -> tuple[Parameter, ...]:
         return (STATUS_PARAMETER,)
+
+    @property
+    def request_parameters(self) -> tuple[Parameter, ...]:
+        return (CONTROL_PARAMETER, *self.drive.cyclic_request)
 
     # -- life cycle -------------------------------------------------------------------------------
 
@@ -205,6 +212,7 @@ class CannordSession(Session):
         words = [setpoint.parameter.word_from_raw(setpoint.raw)
                  for setpoint in self.setpoints.items]
         self.setpoints.changed = False
+        self.sent.take((self._sent_word, *words))
         payloads = [encode_main(self._sent_word, words[:MAIN_VALUES], length=self._length,
                                 swap=self._swap)]
         if self._extra:
@@ -403,6 +411,11 @@ class CannordSession(Session):
     def _fail_requests(self, reason: str) -> None:
         self._channel.clear()
         self._fail_open_requests(reason)
+
+    def cells(self, parameter: Parameter) -> Cells:
+        # a task without sub-index acts on the first element
+        return (frozenset() if parameter.number is None
+                else frozenset([(parameter.number, parameter.subindex or 0)]))
 
     def write_refusal(self, parameter: Parameter) -> str:
         refusal = super().write_refusal(parameter)

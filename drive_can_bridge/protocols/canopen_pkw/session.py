@@ -32,6 +32,7 @@ from drive_can_bridge.core.events import (
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.requests import BRIDGE_INACTIVE, Failure, Request
+from drive_can_bridge.core.roles import Cells
 from drive_can_bridge.core.session import LOOKING, Session
 from drive_can_bridge.protocols.canopen_pkw import addresses, network, pkw, procedures
 from drive_can_bridge.protocols.canopen_pkw.addresses import Span
@@ -95,6 +96,9 @@ class PkwSession(Session):
             self._status = drive.profile.parameters.get(table.status_parameter or '')
         self._response_spans = [addresses.span_of(parameter, self._addressing)
                                 for parameter in drive.cyclic_response]
+        self._request_places = {
+            addresses.span_of(parameter, self._addressing): place
+            for place, parameter in enumerate(self.sent.parameters)}
         self._plan = addresses.round_plan(drive)
         self._refusals: dict[Span, str] = {}
         self._beat = Beat(drive.period)
@@ -327,6 +331,13 @@ class PkwSession(Session):
     # -- frames -----------------------------------------------------------------------------------
 
     def _send(self, message: Message) -> None:
+        meaning = message.meaning
+        if meaning is not None and meaning.writes:
+            place = self._request_places.get(Span(message.address, meaning.count))
+            if place is not None:
+                self.sent.take((addresses.raw_from_words(
+                    self.sent.parameters[place], message.words[:meaning.count],
+                    self._word_order),), place)
         self._frames.append(Frame(self._identifiers.request, pkw.encode(message, self._layout),
                                   False))
 
@@ -442,17 +453,19 @@ class PkwSession(Session):
     def _waiting_requests(self) -> int:
         return self._channel.waiting_users
 
+    def cells(self, parameter: Parameter) -> Cells:
+        return addresses.keys(parameter)
+
     def write_refusal(self, parameter: Parameter) -> str:
-        if not parameter.listed:
-            mine = addresses.keys(parameter)
-            for other in self.drive.profile.parameters.values():
-                if mine & addresses.keys(other):
-                    if other.type.bits != parameter.type.bits:
-                        if not other.writable:
-                            return f'read-only: one half of {other.name}'
-                        return f'one half of {other.name}: set that'
-                    return super().write_refusal(other)
-        return super().write_refusal(parameter)
+        refusal = super().write_refusal(parameter)
+        if refusal or parameter.listed:
+            return refusal
+        mine = addresses.keys(parameter)
+        for other in self.drive.profile.parameters.values():
+            if other.type.bits != parameter.type.bits and mine & addresses.keys(other):
+                return (f'one half of {other.name}: set that' if other.writable
+                        else f'read-only: one half of {other.name}')
+        return ''
 
     def reconfigure(self, *, command_timeout: float | None = None,
                     rearm_immediate: bool | None = None,

@@ -8,8 +8,8 @@ import math
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlMachine, ProfileControl
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.requests import Request
+from drive_can_bridge.core.roles import Cells
 from drive_can_bridge.core.session import DriveState, Session
 from drive_can_bridge.protocols.datamodel import procedures
 from drive_can_bridge.protocols.datamodel.acyclic_control import control_by_hand
@@ -40,8 +40,13 @@ class DataModelSession(Session):
         self._offset: int = options['parameter_offset']
         self._request_base: int = options['request_map_base'] + self._offset
         self._response_base: int = options['response_map_base'] + self._offset
+        # where each of ``request_parameters`` is written by number
+        self._sent_by_number = {
+            (parameter.number or 0) + self._offset: place
+            for place, parameter in enumerate(self.sent.parameters)}
+        self._encode_write = encode_write
         self._channel = AcyclicChannel(
-            encode_read=encode_read, encode_write=encode_write,
+            encode_read=encode_read, encode_write=self._write,
             timeout=drive.parameter_timeout, attempts=drive.parameter_retries + 1,
             eeprom_gap=options['eeprom_write_gap'], polling=polling)
         self._together = together
@@ -61,6 +66,13 @@ class DataModelSession(Session):
 
     def frames_left(self, now: float) -> None:
         self._channel.frames_left(now)
+
+    def _write(self, number: int, words: Words) -> Frame:
+        """Make the frame of a write that leaves now."""
+        for place, word in enumerate(words, number):
+            if place in self._sent_by_number:
+                self.sent.take((word,), self._sent_by_number[place])
+        return self._encode_write(number, words)
 
     def facts(self) -> dict[str, str]:
         return {'short_frames': str(self.statistics.short)}
@@ -100,12 +112,11 @@ class DataModelSession(Session):
             attempts=drive.parameter_retries + 1, verify=drive.verify_writes,
             offset=self._offset, together=self._together)
 
-    def write_refusal(self, parameter: Parameter) -> str:
-        number = (parameter.number or 0) + self._offset
-        if self.active and (self._request_base <= number < self._request_base + SLOTS
-                            or self._response_base <= number < self._response_base + SLOTS):
-            return 'mapping parameter: not written while the bridge is active'
-        return super().write_refusal(parameter)
+    @property
+    def map_cells(self) -> Cells:
+        options = self.drive.family_options     # numbers of the profile, as in ``cells``
+        return frozenset(options[base] + slot for base in ('request_map_base', 'response_map_base')
+                         for slot in range(SLOTS))
 
     # -- for the families -------------------------------------------------------------------------
 

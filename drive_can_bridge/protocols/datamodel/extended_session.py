@@ -232,6 +232,7 @@ class ExtendedSession(DataModelSession):
             if self._control_slot is not None:
                 raws.insert(self._control_slot, self._sent_word)
         self.setpoints.changed = False
+        self.sent.take(raws)
         return Frame(self._request_identifier, self._pack(*raws) + self._padding, True)
 
     def _miss(self, now: float) -> None:

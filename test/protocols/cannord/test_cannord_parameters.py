@@ -409,7 +409,9 @@ def test_raw_names_of_listed_parameters_obey_their_rules() -> None:
                  ('9BE100000000FBFF', '9B110000FFFFFBFF')) == ['written']
     with pytest.raises(ValueRefused, match='read-only'):
         user_value('p700.0', 1)
-    assert raw('p700').access.value == 'rw'
+    # a task without sub-index acts on the first element
+    assert raw('p700').access.value == 'ro'
+    assert raw('p700.1').access.value == 'rw'
 
 
 # -- the inverter's own time-out ------------------------------------------------------------------

@@ -1,0 +1,41 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""What a drive was told last, whatever its frames look like."""
+
+from collections.abc import Sequence
+
+from drive_can_bridge.core.parameters import Parameter
+
+
+class LastSent:
+    """
+    Setpoints and control word as they stood in the frames that carried them last.
+
+    :ivar parameters: all that a drive can be told, in the order of its frames.
+    :ivar raws: the raw integer of each; None: not sent since activation. Another tuple after each
+        change, and the same one as long as nothing changes.
+    """
+
+    __slots__ = ('parameters', 'raws')
+
+    def __init__(self, parameters: Sequence[Parameter]) -> None:
+        self.parameters = tuple(parameters)
+        self.raws: tuple[int | None, ...] = ()
+        self.clear()
+
+    def clear(self) -> None:
+        """Take note that nothing was sent yet."""
+        self.raws = (None,) * len(self.parameters)
+
+    def take(self, words: Sequence[int], first: int = 0) -> None:
+        """
+        Take note of what a frame carries.
+
+        :param words: raw integers, or the words on the wire.
+        :param first: place of the first of them in ``parameters``.
+        """
+        end = first + len(words)
+        raws = (*self.raws[:first], *(
+            parameter.raw_from_word(parameter.word_from_raw(word))
+            for parameter, word in zip(self.parameters[first:end], words)), *self.raws[end:])
+        if raws != self.raws:
+            self.raws = raws

@@ -1,0 +1,71 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""``additional_constraints`` of a drive parameter's descriptor: what tools read."""
+
+import shlex
+from typing import Any
+
+from bridges import parameters, StartBridge
+from builders import EEPROM, parameter, RAM, RO, WO
+from clients import Client
+from families import Facts, FAMILIES
+import pytest
+from rcl_interfaces.srv import DescribeParameters
+
+from drive_can_bridge.core.parameters import Parameter, ParameterType
+from drive_can_bridge.core.roles import Role
+from drive_can_bridge.ros.values import constraints
+
+
+def test_as_the_contract_writes_it() -> None:
+    torque = Parameter(
+        'actual_torque', number=209, index=0x2004, subindex=0x10, type=ParameterType.INT16,
+        scale=0.1, unit='N m', scaled=True, access=RO, storage=RAM)
+    assert constraints(torque, Role.CYCLIC) == (
+        'unit="N m" number=209 index=0x2004 subindex=0x10 type=int16 scale=0.1 offset=0 '
+        'access=ro storage=ram protected=false role=cyclic')
+    assert constraints(parameter('key', 44, access=WO, storage=EEPROM), None) == (
+        'number=44 type=uint16 access=wo storage=eeprom protected=false')
+
+
+@pytest.mark.parametrize('unit', ['rpm', 'N m', '%', "'", '"', '\\', 'a "b" \\c', '°C', 'a=b',
+                                  'line\nfeed'])
+def test_whatever_the_unit_is_it_can_be_taken_apart(unit: str) -> None:
+    text = constraints(parameter('x', 5, unit=unit, scale=1 / 3, offset=-273.15), None)
+    found = dict(pair.split('=', 1) for pair in shlex.split(text))
+    assert found['unit'] == unit
+    assert (float(found['scale']), float(found['offset'])) == (1 / 3, -273.15)
+
+
+def test_what_does_not_apply_is_absent() -> None:
+    plain = Parameter('p80', ParameterType.UINT32, 80, listed=False, width_known=False)
+    assert constraints(plain, None) == 'number=80 access=rw protected=false'
+    element = Parameter('p613.5', number=613, subindex=5, protected=True)
+    assert constraints(element, None) == (
+        'number=613 subindex=5 type=uint16 access=rw protected=true')
+    nowhere = Parameter('frequency', access=RO)
+    assert constraints(nowhere, Role.CYCLIC) == (
+        'type=uint16 access=ro protected=false role=cyclic')
+
+
+@pytest.mark.parametrize('facts', FAMILIES, ids=lambda row: row.protocol)
+def test_of_every_family(bridge: StartBridge, client: Client, facts: Facts,
+                         tmp_path: Any) -> None:
+    bridge(parameters(conveyor=facts.drive(tmp_path)))
+    names = [*facts.listed, 'p110', 'nothing']
+    described = client.call('/conveyor/describe_parameters', DescribeParameters,
+                            DescribeParameters.Request(names=names)).descriptors
+    found = {entry.name: dict(pair.split('=') for pair in shlex.split(
+        entry.additional_constraints)) for entry in described}
+    assert found.pop('nothing') == {}
+    assert {name: fields['role'] for name, fields in found.items() if 'role' in fields} == {
+        'speed_setpoint': 'cyclic', 'mode': 'cyclic', 'brake': 'cyclic',
+        'actual_speed': 'cyclic', 'counts': 'cyclic', 'braked': 'cyclic',
+        **({'control_word': 'control', 'status_word': 'cyclic'} if facts.status_mapped else {})}
+    assert found['ramp_time'] == {
+        'unit': 's', 'number': '102', 'type': 'uint16', 'scale': '0.01', 'offset': '0',
+        'access': 'rw', 'storage': 'eeprom', 'protected': 'false'}
+    assert found['actual_ramp']['offset'] == '-10' and 'unit' not in found['actual_ramp']
+    # a raw name obeys the rules of the listed one
+    assert found['p110'] == {**found['gain'], 'type': 'uint16'}
+    if 'ratio' in found:
+        assert (found['ratio']['index'], found['ratio']['subindex']) == ('0x2007', '0x03')
