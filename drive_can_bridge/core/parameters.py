@@ -21,9 +21,9 @@ from drive_can_bridge.core.errors import ValueRefused
 
 Value = Union[float, int, bool]
 
-# Physical limits are compared with this much tolerance, relative to one raw step, so that
-# 30000 * 0.1 = 3000.0000000000005 does not fall out of "maximum: 3000".
-_STEP_TOLERANCE = 1e-6
+#: Physical limits are compared with this much tolerance, relative to one raw step, so that
+#: 30000 * 0.1 = 3000.0000000000005 does not fall out of "maximum: 3000".
+STEP_TOLERANCE = 1e-6
 # Beyond any integer type, and still an integer for floor().
 _STEPS_MAX = 1e18
 
@@ -224,8 +224,8 @@ class Parameter:
         ends = sorted((self._steps(-math.inf if self.minimum is None else self.minimum),
                        self._steps(math.inf if self.maximum is None else self.maximum)))
         low, high = self.type.raw_range
-        return (max(low, math.ceil(ends[0] - _STEP_TOLERANCE)),
-                min(high, math.floor(ends[1] + _STEP_TOLERANCE)))
+        return (max(low, math.ceil(ends[0] - STEP_TOLERANCE)),
+                min(high, math.floor(ends[1] + STEP_TOLERANCE)))
 
     @cached_property
     def value_range(self) -> tuple[float, float]:
@@ -244,7 +244,7 @@ class Parameter:
 
         :raises ValueRefused: with the range in words.
         """
-        slack = abs(self.scale) * _STEP_TOLERANCE
+        slack = abs(self.scale) * STEP_TOLERANCE
         below = self.minimum is not None and value < self.minimum - slack
         above = self.maximum is not None and value > self.maximum + slack
         if below or above:
