@@ -24,7 +24,7 @@ from drive_can_bridge.core.profile import Profile
 
 #: names that a drive's node uses itself
 RESERVED = frozenset((
-    'online', 'response', 'command', 'joint_state', 'joint_command',
+    'online', 'response', 'request', 'command', 'joint_state', 'joint_command',
     'get_parameters', 'set_parameters', 'set_parameters_atomically', 'list_parameters',
     'describe_parameters', 'get_parameter_types', 'enable', 'reset_fault', 'quick_stop',
 ))

@@ -61,6 +61,9 @@ CASES = [
     ('ramp:', 'online:',
      ["table.yaml:15: parameters.online: 'online' is taken by the node of the drive, allowed "
       'is any other name']),
+    ('ramp:', 'request:',
+     ["table.yaml:15: parameters.request: 'request' is taken by the node of the drive, allowed "
+      'is any other name']),
     ('ramp:', 'joint_command:',
      ["table.yaml:15: parameters.joint_command: 'joint_command' is taken by the node of the "
       'drive, allowed is any other name']),
