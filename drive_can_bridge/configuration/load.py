@@ -88,6 +88,7 @@ def _configuration(tree: Tree, problems: list[Problem], adapters: Adapters | Non
         if checker.usable(('bus', 'protocol', 'period', 'cyclic_request', 'cyclic_response')):
             paced.append(drive)
     problems.extend(store.problems)
+    warnings.extend(store.warnings)
     problems.extend(collisions(tree, placed))
     for bus in buses.values():
         if ('buses', bus.name, 'bitrate') in tree.damaged:

@@ -7,7 +7,7 @@ with it is the family's business, see :meth:`drive_can_bridge.protocols.family.F
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path as FilePath
 import re
 from typing import Any
@@ -17,7 +17,9 @@ from drive_can_bridge.configuration.problems import Path, Problem, show, Tree
 from drive_can_bridge.configuration.schema import profile_schema
 from drive_can_bridge.configuration.schema_check import check_schema
 from drive_can_bridge.core.errors import ValueRefused
-from drive_can_bridge.core.parameters import Access, Parameter, ParameterType, Storage
+from drive_can_bridge.core.parameters import (
+    Access, Parameter, ParameterType, STEP_TOLERANCE, Storage, Value,
+)
 from drive_can_bridge.core.profile import Profile
 
 #: names that a drive's node uses itself
@@ -42,11 +44,13 @@ class LoadedProfile:
     tree: Tree
     names: tuple[str, ...]
     problems: list[Problem] = field(default_factory=list)
+    warnings: list[Problem] = field(default_factory=list)
 
 
 def profile_from_tree(tree: Tree) -> LoadedProfile:
     """Check a profile and make what can be made of it."""
     sound, problems = check_schema(tree, profile_schema())
+    warnings: list[Problem] = []
     parameters: dict[str, Parameter] = {}
     for name, entry in sound.data.get('parameters', {}).items():
         path = ('parameters', name)
@@ -56,7 +60,8 @@ def profile_from_tree(tree: Tree) -> LoadedProfile:
         problems.extend(wrong)
         # An entry of which a part was cut out would be checked with values it never had.
         if not wrong and not any(place[:2] == path for place in sound.damaged):
-            parameters[name] = parameter
+            parameters[name], narrowed = _narrow(sound, path, parameter)
+            warnings.extend(narrowed)
     given = tree.data.get('parameters')
     names = tuple(map(str, given)) if isinstance(given, dict) else ()
     control = None
@@ -70,7 +75,7 @@ def profile_from_tree(tree: Tree) -> LoadedProfile:
         description=sound.data.get('description', ''),
         protocols=tuple(sound.data.get('protocols', ())),
         parameters=parameters, control=control)
-    return LoadedProfile(profile, sound, names, problems)
+    return LoadedProfile(profile, sound, names, problems, warnings)
 
 
 def _parameter(name: str, entry: dict[str, Any]) -> Parameter:
@@ -146,31 +151,27 @@ def _check_parameter(tree: Tree, path: Path, parameter: Parameter,
 
 def _check_range(tree: Tree, path: Path, parameter: Parameter,
                  entry: dict[str, Any]) -> Iterator[Problem]:
-    """Check that minimum, neutral and maximum can be sent, and are in this order."""
-    low, high = parameter.type.raw_range
-    ends = sorted(raw * parameter.scale + parameter.offset for raw in (low, high))
-    # Half a raw step beyond the ends still rounds to them.
-    slack = abs(parameter.scale) * 0.5
-    unit = f' {parameter.unit}' if parameter.unit else ''
+    """Check that minimum, neutral and maximum are in this order, and that they can be sent."""
     sound = True
     for key in ('minimum', 'maximum'):
         limit = entry.get(key)
-        if limit is None:
-            continue
-        if not ends[0] - slack <= limit <= ends[1] + slack:
-            sound = False
-            yield tree.problem((*path, key), f'{show(limit)} is not representable, allowed is '
-                               f'{show(ends[0])} to {show(ends[1])}{unit} '
-                               f'({parameter.type.value})')
-        elif not parameter.scaled and float(limit) != int(limit):
+        if limit is not None and not parameter.scaled and float(limit) != int(limit):
             sound = False
             yield tree.problem((*path, key), f'{show(limit)} is no integer, allowed without '
                                              'scale, offset and unit are integers')
+    low, high = parameter.raw_limits
     if (parameter.minimum is not None and parameter.maximum is not None
             and parameter.minimum > parameter.maximum):
         sound = False
         yield tree.problem((*path, 'minimum'), f'{show(entry["minimum"])} is above the maximum, '
                                                f'allowed is at most {show(entry["maximum"])}')
+    elif sound and low > high:
+        sound = False
+        key = 'minimum' if 'minimum' in entry else 'maximum'
+        scale = f' with scale {parameter.scale:g}' if 'scale' in entry and low == high + 1 else ''
+        yield tree.problem((*path, key), f'{parameter.type.value}{scale} has no value in '
+                           f'{parameter.range_text}, allowed are limits around one (the nearest '
+                           f'is {_with_unit(parameter, _nearest(parameter))})')
     if isinstance(entry.get('neutral'), bool):
         yield tree.problem((*path, 'neutral'), f'{show(entry["neutral"])} is a bool, allowed is '
                                                'a number')
@@ -180,6 +181,38 @@ def _check_range(tree: Tree, path: Path, parameter: Parameter,
         except (ValueRefused, OverflowError):
             yield tree.problem((*path, 'neutral'), f'{show(parameter.neutral)} cannot be sent, '
                                f'allowed is {_range_in_words(parameter)}')
+
+
+def _nearest(parameter: Parameter) -> Value:
+    """Return the value next to limits that have none between them."""
+    first, last = parameter.type.raw_range
+    values = [parameter.value_from_raw(min(max(raw, first), last))
+              for raw in sorted(parameter.raw_limits)]
+    limits = [limit for limit in (parameter.minimum, parameter.maximum) if limit is not None]
+    return min(values, key=lambda value: min(abs(value - limit) for limit in limits))
+
+
+def _narrow(tree: Tree, path: Path, parameter: Parameter,
+            ) -> tuple[Parameter, list[Problem]]:
+    """Bring limits that the type cannot hold to its ends; return what a user should know."""
+    slack = abs(parameter.scale) * STEP_TOLERANCE
+    low, high = parameter.value_range
+    narrowed: dict[str, float] = {}
+    if parameter.minimum is not None and parameter.minimum < low - slack:
+        narrowed['minimum'] = low
+    if parameter.maximum is not None and parameter.maximum > high + slack:
+        narrowed['maximum'] = high
+    warnings = [
+        tree.problem((*path, key), f'{show(tree.data["parameters"][parameter.name][key])} is not '
+                     f'representable in {parameter.type.value}, narrowed to '
+                     f'{_with_unit(parameter, end)}')
+        for key, end in narrowed.items()]
+    return replace(parameter, **narrowed), warnings  # type: ignore[arg-type]
+
+
+def _with_unit(parameter: Parameter, value: Value) -> str:
+    text = show(value if parameter.scaled else round(value))
+    return f'{text} {parameter.unit}' if parameter.unit else text
 
 
 def _range_in_words(parameter: Parameter) -> str:

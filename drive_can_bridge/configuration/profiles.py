@@ -34,6 +34,11 @@ class ProfileStore:
         """What is wrong in the profiles read so far."""
         return [problem for loaded in self._loaded.values() for problem in loaded.problems]
 
+    @property
+    def warnings(self) -> list[Problem]:
+        """What is suspicious in the profiles read so far."""
+        return [warning for loaded in self._loaded.values() for warning in loaded.warnings]
+
     def load(self, name: str) -> LoadedProfile | str:
         """
         Return a profile, or why there is none.

@@ -38,7 +38,8 @@ def collisions(tree: Tree, drives: Iterable[DriveConfiguration]) -> Iterator[Pro
     claimed: dict[str, list[tuple[Claim, DriveConfiguration]]] = {}
     for drive in drives:
         on_bus = claimed.setdefault(drive.bus, [])
-        own = FAMILIES[drive.protocol].claims(drive)
+        family = FAMILIES[drive.protocol]
+        own = [*family.claims(drive), *family.reserved(drive)]
         hit = next(((claim, other) for mine in own for claim, other in on_bus
                     if mine.overlaps(claim)), None)
         if hit is not None:

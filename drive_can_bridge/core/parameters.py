@@ -13,6 +13,7 @@ A parameter of a drive, and the way between its raw integer and its physical val
 
 from dataclasses import dataclass
 from enum import Enum
+from functools import cached_property
 import math
 from typing import Union
 
@@ -20,9 +21,11 @@ from drive_can_bridge.core.errors import ValueRefused
 
 Value = Union[float, int, bool]
 
-# Physical limits are compared with this much tolerance, relative to one raw step, so that
-# 30000 * 0.1 = 3000.0000000000005 does not fall out of "maximum: 3000".
-_STEP_TOLERANCE = 1e-6
+#: Physical limits are compared with this much tolerance, relative to one raw step, so that
+#: 30000 * 0.1 = 3000.0000000000005 does not fall out of "maximum: 3000".
+STEP_TOLERANCE = 1e-6
+# Beyond any integer type, and still an integer for floor().
+_STEPS_MAX = 1e18
 
 
 class ParameterType(Enum):
@@ -201,16 +204,41 @@ class Parameter:
                 raise ValueRefused(f'{value:.12g} is not an integer')
             raw = int(value)
         else:
-            steps = (value - self.offset) / self.scale
-            # beyond any integer type, and beyond what floor() can turn into an integer
-            raw = math.floor(steps + 0.5) if abs(steps) < 1e18 else int(math.copysign(1e18, steps))
+            raw = math.floor(self._steps(value) + 0.5)
         low, high = self.type.raw_range
         if not low <= raw <= high:
-            ends = sorted((low * self.scale + self.offset, high * self.scale + self.offset))
-            raise ValueRefused(
-                f'{value:.12g} is not representable: {self.type.value} carries '
-                f'{ends[0]:.12g} to {ends[1]:.12g}{self._unit_suffix}')
-        return raw
+            raise ValueRefused(f'{value:.12g} is not representable: {self.type.value} carries '
+                               f'{_in_words(self.value_range)}{self._unit_suffix}')
+        low, high = self.raw_limits
+        if low > high:
+            raise ValueRefused(f'{value:.12g} is not representable: {self.type.value} has no '
+                               f'value in {self.range_text}')
+        return min(max(raw, low), high)
+
+    @cached_property
+    def raw_limits(self) -> tuple[int, int]:
+        """
+        Smallest and largest raw integer whose value lies in ``minimum..maximum``.
+
+        They bound what is sent, however a value was rounded. The first is the larger one where
+        the type has no value between the limits.
+        """
+        ends = sorted((self._steps(-math.inf if self.minimum is None else self.minimum),
+                       self._steps(math.inf if self.maximum is None else self.maximum)))
+        low, high = self.type.raw_range
+        return (max(low, math.ceil(ends[0] - STEP_TOLERANCE)),
+                min(high, math.floor(ends[1] + STEP_TOLERANCE)))
+
+    @cached_property
+    def value_range(self) -> tuple[float, float]:
+        """Smallest and largest physical value that the type can carry, whatever the limits."""
+        first, last = (raw * self.scale + self.offset for raw in self.type.raw_range)
+        return (first, last) if first <= last else (last, first)
+
+    def _steps(self, value: float) -> float:
+        """Return a physical value in raw steps, not rounded, in bounds that floor() can take."""
+        steps = (value - self.offset) / self.scale
+        return min(max(steps, -_STEPS_MAX), _STEPS_MAX)
 
     def check_limits(self, value: float) -> None:
         """
@@ -218,7 +246,7 @@ class Parameter:
 
         :raises ValueRefused: with the range in words.
         """
-        slack = abs(self.scale) * _STEP_TOLERANCE
+        slack = abs(self.scale) * STEP_TOLERANCE
         below = self.minimum is not None and value < self.minimum - slack
         above = self.maximum is not None and value > self.maximum + slack
         if below or above:
@@ -228,15 +256,17 @@ class Parameter:
     def range_text(self) -> str:
         """Allowed physical range in words, ``-3000 to 3000 rpm``."""
         if self.minimum is None and self.maximum is None:
-            low, high = self.type.raw_range
-            ends = sorted((low * self.scale + self.offset, high * self.scale + self.offset))
-            return f'{ends[0]:.12g} to {ends[1]:.12g}{self._unit_suffix}'
+            return f'{_in_words(self.value_range)}{self._unit_suffix}'
         if self.minimum is None:
             return f'at most {self.maximum:.12g}{self._unit_suffix}'
         if self.maximum is None:
             return f'at least {self.minimum:.12g}{self._unit_suffix}'
-        return f'{self.minimum:.12g} to {self.maximum:.12g}{self._unit_suffix}'
+        return f'{_in_words((self.minimum, self.maximum))}{self._unit_suffix}'
 
     @property
     def _unit_suffix(self) -> str:
         return f' {self.unit}' if self.unit else ''
+
+
+def _in_words(ends: tuple[float, float]) -> str:
+    return f'{ends[0]:.12g} to {ends[1]:.12g}'

@@ -92,6 +92,10 @@ class Family(ABC):
     def claims(self, drive: DriveConfiguration) -> list[Claim]:
         """Return all identifiers of the drive on its bus, both directions."""
 
+    def reserved(self, drive: DriveConfiguration) -> list[Claim]:
+        """Return identifiers that others must keep off, though the bridge does not use them."""
+        return []
+
     @abstractmethod
     def bits_per_second(self, drive: DriveConfiguration) -> float:
         """Return the worst-case bus load of the drive's exchange (maximal bit stuffing)."""

@@ -205,6 +205,28 @@ def test_members_that_differ(tmp_path: Path) -> None:
     assert problems(tmp_path, changed(together(), 'broadcast: group', joint), PROFILE) == []
 
 
+@pytest.mark.parametrize(('first', 'other'), [('group', 'all'), ('all', 'group')])
+def test_group_and_all_on_one_bus(tmp_path: Path, first: str, other: str) -> None:
+    text = second(together().replace('broadcast: group', f'broadcast: {first}'),
+                  f'broadcast: {first}', f'broadcast: {other}')
+    assert problems(tmp_path, text, PROFILE) == [
+        f"f.yaml:27: drives.hoist.broadcast: '{other}', while drive lift on the same bus has "
+        f"'{first}' and inverters obey both; allowed is '{first}' or 'none'"]
+    apart = changed(second(text, 'bus: main', 'bus: other'), '    drives:\n',
+                    '      other: {interface: virtual, channel: b}\n    drives:\n')
+    assert problems(tmp_path, apart, PROFILE) == []
+    assert problems(tmp_path, second(text, other, 'none'), PROFILE) == []
+
+
+@pytest.mark.parametrize('entry', ['status_word: {type: int16}',
+                                   'flags: {number: 5, bits: {status_word: 1}}'])
+def test_status_word_is_built_in(tmp_path: Path, entry: str) -> None:
+    path = 'status_word' if entry[0] == 's' else 'flags.bits.status_word'
+    assert problems(tmp_path, FILE, f'{PROFILE}  {entry}\n') == [
+        f"table.yaml:13: parameters.{path}: 'status_word' is built in for cannord, allowed is any "
+        'other name']
+
+
 def test_a_wrong_station_makes_no_further_problems(tmp_path: Path) -> None:
     text = second(second(together(), 'station: 2', 'station: 300'), 'period: 0.02', 'period: 0.5')
     assert problems(tmp_path, text, PROFILE) == [

@@ -63,6 +63,7 @@ def test_defaults(drive: DriveConfiguration) -> None:
     assert drive.family_options == {
         'layout': 'word_le', 'word_order': 'high_first', 'abort_code_order': 'auto',
         'addressing': 'register', 'nmt_start': True, 'heartbeat_timeout': 0.0,
+        'predefined_set': True,
         'request_cob_id': 0x505, 'response_cob_id': 0x485, 'refresh_interval': 1.0}
 
 
@@ -75,11 +76,73 @@ def test_claims(drive: DriveConfiguration) -> None:
         0x201, 0x181, 0x085, 0x705, 0x000]
 
 
+def test_predefined_set_is_reserved(drive: DriveConfiguration) -> None:
+    claims = FAMILY.reserved(drive)
+    assert sorted(claim.route.identifier for claim in claims) == [
+        0x080, 0x185, 0x205, 0x285, 0x305, 0x385, 0x405, 0x485, 0x505, 0x585, 0x605]
+    assert {claim.route.mask for claim in claims} == {0x7FF}
+    assert [claim.route.identifier for claim in claims if claim.shared] == [0x080]
+    moved = with_options(drive, request_cob_id=0x201, response_cob_id=0x181)
+    assert FAMILY.reserved(moved) == claims
+    assert FAMILY.reserved(with_options(drive, predefined_set=False)) == []
+
+
+#: an 11-bit drive whose requests are identifiers of node 5, and what they would be to it
+STRANGERS = [
+    ('datamodel_standard', 'request_id_base: 0x204', '205h (receive PDO1 of node 5'),
+    ('datamodel_standard', 'request_id_base: 0x604', '605h (SDO requests to node 5'),
+    ('datamodel_standard', 'response_id_base: 0x584', '585h (SDO responses of node 5'),
+    ('datamodel_standard', 'request_id_base: 0x7F', '080h (SYNC'),
+    ('datamodel_standard', 'request_id_base: 0x384', '385h (transmit PDO3 of node 5'),
+]
+
+
+@pytest.mark.parametrize(('protocol', 'key', 'purpose'), STRANGERS)
+def test_other_families_keep_off_the_predefined_set(tmp_path: Path, protocol: str, key: str,
+                                                    purpose: str) -> None:
+    text = FILE + f"""\
+      fan:
+        bus: main
+        protocol: {protocol}
+        station: 1
+        profile: {tmp_path}/other.yaml
+        period: 0.1
+        cyclic_response: [status]
+        {key}
+"""
+    (tmp_path / 'other.yaml').write_text(
+        'protocols: [datamodel_standard]\nparameters: {status: {number: 1, access: ro}}\n')
+    assert problems(tmp_path, text, PROFILE) == [
+        'f.yaml:21: drives.fan.station: 1 collides with drive pump (station 5) on bus main: both '
+        f'use {purpose}; predefined_set); allowed is a station of its own']
+    without = changed(text, 'station: 5', 'station: 5\n        predefined_set: false')
+    assert problems(tmp_path, without, PROFILE) == []
+
+
+def test_inverters_keep_off_the_predefined_set(tmp_path: Path) -> None:
+    # CANnord address 64: requests on 080h, answers on 081h
+    text = FILE + f"""\
+      fan:
+        bus: main
+        protocol: cannord
+        station: 64
+        profile: {tmp_path}/other.yaml
+        cyclic_response: [speed]
+"""
+    (tmp_path / 'other.yaml').write_text('protocols: [cannord]\nparameters: {speed: {}}\n')
+    assert problems(tmp_path, text, PROFILE) == [
+        'f.yaml:21: drives.fan.station: 64 collides with drive pump (station 5) on bus main: both '
+        'use 080h (SYNC; predefined_set); allowed is a station of its own']
+    without = changed(text, 'station: 5', 'station: 5\n        predefined_set: false')
+    assert problems(tmp_path, without, PROFILE) == []
+
+
 def test_claims_collide_with_the_same_node_only(drive: DriveConfiguration) -> None:
-    own = FAMILY.claims(drive)
+    own = [*FAMILY.claims(drive), *FAMILY.reserved(drive)]
     for station in range(1, 128):
-        others = FAMILY.claims(replace(drive, station=station, family_options={
-            **drive.family_options, **FAMILY.station_defaults(station)}))
+        node = replace(drive, station=station, family_options={
+            **drive.family_options, **FAMILY.station_defaults(station)})
+        others = [*FAMILY.claims(node), *FAMILY.reserved(node)]
         assert any(mine.overlaps(other) for mine in own for other in others) == (station == 5)
 
 

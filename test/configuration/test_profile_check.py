@@ -3,7 +3,9 @@
 
 from pathlib import Path
 
-from configuration_builders import changed, FILE, load, problems, PROFILE
+from configuration_builders import (
+    changed, FILE, load, problems, PROFILE, warnings,
+)
 import pytest
 
 from drive_can_bridge.core.parameters import Access, Parameter, ParameterType, Storage
@@ -59,6 +61,9 @@ CASES = [
     ('ramp:', 'online:',
      ["table.yaml:15: parameters.online: 'online' is taken by the node of the drive, allowed "
       'is any other name']),
+    ('ramp:', 'request:',
+     ["table.yaml:15: parameters.request: 'request' is taken by the node of the drive, allowed "
+      'is any other name']),
     ('ramp:', 'joint_command:',
      ["table.yaml:15: parameters.joint_command: 'joint_command' is taken by the node of the "
       'drive, allowed is any other name']),
@@ -95,9 +100,18 @@ CASES = [
     ('minimum: -3000', 'minimum: 3001',
      ['table.yaml:4: parameters.speed.minimum: 3001 is above the maximum, allowed is at most '
       '3000']),
-    ('minimum: -3000', 'minimum: -4000',
-     ['table.yaml:4: parameters.speed.minimum: -4000 is not representable, allowed is -3276.8 '
-      'to 3276.7 rpm (int16)']),
+    ('minimum: -3000, maximum: 3000', 'minimum: 4000, maximum: 5000',
+     ['table.yaml:4: parameters.speed.minimum: int16 has no value in 4000 to 5000 rpm, allowed '
+      'are limits around one (the nearest is 3276.7 rpm)']),
+    ('minimum: -3000, maximum: 3000', 'maximum: -4000',
+     ['table.yaml:4: parameters.speed.maximum: int16 has no value in at most -4000 rpm, allowed '
+      'are limits around one (the nearest is -3276.8 rpm)']),
+    ('minimum: -3000, maximum: 3000', 'minimum: 0.01, maximum: 0.09',
+     ['table.yaml:4: parameters.speed.minimum: int16 with scale 0.1 has no value in 0.01 to '
+      '0.09 rpm, allowed are limits around one (the nearest is 0.0 rpm)']),
+    ('type: uint16}', 'type: uint16, maximum: -1}',
+     ['table.yaml:5: parameters.limit.maximum: uint16 has no value in at most -1, allowed are '
+      'limits around one (the nearest is 0)']),
     ('maximum: 3000', 'maximum: 3000, neutral: 5000',
      ['table.yaml:4: parameters.speed.neutral: 5000 cannot be sent, allowed is -3000 to 3000 '
       'rpm']),
@@ -256,6 +270,37 @@ def test_good_profile(tmp_path: Path) -> None:
 ])
 def test_all_right(tmp_path: Path, old: str, new: str) -> None:
     assert problems(tmp_path, profile=changed(PROFILE, old, new)) == []
+
+
+@pytest.mark.parametrize(('old', 'new', 'name', 'limits', 'expected'), [
+    ('minimum: -3000', 'minimum: -4000', 'speed', (-3276.8, 3000.0),
+     ['table.yaml:4: parameters.speed.minimum: -4000 is not representable in int16, narrowed to '
+      '-3276.8 rpm']),
+    ('minimum: -3000, maximum: 3000', 'minimum: -9e9, maximum: 9e9', 'speed', (-3276.8, 3276.7),
+     ['table.yaml:4: parameters.speed.minimum: -9000000000.0 is not representable in int16, '
+      'narrowed to -3276.8 rpm',
+      'table.yaml:4: parameters.speed.maximum: 9000000000.0 is not representable in int16, '
+      'narrowed to 3276.7 rpm']),
+    ('type: uint16}', 'type: uint16, minimum: -5, maximum: 70000}', 'limit', (0, 65535),
+     ['table.yaml:5: parameters.limit.minimum: -5 is not representable in uint16, narrowed to 0',
+      'table.yaml:5: parameters.limit.maximum: 70000 is not representable in uint16, narrowed to '
+      '65535']),
+    # as far as the type goes, apart from noise in the last digits
+    ('maximum: 3000', 'maximum: 3276.7', 'speed', (-3000.0, 3276.7), []),
+    # scale -0.01: the smallest raw integer is the largest value
+    ('type: int16, scale: 0.01, unit: A',
+     'type: int16, scale: -0.01, unit: A, minimum: -327.67, maximum: 327.69', 'current',
+     (-327.67, 327.68),
+     ['table.yaml:11: parameters.current.maximum: 327.69 is not representable in int16, narrowed '
+      'to 327.68 A']),
+])
+def test_limits_that_the_type_cannot_hold_are_narrowed(
+        tmp_path: Path, old: str, new: str, name: str, limits: tuple[float, float],
+        expected: list[str]) -> None:
+    profile = changed(PROFILE, old, new)
+    assert warnings(tmp_path, profile=profile) == expected
+    parameter = load(tmp_path, profile=profile).drives['lift'].profile.parameters[name]
+    assert (parameter.minimum, parameter.maximum) == pytest.approx(limits, abs=1e-9)
 
 
 def test_subindex_of_another_protocol(tmp_path: Path) -> None:

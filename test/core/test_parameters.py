@@ -1,6 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Raw integers, words and values of a parameter."""
 
+from dataclasses import replace
 import math
 
 from builders import (
@@ -138,3 +139,47 @@ def test_widths() -> None:
     assert INT32.raw_range == (-2**31, 2**31 - 1)
     assert BOOL.raw_range == (0, 1)
     assert issubclass(ValueRefused, (DriveCanError, ValueError))
+
+
+COARSE = parameter('coarse', 1, type=INT16, scale=10.0, minimum=-25.0, maximum=25.0, unit='rpm')
+
+
+@pytest.mark.parametrize('entry, value, raw', [
+    (COARSE, 25.0, 2), (COARSE, -25.0, -2), (COARSE, 24.9, 2), (COARSE, 15.0, 2),
+    (COARSE, 14.9, 1), (COARSE, 4.9, 0), (COARSE, 20, 2),
+    (replace(COARSE, scale=-10.0), 25.0, -2), (replace(COARSE, scale=-10.0), -25.0, 2),
+    (replace(COARSE, offset=7.0), 25.0, 1), (replace(COARSE, offset=7.0), -25.0, -3),
+    (replace(COARSE, minimum=None), 25.0, 2), (replace(COARSE, minimum=None), -25.0, -2),
+    (replace(COARSE, maximum=None), -25.0, -2),
+    # what the type cannot hold is no value either
+    (replace(COARSE, minimum=-1e6, maximum=1e6), 327674.0, 32767),
+    (replace(COARSE, type=UINT16), -4.0, 0),
+    # 0.3 * 10 = 3.0000000000000004 is inside all the same
+    (parameter('tenths', 1, scale=0.3, maximum=3.0), 3.0, 10),
+])
+def test_rounding_stays_within_the_limits(entry: Parameter, value: float, raw: int) -> None:
+    assert entry.raw_from_value(value) == raw
+
+
+@given(st.floats(-1e5, 1e5), st.floats(-1e5, 1e5), st.floats(-1e5, 1e5),
+       st.sampled_from([0.1, 0.3, -0.3, 7.0, 1000.0, -1e4]), st.sampled_from([0.0, -40.0, 0.05]),
+       st.sampled_from([INT16, UINT16, INT32]))
+def test_what_is_sent_is_within_the_limits(
+        one: float, other: float, value: float, scale: float, offset: float,
+        kind: ParameterType) -> None:
+    low, high = sorted((one, other))
+    entry = parameter('any', 1, type=kind, scale=scale, offset=offset, minimum=low, maximum=high)
+    try:
+        sent = entry.value_from_raw(entry.raw_from_value(value))
+    except ValueRefused:
+        return
+    tolerance = abs(scale) * 1e-5
+    assert low - tolerance <= sent <= high + tolerance
+    assert abs(sent - value) < abs(scale) + tolerance
+
+
+def test_limits_without_a_value_between_them() -> None:
+    entry = parameter('gap', 1, scale=10.0, minimum=1.0, maximum=9.0, unit='V')
+    assert entry.raw_limits == (1, 0)
+    with pytest.raises(ValueRefused, match='5 is not representable: uint16 has no value in 1'):
+        entry.raw_from_value(5.0)

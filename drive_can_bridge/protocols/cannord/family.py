@@ -104,6 +104,7 @@ class Cannord(Family):
     def check_together(self, drives: Sequence[DriveConfiguration],
                        ) -> Iterator[tuple[DriveConfiguration, Complaint]]:
         """Yield in what drives of a broadcast group differ from the one that leads them."""
+        yield from self._check_kinds(drives)
         for leader, *members in groups(_placeable(drives)):
             for member in members:
                 for complaint in self._differences(leader, member):
@@ -179,6 +180,18 @@ class Cannord(Family):
             bits += frame_bits(EXTRA_LENGTH, extended=extended)
         return bits
 
+    def _check_kinds(self, drives: Sequence[DriveConfiguration],
+                     ) -> Iterator[tuple[DriveConfiguration, Complaint]]:
+        """Look for both kinds of broadcast on one bus: whoever listens, listens to both."""
+        everyone = [drive for drive in drives if drive.family_options['broadcast'] != 'none']
+        for drive in everyone[1:]:
+            mine = drive.family_options['broadcast']
+            other = everyone[0].family_options['broadcast']
+            if mine != other:
+                yield drive, Complaint('broadcast', (
+                    f"'{mine}', while drive {everyone[0].name} on the same bus has '{other}' and "
+                    f"inverters obey both; allowed is '{other}' or 'none'"))
+
     def _check_lists(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         extra = drive.family_options['extra_setpoints']
         largest = MAIN_VALUES + EXTRA_VALUES if extra else MAIN_VALUES
@@ -197,9 +210,10 @@ class Cannord(Family):
         foreign = any(protocol != self.name for protocol in drive.profile.protocols)
         for name, parameter in drive.profile.parameters.items():
             place = f'profile.parameters.{name}'
-            if name == STATUS_WORD:
-                yield Complaint(place, f"'{name}' is built in for {self.name}, allowed is any "
-                                       'other name')
+            for taken in (place, *(f'{place}.bits.{bit}' for bit, _ in parameter.bits)):
+                if taken.endswith(f'.{STATUS_WORD}'):
+                    yield Complaint(taken, f"'{STATUS_WORD}' is built in for {self.name}, allowed "
+                                           'is any other name')
             if parameter.number is not None and not 0 <= parameter.number <= NUMBER_MAX:
                 yield Complaint(f'{place}.number', f'{parameter.number} is out of range, '
                                                    f'allowed is 0 to {NUMBER_MAX}')

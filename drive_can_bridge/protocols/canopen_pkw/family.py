@@ -62,6 +62,13 @@ class CanopenPkw(Family):
                            'watched. The producer (1017h) is not configured by the bridge.',
             'type': 'number', 'minimum': 0, 'maximum': 3600, 'default': 0.0,
         },
+        'predefined_set': {
+            'description': 'Keep other drives off all identifiers of the predefined connection '
+                           'set of the node, also those that the bridge does not use: what they '
+                           'send there would be commands to it.',
+            'type': 'boolean',
+            'default': True,
+        },
         'request_cob_id': {
             'description': 'Identifier of requests to the device (receive PDO4); by default '
                            '500h + node.',
@@ -105,10 +112,17 @@ class CanopenPkw(Family):
             identifiers.emergency: f'emergency messages of node {node}',
             identifiers.heartbeat: f'heartbeats of node {node}',
         }
-        claims = [Claim(_route(identifier), f'{identifier:03X}h ({purpose})')
-                  for identifier, purpose in purposes.items()]
         # all CANopen nodes of a bus listen to the one NMT identifier
-        return [*claims, Claim(_route(network.NMT_IDENTIFIER), '000h (NMT)', shared='NMT')]
+        return [*_claims(purposes), *_claims({network.NMT_IDENTIFIER: 'NMT'}, shared='NMT')]
+
+    def reserved(self, drive: DriveConfiguration) -> list[Claim]:
+        """Return the rest of what a node listens to and sends on from the factory."""
+        if not drive.family_options['predefined_set']:
+            return []
+        remark = 'predefined_set'
+        return [*_claims({base + drive.station: f'{what} node {drive.station}; {remark}'
+                          for base, what in network.PREDEFINED_SET.items()}),
+                *_claims({network.SYNC_IDENTIFIER: f'SYNC; {remark}'}, shared='SYNC')]
 
     def bits_per_second(self, drive: DriveConfiguration) -> float:
         """Return the worst-case load: each period one round, and every setpoint changes."""
@@ -202,5 +216,7 @@ class CanopenPkw(Family):
             taken.update(dict.fromkeys(mine, parameter.name))
 
 
-def _route(identifier: int) -> Route:
-    return Route(identifier, STANDARD_IDENTIFIER_MAX, False)
+def _claims(purposes: dict[int, str], *, shared: str = '') -> list[Claim]:
+    return [Claim(Route(identifier, STANDARD_IDENTIFIER_MAX, False),
+                  f'{identifier:03X}h ({purpose})', shared)
+            for identifier, purpose in purposes.items()]

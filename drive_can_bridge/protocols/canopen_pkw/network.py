@@ -25,10 +25,20 @@ from drive_can_bridge.core.frame import Frame
 
 NODE_MAX = 127
 NMT_IDENTIFIER = 0x000
+SYNC_IDENTIFIER = 0x080
 EMERGENCY_BASE = 0x080
 RESPONSE_BASE = 0x480
 REQUEST_BASE = 0x500
 HEARTBEAT_BASE = 0x700
+#: what a node listens to and sends on from the factory (CiA 301, "predefined connection set"),
+#: besides emergency messages and heartbeat; plus the node's number
+PREDEFINED_SET = {
+    0x180: 'transmit PDO1 of', 0x200: 'receive PDO1 of',
+    0x280: 'transmit PDO2 of', 0x300: 'receive PDO2 of',
+    0x380: 'transmit PDO3 of', 0x400: 'receive PDO3 of',
+    RESPONSE_BASE: 'transmit PDO4 of', REQUEST_BASE: 'receive PDO4 of',
+    0x580: 'SDO responses of', 0x600: 'SDO requests to',
+}
 EMERGENCY_LENGTH = 8
 NO_ERROR = 0x0000
 

@@ -1,6 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Broadcast groups: stations 1, 2 and 3 are led by station 1 and share identifier 400h (408h)."""
 
+from dataclasses import replace
 import math
 from typing import Any
 
@@ -545,7 +546,7 @@ def test_differences(options: dict[str, Any], text: str) -> None:
 
 def test_the_same_word_means_the_same_everywhere() -> None:
     faster = drive('cannord', name='turn', station=3, broadcast='group', response=(ACTUAL,),
-                   request=(FREQUENCY.__class__(**{**vars(FREQUENCY), 'scale': 100 / 16384}),),
+                   request=(replace(FREQUENCY, scale=100 / 16384),),
                    table=PARAMETERS)
     (name, found), = complaints(*members(1), faster)
     assert name == 'turn'

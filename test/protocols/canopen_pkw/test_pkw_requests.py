@@ -1,6 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Requests of users: all eight functions, what fails and how it is said, and whose turn it is."""
 
+from dataclasses import replace
 from typing import Any
 
 from builders import Conversation, read, write
@@ -107,7 +108,7 @@ def test_raw_writes_are_16_bits() -> None:
 
 
 def test_word_order_of_a_parameter_wins() -> None:
-    swapped = Parameter(**{**vars(POSITION), 'word_order': 'low_first'})
+    swapped = replace(POSITION, word_order='low_first')
     talk = online()
     assert asked(talk, write((swapped, 0x12345678))) == '505#D002002B78563412'
     talk = online()
@@ -322,7 +323,7 @@ def test_raw_names_of_listed_parameters_obey_their_rules() -> None:
 
 
 def test_register_and_object_are_one_even_if_the_profile_gives_one_of_them() -> None:
-    bare = [Parameter(**{**vars(entry), 'index': None, 'subindex': None}) for entry in TABLE]
+    bare = [replace(entry, index=None, subindex=None) for entry in TABLE]
     assert not raw('x2004.6', table=bare).writable
     talk = online(table=bare, response=bare[:2], request=(bare[10],))
     assert SPEED.name == bare[10].name
