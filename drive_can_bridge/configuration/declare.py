@@ -16,6 +16,11 @@ DYNAMIC_DRIVE_KEYS = ('command_timeout', 'rearm', 'parameter_timeout')
 DYNAMIC_KEYS = ('diagnostics_period',)
 
 
+def identity_name(drive: str) -> str:
+    """Return the name of the parameter that says who a drive is; the bridge itself sets it."""
+    return f'drives.{drive}.identity'
+
+
 class DeclaredParameter(NamedTuple):
     """
     A parameter of the bridge's node.
@@ -92,6 +97,9 @@ def _drive(drive: DriveConfiguration) -> Iterator[DeclaredParameter]:
     for key, value in values.items():
         yield DeclaredParameter(prefix + key, value, _description('drive', key),
                                 key in DYNAMIC_DRIVE_KEYS)
+    yield DeclaredParameter(
+        identity_name(drive.name), '', 'Found out by the bridge when the drive comes online: the '
+        'section identity of its profile. Empty while not known.', False)
     options = FAMILIES[drive.protocol].options_schema
     for key, value in drive.family_options.items():
         yield DeclaredParameter(prefix + key, value, options[key].get('description', ''), False)

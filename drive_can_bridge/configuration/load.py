@@ -59,6 +59,7 @@ def configuration_from_overrides(overrides: Mapping[str, object], *,
 
 def _configuration(tree: Tree, problems: list[Problem], adapters: Adapters | None,
                    ) -> BridgeConfiguration:
+    _forget_findings(tree)
     bus_names, drive_count = _names(tree, 'buses'), len(_names(tree, 'drives'))
     tree, found = check_schema(tree, parameter_file_schema(), 'bridge', override=_Override(tree))
     problems = [*problems, *found]
@@ -112,6 +113,14 @@ def _configuration(tree: Tree, problems: list[Problem], adapters: Adapters | Non
         diagnostics_period=float(values['diagnostics_period']),
         buses=buses, drives=drives, profile_directories=directories,
         warnings=tuple(report(warnings)))
+
+
+def _forget_findings(tree: Tree) -> None:
+    """Leave out what the bridge finds out by itself: ``ros2 param dump`` writes that too."""
+    drives = tree.data.get('drives')
+    for drive in drives.values() if isinstance(drives, dict) else ():
+        if isinstance(drive, dict) and isinstance(drive.get('identity'), str):
+            del drive['identity']
 
 
 def _names(tree: Tree, key: str) -> list[str]:

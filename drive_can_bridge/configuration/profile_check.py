@@ -14,6 +14,9 @@ from typing import Any
 
 from drive_can_bridge.configuration.control_check import check_control, control_table
 from drive_can_bridge.configuration.problems import Path, Problem, show, Tree
+from drive_can_bridge.configuration.restore_check import (
+    check_identity, check_restore, restore_table,
+)
 from drive_can_bridge.configuration.schema import profile_schema
 from drive_can_bridge.configuration.schema_check import check_schema
 from drive_can_bridge.core.errors import ValueRefused
@@ -70,11 +73,15 @@ def profile_from_tree(tree: Tree) -> LoadedProfile:
         problems.extend(wrong)
         if not wrong and not any(place[:1] == ('control',) for place in sound.damaged):
             control = control_table(sound.data['control'])
+    wrong = [*check_identity(sound, parameters, names), *check_restore(sound, parameters, names)]
+    problems.extend(wrong)
     profile = Profile(
         name=FilePath(tree.file).stem, path=tree.file,
         description=sound.data.get('description', ''),
         protocols=tuple(sound.data.get('protocols', ())),
-        parameters=parameters, control=control)
+        parameters=parameters, control=control,
+        identity=tuple(name for name in sound.data.get('identity', ()) if name in parameters),
+        restore=restore_table(sound, parameters, usable=not wrong))
     return LoadedProfile(profile, sound, names, problems, warnings)
 
 
@@ -99,6 +106,8 @@ def _parameter(name: str, entry: dict[str, Any]) -> Parameter:
         subindex=entry.get('subindex'),
         index=entry.get('index'),
         word_order=entry.get('word_order'),
+        protected=entry.get('protected', False),
+        verified=entry.get('verified'),
         scaled=any(key in entry for key in ('scale', 'offset', 'unit')))
 
 

@@ -100,6 +100,7 @@ class Parameter:
     :param listed: stands in the profile; False for a parameter addressed by its raw name.
     :param word_order: 32-bit values: ``high_first`` or ``low_first``; None: as the drive says.
     :param protected: a restored backup leaves it alone unless told otherwise.
+    :param verified: what the profile says about its own entry; None: nothing.
     :param width_known: False for a raw name whose width only the drive knows; ``type`` is then the
         widest possible.
     """
@@ -123,6 +124,7 @@ class Parameter:
     scaled: bool = False
     listed: bool = True
     protected: bool = False
+    verified: bool | None = None
     width_known: bool = True
 
     @property

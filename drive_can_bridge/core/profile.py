@@ -42,6 +42,34 @@ class ControlTable:
     fault: StatusPattern | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class RestoreStep:
+    """
+    One write around a restored backup: ``word = (word read & ~mask) | bits``.
+
+    :param parameter: name of the parameter.
+    :param bits: what to write where the mask has ones.
+    :param mask: all ones of the type for a whole value, which needs no reading first.
+    """
+
+    parameter: str
+    bits: int
+    mask: int
+
+
+@dataclass(frozen=True, slots=True)
+class RestoreTable:
+    """
+    The ``restore`` section of a profile.
+
+    :param before: written in this order before the settings of a backup.
+    :param after: written in this order afterwards, whatever became of them.
+    """
+
+    before: tuple[RestoreStep, ...] = ()
+    after: tuple[RestoreStep, ...] = ()
+
+
 @dataclass(frozen=True)
 class Profile:
     """
@@ -51,6 +79,7 @@ class Profile:
     :param path: where it was read from.
     :param protocols: the families the drive type speaks.
     :param parameters: the table, in the order of the file, by name.
+    :param identity: names of the parameters that tell a drive from another one of its type.
     """
 
     name: str
@@ -59,3 +88,5 @@ class Profile:
     protocols: tuple[str, ...]
     parameters: dict[str, Parameter] = field(default_factory=dict)
     control: ControlTable | None = None
+    identity: tuple[str, ...] = ()
+    restore: RestoreTable = RestoreTable()

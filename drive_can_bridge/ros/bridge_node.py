@@ -14,6 +14,7 @@ shutdown   deactivate and cleanup as far as needed
 """
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 import threading
 from typing import Any
@@ -23,6 +24,7 @@ from rclpy.context import Context
 from rclpy.executors import Executor
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
+from drive_can_bridge.configuration.declare import identity_name
 from drive_can_bridge.configuration.load import configuration_from_overrides
 from drive_can_bridge.configuration.parameter_file import duplicate_keys
 from drive_can_bridge.configuration.problems import report
@@ -202,8 +204,9 @@ class BridgeNode(LifecycleNode):
                                    prepare_thread=self._prepare_thread)
             self.exchanges[bus.name] = exchange
             for drive, session, family in zip(drives, sessions, families):
-                node = DriveNode(self, drive, session, family, exchange, self._mailbox,
-                                 self._spinner)
+                node = DriveNode(
+                    self, drive, session, family, exchange, self._mailbox, self._spinner,
+                    partial(self._node_parameters.announce, identity_name(drive.name)))
                 self.drives[drive.name] = node
                 exchange.attach(session, node)
 

@@ -6,6 +6,8 @@ Samples are published in the thread that received the frame; service calls are s
 executor thread and get their answers through the mailbox.
 """
 
+from collections.abc import Callable
+
 from rclpy.clock import Clock
 from rclpy.exceptions import InvalidHandle
 from rclpy.executors import Executor
@@ -23,13 +25,16 @@ from drive_can_bridge.core.events import (
     ProcessDataReceived, RequestCompleted, SetpointsExpired, StationFound, StationLost,
 )
 from drive_can_bridge.core.parameters import Value
-from drive_can_bridge.core.requests import BRIDGE_INACTIVE, Failure, Outcome, Request
+from drive_can_bridge.core.requests import (
+    BRIDGE_INACTIVE, Failure, Outcome, ReadRequest, Request,
+)
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.protocols.family import Family
 from drive_can_bridge.ros.commands import CommandIntake
 from drive_can_bridge.ros.control_services import ControlServices
 from drive_can_bridge.ros.event_topic import RequestTopic
+from drive_can_bridge.ros.identity import IdentityReader
 from drive_can_bridge.ros.mailbox import Mailbox
 from drive_can_bridge.ros.parameter_services import ParameterServices
 from drive_can_bridge.ros.quality import latched_quality, overriding, quality_overrides
@@ -45,10 +50,12 @@ class DriveNode:
     One drive in the ROS graph (a ``DriveListener`` of its exchange).
 
     :param bridge: the bridge's node; the drive lives in its namespace.
+    :param identified: takes the drive's identity in words whenever it changes.
     """
 
     def __init__(self, bridge: Node, drive: DriveConfiguration, session: Session, family: Family,
-                 exchange: BusExchange, mailbox: Mailbox, executor: Executor) -> None:
+                 exchange: BusExchange, mailbox: Mailbox, executor: Executor,
+                 identified: Callable[[str], None]) -> None:
         self.drive = drive
         self.session = session
         self.exchange = exchange
@@ -60,6 +67,8 @@ class DriveNode:
         self._tickets: dict[ControlTicket, Future] = {}
         self._calls = 0  # service calls that wait for their answer
         self.requests_refused = 0
+        self._identity = IdentityReader(drive.profile, self._submit_quietly, identified,
+                                        lambda text: self.warn(text, text))
         self.rejected_text = ''
         self.foreign_text = ''
         # a local remapping wins over a process-wide ``__node:=``, which would rename every drive;
@@ -181,6 +190,7 @@ class DriveNode:
             self._online.publish(Bool(data=True))
             self._throttle.reset()
             self._logger.info(f'{self.name}: online')
+            self._mailbox.post(self._identity.read)
         elif isinstance(event, StationLost):
             self._online.publish(Bool(data=False))
             self.samples.forget()
@@ -230,6 +240,14 @@ class DriveNode:
         finally:
             self._calls -= 1
         return outcomes
+
+    def _submit_quietly(self, request: ReadRequest,
+                        completed: Callable[[tuple[Outcome, ...]], None]) -> None:
+        """Submit a request of our own; nobody waits for its answer."""
+        future = Future(executor=self._executor)
+        future.add_done_callback(lambda done: completed(done.result()))
+        self._requests[id(request)] = (request, future)
+        self.exchange.submit(self.session, request)
 
     async def _ask(self, action: ControlAction) -> tuple[bool, str]:
         future = Future(executor=self._executor)

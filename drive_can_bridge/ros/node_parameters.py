@@ -32,6 +32,7 @@ class NodeParameters:
         self._node = node
         self._changed = changed
         self._dynamic: list[str] = []
+        self._announcing = False
         node.add_on_set_parameters_callback(self._check)
         node.add_post_set_parameters_callback(self._apply)
 
@@ -61,7 +62,22 @@ class NodeParameters:
                     description=description, read_only=not dynamic, dynamic_typing=True),
                 ignore_override=True)
 
+    def announce(self, name: str, value: Any) -> None:
+        """Change a read-only parameter: what the bridge itself has found out."""
+        if self._node.get_parameter(name).value == value:
+            return
+        self._announcing = True
+        try:
+            # the descriptor is handed in again because that is how rclpy leaves it read-only for
+            # everybody else
+            self._node._set_parameters_atomically_common(
+                [Parameter(name, value=value)], {name: self._node.describe_parameter(name)})
+        finally:
+            self._announcing = False
+
     def _check(self, parameters: list[Parameter]) -> SetParametersResult:
+        if self._announcing:
+            return SetParametersResult(successful=True)
         for parameter in parameters:
             if parameter.name.startswith(_OURS) or parameter.name in _OURS_ALONE:
                 problem = check_dynamic(parameter.name, parameter.value)

@@ -127,6 +127,8 @@ def descriptor(name: str, parameter: Parameter, *, role: Role | None = None,
         facts.append(f'unit {parameter.unit}')
     if parameter.storage is not None:
         facts.append(f'storage {parameter.storage.value}')
+    if parameter.verified is False:
+        facts.append('unverified')
     kind = parameter.kind
     untyped = unreadable or not parameter.readable
     if untyped:

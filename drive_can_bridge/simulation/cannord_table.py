@@ -13,6 +13,9 @@ one without, others with ``subindex``        one value per parameter set; the on
                                              sub-index 1 to 3 are the sets 2 to 4
 ============================================ ======================================================
 
+A sub-index counts in array tasks and in plain ones: the rule in the manuals wants array tasks,
+examples in the manuals use plain ones.
+
 The values of parameter sets are kept here; the register of set 1 in the plant always holds the
 value of the *active* set, so that the motor obeys it.
 """
@@ -113,8 +116,9 @@ class CannordTable:
             raise Refused(NOT_AN_ARRAY)
         if what is Task.READ_ELEMENTS:
             return Response.ELEMENTS, max(group.members) + 1
-        # without an array task the sub-index does not count
-        parameter = group.members.get(task.index if array else 0)
+        # The manuals contradict each other on a sub-index in plain tasks: where there is something
+        # to choose, it counts here, as in their examples; a simple parameter has no use for it.
+        parameter = group.members.get(task.index if group.array else 0)
         if parameter is None:
             raise Refused(WRONG_SUBINDEX)
         if what in _WRITES:

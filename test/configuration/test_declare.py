@@ -40,6 +40,7 @@ def test_all_effective_values(tmp_path: Path) -> None:
         ('drives.conveyor.control_timeout', 2.0),
         ('drives.conveyor.parameter_retries', 2),
         ('drives.conveyor.verify_writes', True),
+        ('drives.conveyor.identity', ''),
         ('drives.conveyor.mapping', 'verify'),
         ('drives.conveyor.request_map_base', 122),
         ('drives.conveyor.response_map_base', 126),

@@ -43,9 +43,12 @@ class TestReading:
     def test_no_task(self) -> None:
         assert asks(inverter(), '66 00 00 00 12 34 56 78') == '66 00 00 00 00 00 00 00'
 
-    def test_sub_index_counts_in_array_tasks_only(self) -> None:
+    def test_sub_index_counts_in_plain_tasks_and_in_array_tasks(self) -> None:
+        """BU 0050 page 48 reads P102 of set 2 by the plain task with index 1: 3E8h is 10.00 s."""
+        made = made_with(acceleration_time=1.0, acceleration_time_set_2=10.0)
+        assert asks(made, '66 10 01 00 00 00 00 00') == '66 10 01 00 00 00 E8 03'
+        assert asks(made, '66 10 00 00 00 00 00 00') == '66 10 00 00 00 00 64 00'
         made = made_with(acceleration_time=1.0, acceleration_time_set_2=2.0)
-        assert asks(made, '66 10 01 00 00 00 00 00') == '66 10 01 00 00 00 64 00'
         assert asks(made, '66 60 01 00 00 00 00 00') == '66 40 01 00 00 00 C8 00'
         assert asks(made, '66 60 00 00 00 00 00 00') == '66 40 00 00 00 00 64 00'
 
@@ -58,6 +61,7 @@ class TestWriting:
     @pytest.mark.parametrize(('task', 'answer', 'name', 'value', 'eeprom'), [
         ('66 20 00 00 00 00 0F 27', '66 10 00 00 00 00 0F 27', 'p102', 99.99, 1),
         ('66 E0 00 00 00 00 64 00', '66 10 00 00 00 00 64 00', 'p102', 1.0, 0),
+        ('66 20 01 00 00 00 64 00', '66 10 01 00 00 00 64 00', 'p102.1', 1.0, 1),
         ('66 70 01 00 00 00 64 00', '66 40 01 00 00 00 64 00', 'p102.1', 1.0, 1),
         ('66 C0 01 00 00 00 64 00', '66 40 01 00 00 00 64 00', 'p102.1', 1.0, 0),
         ('66 C0 00 00 00 00 C8 00', '66 40 00 00 00 00 C8 00', 'p102', 2.0, 0),
@@ -112,6 +116,7 @@ class TestRefusals:
         ('66 C0 01 00 FF FF FB FF', 2),     # the same in set 2, which has no limits
         ('04 20 00 00 00 00 02 00', 2),     # P4 is a bool
         ('66 60 02 00 00 00 00 00', 3),     # P102 in set 3 is not in the profile
+        ('66 10 02 00 00 00 00 00', 3),
         ('65 C2 02 00 00 00 00 00', 3),
         ('9B 61 00 00 00 00 00 00', 4),     # P411 is not an array
         ('9B 91 00 00 00 00 00 00', 4),

@@ -4,8 +4,9 @@ Where the registers of a TeSys T LTMR stand in its CANopen object dictionary.
 
 Source: the register overview of the LTMR CANopen guide, which prints the first and last address
 of each group (statistics 2001h.01h, monitoring 2004h.01h = register 450, command 2008h.01h to
-.64h = 700 to 799, …). Inside a group, sub-index 1 is the first register. The rows marked
-*interpolated* are not printed there: they follow from their neighbours.
+.64h = 700 to 799, …). Inside a group, sub-index 1 is the first register. That 2000h and 2003h
+begin at 0 and 300 follows from their last registers (96 and 429), which another overview of the
+vendor names. The two other rows are *interpolated*: they follow from their neighbours.
 """
 
 from dataclasses import dataclass
@@ -16,7 +17,7 @@ class Block:
     """
     The registers of one index: ``first`` has sub-index 1.
 
-    :param certain: printed in the guide; False: interpolated.
+    :param certain: printed by the vendor, or follows from what is; False: interpolated.
     """
 
     index: int
@@ -26,10 +27,10 @@ class Block:
 
 
 BLOCKS = (
-    Block(0x2000, 0, 99, False),       # identification
+    Block(0x2000, 0, 99, True),        # identification
     Block(0x2001, 100, 199, True),     # statistics
     Block(0x2002, 200, 299, False),
-    Block(0x2003, 300, 449, False),
+    Block(0x2003, 300, 449, True),
     Block(0x2004, 450, 539, True),     # monitoring
     Block(0x2005, 540, 599, True),     # configuration
     Block(0x2006, 600, 649, False),

@@ -1,0 +1,112 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""The sections ``identity`` and ``restore`` of a profile: names that exist, values that fit."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from drive_can_bridge.configuration.problems import Path, Problem, show, suggestion, Tree
+from drive_can_bridge.core.errors import ValueRefused
+from drive_can_bridge.core.parameters import Parameter, ParameterType
+from drive_can_bridge.core.profile import RestoreStep, RestoreTable
+
+_PHASES = ('before', 'after')
+
+
+def check_identity(tree: Tree, parameters: dict[str, Parameter],
+                   names: tuple[str, ...]) -> Iterator[Problem]:
+    """
+    Check the ``identity`` section of a profile's tree.
+
+    :param parameters: those that are all right.
+    :param names: of all parameters.
+    """
+    seen: set[str] = set()
+    for position, name in enumerate(tree.data.get('identity', ())):
+        at = ('identity', position)
+        parameter = parameters.get(name)
+        if name in seen:
+            yield tree.problem(('identity',), f'{show(name)} stands twice, allowed is once', at=at)
+        elif parameter is None:
+            yield from _unknown(tree, ('identity',), name, names, at)
+        elif not parameter.readable:
+            yield tree.problem(('identity',), f'{show(name)} is write-only, allowed are '
+                                              'parameters with access ro or rw', at=at)
+        seen.add(name)
+
+
+def check_restore(tree: Tree, parameters: dict[str, Parameter],
+                  names: tuple[str, ...]) -> Iterator[Problem]:
+    """Check the ``restore`` section likewise."""
+    for phase, name, value in _steps(tree):
+        path = ('restore', phase, name)
+        parameter = parameters.get(name)
+        if parameter is None:
+            yield from _unknown(tree, path, name, names, path)
+        elif not parameter.writable:
+            yield tree.problem(path, f'{show(name)} is read-only, allowed are parameters with '
+                                     'access rw or wo')
+        elif isinstance(value, dict):
+            yield from _check_bits(tree, path, parameter, value)
+        else:
+            try:
+                parameter.raw_from_value(value)
+            except (ValueRefused, OverflowError):
+                allowed = 'true or false' if parameter.type is ParameterType.BOOL \
+                    else parameter.range_text
+                yield tree.problem(path, f'{show(value)} cannot be written, allowed is {allowed}')
+
+
+def restore_table(tree: Tree, parameters: dict[str, Parameter], *, usable: bool) -> RestoreTable:
+    """
+    Make the table of the section.
+
+    :param usable: False: something is wrong in it, and nothing of it may be used.
+    """
+    damaged = any(place[:1] == ('restore',) for place in tree.damaged)
+    if not usable or damaged or any(name not in parameters for _, name, _ in _steps(tree)):
+        return RestoreTable()
+    made: dict[str, list[RestoreStep]] = {phase: [] for phase in _PHASES}
+    for phase, name, value in _steps(tree):
+        made[phase].append(_step(parameters[name], value))
+    return RestoreTable(tuple(made['before']), tuple(made['after']))
+
+
+def _step(parameter: Parameter, value: Any) -> RestoreStep:
+    if not isinstance(value, dict):
+        return RestoreStep(parameter.name,
+                           parameter.word_from_raw(parameter.raw_from_value(value)),
+                           parameter.word_from_raw(-1))
+    positions = dict(parameter.bits)
+    bits = mask = 0
+    for name, wanted in value.items():
+        mask |= 1 << positions[name]
+        bits |= wanted << positions[name]
+    return RestoreStep(parameter.name, bits, mask)
+
+
+def _check_bits(tree: Tree, path: Path, parameter: Parameter,
+                value: dict[str, bool]) -> Iterator[Problem]:
+    known = [bit for bit, _ in parameter.bits]
+    for bit in value:
+        if bit not in known:
+            yield tree.problem((*path, bit), f'{show(bit)} is no bit of {parameter.name}, '
+                                             f'{suggestion(bit, known)}')
+    if not parameter.readable:
+        yield tree.problem(path, f'{show(parameter.name)} is write-only: its other bits cannot be '
+                                 'kept, allowed is a value')
+
+
+def _steps(tree: Tree) -> Iterator[tuple[str, str, Any]]:
+    section = tree.data.get('restore')
+    for phase in _PHASES:
+        steps = section.get(phase) if isinstance(section, dict) else None
+        if isinstance(steps, dict):
+            for name, value in steps.items():
+                yield phase, name, value
+
+
+def _unknown(tree: Tree, path: Path, name: str, names: tuple[str, ...],
+             at: Path) -> Iterator[Problem]:
+    """Complain about a name that is not in the table; one with problems of its own is known."""
+    if name not in names and not tree.is_damaged(('parameters',)):
+        yield tree.problem(path, f'{show(name)} is unknown, {suggestion(name, names)}', at=at)

@@ -1,0 +1,105 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Who a drive is: read when it comes online, a read-only parameter of the bridge."""
+
+from pathlib import Path
+
+from bridges import Bridge, CONVEYOR, parameters, StartBridge
+from clients import Client, wait_until
+import pytest
+from rcl_interfaces.srv import DescribeParameters
+
+BRIDGE = '/drive_can_bridge'
+NAME = 'drives.conveyor.identity'
+SPEED = """\
+protocols: [datamodel_extended]
+identity: [firmware, serial_number, supply, factory_made]
+parameters:
+  speed_setpoint: {number: 50, type: int16, scale: 0.1, unit: rpm, storage: ram}
+  actual_speed: {number: 209, type: int16, scale: 0.1, unit: rpm, access: ro}
+  firmware: {number: 300, access: ro}
+  serial_number: {number: 305, access: ro}
+  supply: {number: 310, type: int16, scale: 0.5, unit: V, access: ro}
+  factory_made: {number: 311, type: bool, access: ro}
+"""
+
+
+@pytest.fixture
+def keys(tmp_path: Path) -> dict[str, object]:
+    """Return the keys of a drive with such a profile."""
+    path = tmp_path / 'who.yaml'
+    path.write_text(SPEED)
+    return {**CONVEYOR, 'profile': str(path), 'cyclic_request': ['speed_setpoint'],
+            'cyclic_response': ['actual_speed'], 'missed_limit': 5}
+
+
+def give(one: Bridge, **values: float) -> None:
+    """Make the simulated drive another one."""
+    for name, value in values.items():
+        one.played['conveyor'].set_value(name, value)
+
+
+def identity_becomes(client: Client, text: str) -> None:
+    """Wait for a text; a failure shows the last one."""
+    seen: list[object] = []
+
+    def there() -> bool:
+        seen[:] = client.get(BRIDGE, NAME)
+        return seen == [text]
+
+    try:
+        wait_until(there)
+    except AssertionError:
+        assert seen == [text]
+
+
+def test_is_read_whenever_the_drive_comes_online(bridge: StartBridge, client: Client,
+                                                 keys: dict[str, object]) -> None:
+    one = bridge(parameters(conveyor=keys), autostart=False)
+    give(one, firmware=10205, serial_number=4711, supply=24.5, factory_made=True)
+    assert one.node.start()
+    first = 'firmware=10205 serial_number=4711 supply=24.5 factory_made=true'
+    identity_becomes(client, first)
+    played = one.played['conveyor']
+    before = one.node.drives['conveyor'].session.statistics.exchanges
+    played.fault('silent')
+    wait_until(lambda: not one.node.drives['conveyor'].session.online, 20.0)
+    give(one, serial_number=4712)
+    assert client.get(BRIDGE, NAME) == [first]  # nobody has answered since
+    played.fault('ok')
+    identity_becomes(client, first.replace('4711', '4712'))
+    assert one.node.drives['conveyor'].session.statistics.exchanges > before
+
+
+def test_is_read_only(bridge: StartBridge, client: Client, keys: dict[str, object]) -> None:
+    one = bridge(parameters(conveyor=keys), autostart=False)
+    give(one, firmware=1, serial_number=2, supply=0, factory_made=False)
+    assert one.node.start()
+    text = 'firmware=1 serial_number=2 supply=0 factory_made=false'
+    identity_becomes(client, text)
+    [descriptor] = client.call(
+        f'{BRIDGE}/describe_parameters', DescribeParameters,
+        DescribeParameters.Request(names=[NAME])).descriptors
+    assert descriptor.read_only and 'Found out by the bridge' in descriptor.description
+    [(success, reason)] = client.set(BRIDGE, **{NAME: 'somebody else'})
+    assert not success and 'read-only' in reason
+    assert client.get(BRIDGE, NAME) == [text]
+    assert one.errors == []
+
+
+def test_what_cannot_be_read_is_left_out(bridge: StartBridge, client: Client, tmp_path: Path,
+                                         keys: dict[str, object]) -> None:
+    path = tmp_path / 'who.yaml'
+    path.write_text(SPEED.replace('[firmware, ', '[').replace('  firmware:', '  # firmware:'))
+    one = bridge(parameters(conveyor={**keys, 'parameter_timeout': 0.2, 'parameter_retries': 0}),
+                 autostart=False)
+    path.write_text(SPEED)  # the drive that is played lacks a parameter of the bridge's profile
+    give(one, serial_number=4711, supply=0, factory_made=False)
+    assert one.node.start()
+    identity_becomes(client, 'serial_number=4711 supply=0 factory_made=false')
+
+
+def test_a_profile_without_identity_asks_nothing(bridge: StartBridge, client: Client) -> None:
+    one = bridge()
+    one.online()
+    assert client.get(BRIDGE, NAME) == ['']
+    assert one.node.drives['conveyor'].session.statistics.requests_ok == 0
