@@ -171,12 +171,9 @@ class SimulatedCannordInverter(SimulatedDrive):
 
     # -- time -------------------------------------------------------------------------------------
 
-    def next_timer(self) -> float | None:
-        """Return when :meth:`handle_timer` wants to be called, or None."""
-        late, deadline = super().next_timer(), self._silent_since + self._timeout
-        if deadline == math.inf:
-            return late
-        return deadline if late is None else min(late, deadline)
+    def next_timer(self) -> float:
+        """Return when :meth:`handle_timer` wants to be called; infinity: never."""
+        return min(super().next_timer(), self._silent_since + self._timeout)
 
     def handle_timer(self, now: float) -> None:
         """Do what is due: answers that were held back, and the end of patience."""

@@ -105,11 +105,9 @@ class SimulatedPkwDrive(SimulatedDrive):
 
     # -- time -------------------------------------------------------------------------------------
 
-    def next_timer(self) -> float | None:
-        """Return when :meth:`handle_timer` wants to be called, or None."""
-        late = super().next_timer()
-        due = min(self.nmt.next_timer(), self._looks_at, math.inf if late is None else late)
-        return None if due == math.inf else due
+    def next_timer(self) -> float:
+        """Return when :meth:`handle_timer` wants to be called; infinity: never."""
+        return min(super().next_timer(), self.nmt.next_timer(), self._looks_at)
 
     def handle_timer(self, now: float) -> None:
         """Do what is due: held back answers, boot-up frame, heartbeat, a look at the motor."""

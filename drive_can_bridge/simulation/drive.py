@@ -64,16 +64,16 @@ class SimulatedDrive(ABC):
         if now >= self._deaf_until:
             self._receive(frame, now)
 
-    def next_timer(self) -> float | None:
-        """Return when :meth:`handle_timer` wants to be called, or None."""
-        return self._late[0][0] if self._late else None
+    def next_timer(self) -> float:
+        """Return when :meth:`handle_timer` wants to be called; infinity: never."""
+        return self._late[0][0] if self._late else math.inf
 
     def handle_timer(self, now: float) -> None:
         """Do what is due: answers that were held back."""
         while self._late and self._late[0][0] <= now:
             self._outbox += heapq.heappop(self._late)[2]
 
-    def frames_to_send(self) -> list[Frame]:
+    def take_frames(self) -> list[Frame]:
         """Return the frames that the drive sends now."""
         frames, self._outbox = self._outbox, []
         return frames
@@ -82,11 +82,6 @@ class SimulatedDrive(ABC):
         """Return readable lines about what is worth knowing, since the last call."""
         notices, self._notices = self._notices, []
         return notices
-
-    @property
-    def has_output(self) -> bool:
-        """There are frames or notices to fetch."""
-        return bool(self._outbox or self._notices)
 
     # -- by hand, at the drive --------------------------------------------------------------------
 

@@ -1,43 +1,30 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""One thread that plays the drives of one bus."""
+"""
+Plays the drives of one bus: on a link as the bridge's exchange, with a thread for their timers.
 
-from collections.abc import Callable, Sequence
+The link opens the bus, reads it and gets it back when it is lost. Whoever touches a drive does so
+within :meth:`BusPlayer.touch`.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 import threading
-import time
-from typing import Protocol
 
 from drive_can_bridge.core.configuration import BusConfiguration
-from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, TransportError
+from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.simulation.drive import SimulatedDrive
+from drive_can_bridge.transport.end_point import EndPoint
+from drive_can_bridge.transport.link import Link, steady_now
 
-#: s; a stop, and a fault played by another thread, are noticed that late at most
-_WAIT_MAX = 0.05
+#: s that an answer may wait for room in the adapter's queue
 _SEND_TIMEOUT = 0.05
+#: s that the first attempt to open a bus may take before the simulation goes on without it
+_OPEN_TIMEOUT = 10.0
 #: identifiers whose addressees are remembered
 _ROUTES_MAX = 4096
 
-
-class Port(Protocol):
-    """
-    What an end point offers; see :class:`drive_can_bridge.transport.port.Port`.
-
-    :ivar age: s between the reception of the last frame and the return of ``receive``.
-    """
-
-    age: float
-
-    def receive(self, timeout: float) -> Frame | None:
-        """Wait for a frame."""
-
-    def send(self, frame: Frame, timeout: float) -> None:
-        """Hand out a frame."""
-
-    def close(self) -> None:
-        """Close. Never raises."""
-
-
-OpenBus = Callable[[BusConfiguration], Port]
+OpenBus = Callable[[BusConfiguration], EndPoint]
 #: takes one readable line
 Say = Callable[[str], None]
 #: takes bus name, frame, and True for a frame that a simulated drive sends
@@ -46,31 +33,38 @@ ShowFrame = Callable[[str, Frame, bool], None]
 
 class BusPlayer:
     """
-    Plays the drives of one bus, and tries to get the bus back when it is lost.
+    The drives of one bus, and the link's listener.
 
     :param complain: takes lines about the bus.
     :param say: takes the drives' lines.
-    :ivar lock: held whenever a drive is touched.
-    :ivar failure: why the thread ended although nobody stopped it, or ''.
+    :ivar failure: why a thread ended although nobody stopped it, or ''.
+    :ivar frames_rejected: what arrived and was no frame.
     """
 
     def __init__(self, bus: BusConfiguration, drives: Sequence[SimulatedDrive], *,
                  open_bus: OpenBus, say: Say, complain: Say,
                  show_frame: ShowFrame | None = None) -> None:
         self.bus = bus
-        self.lock = threading.Lock()
         self.failure = ''
+        self.frames_rejected = 0
         self._drives = tuple(drives)
         self._open_bus = open_bus
         self._say = say
         self._complain = complain
         self._show_frame = show_frame
-        self._stopping = threading.Event()
-        self._thread: threading.Thread | None = None
-        self._port: Port | None = None
+        self._lock = threading.Lock()
+        self._alarm = threading.Event()
+        self._wake_at = 0.0
+        self._closing = False
+        self._opened = False            # ever
+        self._misconfigured: BusMisconfigured | None = None
         self._complained = False
-        self._send_failures = 0
+        self._lost_answers = 0
         self._addressees: dict[tuple[int, bool], tuple[SimulatedDrive, ...]] = {}
+        # no filters: whoever looks on sees all frames
+        self._link = Link(bus, (), self, send_timeout=_SEND_TIMEOUT, opener=self._open)
+        self._thread = threading.Thread(
+            target=self._run, name=f'simulation {bus.name}', daemon=True)
 
     def start(self) -> None:
         """
@@ -78,84 +72,62 @@ class BusPlayer:
 
         :raises BusMisconfigured: no attempt will ever succeed.
         """
-        self._port = self._open()
-        self._thread = threading.Thread(
-            target=self._run, name=f'simulation {self.bus.name}', daemon=True)
+        self._link.start()
+        self._link.wait_first_attempt(_OPEN_TIMEOUT)
+        if self._misconfigured is not None:
+            raise self._misconfigured
         self._thread.start()
 
     def stop(self) -> None:
-        """End the thread and close the bus."""
-        self._stopping.set()
-        if self._thread is not None:
+        """End the threads and close the bus."""
+        self._closing = True
+        self._alarm.set()
+        if self._thread.is_alive():
             self._thread.join()
-        elif self._port is not None:
-            self._port.close()
-        self._port = None
+        self._link.stop()
 
-    # -- thread -----------------------------------------------------------------------------------
+    @contextmanager
+    def touch(self) -> Iterator[float]:
+        """Hold the drives, and give the time; what comes of it is sent at once afterwards."""
+        with self._lock:
+            yield steady_now()
+        self._alarm.set()
+
+    # -- the drives -------------------------------------------------------------------------------
 
     def _run(self) -> None:
         try:
-            while not self._stopping.is_set():
-                try:
-                    if self._port is None:
-                        self._port = self._reopen()
-                    else:
-                        self._step(self._port)
-                except BusUnavailable as error:
-                    self._lost(error)
+            while not self._closing:
+                with self._lock:
+                    now = steady_now()
+                    for drive in self._drives:
+                        if drive.next_timer() <= now:
+                            drive.handle_timer(now)
+                    notices = self._pump(self._drives)
+                    self._wake_at = min(
+                        (drive.next_timer() for drive in self._drives), default=now + 1.0)
+                for notice in notices:
+                    self._say(notice)
+                self._alarm.wait(min(max(self._wake_at - steady_now(), 0.0), 1.0))
+                self._alarm.clear()
         except Exception as error:  # noqa: BLE001  the outermost loop: end with a line of text
-            self.failure = f'bus {self.bus.name}: {type(error).__name__}: {error}'
-            self._complain(self.failure)
-        finally:
-            if self._port is not None:
-                self._port.close()
+            self.link_failed(f'{type(error).__name__}: {error}')
 
-    def _step(self, port: Port) -> None:
-        """Wait for a frame or a timer, and send what comes of it."""
-        frame = port.receive(self._patience())
-        now = time.monotonic()
-        if frame is not None and self._show_frame is not None:
-            self._show_frame(self.bus.name, frame, False)
-        frames: list[Frame] = []
+    def _pump(self, drives: Sequence[SimulatedDrive]) -> list[str]:
+        """Send what drives want sent; return their notices."""
         notices: list[str] = []
-        with self.lock:
-            if frame is not None:
-                for drive in self._addressees_of(frame):
-                    drive.receive_frame(frame, now - port.age)
-            for drive in self._drives:
-                timer = drive.next_timer()
-                if timer is not None and timer <= now:
-                    drive.handle_timer(now)
-                if drive.has_output:
-                    frames += drive.frames_to_send()
-                    notices += drive.take_notices()
-        for notice in notices:
-            self._say(notice)
-        for answer in frames:
-            self._send(port, answer)
-
-    def _patience(self) -> float:
-        with self.lock:
-            timers = [timer for timer in (drive.next_timer() for drive in self._drives)
-                      if timer is not None]
-        if not timers:
-            return _WAIT_MAX
-        return min(max(min(timers) - time.monotonic(), 0.0), _WAIT_MAX)
-
-    def _send(self, port: Port, frame: Frame) -> None:
-        try:
-            port.send(frame, _SEND_TIMEOUT)
-        except BusUnavailable:
-            raise
-        except TransportError as error:
-            # nobody acknowledges, or the queue is full: an answer is lost, as on a real bus
-            if self._send_failures == 0:
-                self._complain(f'bus {self.bus.name}: {error}')
-            self._send_failures += 1
-            return
-        if self._show_frame is not None:
-            self._show_frame(self.bus.name, frame, True)
+        for drive in drives:
+            for frame in drive.take_frames():
+                if self._link.send(frame):
+                    if self._show_frame is not None:
+                        self._show_frame(self.bus.name, frame, True)
+                    continue
+                # nobody acknowledges, or the queue is full: it is lost, as on a real bus
+                if self._lost_answers == 0 and self._link.is_open:
+                    self._complain(f'bus {self.bus.name}: {self._link.last_error}')
+                self._lost_answers += 1
+            notices += drive.take_notices()
+        return notices
 
     def _addressees_of(self, frame: Frame) -> tuple[SimulatedDrive, ...]:
         key = frame.identifier, frame.extended
@@ -168,36 +140,52 @@ class BusPlayer:
                 if any(route.matches(frame) for route in drive.routes(drive.configuration)))
         return found
 
-    # -- the bus ----------------------------------------------------------------------------------
+    # -- the link's reader thread -----------------------------------------------------------------
 
-    def _open(self) -> Port | None:
+    def _open(self) -> EndPoint:
         try:
             return self._open_bus(self.bus)
-        except BusUnavailable as error:
-            self._complain_once(f'{error}; trying again every {self.bus.reconnect_period:g} s')
-            return None
-
-    def _reopen(self) -> Port | None:
-        if self._stopping.wait(self.bus.reconnect_period):
-            return None
-        try:
-            port = self._open()
         except BusMisconfigured as error:
-            # it did work before, or might: an adapter's driver may come back
-            self._complain_once(f'{error}; trying again every {self.bus.reconnect_period:g} s')
-            return None
-        if port is not None:
+            if not self._opened:
+                self._misconfigured = error
+                raise
+            # it did work before: an adapter's driver may come back
+            raise BusUnavailable(str(error)) from error
+
+    def frame_received(self, frame: Frame, age: float) -> None:
+        """Let the drives that a frame is for answer it."""
+        if self._show_frame is not None:
+            self._show_frame(self.bus.name, frame, False)
+        with self._lock:
+            drives = self._addressees_of(frame)
+            now = steady_now()
+            for drive in drives:
+                drive.receive_frame(frame, now - age)
+            notices = self._pump(drives)
+            due = any(drive.next_timer() < self._wake_at for drive in drives)
+        if due:
+            self._alarm.set()
+        for notice in notices:
+            self._say(notice)
+
+    def bus_opened(self) -> None:
+        """Take note that the bus is there (again)."""
+        if self._complained:
             self._complain(f'bus {self.bus.name}: open')
-            self._complained = False
-        return port
+        self._opened, self._complained = True, False
 
-    def _lost(self, error: BusUnavailable) -> None:
-        if self._port is not None:
-            self._port.close()
-            self._port = None
-        self._complain_once(f'lost: {error}; trying again every {self.bus.reconnect_period:g} s')
-
-    def _complain_once(self, text: str) -> None:
+    def bus_lost(self, reason: str) -> None:
+        """Tell once that the bus is gone, or could not be opened."""
         if not self._complained:
-            self._complain(f'bus {self.bus.name}: {text}')
+            lost = 'lost: ' if self._opened else ''
+            self._complain(f'bus {self.bus.name}: {lost}{reason}; trying again every '
+                           f'{self.bus.reconnect_period:g} s')
         self._complained = True
+
+    def bus_misconfigured(self, reason: str) -> None:
+        """Leave it to :meth:`start`, which tells."""
+
+    def link_failed(self, reason: str) -> None:
+        """Take note of a defect of the program."""
+        self.failure = f'bus {self.bus.name}: {reason}'
+        self._complain(self.failure)

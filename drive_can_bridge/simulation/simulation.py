@@ -8,22 +8,20 @@ Every drive of a bridge configuration, played on its buses.
         simulation.drives['conveyor'].fault('late=0.15')
         simulation.drives['conveyor'].value('actual_speed')
 
-The end points are python-can interfaces unless ``open_bus`` says otherwise. Neither ``can`` nor
-``rclpy`` is imported here.
+The end points are python-can interfaces unless ``open_bus`` says otherwise.
 """
 
 from collections import Counter
 import sys
-import threading
-import time
 from typing import Any
 
-from drive_can_bridge.core.configuration import BridgeConfiguration, BusConfiguration
+from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.parameters import Value
 from drive_can_bridge.simulation.drive import EEPROM_TIME, SimulatedDrive
 from drive_can_bridge.simulation.drives import make_drives
 from drive_can_bridge.simulation.faults import Fault
-from drive_can_bridge.simulation.player import BusPlayer, OpenBus, Port, Say, ShowFrame
+from drive_can_bridge.simulation.player import BusPlayer, OpenBus, Say, ShowFrame
+from drive_can_bridge.transport.port import open_port
 
 #: s that the arrival of a frame may be noticed late. Two writes 20 ms apart on the wire must not
 #: seem closer because the thread that plays the bus slept over the first.
@@ -33,10 +31,10 @@ ARRIVAL_JITTER = 0.002
 class PlayedDrive:
     """A simulated drive on a running bus, for use from any thread."""
 
-    def __init__(self, drive: SimulatedDrive, lock: threading.Lock) -> None:
+    def __init__(self, drive: SimulatedDrive, player: BusPlayer) -> None:
         self.drive = drive
         self.name = drive.name
-        self._lock = lock
+        self._touch = player.touch
 
     def fault(self, fault: str | Fault) -> None:
         """
@@ -44,8 +42,8 @@ class PlayedDrive:
 
         :raises ValueRefused: there is no such fault, or it does not suit this drive.
         """
-        with self._lock:
-            self.drive.fault(fault, time.monotonic())
+        with self._touch() as now:
+            self.drive.fault(fault, now)
 
     def value(self, name: str) -> Value:
         """
@@ -53,8 +51,8 @@ class PlayedDrive:
 
         :raises ValueRefused: there is no such register.
         """
-        with self._lock:
-            return self.drive.value(name, time.monotonic())
+        with self._touch() as now:
+            return self.drive.value(name, now)
 
     def set_value(self, name: str, value: Value) -> None:
         """
@@ -62,24 +60,24 @@ class PlayedDrive:
 
         :raises ValueRefused: there is no such register, or the value does not fit.
         """
-        with self._lock:
-            self.drive.set_value(name, value, time.monotonic())
+        with self._touch() as now:
+            self.drive.set_value(name, value, now)
 
     def release(self, name: str) -> None:
         """Let an actual value that was set follow the motor again."""
-        with self._lock:
+        with self._touch():
             self.drive.release(name)
 
     @property
     def faults_text(self) -> str:
         """The faults in force, in words; 'ok' without any."""
-        with self._lock:
+        with self._touch():
             return self.drive.faults_text
 
     @property
     def violations(self) -> Counter[str]:
         """How often the other side broke a rule of the protocol, by rule."""
-        with self._lock:
+        with self._touch():
             return Counter(self.drive.violations)
 
     @property
@@ -120,11 +118,11 @@ class Simulation:
         self._players = {
             bus.name: BusPlayer(
                 bus, [drive for drive in drives.values() if drive.configuration.bus == bus.name],
-                open_bus=open_bus or open_configured_bus, say=say or _drop,
+                open_bus=open_bus or open_port, say=say or _drop,
                 complain=complain or _to_standard_error, show_frame=show_frame)
             for bus in configuration.buses.values()}
         self.drives = {
-            name: PlayedDrive(drive, self._players[drive.configuration.bus].lock)
+            name: PlayedDrive(drive, self._players[drive.configuration.bus])
             for name, drive in drives.items()}
 
     def start(self) -> None:
@@ -158,17 +156,6 @@ class Simulation:
     def __exit__(self, *_: Any) -> None:
         """Stop."""
         self.stop()
-
-
-def open_configured_bus(bus: BusConfiguration) -> Port:
-    """
-    Open a bus by python-can.
-
-    :raises TransportError: see :func:`drive_can_bridge.transport.port.open_port`.
-    """
-    # imported late: pseudo-terminals work where python-can does not
-    from drive_can_bridge.transport.port import open_port
-    return open_port(bus)
 
 
 def _drop(line: str) -> None:

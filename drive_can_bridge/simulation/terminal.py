@@ -14,12 +14,14 @@ import os
 from pathlib import Path
 import select
 import termios
+import threading
 import time
 import tty
 
 from drive_can_bridge.core.errors import BusUnavailable
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.simulation.slcan import SlcanAdapter
+from drive_can_bridge.transport.end_point import EndPoint
 
 #: frames that wait while a client does not read, beside what the kernel holds
 BACKLOG = 256
@@ -32,11 +34,9 @@ _CHUNK = 4096
 _BACKLOG_PERIOD = 0.005
 
 
-class SlcanTerminal:
+class SlcanTerminal(EndPoint):
     """
-    A bus end point like :class:`drive_can_bridge.transport.port.Port`, on a pseudo-terminal.
-
-    Not for several threads at once.
+    A bus end point on a pseudo-terminal. One thread may receive while others send.
 
     :ivar path: the device that a client opens.
     :ivar dropped: frames lost because nobody read them.
@@ -44,6 +44,7 @@ class SlcanTerminal:
     """
 
     def __init__(self) -> None:
+        super().__init__()
         try:
             self._master, self._slave = os.openpty()
         except OSError as error:
@@ -52,8 +53,8 @@ class SlcanTerminal:
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
         self.path = os.ttyname(self._slave)
-        self.age = 0.0
         self.dropped = 0
+        self._lock = threading.Lock()
         self._adapter = SlcanAdapter()
         self._received: deque[Frame] = deque()
         self._outgoing: deque[tuple[float, bytes]] = deque()
@@ -79,11 +80,12 @@ class SlcanTerminal:
             waiting = bool(self._started or self._outgoing)
             readable, _, _ = select.select(
                 [self._master], [], [], min(left, _BACKLOG_PERIOD) if waiting else left)
-            # in this order: a new client's first command ends the backlog of the one before
-            if readable:
-                self._read()
-            if waiting:
-                self._flush()
+            with self._lock:
+                # in this order: a new client's first command ends the backlog of the one before
+                if readable:
+                    self._read()
+                if waiting:
+                    self._flush()
             if not readable and left <= 0.0:
                 break
         return self._received.popleft() if self._received else None
@@ -95,14 +97,15 @@ class SlcanTerminal:
         :raises BusUnavailable: closed.
         """
         self._check_open()
-        if not self._adapter.is_open:
-            return
-        if len(self._outgoing) >= BACKLOG:
-            self._outgoing.popleft()
-            self.dropped += 1
-        now = time.monotonic()
-        self._outgoing.append((now, self._adapter.encode(frame, now)))
-        self._flush()
+        with self._lock:
+            if not self._adapter.is_open:
+                return
+            if len(self._outgoing) >= BACKLOG:
+                self._outgoing.popleft()
+                self.dropped += 1
+            now = time.monotonic()
+            self._outgoing.append((now, self._adapter.encode(frame, now)))
+            self._flush()
 
     def link(self, path: Path) -> None:
         """

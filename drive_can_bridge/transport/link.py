@@ -24,9 +24,10 @@ from typing import Protocol
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, TransportError
 from drive_can_bridge.core.frame import Frame, Route
+from drive_can_bridge.transport.end_point import EndPoint
 from drive_can_bridge.transport.error_frames import ADVICE_ALONE, BUS_OFF, BusError
 from drive_can_bridge.transport.failures import in_words
-from drive_can_bridge.transport.port import open_port, Port
+from drive_can_bridge.transport.port import open_port
 
 #: s that a receive may block: how soon a stop, or a loss seen by a sender, is noticed
 RECEIVE_TIMEOUT = 0.02
@@ -70,18 +71,19 @@ class Link:
     :param send_timeout: s that one send may take.
     :param stations: how many drives are on the bus, for each of which a frame may wait.
     :param prepare_thread: called first in the reader thread.
+    :param opener: opens the bus; None: python-can, by the configuration.
     """
 
     def __init__(self, bus: BusConfiguration, routes: Sequence[Route], listener: LinkListener, *,
                  send_timeout: float, stations: int = 0,
-                 prepare_thread: Callable[[], object] = lambda: None) -> None:
+                 prepare_thread: Callable[[], object] = lambda: None,
+                 opener: Callable[[], EndPoint] | None = None) -> None:
         self.bus = bus
-        self._routes = routes
+        self._open = opener or (lambda: open_port(bus, routes, stations=stations))
         self._listener = listener
         self._send_timeout = send_timeout
-        self._stations = stations
         self._prepare_thread = prepare_thread
-        self._port: Port | None = None
+        self._port: EndPoint | None = None
         self._loss: str | None = None
         self._blocked: str | None = None
         self._no_room_since: float | None = None
@@ -205,7 +207,7 @@ class Link:
         while not self._closing.is_set():
             try:
                 self._loss = NOT_READ_YET
-                self._port = port = open_port(self.bus, self._routes, stations=self._stations)
+                self._port = port = self._open()
                 frame = port.receive(RECEIVE_TIMEOUT)
                 self._loss = self._blocked = self._no_room_since = None
                 # after a loss nobody knows whether anybody is there before somebody was heard
@@ -229,7 +231,7 @@ class Link:
                 self._first_attempt.set()
             self._closing.wait(self.bus.reconnect_period)
 
-    def _read(self, port: Port, frame: Frame | None) -> None:
+    def _read(self, port: EndPoint, frame: Frame | None) -> None:
         receive = port.receive
         listener = self._listener.frame_received
         closing = self._closing
@@ -248,7 +250,7 @@ class Link:
                 rejected = port.rejected_frames
             frame = receive(RECEIVE_TIMEOUT)
 
-    def _sit_out(self, port: Port, reason: str) -> None:
+    def _sit_out(self, port: EndPoint, reason: str) -> None:
         """
         Wait until something leaves again. Frames of that time are nobody's: all drives are lost.
 

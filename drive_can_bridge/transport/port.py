@@ -20,8 +20,9 @@ from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, Trans
 from drive_can_bridge.core.frame import (
     EXTENDED_IDENTIFIER_MAX, Frame, Route, STANDARD_IDENTIFIER_MAX,
 )
+from drive_can_bridge.transport.end_point import EndPoint
 from drive_can_bridge.transport.error_frames import (
-    ADVICE_DISTURBED, BUS_OFF, BusError, decode_error_frame, ERROR_ACTIVE,
+    ADVICE_DISTURBED, BUS_OFF, BusError, decode_error_frame,
 )
 from drive_can_bridge.transport.failures import (
     in_words, is_full_queue, is_malformed, is_misconfiguration, with_cause,
@@ -46,20 +47,16 @@ _KERNEL_ERRORS = ('socketcan', 'socketcand')
 _SERIAL = ('slcan', 'robotell')
 
 
-class Port:
+class Port(EndPoint):
     """
-    One open bus.
+    A bus that python-can has opened.
 
-    :ivar age: s between the reception of the last received frame and the return of ``receive``.
-    :ivar error_frames: error frames seen.
-    :ivar last_error: the last of them that asks for something to be done; None: there was none.
-    :ivar controller: state of the controller as far as it tells, '' while all is well.
-    :ivar rejected_frames: what arrived and is of no use: of other identifiers (where the adapter
-        does not keep them away); remote and CAN FD frames, which no protocol here has; a serial
-        adapter's line with bytes lost.
+    It rejects what has other identifiers (where the adapter does not keep them away), remote and
+    CAN FD frames, which no protocol here has, and a serial adapter's line with bytes lost.
     """
 
     def __init__(self, bus: can.BusABC, *, kernel_errors: bool = False) -> None:
+        super().__init__()
         self._bus = bus
         # what python-can documents for adapters to implement; the ``recv`` around it looks at the
         # system clock, and waits for hours when that is set back
@@ -72,21 +69,9 @@ class Port:
         self._socket = RawSocket.below(bus)
         self._lost = False
         self._malformed_in_row = 0
-        self.age = 0.0
-        self.error_frames = 0
-        self.rejected_frames = 0
-        self.last_error: BusError | None = None
-        self.controller = ERROR_ACTIVE
-        self.bus_off_count = 0
 
     def receive(self, timeout: float) -> Frame | None:
-        """
-        Wait for a frame.
-
-        :param timeout: s.
-        :return: a data frame, or None after the time-out or when something else came.
-        :raises BusUnavailable: the bus is lost, or its controller went bus-off.
-        """
+        """Wait for a frame. See the base class."""
         try:
             message, filtered = self._receive(timeout)
         except Exception as error:  # whatever an adapter throws: the bus is lost
@@ -119,13 +104,7 @@ class Port:
         return Frame(message.arbitration_id, data, message.is_extended_id)
 
     def send(self, frame: Frame, timeout: float) -> None:
-        """
-        Hand a frame to the adapter.
-
-        :param timeout: s to wait for room in the adapter's queue.
-        :raises TransportError: this frame was not sent, but the bus is still there (queue full).
-        :raises BusUnavailable: the bus is lost.
-        """
+        """Hand a frame to the adapter. See the base class."""
         message = can.Message(arbitration_id=frame.identifier, data=frame.data,
                               is_extended_id=frame.extended)
         try:

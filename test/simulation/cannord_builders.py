@@ -63,7 +63,7 @@ def inverter(**options: Any) -> SimulatedCannordInverter:
 def says(made: SimulatedDrive, text: str, now: float = 0.0) -> list[str]:
     """Send a frame, ``0C8#7E040000``; return the answers as candump writes them."""
     made.receive_frame(frame(text), now)
-    return [str(answer) for answer in made.frames_to_send()]
+    return [str(answer) for answer in made.take_frames()]
 
 
 def tells(made: SimulatedCannordInverter, data: str, now: float = 0.0) -> str:

@@ -52,7 +52,7 @@ class Ltmr:
 
     def sent(self) -> list[str]:
         """Return what it has sent since the last look."""
-        return [str(answer) for answer in self.drive.frames_to_send()]
+        return [str(answer) for answer in self.drive.take_frames()]
 
     def ask(self, text: str, now: float) -> list[str]:
         """Send it a frame; return what it sends."""
@@ -69,7 +69,7 @@ class Ltmr:
         found = []
         for _ in range(10_000):
             due = self.drive.next_timer()
-            if due is None or due > end:
+            if due > end:
                 return found
             found += [(round(due, 6), text) for text in self.at(due)]
         raise AssertionError(f'the timer spins at {due}')

@@ -82,4 +82,4 @@ def frame(text: str) -> Frame:
 def ask(simulated: SimulatedDataModelDrive, text: str, now: float) -> list[str]:
     """Send a frame to a drive; return its answers as candump writes them."""
     simulated.receive_frame(frame(text), now)
-    return [str(answer) for answer in simulated.frames_to_send()]
+    return [str(answer) for answer in simulated.take_frames()]

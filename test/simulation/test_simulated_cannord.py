@@ -1,6 +1,8 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Conversations with the simulated CANnord inverter, in literal bytes and literal times."""
 
+import math
+
 from cannord_builders import (
     ACTUAL, ACTUAL_PERCENT, asks, configuration, FREQUENCY, inverter, PERCENT, run, says,
     SETPOINTS, TABLE, tells, VALUES,
@@ -291,7 +293,7 @@ class TestFaults:
         run(made)
         tells(made, '7F040040', 0.0)
         made.fault('trip', 5.0)
-        assert [str(sent) for sent in made.frames_to_send()] == ['0C9#380A0040']
+        assert [str(sent) for sent in made.take_frames()] == ['0C9#380A0040']
         assert tells(made, RUN, 5.0) == '380A0040'
 
     @pytest.mark.parametrize(('request_data', 'length'), [(READY, 4), (READY + '00000000', 8)])
@@ -299,16 +301,16 @@ class TestFaults:
                                                             length: int) -> None:
         made = inverter()
         made.fault('trip', 0.0)
-        assert [len(sent.data) for sent in made.frames_to_send()] == [4]
+        assert [len(sent.data) for sent in made.take_frames()] == [4]
         tells(made, request_data)
         made.fault('trip', 0.0)
-        assert [len(sent.data) for sent in made.frames_to_send()] == [length]
+        assert [len(sent.data) for sent in made.take_frames()] == [length]
 
     def test_reset_needs_an_edge(self) -> None:
         made = inverter()
         tells(made, ACKNOWLEDGE)            # held already when the fault comes
         made.fault('trip', 1.0)
-        made.frames_to_send()
+        made.take_frames()
         tells(made, ACKNOWLEDGE, 1.0)
         assert tells(made, ACKNOWLEDGE, 1.0)[:4] == FAULT
         assert tells(made, READY, 1.0)[:4] == FAULT
@@ -320,7 +322,7 @@ class TestFaults:
     def test_reset_works_only_after_the_cause_is_gone(self) -> None:
         made = inverter()
         made.fault('trip=2', 1.0)
-        made.frames_to_send()
+        made.take_frames()
         for data, now in ((ACKNOWLEDGE, 2.9), (READY, 3.1), (READY, 3.2), (ACKNOWLEDGE, 3.3)):
             assert tells(made, data, now)[:4] == FAULT
         assert tells(made, READY, 3.4)[:4] == DISABLED
@@ -329,7 +331,7 @@ class TestFaults:
         made = inverter()
         assert asks(made, 'BC62000000000000') == 'BC 42 00 00 00 00 00 00'
         made.fault('trip', 0.0)
-        made.frames_to_send()
+        made.take_frames()
         assert asks(made, 'BC62000000000000') == 'BC 42 00 00 00 00 46 00'     # 7.0
         made.fault('ok', 0.0)
         assert asks(made, 'BC62000000000000') == 'BC 42 00 00 00 00 00 00'
@@ -339,17 +341,17 @@ class TestFaults:
         made = inverter()
         made.fault('silent', 0.0)
         made.fault('trip', 0.0)
-        assert made.frames_to_send() == []
+        assert made.take_frames() == []
 
     def test_no_power(self) -> None:
         made = inverter()
         made.fault('off', 0.0)
         made.fault('trip', 0.0)
-        assert made.frames_to_send() == []
+        assert made.take_frames() == []
         assert says(made, '0C8#7E040000', 1.0) == []
         made.fault('restart', 2.0)
         made.fault('trip', 2.1)
-        assert made.frames_to_send() == []
+        assert made.take_frames() == []
 
     def test_restart(self) -> None:
         made = inverter()
@@ -374,7 +376,7 @@ class TestFaults:
             configuration(name='a', station=100), configuration(name='b', station=101)))['a']
         made.fault('foreign', 0.0)
         made.receive_frame(frame(f'0C8#{READY}'), 0.0)
-        assert str(made.frames_to_send()[0]) == '0CD#5A5A5A5A'
+        assert str(made.take_frames()[0]) == '0CD#5A5A5A5A'
 
     def test_stuck(self) -> None:
         made = inverter()
@@ -393,21 +395,21 @@ class TestTelegramTimeout:
     def test_off_by_default(self) -> None:
         made = inverter()
         run(made)
-        assert made.next_timer() is None
+        assert made.next_timer() == math.inf
         made.handle_timer(1e6)
         assert tells(made, RUN, 1e6)[:4] == ENABLED
 
     def test_silence_is_a_fault(self) -> None:
         made = inverter()
         made.set_value('telegram_timeout', 0.5)
-        assert made.next_timer() is None        # the first telegram starts the watch
+        assert made.next_timer() == math.inf        # the first telegram starts the watch
         run(made, 10.0)
         assert made.next_timer() == pytest.approx(10.5)
         made.handle_timer(10.4)
-        assert made.frames_to_send() == []
+        assert made.take_frames() == []
         made.handle_timer(10.5)
-        assert [str(sent) for sent in made.frames_to_send()] == ['0C9#380B0000']
-        assert made.next_timer() is None
+        assert [str(sent) for sent in made.take_frames()] == ['0C9#380B0000']
+        assert made.next_timer() == math.inf
         # E10.2
         assert asks(made, 'BC62000000000000', 20.0) == 'BC 42 00 00 00 00 66 00'
         # the first telegram ends the cause; then a reset helps
@@ -436,7 +438,7 @@ class TestTelegramTimeout:
         made = inverter()
         made.set_value('telegram_timeout', seconds)
         run(made, 10.0)
-        assert made.next_timer() is None
+        assert made.next_timer() == math.inf
 
     def test_late_answers_are_served_too(self) -> None:
         made = inverter()
@@ -445,7 +447,7 @@ class TestTelegramTimeout:
         made.receive_frame(frame(f'0C8#{RUN}'), 10.0)
         assert made.next_timer() == pytest.approx(10.2)
         made.handle_timer(10.2)
-        assert len(made.frames_to_send()) == 1
+        assert len(made.take_frames()) == 1
         assert made.next_timer() == pytest.approx(10.5)
 
 
@@ -487,7 +489,7 @@ def test_no_frame_ever_raises(conversation: list[tuple[Frame, float]], extra: bo
     for received, now in conversation:
         made.receive_frame(received, now)
         made.handle_timer(now)
-        for answer in made.frames_to_send():
+        for answer in made.take_frames():
             assert not answer.extended
             assert (answer.identifier, len(answer.data)) in {
                 (0x0C9, 4), (0x0C9, 5), (0x0C9, 8), (0x2C9, 8)}

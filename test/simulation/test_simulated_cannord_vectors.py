@@ -80,7 +80,7 @@ def test_takes_setpoints(row: dict[str, Any]) -> None:
     expected = [UNTOUCHED] * 5
     expected[first:first + len(row['values'])] = row['values']
     assert [made.plant.raw(setpoint.name) for setpoint in REQUEST] == expected
-    answers = made.frames_to_send()
+    answers = made.take_frames()
     if row['kind'].startswith('broadcast'):
         assert answers == []
     else:
@@ -103,7 +103,7 @@ def test_reports_actual_values(row: dict[str, Any]) -> None:
 
     made.receive_frame(Frame(request, b'\x7E\x04' + bytes(length - 2), frame(row).extended), 0.0)
 
-    answer, = made.frames_to_send()
+    answer, = made.take_frames()
     assert answer.identifier == frame(row).identifier
     if first:
         assert answer.data[:4] == frame(row).data[:4]
@@ -116,7 +116,7 @@ def test_reports_actual_values(row: dict[str, Any]) -> None:
 def test_lengths_that_do_not_exist(row: dict[str, Any]) -> None:
     made = made_for(row)
     made.receive_frame(Frame(0x0C8, frame(row).data, False), 0.0)
-    assert made.frames_to_send() == []
+    assert made.take_frames() == []
     assert sum(made.violations.values()) == 1
 
 
@@ -129,7 +129,7 @@ def test_carries_out_tasks(row: dict[str, Any]) -> None:
 
     made.receive_frame(frame(row), 0.0)
 
-    answer, = made.frames_to_send()
+    answer, = made.take_frames()
     assert answer.identifier == answer_identifier(row)
     task, = (entry for entry in FILE['tasks'] if entry['task'] == row['code'])
     low, high = answer.data[0], answer.data[1]
@@ -159,4 +159,4 @@ def test_answers(row: dict[str, Any]) -> None:
 
     made.receive_frame(Frame(identifier, request, frame(row).extended), 0.0)
 
-    assert made.frames_to_send() == [frame(row)]
+    assert made.take_frames() == [frame(row)]

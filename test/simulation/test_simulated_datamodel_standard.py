@@ -100,7 +100,7 @@ def test_read_request(row: dict[str, Any]) -> None:
 
     made.receive_frame(frame_of(row), 0.0)
 
-    answer, = made.frames_to_send()
+    answer, = made.take_frames()
     assert answer.identifier == {1: 0x7F1, 15: 0x7FF, 20: 0x394}[address]
     assert not answer.extended
     used = b'\0' * 8 if fields['pnu'] == 122 else b'\x51' * 2 * count
@@ -128,7 +128,7 @@ def test_read_response(row: dict[str, Any]) -> None:
 
     made.receive_frame(frame(question), 0.0)
 
-    answer, = made.frames_to_send()
+    answer, = made.take_frames()
     assert answer.identifier == int(row['can_id_hex'], 16)
     assert not answer.extended
     assert answer.data[:2 * count] == data[:2 * count]
@@ -145,7 +145,7 @@ def test_write(row: dict[str, Any]) -> None:
     expected = dict.fromkeys(NUMBERS, UNTOUCHED)
     expected[row['fields']['pnu']] = data[3] + 256 * data[4]
     assert {number: made.value(f'reg_{number}') for number in NUMBERS} == expected
-    assert made.frames_to_send() == []
+    assert made.take_frames() == []
     assert not made.violations
 
 
@@ -155,7 +155,7 @@ def test_what_the_manual_does_not_define(row: dict[str, Any]) -> None:
 
     made.receive_frame(frame_of(row), 0.0)
 
-    assert made.frames_to_send() == []
+    assert made.take_frames() == []
     assert {made.value(f'reg_{number}') for number in NUMBERS} == {UNTOUCHED}
     assert made.violations == {UNDEFINED: 1}
     assert made.requests == 0
@@ -302,7 +302,7 @@ def test_anything(identifier: int, data: bytes, is_extended: bool, near: bool) -
         identifier, is_extended = 0x3F1, False
     made.receive_frame(Frame(identifier if is_extended else identifier & 0x7FF, data,
                              is_extended), 0.0)
-    for answer in made.frames_to_send():
+    for answer in made.take_frames():
         assert data[0] == 3
         assert (answer.identifier, len(answer.data), answer.extended) == (0x7F1, 8, False)
 
@@ -423,9 +423,9 @@ def test_late_answers() -> None:
     assert ask(made, READ_RAMP, 1.0) == []
     assert made.next_timer() == pytest.approx(1.15)
     made.handle_timer(1.149)
-    assert made.frames_to_send() == []
+    assert made.take_frames() == []
     made.handle_timer(1.15)
-    assert [str(sent) for sent in made.frames_to_send()] == ['7F1#6400A5A5A5A5A5A5']
+    assert [str(sent) for sent in made.take_frames()] == ['7F1#6400A5A5A5A5A5A5']
 
 
 @pytest.mark.parametrize(('fault', 'answers'), [

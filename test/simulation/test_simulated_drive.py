@@ -347,6 +347,6 @@ def test_no_frame_ever_raises(conversation: list[tuple[Frame, float]]) -> None:
     for received, now in conversation:
         made.receive_frame(received, now)
         made.handle_timer(now)
-        for answer in made.frames_to_send():
+        for answer in made.take_frames():
             assert answer.identifier >> 21 == 0x81
             assert len(answer.data) == 8

@@ -5,7 +5,6 @@ The session of a bridge and a simulated LTMR, both without a clock: conversation
 A frame takes a millisecond. Nothing here waits, and nothing depends on the machine.
 """
 
-import math
 from typing import Any
 
 from builders import drive, read, text_of, write
@@ -54,8 +53,8 @@ class Line:
         """Let time pass."""
         for _ in range(100_000):
             timer = self.ltmr.next_timer()
-            due = min(self.session.next_timer(), math.inf if timer is None else timer,
-                      *(at for at, _, _ in self._under_way), math.inf)
+            due = min(self.session.next_timer(), timer,
+                      *(at for at, _, _ in self._under_way))
             if due > until:
                 self.now = until
                 return
@@ -67,7 +66,7 @@ class Line:
                     self.ltmr.receive_frame(frame, self.now)
                 else:
                     self.session.receive_frame(frame, self.now)
-            if timer is not None and timer <= self.now:
+            if timer <= self.now:
                 self.ltmr.handle_timer(self.now)
             self.session.handle_timer(self.now)
             self._collect()
@@ -78,7 +77,7 @@ class Line:
             self.sent.append((round(self.now, 6), str(frame)))
             self._under_way.append((self.now + FRAME_TIME, True, frame))
         self.session.frames_left(self.now)
-        for frame in self.ltmr.frames_to_send():
+        for frame in self.ltmr.take_frames():
             self._under_way.append((self.now + FRAME_TIME, False, frame))
         self.events += [(round(self.now, 6), event) for event in self.session.take_events()]
 
@@ -268,7 +267,7 @@ def test_unknown_last_function_byte(function: str) -> None:
     line = Line()
     line.ltmr.receive_frame(Frame(0x000, b'\x01\x05', False), 0.0)
     line.ltmr.receive_frame(Frame(0x505, bytes.fromhex(f'C80100{function}00000000'), False), 0.0)
-    line.ltmr.frames_to_send()
+    line.ltmr.take_frames()
     line.run(2.0)
     assert line.session.online
     assert line.outcome(write((RATIO, 50))) == ['written']

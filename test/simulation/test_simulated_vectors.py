@@ -71,7 +71,7 @@ def test_cyclic_request(row: dict[str, Any]) -> None:
     expected = dict.fromkeys(NUMBERS, UNTOUCHED)
     expected.update(zip(entries[:length_of(entries)], literal_words(row), strict=False))
     assert {number: made.value(f'reg_{number}') for number in NUMBERS} == expected
-    assert made.frames_to_send() == [Frame(
+    assert made.take_frames() == [Frame(
         int(row['can_id_hex'], 16) + 0x10000000, bytes.fromhex('5151A5A5A5A5A5A5'), True)]
     assert not made.violations
 
@@ -87,7 +87,7 @@ def test_cyclic_response(row: dict[str, Any]) -> None:
 
     made.receive_frame(Frame(int(row['can_id_hex'], 16) - 0x10000000, bytes(8), True), 0.0)
 
-    answer, = made.frames_to_send()
+    answer, = made.take_frames()
     assert answer.identifier == int(row['can_id_hex'], 16)
     assert answer.extended
     assert len(answer.data) == 8
@@ -107,7 +107,7 @@ def test_write(row: dict[str, Any]) -> None:
         number = first + step
         name = f'p{number}' if 122 <= number <= 129 else f'reg_{number}'
         assert made.value(name) == word
-    assert made.frames_to_send() == []
+    assert made.take_frames() == []
     assert not made.violations
 
 
@@ -122,7 +122,7 @@ def test_read(row: dict[str, Any]) -> None:
 
     made.receive_frame(Frame(int(row['can_id_hex'], 16) - 0x10000000, bytes(8), True), 0.0)
 
-    answer, = made.frames_to_send()
+    answer, = made.take_frames()
     assert answer.identifier == int(row['can_id_hex'], 16)
     assert answer.data[:2 * count] == bytes.fromhex(row['data_hex'])[:2 * count]
     assert answer.data[2 * count:] == b'\xA5' * (8 - 2 * count)
@@ -134,7 +134,7 @@ def test_read_request_is_answered_on_its_own_identifier(row: dict[str, Any]) -> 
 
     made.receive_frame(frame(row), 0.0)
 
-    answer, = made.frames_to_send()
+    answer, = made.take_frames()
     assert answer.identifier == int(row['can_id_hex'], 16) + 0x10000000
 
 
@@ -145,6 +145,6 @@ def test_what_the_manual_does_not_define(row: dict[str, Any]) -> None:
 
     made.receive_frame(frame(row), 0.0)
 
-    assert made.frames_to_send() == []
+    assert made.take_frames() == []
     assert {made.value(f'reg_{number}') for number in NUMBERS} == {UNTOUCHED}
     assert sum(made.violations.values()) == 1

@@ -21,16 +21,17 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.simulation.console import Console, LineReader
 from drive_can_bridge.simulation.simulation import Simulation
 from drive_can_bridge.simulation.terminal import SlcanTerminal
+from drive_can_bridge.transport.end_point import EndPoint
 
 POLL = frame('003FFFF0#0000000000000000')
 ANSWER = frame('103FFFF0#000000C80003A5A5')
 
 
-class ScriptedPort:
+class ScriptedPort(EndPoint):
     """An end point whose frames and failures come from the test."""
 
     def __init__(self) -> None:
-        self.age = 0.0
+        super().__init__()
         self.incoming: deque[Frame | Exception] = deque()
         self.sent: list[Frame] = []
         self.send_failure: Exception | None = None
