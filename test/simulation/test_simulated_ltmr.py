@@ -16,6 +16,7 @@ from drive_can_bridge.core.frame import EXTENDED_IDENTIFIER_MAX, Frame, Route
 from drive_can_bridge.core.parameters import Access, Parameter, ParameterType
 from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.simulation.canopen_pkw import SimulatedPkwDrive
+from drive_can_bridge.simulation.drive import Surroundings
 
 VECTORS = json.loads((Path(__file__).parents[1] / 'vectors' / 'canopen_pkw.json').read_text(
     encoding='utf-8'))
@@ -408,7 +409,7 @@ class TestFaults:
     def test_foreign_frames_keep_clear_of_neighbours(self) -> None:
         neighbour = SimulatedPkwDrive.routes(configuration(name='fan', station=1))
         made = Ltmr()
-        made.drive.neighbours = tuple(neighbour)
+        made.drive.surroundings = Surroundings(neighbours=tuple(neighbour))
         made.fault('foreign', 0.0)
         assert made.ask(READ_455, 0.1)[0].startswith('482#')
 
@@ -499,8 +500,8 @@ class TestMotor:
         made.until(60.0)
         made.drive.take_frames()
         assert 10 < made.read(465, 60.0) < 50
-        # 10 % of 27 A: the motor takes 233 %
-        made.write(652, 10, 60.0)
+        # 10 % of 27 A: the motor takes 233 %. Over the bus it would have to stand
+        made.drive.set_value('flc1_ratio', 10.0, 60.0)
         left = made.read(511, 60.0)
         assert 5 < left < 60
         tripped = [now for now, text in made.until(200.0) if text == '085#00FF810400000000']
@@ -710,6 +711,6 @@ def test_whatever_comes_it_stays_a_good_node(steps: list[tuple[float, Frame]]) -
                 and frame.data[1] in (0, NODE):
             operational = frame.data[0] == 1 or operational and frame.data[0] not in (
                 2, 0x80, 0x81, 0x82)
-        raw = made.drive.plant.raw
+        raw = made.drive.registers.raw
         assert 5 <= raw('flc1_ratio') <= 100
         assert raw('motor_trip_class') % 5 == 0

@@ -243,7 +243,7 @@ class TestConsole:
                 '0 EEPROM writes, faults: ok')
         assert lines('lift') == ([line], [])
         assert lines('list')[0][1] == line
-        assert '  drop=N             every Nth answer is lost (1: all)' in lines('help')[0]
+        assert '  drop=N               every Nth answer is lost (1: all)' in lines('help')[0]
         assert lines('') == ([], [])
 
     @pytest.mark.parametrize(('line', 'complaint'), [
