@@ -115,7 +115,7 @@ class CannordTable:
         raw = value if double else _word(value)
         # a negative number also comes without its sign in the upper half
         raw = parameter.raw_from_word(raw) if raw >= 0 else raw
-        refusal = self._registers.refusal(parameter.name, raw)
+        refusal = self._registers.refusal({parameter.name: raw})
         if refusal is not None:
             raise Refused(LIMIT_EXCEEDED if refusal in _LIMITS else CANNOT_BE_CHANGED)
         self._registers.write(parameter.name, raw, keep=eeprom, wear=int(eeprom))

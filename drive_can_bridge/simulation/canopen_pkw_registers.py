@@ -89,10 +89,9 @@ class RegisterTable:
             wear[parameter.name] += parameter.storage is Storage.EEPROM
         raws = {name: self._registers.parameters[name].raw_from_word(value)
                 for name, value in values.items()}
-        for name, raw in raws.items():
-            refusal = self._registers.refusal(name, raw)
-            if refusal is not None:
-                raise Refused(_CODES[refusal])
+        refusal = self._registers.refusal(raws)
+        if refusal is not None:
+            raise Refused(_CODES[refusal])
         for name, raw in raws.items():
             self._registers.write(name, raw, wear=wear[name])
 

@@ -158,5 +158,5 @@ class DataModelTable:
     def _store(self, parameter: Parameter, word: int, wears: bool) -> None:
         """Write within the limits; what is refused keeps its value, nobody is told."""
         raw = self._registers.clamped(parameter.name, parameter.raw_from_word(word))
-        if self._registers.refusal(parameter.name, raw) is None:
+        if self._registers.refusal({parameter.name: raw}) is None:
             self._registers.write(parameter.name, raw, wear=int(wears))

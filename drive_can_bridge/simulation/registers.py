@@ -86,19 +86,21 @@ class Registers:
         """Return the allowed raw integer nearest to another one."""
         return self._limits[name].clamp(raw)
 
-    def refusal(self, name: str, raw: int) -> Refusal | None:
-        """Say why a write is refused; None: it is not."""
-        if not self.parameters[name].writable:
-            return Refusal.READ_ONLY
-        if name in self.refused:
-            return Refusal.FORBIDDEN
-        if raw != self.clamped(name, raw) or not self._plant.allows(self.parameters[name], raw):
-            return Refusal.OUT_OF_RANGE
-        for low, high in self._crossings.get(name, ()):
-            bounds = [raw if end == name else self._raw[end] for end in (low, high)]
-            if self.parameters[low].value_from_raw(bounds[0]) > (
-                    self.parameters[high].value_from_raw(bounds[1])):
-                return Refusal.CROSSED
+    def refusal(self, raws: Mapping[str, int]) -> Refusal | None:
+        """Say why registers that are written together refuse it; None: they do not."""
+        for name, raw in raws.items():
+            parameter = self.parameters[name]
+            if not parameter.writable:
+                return Refusal.READ_ONLY
+            if name in self.refused:
+                return Refusal.FORBIDDEN
+            if raw != self.clamped(name, raw) or not self._plant.allows(parameter, raw):
+                return Refusal.OUT_OF_RANGE
+            for ends in self._crossings.get(name, ()):
+                low, high = (self.parameters[end].value_from_raw(raws.get(end, self._raw[end]))
+                             for end in ends)
+                if low > high:
+                    return Refusal.CROSSED
         return None
 
     def write(self, name: str, raw: int, *, keep: bool | None = None, wear: int = 0) -> None:
