@@ -17,15 +17,20 @@ import signal
 import sys
 import threading
 import time
-from typing import Any, TextIO
+from typing import Any, TextIO, TypeVar
 
 from drive_can_bridge.core.configuration import BridgeConfiguration, BusConfiguration
 from drive_can_bridge.core.errors import ConfigurationError, TransportError, ValueRefused
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.simulation.console import Console, describe, help_lines, LineReader
+from drive_can_bridge.simulation.console import (
+    Console, describe, help_lines, LineReader, wear_lines,
+)
 from drive_can_bridge.simulation.faults import Fault, parse_fault
+from drive_can_bridge.simulation.plant import Mechanics
 from drive_can_bridge.simulation.simulation import Simulation
 from drive_can_bridge.simulation.terminal import SlcanTerminal
+
+Parsed = TypeVar('Parsed')
 
 FAILED = 1
 WRONG_USAGE = 2
@@ -57,6 +62,9 @@ def add_parser(subparsers: Any) -> None:
                              '--pty)')
     parser.add_argument('--fault', metavar='DRIVE:FAULT', action='append', default=[],
                         help='begin with a fault, for example conveyor:late=0.15; repeatable')
+    parser.add_argument('--axis', metavar='DRIVE:KEY=VALUE,…', action='append', default=[],
+                        help='what the motor of a drive carries, for example '
+                             'lift:load=0.3,noise=1,brake=0; repeatable')
     parser.add_argument('--log-frames', action='store_true',
                         help='print every frame: (seconds) BUS ID#DATA R|T')
     parser.set_defaults(run=run)
@@ -73,10 +81,12 @@ def run(args: argparse.Namespace) -> int:
         if pty and (args.interface or args.channel):
             raise _WrongUsage('--pty and --interface/--channel exclude each other')
         configuration = _on_buses(_load(args.params_file), args.interface, args.channel)
-        faults = [_fault(text, configuration) for text in args.fault]
+        faults = [_of_drive('--fault', text, configuration, parse_fault) for text in args.fault]
+        mechanics = dict(_of_drive('--axis', text, configuration, Mechanics.parse)
+                         for text in args.axis)
         with ExitStack() as stack:
-            return _simulate(stack, configuration, faults, pty=pty, link=args.pty_link,
-                             log_frames=args.log_frames)
+            return _simulate(stack, configuration, faults, mechanics, pty=pty,
+                             link=args.pty_link, log_frames=args.log_frames)
     except _WrongUsage as error:
         _complain(str(error))
         return WRONG_USAGE
@@ -88,8 +98,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _simulate(stack: ExitStack, configuration: BridgeConfiguration,
-              faults: list[tuple[str, Fault]], *, pty: bool, link: Path | None,
-              log_frames: bool) -> int:
+              faults: list[tuple[str, Fault]], mechanics: dict[str, Mechanics], *, pty: bool,
+              link: Path | None, log_frames: bool) -> int:
     # before anything is announced: whoever reads the first line may send the signal at once
     wake = stack.enter_context(_signals_as_descriptor())
     output = _Output(sys.stdout)
@@ -103,7 +113,7 @@ def _simulate(stack: ExitStack, configuration: BridgeConfiguration,
 
     simulation = Simulation(
         configuration, open_bus=open_terminal if pty else None, say=output.say,
-        complain=_complain, show_frame=show_frame if log_frames else None)
+        complain=_complain, show_frame=show_frame if log_frames else None, mechanics=mechanics)
     for name, fault in faults:
         try:
             simulation.drives[name].fault(fault)
@@ -124,7 +134,8 @@ def _simulate(stack: ExitStack, configuration: BridgeConfiguration,
     status = _wait(simulation, wake, Console(simulation, say=output.say, complain=_complain))
     simulation.stop()
     for drive in simulation.drives.values():
-        output.say(describe(drive))
+        for line in (describe(drive), *wear_lines(drive)):
+            output.say(line)
         for rule, count in drive.violations.items():
             output.say(f'{drive.name}: violation: {rule}: {count} times')
     return status
@@ -166,18 +177,21 @@ def _on_buses(configuration: BridgeConfiguration, interface: str | None,
     return replace(configuration, buses=buses)
 
 
-def _fault(text: str, configuration: BridgeConfiguration) -> tuple[str, Fault]:
-    """Read an argument of ``--fault``."""
-    name, colon, fault = text.partition(':')
+def _of_drive(option: str, text: str, configuration: BridgeConfiguration,
+              parse: Callable[[str], Parsed]) -> tuple[str, Parsed]:
+    """Read an argument that begins with the name of a drive."""
+    name, colon, rest = text.partition(':')
     if not colon:
-        raise _WrongUsage(f'--fault {text}: write DRIVE:FAULT, for example conveyor:late=0.15')
+        raise _WrongUsage(f'{option} {text}: write DRIVE:FAULT, for example conveyor:late=0.15'
+                          if option == '--fault' else
+                          f'{option} {text}: write DRIVE:KEY=VALUE, for example lift:load=0.3')
     if name not in configuration.drives:
-        raise _WrongUsage(f"--fault {text}: no drive '{name}'; drives: "
+        raise _WrongUsage(f"{option} {text}: no drive '{name}'; drives: "
                           f"{', '.join(configuration.drives) or 'none'}")
     try:
-        return name, parse_fault(fault)
+        return name, parse(rest)
     except ValueRefused as error:
-        raise _WrongUsage(f'--fault {text}: {error}') from None
+        raise _WrongUsage(f'{option} {text}: {error}') from None
 
 
 class _Output:

@@ -6,15 +6,23 @@ One setpoint moves the shaft: the first speed or position in the cyclic request,
 speed of the profile, or else the first position. Speeds and positions of the other kind are those
 of the shaft then. Any other pair of setpoint and actual value follows on its own, from 0 to its
 largest setpoint in a second.
+
+A position goes to its setpoint with finite speed and acceleration. Without torque it rolls to a
+standstill, or sinks under its load.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping
+from functools import partial
+import random
 
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.simulation import names, scales
 from drive_can_bridge.simulation.control import Operation
-from drive_can_bridge.simulation.motor import Motor, Ramp, Rates
-from drive_can_bridge.simulation.names import Pair, Quantity, RampKind, RampUse
+from drive_can_bridge.simulation.motor import Motor, Ramp, Rates, Travel
+from drive_can_bridge.simulation.names import Quantity, RampKind, RampUse
+from drive_can_bridge.simulation.plant import Mechanics
+from drive_can_bridge.simulation.registers import Registers
 
 #: s from 0 to the rated speed, where the profile has no ramp parameter
 RAMP_TIME = 1.0
@@ -22,78 +30,124 @@ RAMP_TIME_MIN = 0.01
 QUICK_STOP_TIME = 0.2
 #: s from rated speed to standstill without torque
 COAST_TIME = 4.0
+#: share of the rated speed with which the full load sinks
+SINKING_SPEED = 0.1
 
 
 class Axes:
     """
     Motor and followers of one drive.
 
-    :param registers: raw integers by parameter name; read whenever time passes.
-    :param control_name: name of the control parameter, which is no setpoint.
-    :param preferred: names of the parameters in the cyclic request.
+    :param parameters: those that may move something.
+    :param command: what becomes of the value of the speed setpoint.
     :ivar speed_setpoint: what moves the shaft, or None: a position does, or nothing.
     :ivar setpoints: names of all parameters that are setpoints.
-    :ivar actuals: the pairs, by the name of the actual value.
+    :ivar jitter: raw steps by which measured positions are off at the moment.
     """
 
-    def __init__(self, parameters: Mapping[str, Parameter], registers: Mapping[str, int],
-                 control_name: str | None, preferred: Sequence[str] = ()) -> None:
+    def __init__(self, parameters: Mapping[str, Parameter], registers: Registers,
+                 configuration: DriveConfiguration, mechanics: Mechanics,
+                 command: Callable[[float], float]) -> None:
         self._registers = registers
-        found = names.pairs(parameters, without=control_name)
-        named = names.setpoints(parameters, without=control_name)
-        self.setpoints = {p.name for p in named} | {pair.setpoint.name for pair in found}
+        self._mechanics = mechanics
+        self._command = command
+        self._noise = random.Random(configuration.name)
+        self.jitter = 0
+        control = configuration.profile.control
+        control_name = control.parameter if control else None
+        pairs = names.pairs(parameters, without=control_name)
+        candidates = [pair.setpoint for pair in pairs]
+        candidates += names.setpoints(parameters, without=control_name)
+        self.setpoints = {parameter.name for parameter in candidates}
         self.ramps = {ramp.parameter.name: ramp for ramp in names.ramp_parameters(parameters)}
-        # a speed setpoint whose actual value the profile lacks still moves the motor
-        mover = _mover([pair.setpoint for pair in found] + named, preferred)
-        by_speed = mover is not None and names.quantity_of(mover) is Quantity.SPEED
+        # a setpoint whose actual value the profile lacks still moves the motor
+        mover, quantity = names.mover(candidates, configuration.cyclic_request, control_name)
+        by_speed = quantity is Quantity.SPEED
         self.speed_setpoint = speed = mover if by_speed else None
         other_kind = Quantity.POSITION if by_speed else Quantity.SPEED
-        self.actuals = {pair.actual.name: pair for pair in found
-                        if names.quantity_of(pair.setpoint) is not other_kind}
-        self._mover = mover
-        self._followers = {name: Ramp() for name, pair in self.actuals.items()
-                           if speed is None or pair.setpoint is not speed}
-        rated = scales.rated_speed(speed) if speed else 1.0
-        self.motor = Motor(rated, scales.revolutions_per_unit(speed, rated) if speed else 1.0)
-        self._coast = Rates(rated / COAST_TIME, rated / COAST_TIME)
-        self.ramps_changed()
+        self._mover = mover.name if mover else ''
+        self._travels: dict[str, tuple[Parameter, Travel]] = {}     # by setpoint
+        self._ramps: dict[str, tuple[Parameter, Ramp]] = {}
+        #: by the name of the actual value
+        self.actuals: dict[str, Callable[[], float]] = {}
+        if quantity is Quantity.POSITION and mover is not None:
+            self._travels[mover.name] = mover, Travel()
+        for setpoint, actual in pairs:
+            kind = names.quantity_of(setpoint)
+            if setpoint is speed:
+                self.actuals[actual.name] = lambda: self.motor.speed
+            elif kind is Quantity.POSITION and kind is not other_kind:
+                _, travel = self._travels.setdefault(setpoint.name, (setpoint, Travel()))
+                self.actuals[actual.name] = partial(getattr, travel, 'position')
+            elif kind is not other_kind:
+                _, ramp = self._ramps.setdefault(setpoint.name, (setpoint, Ramp()))
+                self.actuals[actual.name] = partial(getattr, ramp, 'value')
+        rated, turns = 1.0, 1.0
+        if speed is not None:
+            rated = scales.rated_speed(speed)
+            turns = scales.revolutions_per_unit(speed, rated)
+        elif mover is not None:
+            rated, turns = scales.travel_speed(mover), scales.revolutions_per_position(mover)
+        self.motor = Motor(rated, turns, mechanics.load)
 
     @property
     def target(self) -> float:
         """Commanded speed."""
         if self.speed_setpoint is None:
             return 0.0
-        return self._value(self.speed_setpoint)
+        return self._command(self._registers.commanded(self.speed_setpoint.name))
 
-    def actual(self, name: str) -> float:
-        """Return the actual value of a pair."""
-        follower = self._followers.get(name)
-        return self.motor.speed if follower is None else follower.value
-
-    def advance(self, duration: float, operation: Operation) -> None:
+    def advance(self, duration: float, operation: Operation, *, energised: bool) -> None:
         """Let time pass."""
-        motor = self.motor
-        if operation.stopping:
-            target, rates = 0.0, self._quick_stop
-        else:
-            target, rates = self.target, self._rates
-        if not operation.enabled:
-            rates = self._coast
-        if self.speed_setpoint is None:
-            motor.ramp.value = 0.0
-        motor.advance(duration, target, rates, energised=operation.enabled)
-        for name, ramp in self._followers.items():
-            self._follow(self.actuals[name], ramp, duration, operation)
+        if duration > 0.0 and self._mechanics.noise:
+            self.jitter = self._noise.randint(-self._mechanics.noise, self._mechanics.noise)
+        motor, rated = self.motor, self.motor.rated_speed
+        rates, quick_stop = self._rates()
+        driven = energised and not operation.stopping
+        sinking = -SINKING_SPEED * self._mechanics.load
+        for name, (setpoint, ramp) in self._ramps.items():
+            rate = scales.rated_speed(setpoint) / RAMP_TIME
+            target = self._registers.commanded(name) if driven else 0.0
+            ramp.advance(duration, target, Rates(rate, rate))
+        for name, (setpoint, travel) in self._travels.items():
+            before, limit = travel.position, scales.travel_speed(setpoint)
+            if driven:
+                travel.go(duration, self._registers.commanded(name), limit,
+                          limit * rates.rising / rated)
+            elif energised:
+                travel.run(duration, 0.0, limit * quick_stop.falling / rated)
+            elif self._mechanics.brake:
+                travel.speed = travel.slope = 0.0
+            else:
+                travel.run(duration, sinking * limit, limit / COAST_TIME)
+            if name == self._mover:
+                motor.ramp.value, motor.ramp.slope = travel.speed, travel.slope
+                motor.moved(duration, travel.position - before, energised=energised)
+        if self._mover not in self._travels:
+            target = self.target if driven else 0.0
+            if energised:
+                rates = rates if driven else quick_stop
+            else:
+                target, rates = sinking * rated, Rates(rated / COAST_TIME, rated / COAST_TIME)
+                if self._mechanics.brake:
+                    motor.ramp.value = target = 0.0
+            motor.advance(duration, target, rates, energised=energised)
         if operation.stopping and motor.speed == 0.0:
             operation.standstill()
-            motor.advance(0.0, 0.0, rates, energised=operation.enabled)
+            motor.moved(0.0, 0.0, energised=operation.enabled)
+
+    def power_off(self) -> None:
+        """Stand still; the position is kept, as by an absolute encoder."""
+        self.motor.ramp.value = self.motor.ramp.slope = 0.0
+        for _, ramp in self._ramps.values():
+            ramp.value = 0.0
+        for _, travel in self._travels.values():
+            travel.speed = 0.0
 
     def power_on(self) -> None:
-        """Stand still; the position is kept, as by an absolute encoder."""
-        self.motor.ramp = Ramp()
-        for name in self._followers:
-            self._followers[name] = Ramp()
-        self.ramps_changed()
+        """Stay where the axis is until a setpoint comes."""
+        for name, (_, travel) in self._travels.items():
+            self._registers.put(name, travel.position)
 
     def initial_ramp_value(self, parameter: Parameter) -> float:
         """Return what a new drive has in a ramp parameter."""
@@ -103,15 +157,13 @@ class Axes:
             return self.motor.rated_speed / seconds
         return seconds * 1000.0 if parameter.unit == 'ms' else seconds
 
-    def ramps_changed(self) -> None:
-        """Translate the ramp parameters into rates."""
+    def _rates(self) -> tuple[Rates, Rates]:
+        """Return what the ramp parameters say: the usual rates, those of a quick stop."""
         rated = self.motor.rated_speed
         rising = falling = rated / RAMP_TIME
         quick: float | None = None
         for name, ramp in self.ramps.items():
-            if name not in self._registers:
-                continue
-            value = self._value(ramp.parameter)
+            value = self._registers.commanded(name)
             if ramp.kind is RampKind.TIME:
                 seconds = value / 1000.0 if ramp.parameter.unit == 'ms' else value
                 rate = rated / max(seconds, RAMP_TIME_MIN)
@@ -125,33 +177,4 @@ class Axes:
                 falling = rate
         if quick is None:
             quick = max(rated / QUICK_STOP_TIME, falling)
-        self._rates = Rates(rising, falling)
-        self._quick_stop = Rates(quick, quick)
-
-    def _follow(self, pair: Pair, ramp: Ramp, duration: float, operation: Operation) -> None:
-        position = names.quantity_of(pair.setpoint) is Quantity.POSITION
-        target = self._value(pair.setpoint)
-        if not operation.enabled or operation.stopping:
-            # without torque a position stays, and everything else ends
-            target = ramp.value if position else 0.0
-        rate = scales.rated_speed(pair.setpoint) / RAMP_TIME
-        before = ramp.value
-        ramp.advance(duration, target, Rates(rate, rate))
-        if pair.setpoint is self._mover:
-            turns = scales.revolutions_per_position(pair.setpoint)
-            self.motor.position += (ramp.value - before) * turns
-            self.motor.ramp.value = ramp.slope * turns
-
-    def _value(self, parameter: Parameter) -> float:
-        return float(parameter.value_from_raw(self._registers[parameter.name]))
-
-
-def _mover(candidates: Sequence[Parameter], preferred: Sequence[str]) -> Parameter | None:
-    """Choose the setpoint that moves the shaft."""
-    def rank(parameter: Parameter) -> tuple[int, bool]:
-        place = (preferred.index(parameter.name) if parameter.name in preferred
-                 else len(preferred))
-        return place, names.quantity_of(parameter) is Quantity.POSITION
-
-    kinds = (Quantity.SPEED, Quantity.POSITION)
-    return min((p for p in candidates if names.quantity_of(p) in kinds), key=rank, default=None)
+        return Rates(rising, falling), Rates(quick, quick)

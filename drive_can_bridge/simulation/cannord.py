@@ -9,13 +9,12 @@ it sends its process data unasked.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
 import math
 
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.errors import RemoteProtocolError
+from drive_can_bridge.core.errors import ConfigurationError, RemoteProtocolError
 from drive_can_bridge.core.frame import Frame, Route
-from drive_can_bridge.core.parameters import Parameter, Value
+from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.cannord import identifiers, process_data, states
 from drive_can_bridge.protocols.cannord.identifiers import MessageObject
 from drive_can_bridge.protocols.cannord.parameter_frame import (
@@ -25,10 +24,11 @@ from drive_can_bridge.protocols.cannord.process_data import (
     EXTRA_LENGTH, LONG_LENGTH, MAIN_VALUES, SHORT_LENGTH,
 )
 from drive_can_bridge.simulation.cannord_plant import InverterPlant
-from drive_can_bridge.simulation.cannord_table import CannordTable, Refused, without_other_sets
-from drive_can_bridge.simulation.drive import EEPROM_TIME, SimulatedDrive
+from drive_can_bridge.simulation.cannord_table import CannordTable, Refused
+from drive_can_bridge.simulation.drive import ALONE, SimulatedDrive, Surroundings
 from drive_can_bridge.simulation.faults import Fault, FaultKind, parse_fault
-from drive_can_bridge.simulation.plant import FAULT_CODE
+from drive_can_bridge.simulation.motor_plant import FAULT_CODE
+from drive_can_bridge.simulation.plant import PlantFactory
 
 #: P513, s that may pass between two telegrams; 0 or less: any
 TELEGRAM_TIMEOUT = 513
@@ -42,28 +42,24 @@ _RESERVED_BIT = 0x2000
 class SimulatedCannordInverter(SimulatedDrive):
     """One inverter. See the base class."""
 
-    def __init__(self, configuration: DriveConfiguration, *, neighbours: Sequence[Route] = (),
-                 eeprom_time: float = EEPROM_TIME) -> None:
-        profile = configuration.profile
-        known = replace(configuration, profile=replace(
-            profile, parameters=without_other_sets(profile.parameters)))
-        super().__init__(known, neighbours=neighbours, eeprom_time=eeprom_time)
-        self.configuration = configuration
+    plant: InverterPlant
+
+    def __init__(self, configuration: DriveConfiguration,
+                 surroundings: Surroundings = ALONE) -> None:
+        super().__init__(configuration, surroundings)
+        if not isinstance(self.plant, InverterPlant):
+            raise ConfigurationError([f'{self.name}: an inverter needs an InverterPlant'])
         options = configuration.family_options
         self._requested = configuration.cyclic_request
         self._reported = configuration.cyclic_response
-        self.plant: InverterPlant = InverterPlant(
-            known.profile, volatile={p.name for p in (*self._requested, *self._reported)},
-            preferred=[p.name for p in self._requested])
-        self.table = CannordTable(profile.parameters, self.plant)
+        self.table = CannordTable(configuration.profile.parameters, self.registers)
         self._timeout_parameter = self.table.numbered(TELEGRAM_TIMEOUT)
         self._leaves_factory(TELEGRAM_TIMEOUT, 0)
         self._leaves_factory(CAN_ADDRESS, configuration.station)
-        self._extended: bool = options.get('extended_identifiers', False)
-        self._swap: bool = options.get('swap_setpoints_2_3', False)
-        self._extra: bool = options.get('extra_setpoints', False)
-        self._layout = ParameterLayout(options.get('value_order', 'high_first'),
-                                       options.get('index_byte', 'low'))
+        self._extended: bool = options['extended_identifiers']
+        self._swap: bool = options['swap_setpoints_2_3']
+        self._extra: bool = options['extra_setpoints']
+        self._layout = ParameterLayout(options['value_order'], options['index_byte'])
         self._identifiers = {kind: self._identifier(kind) for kind in MessageObject}
         self._broadcasts = _broadcast_identifiers(configuration)
         self._length = SHORT_LENGTH
@@ -74,20 +70,19 @@ class SimulatedCannordInverter(SimulatedDrive):
     @classmethod
     def routes(cls, configuration: DriveConfiguration) -> list[Route]:
         """Return the four identifiers of the address, and the broadcasts that are listened to."""
-        extended = configuration.family_options.get('extended_identifiers', False)
+        extended = configuration.family_options['extended_identifiers']
         own = [identifiers.identifier(kind, configuration.station, extended=extended)
                for kind in MessageObject]
         return [identifiers.route(value, extended=extended)
                 for value in (*own, *_broadcast_identifiers(configuration))]
 
-    @property
-    def eeprom_writes(self) -> int:
-        """EEPROM cells written."""
-        return self.table.eeprom_writes
+    def choose_plant(self) -> PlantFactory:
+        """Return what makes the motor."""
+        return InverterPlant
 
     # -- telegrams --------------------------------------------------------------------------------
 
-    def _receive(self, frame: Frame, now: float) -> None:
+    def receive(self, frame: Frame, now: float) -> None:
         if frame.extended is not self._extended:
             return
         if frame.identifier in self._broadcasts:
@@ -108,7 +103,6 @@ class SimulatedCannordInverter(SimulatedDrive):
             return
         self.requests += 1
         self._look_at_clock(now)
-        self.plant.advance(now)
         self._telegram_came(now)
         # before the values are taken: it tells how the inverter was when they came
         answer = self._status(len(data))
@@ -132,11 +126,13 @@ class SimulatedCannordInverter(SimulatedDrive):
 
     def _take(self, parameters: Sequence[Parameter], words: Sequence[int]) -> None:
         for parameter, word in zip(parameters, words, strict=False):
-            self.plant.take_setpoint(parameter, parameter.raw_from_word(word))
+            if parameter.writable:
+                self.registers.write(parameter.name, self.registers.clamped(
+                    parameter.name, parameter.raw_from_word(word)))
 
     def _status(self, length: int) -> Frame:
         """Return the process data as they are now; the length is that of the request."""
-        words = [self.plant.raw(p.name) & 0xFFFF for p in self._reported]
+        words = [self.registers.raw(p.name) & 0xFFFF for p in self._reported]
         if length == EXTRA_LENGTH:
             data = process_data.encode_extra(words[MAIN_VALUES:])
         else:
@@ -160,7 +156,6 @@ class SimulatedCannordInverter(SimulatedDrive):
         if task.identifier not in list(Task):
             self._violation('task identifier that does not exist (refused)')
         self._look_at_clock(now)
-        self.plant.advance(now)
         try:
             response, value = self.table.answer(task)
         except Refused as refusal:
@@ -182,10 +177,9 @@ class SimulatedCannordInverter(SimulatedDrive):
 
     def _look_at_clock(self, now: float) -> None:
         """Trip when no telegram came for too long. The first one starts the watch."""
-        if now >= self._silent_since + self._timeout and self.powered:
+        if now >= self._silent_since + self._timeout:
             self._silent_since = math.inf
             self._timed_out = True
-            self.plant.advance(now)
             self._trip(now, TIMEOUT_FAULT, math.inf)
             self._notices.append(f'{self.name}: telegram time-out')
 
@@ -200,7 +194,7 @@ class SimulatedCannordInverter(SimulatedDrive):
         """Seconds between telegrams that are allowed."""
         if self._timeout_parameter is None:
             return math.inf
-        value = float(self.table.value(self._timeout_parameter.name))
+        value = float(self.registers.value(self._timeout_parameter.name))
         return value if value > 0.0 else math.inf
 
     # -- faults -----------------------------------------------------------------------------------
@@ -210,57 +204,50 @@ class SimulatedCannordInverter(SimulatedDrive):
         if isinstance(fault, str):
             fault = parse_fault(fault)
         super().fault(fault, now)
-        if fault.kind is FaultKind.TRIP and self.powered:
+        if fault.kind is FaultKind.TRIP and now >= self._deaf_until:
             self._trip(now, FAULT_CODE, fault.number or 0.0)
 
     def _trip(self, now: float, code: float, duration: float) -> None:
         self.plant.fault_code = code
         self.plant.trip(duration)
-        if now >= self._deaf_until:
-            self._answer(self._status(self._length), now)
+        self._answer(self._status(self._length), now)
 
-    def _power_on(self, *, forget: bool) -> None:
-        super()._power_on(forget=forget)
-        self.table.power_on()
+    def power_lost(self, back_at: float, *, forget: bool) -> None:
+        """Begin with parameter set 1, and wait for a first telegram."""
+        self.table.select_set(1)
         self._length = SHORT_LENGTH
         self._silent_since = math.inf
         self._timed_out = False
 
     # -- by hand ----------------------------------------------------------------------------------
 
-    def value(self, name: str, now: float | None = None) -> Value:
-        """Return a register; those with a number also as ``p102`` and ``p102.1``."""
-        if now is not None and self.powered:
-            self.plant.advance(now)
-        return self.table.value(self._known(name))
-
-    def set_value(self, name: str, value: Value, now: float | None = None) -> None:
-        """Set a register as if at the panel; those with a number also as ``p102.1``."""
-        if now is not None and self.powered:
-            self.plant.advance(now)
-        self.table.set_value(self._known(name), value)
-
-    def _known(self, name: str) -> str:
-        known = self.table.name_of(name)
-        return super()._known(name) if known is None else known
+    def raw_name(self, name: str) -> str | None:
+        """Understand ``p102`` and ``p102.1``."""
+        return self.table.name_of(name)
 
     def _leaves_factory(self, number: int, raw: int) -> None:
         """Give a parameter of known meaning its value, if the profile lists it."""
         parameter = self.table.numbered(number)
         if parameter is not None and parameter.writable:
-            self.table.set_value(parameter.name, parameter.value_from_raw(raw))
+            self.registers.set_value(parameter.name, parameter.value_from_raw(raw))
 
     # -- frames of others -------------------------------------------------------------------------
 
     def _identifier(self, kind: MessageObject) -> int:
         return identifiers.identifier(kind, self.configuration.station, extended=self._extended)
 
-    def _foreign_frames(self, answer: Frame) -> list[Frame]:
+    def foreign_frames(self, answer: Frame) -> list[Frame]:
         """Return one of: the answer of an absent address, its twin of the other form, a task."""
         self._foreign_turn += 1
         turn = self._foreign_turn % 3
         if turn == 1:
-            return self._frame_of_somebody_else(answer)
+            last = identifiers.ADDRESS_MAX + 1
+            others = [(self.configuration.station + step) % last for step in range(1, last)]
+            junk = bytes([0x5A]) * len(answer.data)
+            return self._nobodys([
+                Frame(identifiers.identifier(MessageObject.PROCESS_RESPONSE, address,
+                                             extended=answer.extended), junk, answer.extended)
+                for address in others])
         if turn == 2:
             shift = identifiers.EXTENDED_SHIFT
             twin = answer.identifier >> shift if answer.extended else answer.identifier << shift
@@ -269,22 +256,12 @@ class SimulatedCannordInverter(SimulatedDrive):
         data = self._layout.encode(Response.WORD, 0x7FF, 0, 0x5A5A)
         return [Frame(self._identifiers[MessageObject.PARAMETER_RESPONSE], data, self._extended)]
 
-    def _frame_of_somebody_else(self, answer: Frame) -> list[Frame]:
-        for step in range(1, identifiers.ADDRESS_MAX + 1):
-            address = (self.configuration.station + step) % (identifiers.ADDRESS_MAX + 1)
-            frame = Frame(identifiers.identifier(
-                MessageObject.PROCESS_RESPONSE, address, extended=answer.extended),
-                bytes([0x5A]) * len(answer.data), answer.extended)
-            if not any(route.matches(frame) for route in self.neighbours):
-                return [frame]
-        return []
-
 
 def _broadcast_identifiers(configuration: DriveConfiguration) -> tuple[int, ...]:
     """Return the identifiers of the broadcasts that an inverter obeys: both, or none."""
     options = configuration.family_options
-    if options.get('broadcast', 'none') == 'none':
+    if options['broadcast'] == 'none':
         return ()
-    extended = options.get('extended_identifiers', False)
+    extended = options['extended_identifiers']
     return (identifiers.group_identifier(configuration.station, extended=extended),
             identifiers.all_identifier(extended=extended))

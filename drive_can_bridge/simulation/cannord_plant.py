@@ -7,14 +7,17 @@ frequency or speed among the actual values tells the same share of 100 % as the 
 as in percent.
 """
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable
 
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.simulation import names
+from drive_can_bridge.simulation.cannord_groups import groups_of
 from drive_can_bridge.simulation.cannord_operation import InverterOperation
+from drive_can_bridge.simulation.motor_plant import FAULT_CODE, MotorPlant, WARNING_TEMPERATURE
 from drive_can_bridge.simulation.names import Quantity
-from drive_can_bridge.simulation.plant import FAULT_CODE, Plant, WARNING_TEMPERATURE
+from drive_can_bridge.simulation.plant import Mechanics
+from drive_can_bridge.simulation.registers import initial_value, Registers
 from drive_can_bridge.simulation.scales import RawRange
 
 WARNING = 0x0080
@@ -25,56 +28,50 @@ ROTATING_LEFT = 0x1000
 PARAMETER_SET_SHIFT = 14
 
 
-class InverterPlant(Plant):
+class InverterPlant(MotorPlant):
     """
-    Registers and motor of one inverter. See the base class.
+    The motor of one inverter. See the base class.
 
     :ivar state: the state machine, which is the base class's ``operation``.
     :ivar fault_code: what the fault number shows while there is a fault.
     """
 
-    def __init__(self, profile: Profile, *, volatile: Collection[str] = (),
-                 preferred: Sequence[str] = ()) -> None:
+    def __init__(self, registers: Registers, configuration: DriveConfiguration,
+                 mechanics: Mechanics) -> None:
         self.fault_code: float = FAULT_CODE
-        super().__init__(profile, volatile=volatile, preferred=preferred)
-        self.operation = self.state = InverterOperation()
+        self.state = InverterOperation()
+        # entries of the sets 2 to 4, by name: the motor knows set 1 and what stands in for it
+        self._of_sets = {
+            member.name: group.members[0] for group in groups_of(registers.parameters).values()
+            if group.sets for index, member in group.members.items() if index != 0}
+        super().__init__(
+            registers, configuration, mechanics, operation=self.state,
+            movable={name: parameter for name, parameter in registers.parameters.items()
+                     if name not in self._of_sets})
         moved = self.axes.speed_setpoint
-        self._mover = moved if moved is not None and moved.name in preferred else None
+        self._mover = moved if moved in configuration.cyclic_request else None
         self._share = None if moved is None else RawRange(moved, limits=False)
-        self._setpoint = 0
+
+    def command(self, value: float) -> float:
+        """Return what the last control word makes of the frequency setpoint."""
+        if self._mover is None:
+            return value
+        if self.state.frozen:
+            return self.axes.motor.speed
+        if not self.state.setpoint_counts:
+            return 0.0
+        if self.state.reversed:
+            name = self._mover.name
+            raw = self.registers.clamped(name, -self.registers.plain(name))
+            return float(self._mover.value_from_raw(raw))
+        return value
 
     def advance(self, now: float) -> None:
         """Let the motor move up to now."""
-        self.obey_setpoint()
         super().advance(now)
         if self.state.shutting_down and self.axes.motor.speed == 0.0:
             self.state.standstill()
             super().advance(now)
-
-    def power_on(self) -> None:
-        """Begin anew after a loss of power."""
-        self._setpoint = 0
-        super().power_on()
-
-    def take_setpoint(self, parameter: Parameter, raw: int) -> None:
-        """Take a value of the process data."""
-        if self._mover is not None and parameter.name == self._mover.name:
-            self._setpoint = raw
-        elif parameter.writable:
-            self.write(parameter.name, raw)
-
-    def obey_setpoint(self) -> None:
-        """Put into force what the last control word makes of the frequency setpoint."""
-        if self._mover is None or self._share is None:
-            return
-        raw = self._setpoint
-        if self.state.frozen:
-            raw = self._share.nearest(self.axes.motor.speed)
-        elif not self.state.setpoint_counts:
-            raw = 0
-        elif self.state.reversed:
-            raw = -raw
-        self.write(self._mover.name, raw)
 
     @property
     def status_word(self) -> int:
@@ -89,21 +86,28 @@ class InverterPlant(Plant):
         # at standstill the manuals' examples show "right"
         return word | (ROTATING_LEFT if motor.speed < 0.0 else ROTATING_RIGHT)
 
-    # -- inside -----------------------------------------------------------------------------------
+    # -- registers --------------------------------------------------------------------------------
 
-    def _source(self, parameter: Parameter) -> Callable[[], int] | None:
-        if parameter.number is None and names.measured(parameter) is Quantity.SPEED:
-            return lambda: self._speed_word(parameter)
-        return super()._source(parameter)
+    def initial(self, parameter: Parameter) -> int | None:
+        """Return what a new inverter has in a register: the same in all parameter sets."""
+        first = self._of_sets.get(parameter.name)
+        if first is None:
+            return super().initial(parameter)
+        initial = super().initial(first)
+        return initial_value(first, RawRange(first, limits=True)) if initial is None else initial
 
-    def _speed_word(self, parameter: Parameter) -> int:
-        """Return the speed as the raw integer that it is in every actual value."""
-        if self._share is None:
-            return 0
+    def source(self, parameter: Parameter) -> Callable[[], int] | None:
+        """Return what computes a read-only register; None: it is plain memory."""
+        if parameter.number is not None or names.measured(parameter) is not Quantity.SPEED:
+            return super().source(parameter)
         low, high = parameter.type.raw_range
-        return min(max(self._share.nearest(self.axes.motor.speed), low), high)
+        share, motor = self._share, self.axes.motor
+        if share is None:
+            return lambda: 0
+        return lambda: min(max(share.nearest(motor.speed), low), high)
 
-    def _measure(self, parameter: Parameter, quantity: Quantity) -> Callable[[], float]:
+    def measure(self, parameter: Parameter, quantity: Quantity) -> Callable[[], float]:
+        """Return what a quantity of the motor amounts to in the parameter's unit."""
         if quantity is Quantity.FAULT_CODE:
             return lambda: self.fault_code if self.operation.faulted else 0.0
-        return super()._measure(parameter, quantity)
+        return super().measure(parameter, quantity)

@@ -6,29 +6,25 @@ A value of 32 bits takes two registers, the order of its words is that of the co
 refused access changes nothing and carries an SDO abort code.
 """
 
+from collections import Counter
 from typing import NamedTuple
 
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.parameters import Parameter, Storage
 from drive_can_bridge.protocols.canopen_pkw import abort_codes
 from drive_can_bridge.protocols.canopen_pkw.object_map import BLOCKS, object_of, register_of
 from drive_can_bridge.protocols.canopen_pkw.pkw import (
     Address, value_from_words, words_from_value,
 )
-from drive_can_bridge.simulation.canopen_pkw_starter import StarterPlant
+from drive_can_bridge.simulation.canopen.sdo import Refused
+from drive_can_bridge.simulation.registers import Refusal, Registers
 
-
-class Refused(DriveCanError):
-    """
-    An access that the controller does not carry out.
-
-    :param code: SDO abort code.
-    """
-
-    def __init__(self, code: int) -> None:
-        super().__init__(abort_codes.describe(code))
-        self.code = code
+_CODES = {
+    Refusal.READ_ONLY: abort_codes.WRITE_OF_READ_ONLY,
+    Refusal.OUT_OF_RANGE: abort_codes.VALUE_OUT_OF_RANGE,
+    Refusal.CROSSED: 0x06090036,
+    Refusal.FORBIDDEN: abort_codes.DEVICE_STATE,
+}
 
 
 class Cell(NamedTuple):
@@ -39,18 +35,13 @@ class Cell(NamedTuple):
 
 
 class RegisterTable:
-    """
-    Everything that can be addressed.
+    """Everything that can be addressed."""
 
-    :ivar eeprom_writes: registers written that the profile says are kept in EEPROM.
-    """
-
-    def __init__(self, configuration: DriveConfiguration, plant: StarterPlant) -> None:
-        self._plant = plant
-        self._high_first = configuration.family_options.get('word_order') != 'low_first'
-        self.eeprom_writes = 0
+    def __init__(self, configuration: DriveConfiguration, registers: Registers) -> None:
+        self._registers = registers
+        self._high_first: bool = configuration.family_options['word_order'] == 'high_first'
         self._cells: dict[Address, Cell] = {}
-        parameters = list(plant.parameters.values())
+        parameters = list(registers.parameters.values())
         # what the profile says goes before what follows from the table of the vendor
         for parameter in parameters:
             self._enter(parameter, parameter.number, _object(parameter))
@@ -90,23 +81,19 @@ class RegisterTable:
         :raises Refused: there is none, it is read-only, or it does not take the value.
         """
         values: dict[str, int] = {}
-        cells = self._find(address, len(words))
-        for cell, word in zip(cells, words, strict=True):
+        wear: Counter[str] = Counter()
+        for cell, word in zip(self._find(address, len(words)), words, strict=True):
             parameter = cell.parameter
-            if not parameter.writable:
-                raise Refused(abort_codes.WRITE_OF_READ_ONLY)
             value = values.get(parameter.name, self._value(parameter))
             values[parameter.name] = self._replaced(value, cell, word)
-        raws = {}
-        for name, value in values.items():
-            parameter = self._plant.parameters[name]
-            raw = parameter.raw_from_word(value)
-            if not self._plant.allows(parameter, raw):
-                raise Refused(abort_codes.VALUE_OUT_OF_RANGE)
-            raws[name] = raw
+            wear[parameter.name] += parameter.storage is Storage.EEPROM
+        raws = {name: self._registers.parameters[name].raw_from_word(value)
+                for name, value in values.items()}
+        refusal = self._registers.refusal(raws)
+        if refusal is not None:
+            raise Refused(_CODES[refusal])
         for name, raw in raws.items():
-            self._plant.write(name, raw)
-        self.eeprom_writes += sum(cell.parameter.storage is Storage.EEPROM for cell in cells)
+            self._registers.write(name, raw, wear=wear[name])
 
     def highest_subindex(self, index: int) -> int | None:
         """Return the highest sub-index of an object; None: there is no such object."""
@@ -155,7 +142,7 @@ class RegisterTable:
         return abort_codes.NO_SUCH_OBJECT
 
     def _value(self, parameter: Parameter) -> int:
-        return parameter.word_from_raw(self._plant.raw(parameter.name))
+        return parameter.word_from_raw(self._registers.raw(parameter.name))
 
     def _word(self, cell: Cell) -> int:
         value = self._value(cell.parameter)

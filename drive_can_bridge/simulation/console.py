@@ -6,8 +6,9 @@ Lines typed by a person, or sent by a script, while drives are simulated.
 
     conveyor silent          a fault begins; several may follow each other on one line
     conveyor ok              all faults of the drive end
-    conveyor                 what the drive is doing
-    list                     the same for all drives
+    conveyor                 what the drive is doing, and which EEPROM cells it has written
+    status                   the same for all drives
+    list                     one line for each drive
     help                     the faults
 """
 
@@ -47,13 +48,20 @@ class Console:
         elif words == ['list']:
             for drive in self._drives.values():
                 self._say(describe(drive))
+        elif words == ['status']:
+            for drive in self._drives.values():
+                self._tell(drive)
         elif words[0] not in self._drives:
             self._complain(f"no drive '{words[0]}'; drives: {', '.join(self._drives)}; "
-                           f"also: list, help")
+                           f"also: status, list, help")
         elif len(words) == 1:
-            self._say(describe(self._drives[words[0]]))
+            self._tell(self._drives[words[0]])
         else:
             self._play(self._drives[words[0]], words[1:])
+
+    def _tell(self, drive: PlayedDrive) -> None:
+        for text in (describe(drive), *wear_lines(drive)):
+            self._say(text)
 
     def _play(self, drive: PlayedDrive, texts: list[str]) -> None:
         try:
@@ -116,8 +124,14 @@ def describe(drive: PlayedDrive) -> str:
             f'{drive.eeprom_writes} EEPROM writes, faults: {drive.faults_text}')
 
 
+def wear_lines(drive: PlayedDrive) -> list[str]:
+    """Return a line about the EEPROM cells that a drive has written, if there are any."""
+    worn = ', '.join(f'{name} {count}' for name, count in sorted(drive.wear.items()))
+    return [f'{drive.name}: EEPROM writes: {worn}'] if worn else []
+
+
 def help_lines() -> list[str]:
     """Return what can be typed."""
     width = max(len(usage) for usage, _ in USAGE)
-    return ['DRIVE FAULT …  DRIVE  list  help; faults:'] + [
+    return ['DRIVE FAULT …  DRIVE  status  list  help; faults:'] + [
         f'  {usage:{width}}  {meaning}' for usage, meaning in USAGE]

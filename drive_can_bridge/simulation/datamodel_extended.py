@@ -7,33 +7,51 @@ reads of parameters that exist; it never answers a write, and never anything tha
 not define. Unused bytes of a response hold junk, since the manual calls them undetermined.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.frame import Frame, Route
+from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.datamodel import extended
-from drive_can_bridge.simulation.datamodel_drive import DataModelDrive, JUNK
-from drive_can_bridge.simulation.drive import EEPROM_TIME
+from drive_can_bridge.simulation.datamodel_table import DataModelTable, JUNK, map_parameters
+from drive_can_bridge.simulation.drive import ALONE, SimulatedDrive, Surroundings
 
 
-class SimulatedDataModelDrive(DataModelDrive):
+class SimulatedDataModelDrive(SimulatedDrive):
     """One DataModel drive with 29-bit identifiers. See the base class."""
 
-    def __init__(self, configuration: DriveConfiguration, *, neighbours: Sequence[Route] = (),
-                 eeprom_time: float = EEPROM_TIME) -> None:
-        super().__init__(configuration, neighbours=neighbours, eeprom_time=eeprom_time)
-        self._request_bits = self.station << extended.STATION_SHIFT
-        self._cyclic_identifier = extended.cyclic_request_identifier(self.station)
+    def __init__(self, configuration: DriveConfiguration,
+                 surroundings: Surroundings = ALONE) -> None:
+        super().__init__(configuration, surroundings)
+        self.table = DataModelTable(configuration, self.registers, violation=self._violation,
+                                    eeprom_time=surroundings.eeprom_time)
+        self._station = configuration.station
+        self._request_bits = self._station << extended.STATION_SHIFT
+        self._cyclic_identifier = extended.cyclic_request_identifier(self._station)
+        self._foreign_turn = 0
 
     @classmethod
     def routes(cls, configuration: DriveConfiguration) -> list[Route]:
         """Return all identifiers of the station."""
         return [extended.station_route(configuration.station)]
 
+    def own_parameters(self) -> Mapping[str, Parameter]:
+        """Return the entries of the maps."""
+        return map_parameters(self.configuration)
+
+    def raw_name(self, name: str) -> str | None:
+        """Understand ``p30``."""
+        return self.table.name_of(name)
+
+    def power_lost(self, back_at: float, *, forget: bool) -> None:
+        """Keep the maps, unless they are to be forgotten."""
+        if forget:
+            self.table.clear_maps()
+
     # -- telegrams --------------------------------------------------------------------------------
 
-    def _receive(self, frame: Frame, now: float) -> None:
+    def receive(self, frame: Frame, now: float) -> None:
         if (not frame.extended
                 or frame.identifier & extended.STATION_MASK != self._request_bits):
             return
@@ -49,7 +67,6 @@ class SimulatedDataModelDrive(DataModelDrive):
             self._violation('read request without eight data bytes (ignored)')
             return
         self.requests += 1
-        self.plant.advance(now)
         if isinstance(telegram, extended.CyclicRequest):
             self.table.cyclic_write(telegram.words)
             self._answer(self._response(
@@ -70,22 +87,19 @@ class SimulatedDataModelDrive(DataModelDrive):
 
     # -- faults -----------------------------------------------------------------------------------
 
-    def _foreign_frames(self, answer: Frame) -> list[Frame]:
+    def foreign_frames(self, answer: Frame) -> list[Frame]:
         """Return one of: the answer of an absent station, an 11-bit twin, a write echo."""
         junk = bytes([0x5A]) * extended.PAYLOAD
         own = answer.identifier & extended.STATION_MASK
         self._foreign_turn += 1
         turn = self._foreign_turn % 3
         if turn == 1:
-            for step in range(1, extended.STATION_MAX):
-                station = (self.station + step) % (extended.STATION_MAX + 1)
-                frame = Frame(answer.identifier & ~own | station << extended.STATION_SHIFT,
-                              junk, True)
-                if station and not self._belongs_to_neighbour(frame):
-                    return [frame]
-            return []
+            others = [(self._station + step) % (extended.STATION_MAX + 1)
+                      for step in range(1, extended.STATION_MAX)]
+            return self._nobodys([
+                Frame(answer.identifier & ~own | station << extended.STATION_SHIFT, junk, True)
+                for station in others if station])
         if turn == 2:
-            frame = Frame(answer.identifier & 0x7FF, junk, False)
-            return [] if self._belongs_to_neighbour(frame) else [frame]
+            return self._nobodys([Frame(answer.identifier & 0x7FF, junk, False)])
         # drives do not acknowledge writes: nobody may take this for one
         return [Frame(extended.DIR | self._request_bits | extended.W | 30 << 4 | 1, junk, True)]

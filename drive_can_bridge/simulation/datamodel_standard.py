@@ -6,23 +6,27 @@ It answers reads of parameters that exist, and nothing else. Unused words of a r
 since the manual does not define them.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.frame import Frame, Route, STANDARD_IDENTIFIER_MAX
+from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.datamodel import standard
-from drive_can_bridge.simulation.datamodel_drive import DataModelDrive, JUNK
-from drive_can_bridge.simulation.drive import EEPROM_TIME
+from drive_can_bridge.simulation.datamodel_table import DataModelTable, JUNK, map_parameters
+from drive_can_bridge.simulation.drive import ALONE, SimulatedDrive, Surroundings
 
 
-class SimulatedDataModelStandardDrive(DataModelDrive):
+class SimulatedDataModelStandardDrive(SimulatedDrive):
     """One DataModel drive with 11-bit identifiers. See the base class."""
 
-    def __init__(self, configuration: DriveConfiguration, *, neighbours: Sequence[Route] = (),
-                 eeprom_time: float = EEPROM_TIME) -> None:
-        super().__init__(configuration, neighbours=neighbours, eeprom_time=eeprom_time)
+    def __init__(self, configuration: DriveConfiguration,
+                 surroundings: Surroundings = ALONE) -> None:
+        super().__init__(configuration, surroundings)
+        self.table = DataModelTable(configuration, self.registers, violation=self._violation,
+                                    eeprom_time=surroundings.eeprom_time)
         self._request_identifier, self._response_identifier = _identifiers(configuration)
+        self._foreign_turn = 0
 
     @classmethod
     def routes(cls, configuration: DriveConfiguration) -> list[Route]:
@@ -30,9 +34,22 @@ class SimulatedDataModelStandardDrive(DataModelDrive):
         return [Route(identifier, STANDARD_IDENTIFIER_MAX, False)
                 for identifier in _identifiers(configuration)]
 
+    def own_parameters(self) -> Mapping[str, Parameter]:
+        """Return the entries of the maps, which have no effect here."""
+        return map_parameters(self.configuration)
+
+    def raw_name(self, name: str) -> str | None:
+        """Understand ``p30``."""
+        return self.table.name_of(name)
+
+    def power_lost(self, back_at: float, *, forget: bool) -> None:
+        """Keep the maps, unless they are to be forgotten."""
+        if forget:
+            self.table.clear_maps()
+
     # -- telegrams --------------------------------------------------------------------------------
 
-    def _receive(self, frame: Frame, now: float) -> None:
+    def receive(self, frame: Frame, now: float) -> None:
         if frame.extended:
             return
         if frame.identifier == self._response_identifier:
@@ -46,7 +63,6 @@ class SimulatedDataModelStandardDrive(DataModelDrive):
             self._violation('frame that the manual does not define (ignored)')
             return
         self.requests += 1
-        self.plant.advance(now)
         if isinstance(request, standard.Write):
             if any(frame.data[5:]):
                 self._violation('write with unused bytes other than 00h')
@@ -62,7 +78,7 @@ class SimulatedDataModelStandardDrive(DataModelDrive):
 
     # -- faults -----------------------------------------------------------------------------------
 
-    def _foreign_frames(self, answer: Frame) -> list[Frame]:
+    def foreign_frames(self, answer: Frame) -> list[Frame]:
         """Return one of: a 29-bit twin, the answer of an absent station, a frame of CANopen."""
         junk = bytes([0x5A]) * standard.PAYLOAD
         self._foreign_turn += 1
@@ -73,18 +89,12 @@ class SimulatedDataModelStandardDrive(DataModelDrive):
             made = [Frame(answer.identifier ^ bit, junk, False) for bit in (8, 4, 2, 1)]
         else:
             made = [Frame(0x701, b'\x05', False)]
-        return [frame for frame in made if self._is_nobodys(frame)][:1]
-
-    def _is_nobodys(self, frame: Frame) -> bool:
-        """Tell whether a frame is neither a neighbour's nor this drive's own."""
         own = (self._request_identifier, self._response_identifier)
-        return ((frame.extended or frame.identifier not in own)
-                and not self._belongs_to_neighbour(frame))
+        return self._nobodys([frame for frame in made
+                              if frame.extended or frame.identifier not in own])
 
 
 def _identifiers(configuration: DriveConfiguration) -> tuple[int, int]:
-    options = configuration.family_options
-    return (standard.identifier(options.get('request_id_base', standard.REQUEST_ID_BASE),
-                                configuration.station),
-            standard.identifier(options.get('response_id_base', standard.RESPONSE_ID_BASE),
-                                configuration.station))
+    options, station = configuration.family_options, configuration.station
+    return (standard.identifier(options['request_id_base'], station),
+            standard.identifier(options['response_id_base'], station))

@@ -2,50 +2,84 @@
 """
 A drive played in software: what all protocol families have in common.
 
-Sans-IO: frames and the time go in, frames come out. A family derives a class that knows its
-telegrams; the registers and the motor are in :class:`~.plant.Plant`.
+Sans-IO, in the dialect of the bridge's sessions:
+
+.. code-block:: python
+
+    drive.receive_frame(frame, now)
+    drive.handle_timer(now)            # when next_timer() says so
+    for frame in drive.take_frames(): ...
+
+A family derives a class that knows its telegrams. The values are in its
+:class:`~.registers.Registers`, what moves is a :class:`~.plant.Plant`.
 """
 
 from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 import heapq
 import math
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.frame import Frame, Route
-from drive_can_bridge.core.parameters import Value
+from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.simulation.faults import AnswerFaults, Fault, FaultKind, parse_fault
-from drive_can_bridge.simulation.plant import Plant
+from drive_can_bridge.simulation.motor_plant import MotorPlant
+from drive_can_bridge.simulation.plant import Mechanics, PlantFactory
+from drive_can_bridge.simulation.registers import Registers
 
 #: the manual's least time between two EEPROM writes
 EEPROM_TIME = 0.020
-#: s that a drive is deaf after power came back
+#: s that a drive is deaf after power came back, or was lost, where a fault does not say
 BOOT_TIME = 0.5
+POWER_CUT_TIME = 5.0
+
+_MARKS = (FaultKind.STUCK, FaultKind.REFUSE)
+
+
+@dataclass(frozen=True, slots=True)
+class Surroundings:
+    """
+    What a simulated drive depends on beside its configuration.
+
+    :param neighbours: identifiers of the other drives on the bus; scripted faults keep clear of
+        them.
+    :param eeprom_time: s that an EEPROM write takes.
+    :param mechanics: what the motor carries.
+    :param plant: makes what moves; None: what the family chooses.
+    """
+
+    neighbours: tuple[Route, ...] = ()
+    eeprom_time: float = EEPROM_TIME
+    mechanics: Mechanics = Mechanics()
+    plant: PlantFactory | None = None
+
+
+ALONE = Surroundings()
 
 
 class SimulatedDrive(ABC):
     """
     One simulated drive.
 
-    :param neighbours: identifiers of the other drives on the bus; scripted faults keep clear of
-        them.
-    :param eeprom_time: s that an EEPROM write takes.
     :ivar requests: requests understood.
     :ivar answers: answers given, before scripted faults took theirs.
     :ivar violations: how often the other side broke a rule of the protocol, by rule.
     """
 
-    def __init__(self, configuration: DriveConfiguration, *, neighbours: Sequence[Route] = (),
-                 eeprom_time: float = EEPROM_TIME) -> None:
+    def __init__(self, configuration: DriveConfiguration,
+                 surroundings: Surroundings = ALONE) -> None:
         self.configuration = configuration
         self.name = configuration.name
-        self.neighbours = tuple(neighbours)
-        self.eeprom_time = eeprom_time
-        cyclic = (*configuration.cyclic_request, *configuration.cyclic_response)
-        self.plant = Plant(configuration.profile, volatile={p.name for p in cyclic},
-                           preferred=[p.name for p in configuration.cyclic_request])
+        self.surroundings = surroundings
+        self.registers = Registers(
+            {**configuration.profile.parameters, **self.own_parameters()},
+            {p.name for p in (*configuration.cyclic_request, *configuration.cyclic_response)})
+        make_plant = surroundings.plant or self.choose_plant()
+        self.plant = make_plant(self.registers, configuration, surroundings.mechanics)
+        self.registers.connect(self.plant)
         self.requests = 0
         self.answers = 0
         self.violations: Counter[str] = Counter()
@@ -53,16 +87,18 @@ class SimulatedDrive(ABC):
         self._outbox: list[Frame] = []
         self._late: list[tuple[float, int, list[Frame]]] = []
         self._late_count = 0
+        self._powered = True
         self._deaf_until = -math.inf
-        self._stuck: dict[str, Fault] = {}
-        self._answer_faults = AnswerFaults(self._foreign_frames)
+        self._marks: dict[tuple[FaultKind, str], Fault] = {}
+        self._answer_faults = AnswerFaults(self.foreign_frames)
 
     # -- input and output -------------------------------------------------------------------------
 
     def receive_frame(self, frame: Frame, now: float) -> None:
         """Take a frame from the bus. Any frame; what is not for this drive is ignored."""
         if now >= self._deaf_until:
-            self._receive(frame, now)
+            self._advance(now)
+            self.receive(frame, now)
 
     def next_timer(self) -> float:
         """Return when :meth:`handle_timer` wants to be called; infinity: never."""
@@ -70,6 +106,7 @@ class SimulatedDrive(ABC):
 
     def handle_timer(self, now: float) -> None:
         """Do what is due: answers that were held back."""
+        self._advance(now)
         while self._late and self._late[0][0] <= now:
             self._outbox += heapq.heappop(self._late)[2]
 
@@ -93,9 +130,9 @@ class SimulatedDrive(ABC):
         :param now: let the motor move up to this time first.
         :raises ValueRefused: there is no such register.
         """
-        if now is not None and self.powered:
-            self.plant.advance(now)
-        return self.plant.value(self._known(name))
+        if now is not None:
+            self._advance(now)
+        return self.registers.value(self._known(name))
 
     def set_value(self, name: str, value: Value, now: float | None = None) -> None:
         """
@@ -103,13 +140,13 @@ class SimulatedDrive(ABC):
 
         :raises ValueRefused: there is no such register, or the value does not fit.
         """
-        if now is not None and self.powered:
-            self.plant.advance(now)
-        self.plant.set_value(self._known(name), value)
+        if now is not None:
+            self._advance(now)
+        self.registers.set_value(self._known(name), value)
 
     def release(self, name: str) -> None:
         """Let an actual value that was set by hand follow the motor again."""
-        self.plant.release(self._known(name))
+        self.registers.release(self._known(name))
 
     def fault(self, fault: str | Fault, now: float) -> None:
         """
@@ -119,52 +156,52 @@ class SimulatedDrive(ABC):
         """
         if isinstance(fault, str):
             fault = parse_fault(fault)
-        if self.powered:
-            self.plant.advance(now)
-        if fault.kind in AnswerFaults.KINDS:
+        self._advance(now)
+        kind = fault.kind
+        if kind in AnswerFaults.KINDS:
             self._answer_faults.add(fault)
-        elif fault.kind is FaultKind.STUCK:
+        elif kind in _MARKS:
             name = self._known(str(fault.argument))
-            self._stuck[name] = fault
-            self.plant.stuck.add(name)
-        elif fault.kind is FaultKind.TRIP:
-            if self.powered:
+            self._marks[kind, name] = fault
+            (self.registers.stuck if kind is FaultKind.STUCK else self.registers.refused).add(name)
+        elif kind is FaultKind.TRIP:
+            if self._powered:
                 self.plant.trip(fault.number or 0.0)
-        elif fault.kind is FaultKind.OFF:
-            self._deaf_until = math.inf
-            self._drop_answers()
-        elif fault.kind in (FaultKind.RESTART, FaultKind.FORGET):
-            boot = BOOT_TIME if fault.number is None else fault.number
-            self._restart(now, boot, forget=fault.kind is FaultKind.FORGET)
+        elif kind is FaultKind.OFF:
+            self._lose_power(now, math.inf)
+        elif kind is not FaultKind.OK:
+            default = POWER_CUT_TIME if kind is FaultKind.POWER_CUT else BOOT_TIME
+            seconds = default if fault.number is None else fault.number
+            self._lose_power(now, now + seconds, forget=kind is FaultKind.FORGET)
         else:
             self._repair(now)
-        self._notices.append(f'{self.name}: fault {fault}' if fault.kind is not FaultKind.OK
+        self._notices.append(f'{self.name}: fault {fault}' if kind is not FaultKind.OK
                              else f'{self.name}: no fault any more')
 
     @property
-    def eeprom_writes(self) -> int:
-        """EEPROM cells written so far (they wear)."""
-        return 0
+    def wear(self) -> Counter[str]:
+        """EEPROM cells written so far, by parameter."""
+        return self.registers.wear
 
     @property
-    def powered(self) -> bool:
-        """The drive has power (it may still be starting)."""
-        return self._deaf_until < math.inf
+    def eeprom_writes(self) -> int:
+        """EEPROM cells written so far."""
+        return sum(self.registers.wear.values())
 
     @property
     def faults_text(self) -> str:
         """The faults in force, in words."""
-        texts = [str(fault) for fault in (*self._answer_faults.active, *self._stuck.values())]
+        texts = [str(fault) for fault in (*self._answer_faults.active, *self._marks.values())]
         if self.plant.operation.faulted:
             texts.append('tripped')
-        if not self.powered:
+        if self._deaf_until == math.inf:
             texts.append('off')
         return ', '.join(texts) or 'ok'
 
     # -- for the families -------------------------------------------------------------------------
 
     @abstractmethod
-    def _receive(self, frame: Frame, now: float) -> None:
+    def receive(self, frame: Frame, now: float) -> None:
         """Take a frame while there is power."""
 
     @classmethod
@@ -172,9 +209,21 @@ class SimulatedDrive(ABC):
     def routes(cls, configuration: DriveConfiguration) -> list[Route]:
         """Return the identifiers that belong to a drive, in both directions."""
 
+    def own_parameters(self) -> Mapping[str, Parameter]:
+        """Return what every drive of the family has, listed or not, by name."""
+        return {}
+
+    def choose_plant(self) -> PlantFactory:
+        """Return what makes the plant, where nobody brings another one."""
+        return MotorPlant
+
     @abstractmethod
-    def _foreign_frames(self, answer: Frame) -> list[Frame]:
+    def foreign_frames(self, answer: Frame) -> list[Frame]:
         """Make frames that look like this answer and are none of anybody."""
+
+    def raw_name(self, name: str) -> str | None:
+        """Return the name of a register for a raw name of the family; None: there is none."""
+        return None
 
     def _known(self, name: str) -> str:
         """
@@ -182,13 +231,14 @@ class SimulatedDrive(ABC):
 
         :raises ValueRefused: there is no such register.
         """
-        if name not in self.plant.parameters:
+        known = name if name in self.registers.parameters else self.raw_name(name)
+        if known is None:
             raise ValueRefused(f"{self.name} has no parameter '{name}'")
-        return name
+        return known
 
-    def _power_on(self, *, forget: bool) -> None:
-        """Begin anew; a family adds what it keeps outside the plant."""
-        self.plant.power_on()
+    def power_lost(  # noqa: B027  optional hook
+            self, back_at: float, *, forget: bool) -> None:
+        """Forget what a family keeps outside the registers; power is back at some time."""
 
     def _answer(self, frame: Frame, now: float) -> None:
         """Send an answer, as far as scripted faults let it."""
@@ -209,21 +259,37 @@ class SimulatedDrive(ABC):
             self._notices.append(f'{self.name}: violation: {rule}')
         self.violations[rule] += 1
 
+    def _nobodys(self, frames: Sequence[Frame]) -> list[Frame]:
+        """Return the first frame that is no neighbour's, if there is one."""
+        return [frame for frame in frames if not any(
+            route.matches(frame) for route in self.surroundings.neighbours)][:1]
+
+    def _lose_power(self, now: float, back_at: float, *, forget: bool = False) -> None:
+        """Lose power until some time; RAM is lost with it."""
+        self._outbox.clear()
+        self._late.clear()
+        self.plant.power_off()
+        self.registers.lose_power()
+        self._powered = False
+        self._deaf_until = back_at
+        self.power_lost(back_at, forget=forget)
+        self._advance(now)
+
     # -- inside -----------------------------------------------------------------------------------
 
-    def _restart(self, now: float, boot: float, *, forget: bool) -> None:
-        self._drop_answers()
-        self._power_on(forget=forget)
-        self._deaf_until = now + boot
+    def _advance(self, now: float) -> None:
+        """Let the motor move up to now; power may have come back on the way."""
+        if not self._powered and now >= self._deaf_until:
+            self.plant.advance(self._deaf_until)
+            self.plant.power_on()
+            self._powered = True
+        self.plant.advance(now)
 
     def _repair(self, now: float) -> None:
         self._answer_faults.clear()
-        self._stuck.clear()
-        self.plant.stuck.clear()
+        self._marks.clear()
+        self.registers.stuck.clear()
+        self.registers.refused.clear()
         self.plant.operation.repair()
-        if not self.powered:
-            self._restart(now, BOOT_TIME, forget=False)
-
-    def _drop_answers(self) -> None:
-        self._outbox.clear()
-        self._late.clear()
+        if self._deaf_until == math.inf:
+            self._lose_power(now, now + BOOT_TIME)

@@ -9,7 +9,8 @@ from drive_can_bridge.simulation.cannord import SimulatedCannordInverter
 from drive_can_bridge.simulation.canopen_pkw import SimulatedPkwDrive
 from drive_can_bridge.simulation.datamodel_extended import SimulatedDataModelDrive
 from drive_can_bridge.simulation.datamodel_standard import SimulatedDataModelStandardDrive
-from drive_can_bridge.simulation.drive import EEPROM_TIME, SimulatedDrive
+from drive_can_bridge.simulation.drive import EEPROM_TIME, SimulatedDrive, Surroundings
+from drive_can_bridge.simulation.plant import Mechanics, PlantFactory
 
 SIMULATED_DRIVES: Mapping[str, type[SimulatedDrive]] = {
     'cannord': SimulatedCannordInverter,
@@ -20,10 +21,13 @@ SIMULATED_DRIVES: Mapping[str, type[SimulatedDrive]] = {
 
 
 def make_drives(configuration: BridgeConfiguration, *, eeprom_time: float = EEPROM_TIME,
-                ) -> dict[str, SimulatedDrive]:
+                mechanics: Mapping[str, Mechanics] | None = None,
+                plants: Mapping[str, PlantFactory] | None = None) -> dict[str, SimulatedDrive]:
     """
     Make every drive of a configuration.
 
+    :param mechanics: what motors carry, by the name of the drive.
+    :param plants: what moves instead of what the family chooses, by the name of the drive.
     :raises ConfigurationError: a protocol that is not simulated.
     """
     problems = [
@@ -34,10 +38,11 @@ def make_drives(configuration: BridgeConfiguration, *, eeprom_time: float = EEPR
         raise ConfigurationError(problems)
     drives = {}
     for drive in configuration.drives.values():
-        neighbours = [
+        neighbours = tuple(
             route for other in configuration.drives.values()
             if other is not drive and other.bus == drive.bus
-            for route in SIMULATED_DRIVES[other.protocol].routes(other)]
-        drives[drive.name] = SIMULATED_DRIVES[drive.protocol](
-            drive, neighbours=neighbours, eeprom_time=eeprom_time)
+            for route in SIMULATED_DRIVES[other.protocol].routes(other))
+        drives[drive.name] = SIMULATED_DRIVES[drive.protocol](drive, Surroundings(
+            neighbours, eeprom_time, (mechanics or {}).get(drive.name, Mechanics()),
+            (plants or {}).get(drive.name)))
     return drives

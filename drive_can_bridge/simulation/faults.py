@@ -26,8 +26,10 @@ class FaultKind(Enum):
     FOREIGN = 'foreign'
     DUPLICATE = 'duplicate'
     STUCK = 'stuck'
+    REFUSE = 'refuse'
     TRIP = 'trip'
     RESTART = 'restart'
+    POWER_CUT = 'power_cut'
     FORGET = 'forget'
     OFF = 'off'
     OK = 'ok'
@@ -72,10 +74,14 @@ _RULES = {
     FaultKind.FOREIGN: _Rule('foreign', 'frames nobody should send accompany the answers'),
     FaultKind.DUPLICATE: _Rule('duplicate', 'each answer is sent twice'),
     FaultKind.STUCK: _Rule('stuck=PARAMETER', 'writes to the parameter have no effect', True, str),
+    FaultKind.REFUSE: _Rule('refuse=PARAMETER', 'writes to the parameter are refused (as far as '
+                            'the protocol can)', True, str),
     FaultKind.TRIP: _Rule('trip[=SECONDS]', 'fault of the drive itself; cannot be reset before '
                           'the seconds are over', False, _seconds),
     FaultKind.RESTART: _Rule('restart[=SECONDS]', 'power is lost and back; deaf for 0.5 s, or as '
                              'long as it says', False, _seconds),
+    FaultKind.POWER_CUT: _Rule('power_cut[=SECONDS]', 'the same for 5 s, or as long as it says',
+                               False, _seconds),
     FaultKind.FORGET: _Rule('forget[=SECONDS]', 'restart with empty maps', False, _seconds),
     FaultKind.OFF: _Rule('off', 'no power, until ok or restart'),
     FaultKind.OK: _Rule('ok', 'all faults end'),

@@ -72,21 +72,71 @@ class Ramp:
         return integral + self.value * max(duration, 0.0)
 
 
+class Travel:
+    """
+    A position that goes to its target with limited speed and acceleration.
+
+    :ivar slope: rate of change of the speed at the end of the last step.
+    """
+
+    def __init__(self) -> None:
+        self.position = 0.0
+        self.speed = 0.0
+        self.slope = 0.0
+
+    def go(self, duration: float, target: float, speed_max: float, acceleration: float) -> None:
+        """Go towards the target for some time, as fast as possible and without overshoot."""
+        distance = target - self.position
+        braking = self.speed * abs(self.speed) / (2.0 * acceleration)
+        way = math.copysign(1.0, self.speed if distance == braking else distance - braking)
+        # from here on the target lies ahead: speed up (or down) to the peak, cruise, brake
+        distance, speed = distance * way, self.speed * way
+        peak = min(speed_max, math.sqrt(
+            max(acceleration * distance + speed * speed / 2.0, 0.0)))
+        change = math.copysign(acceleration, peak - speed)
+        first = (peak - speed) / change
+        covered = (speed + peak) / 2.0 * first
+        cruise = max(distance - covered - peak * peak / (2.0 * acceleration), 0.0)
+        second = cruise / peak if peak else 0.0
+        left = first + second + peak / acceleration - duration
+        if left <= 0.0:
+            self.position, self.speed, self.slope = target, 0.0, 0.0
+            return
+        if duration < first:
+            moved = speed * duration + change * duration * duration / 2.0
+            speed, slope = speed + change * duration, change
+        elif duration < first + second:
+            moved, speed, slope = covered + peak * (duration - first), peak, 0.0
+        else:
+            moved = distance - acceleration * left * left / 2.0
+            speed, slope = acceleration * left, -acceleration
+        self.position += way * moved
+        self.speed, self.slope = way * speed, way * slope
+
+    def run(self, duration: float, speed: float, rate: float) -> None:
+        """Go to a speed instead, and on with it."""
+        ramp = Ramp(self.speed)
+        self.position += ramp.advance(duration, speed, Rates(rate, rate))
+        self.speed, self.slope = ramp.value, ramp.slope
+
+
 class Motor:
     """
     Speed, position, torque, current and temperature of a motor.
 
     :param rated_speed: in whatever unit speed setpoints have.
     :param revolutions: revolutions per second at a speed of one unit.
+    :param load: share of the rated torque that a weight takes.
     :ivar position: revolutions since power was applied first.
     :ivar torque: share of the rated torque, with sign.
     :ivar current: share of the rated current, a magnitude.
     :ivar temperature: °C.
     """
 
-    def __init__(self, rated_speed: float, revolutions: float) -> None:
+    def __init__(self, rated_speed: float, revolutions: float, load: float = 0.0) -> None:
         self.rated_speed = rated_speed
         self.revolutions = revolutions
+        self.load = load
         self.ramp = Ramp()
         self.position = 0.0
         self.torque = 0.0
@@ -109,26 +159,22 @@ class Motor:
         return self.ramp.value * self.revolutions
 
     def advance(self, duration: float, target: float, rates: Rates, *, energised: bool) -> None:
-        """
-        Let time pass.
+        """Let time pass on the way to a speed."""
+        travelled = self.ramp.advance(duration, target, rates) if duration > 0.0 else 0.0
+        self.moved(duration, travelled, energised=energised)
 
-        :param target: speed to go to; a motor that is not energised coasts towards 0.
-        """
-        if duration > 0.0:
-            travelled = self.ramp.advance(duration, target if energised else 0.0, rates)
-            self.position += travelled * self.revolutions
-            goal = AMBIENT_TEMPERATURE + TEMPERATURE_RISE * self.current ** 2
-            self.temperature += (goal - self.temperature) * -math.expm1(
-                -duration / TEMPERATURE_TIME_CONSTANT)
-        self._load(energised)
-
-    def _load(self, energised: bool) -> None:
+    def moved(self, duration: float, travelled: float, *, energised: bool) -> None:
+        """Take note of a way in units of speed times s: position, temperature, torque."""
+        self.position += travelled * self.revolutions
+        goal = AMBIENT_TEMPERATURE + TEMPERATURE_RISE * self.current ** 2
+        self.temperature += (goal - self.temperature) * -math.expm1(
+            -duration / TEMPERATURE_TIME_CONSTANT)
         if not energised:
             self.torque = self.current = 0.0
             return
         speed = self.share_of_rated_speed
         friction = math.copysign(FRICTION_TORQUE, speed) if speed else 0.0
-        torque = (LOAD_TORQUE * speed + friction
+        torque = (LOAD_TORQUE * speed + friction + self.load
                   + INERTIA_TORQUE * self.ramp.slope / self.rated_speed)
         self.torque = min(max(torque, -TORQUE_MAX), TORQUE_MAX)
         self.current = math.hypot(MAGNETISING_CURRENT, self.torque)

@@ -7,7 +7,7 @@ by the few rules of this module (docs/simulation.md has them as a table). A para
 takes is a plain register: it keeps what is written.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from enum import Enum
 import re
 from typing import NamedTuple
@@ -43,6 +43,12 @@ _QUANTITY_WORDS: tuple[tuple[Quantity, frozenset[str]], ...] = (
 # A "nominal_current" or "speed_limit" is a setting, even where it is read-only.
 _SETTING_WORDS = frozenset(('limit', 'maximum', 'minimum', 'max', 'min', 'nominal', 'rated',
                             'reference', 'threshold', 'setpoint', 'target', 'command'))
+_LIMIT_WORDS = frozenset(('limit', 'maximum', 'minimum', 'max', 'min'))
+_QUANTITIES_BY_UNIT = {
+    **dict.fromkeys(('rpm', '1/min', 'min-1', 'rev/s', 'rad/s', 'deg/s', 'mm/s', 'm/s'),
+                    Quantity.SPEED),
+    **dict.fromkeys(('rev', 'rad', 'deg', '°', 'mm', 'm'), Quantity.POSITION),
+}
 _FAULT_WORDS = frozenset(('fault', 'error', 'alarm'))
 _CODE_WORDS = frozenset(('code', 'number'))
 
@@ -97,6 +103,51 @@ def measured(parameter: Parameter) -> Quantity | None:
     if parameter.writable or _words(parameter) & _SETTING_WORDS:
         return None
     return quantity_of(parameter)
+
+
+def quantity_by_unit(parameter: Parameter) -> Quantity | None:
+    """Tell what a parameter that is exchanged cyclically means, if its name does not."""
+    return _QUANTITIES_BY_UNIT.get(parameter.unit)
+
+
+def mover(candidates: Sequence[Parameter], cyclic: Sequence[Parameter], control: str | None,
+          ) -> tuple[Parameter | None, Quantity | None]:
+    """
+    Choose the setpoint that moves the shaft.
+
+    :param candidates: parameters whose names are those of setpoints.
+    :param cyclic: the cyclic request, in order. What is a speed or a position there counts first,
+        by its name or by its unit.
+    :param control: name of the control parameter.
+    :return: the setpoint, and whether it is a speed or a position.
+    """
+    kinds = (Quantity.SPEED, Quantity.POSITION)
+    requested = [p for p in cyclic if p.name != control and not _words(p) & _LIMIT_WORDS]
+    for parameter in requested:
+        quantity = quantity_of(parameter) or quantity_by_unit(parameter)
+        if quantity in kinds:
+            return parameter, quantity
+    for kind in kinds:
+        for parameter in candidates:
+            if quantity_of(parameter) is kind:
+                return parameter, kind
+    return None, None
+
+
+def crossings(parameters: Mapping[str, Parameter]) -> dict[str, list[tuple[str, str]]]:
+    """
+    Find settings of which one must not exceed the other: ``minimum_speed``, ``maximum_speed``.
+
+    :return: names of the lower and the upper end, by the name of either.
+    """
+    found: dict[str, list[tuple[str, str]]] = {}
+    for low in parameters.values():
+        high = parameters.get(re.sub('min(imum)?(?=_|$)', r'max\1', low.name, count=1)
+                              if _words(low) & {'minimum', 'min'} else '')
+        if high is not None and low.writable and high.writable and low.unit == high.unit:
+            for end in (low, high):
+                found.setdefault(end.name, []).append((low.name, high.name))
+    return found
 
 
 def pairs(parameters: Mapping[str, Parameter], *, without: str | None = None) -> list[Pair]:

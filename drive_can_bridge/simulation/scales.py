@@ -15,12 +15,13 @@ from drive_can_bridge.simulation.names import Quantity
 _REVOLUTIONS = {
     'rpm': 1.0 / 60.0, '1/min': 1.0 / 60.0, 'min-1': 1.0 / 60.0,
     'Hz': 1.0, 'rev/s': 1.0, '1/s': 1.0,
-    'rad/s': 0.5 / math.pi, 'deg/s': 1.0 / 360.0,
+    'rad/s': 0.5 / math.pi, 'deg/s': 1.0 / 360.0, 'mm/s': 0.1, 'm/s': 100.0,
 }
 #: revolutions per second at rated speed, for a unit that says nothing about revolutions
 _RATED_REVOLUTIONS = 25.0
 #: value after one revolution
-_PER_REVOLUTION = {'rev': 1.0, 'rad': 2.0 * math.pi, 'deg': 360.0}
+_PER_REVOLUTION = {'rev': 1.0, 'rad': 2.0 * math.pi, 'deg': 360.0, '°': 360.0,
+                   'mm': 10.0, 'm': 0.01}
 _INCREMENTS_PER_REVOLUTION = 4096.0
 
 _RATINGS = {
@@ -74,6 +75,11 @@ def position_value(parameter: Parameter, revolutions: float) -> float:
 def revolutions_per_position(parameter: Parameter) -> float:
     """Return the revolutions that a change of position by one unit stands for."""
     return 1.0 / _per_revolution(parameter)
+
+
+def travel_speed(setpoint: Parameter) -> float:
+    """Return how fast a position moves, per s: over all its range, or 25 revolutions."""
+    return min(highest(setpoint), _RATED_REVOLUTIONS * _per_revolution(setpoint))
 
 
 def temperature_value(parameter: Parameter, celsius: float) -> float:

@@ -12,6 +12,7 @@ The end points are python-can interfaces unless ``open_bus`` says otherwise.
 """
 
 from collections import Counter
+from collections.abc import Mapping
 import sys
 from typing import Any
 
@@ -20,6 +21,7 @@ from drive_can_bridge.core.parameters import Value
 from drive_can_bridge.simulation.drive import EEPROM_TIME, SimulatedDrive
 from drive_can_bridge.simulation.drives import make_drives
 from drive_can_bridge.simulation.faults import Fault
+from drive_can_bridge.simulation.plant import Mechanics, PlantFactory
 from drive_can_bridge.simulation.player import BusPlayer, OpenBus, Say, ShowFrame
 from drive_can_bridge.transport.port import open_port
 
@@ -95,6 +97,12 @@ class PlayedDrive:
         """EEPROM cells written."""
         return self.drive.eeprom_writes
 
+    @property
+    def wear(self) -> Counter[str]:
+        """EEPROM cells written, by parameter."""
+        with self._touch():
+            return Counter(self.drive.wear)
+
 
 class Simulation:
     """
@@ -105,6 +113,8 @@ class Simulation:
     :param complain: takes lines about the buses; None: standard error.
     :param show_frame: called for each frame.
     :param eeprom_time: s that an EEPROM write takes.
+    :param mechanics: what the motors of drives carry, by name.
+    :param plants: what drives move instead of what they would choose, by name.
     :ivar drives: the drives by name.
     :raises ConfigurationError: a protocol that is not simulated.
     """
@@ -112,9 +122,12 @@ class Simulation:
     def __init__(self, configuration: BridgeConfiguration, *, open_bus: OpenBus | None = None,
                  say: Say | None = None, complain: Say | None = None,
                  show_frame: ShowFrame | None = None,
-                 eeprom_time: float = EEPROM_TIME - ARRIVAL_JITTER) -> None:
+                 eeprom_time: float = EEPROM_TIME - ARRIVAL_JITTER,
+                 mechanics: Mapping[str, Mechanics] | None = None,
+                 plants: Mapping[str, PlantFactory] | None = None) -> None:
         self.configuration = configuration
-        drives = make_drives(configuration, eeprom_time=eeprom_time)
+        drives = make_drives(configuration, eeprom_time=eeprom_time, mechanics=mechanics,
+                             plants=plants)
         self._players = {
             bus.name: BusPlayer(
                 bus, [drive for drive in drives.values() if drive.configuration.bus == bus.name],

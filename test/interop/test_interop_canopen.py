@@ -103,9 +103,9 @@ def states(node: Any) -> list[int]:
 
 
 def ltmr_configuration(**options: Any) -> DriveConfiguration:
-    return DriveConfiguration(
-        name='pump', bus='main', protocol='canopen_pkw', station=NODE, profile=LTMR,
-        cyclic_response=(LTMR.parameters['system_status_1'],), family_options=options)
+    return drive('canopen_pkw', name='pump', station=NODE, table=LTMR.parameters.values(),
+                 control=LTMR.control, request=(),
+                 response=(LTMR.parameters['system_status_1'],), **options)
 
 
 @pytest.fixture

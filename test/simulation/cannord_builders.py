@@ -4,11 +4,11 @@
 from collections.abc import Iterable
 from typing import Any
 
+import builders
 from simulation_builders import EEPROM, frame, INT16, parameter, RAM, RO, WO
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter, ParameterType
-from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.simulation.cannord import SimulatedCannordInverter
 from drive_can_bridge.simulation.drive import SimulatedDrive
 
@@ -49,10 +49,8 @@ def configuration(*, table: Iterable[Parameter] = TABLE,
                   response: Iterable[Parameter] = (ACTUAL,), station: int = 100,
                   name: str = 'conveyor', **options: Any) -> DriveConfiguration:
     """Make the configuration of an inverter; further keywords are keys of the family."""
-    profile = Profile('table', '/table.yaml', '', ('cannord',), {p.name: p for p in table})
-    return DriveConfiguration(
-        name=name, bus='main', protocol='cannord', station=station, profile=profile,
-        cyclic_request=tuple(request), cyclic_response=tuple(response), family_options=options)
+    return builders.drive('cannord', name=name, station=station, table=table, request=request,
+                          response=response, **options)
 
 
 def inverter(**options: Any) -> SimulatedCannordInverter:

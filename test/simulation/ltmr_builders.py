@@ -4,6 +4,8 @@
 from collections.abc import Iterable
 from typing import Any
 
+import builders
+
 from drive_can_bridge.configuration.profiles import read_profile
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Frame
@@ -25,10 +27,10 @@ def configuration(profile: Profile = LTMR, *, name: str = 'pump', station: int =
                   request: Iterable[str] = (), response: Iterable[str] = ('system_status_1',),
                   **options: Any) -> DriveConfiguration:
     """Make the configuration of a controller; further keywords are family options."""
-    return DriveConfiguration(
-        name=name, bus='main', protocol='canopen_pkw', station=station, profile=profile,
-        cyclic_request=names(*request, profile=profile),
-        cyclic_response=names(*response, profile=profile), family_options=options)
+    return builders.drive(
+        'canopen_pkw', name=name, station=station, table=profile.parameters.values(),
+        control=profile.control, request=names(*request, profile=profile),
+        response=names(*response, profile=profile), **options)
 
 
 def frame(text: str) -> Frame:
@@ -47,8 +49,8 @@ class Ltmr:
     def __init__(self, *args: Any, started: bool = True, **options: Any) -> None:
         self.drive = SimulatedPkwDrive(configuration(*args, **options))
         if started:
-            assert self.at(0.0) == [f'{0x700 + self.drive.station:03X}#00']
-            assert self.ask(f'000#01{self.drive.station:02X}', 0.0) == []
+            assert self.at(0.0) == [f'{0x700 + self.drive.node.number:03X}#00']
+            assert self.ask(f'000#01{self.drive.node.number:02X}', 0.0) == []
 
     def sent(self) -> list[str]:
         """Return what it has sent since the last look."""

@@ -4,13 +4,17 @@
 from collections.abc import Iterable
 from typing import Any
 
+import builders
+
 from drive_can_bridge.core.configuration import (
     BridgeConfiguration, BusConfiguration, DriveConfiguration,
 )
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Access, Parameter, ParameterType, Storage
-from drive_can_bridge.core.profile import ControlTable, Profile, StatusPattern
+from drive_can_bridge.core.profile import ControlTable, StatusPattern
 from drive_can_bridge.simulation.datamodel_extended import SimulatedDataModelDrive
+from drive_can_bridge.simulation.drive import Surroundings
+from drive_can_bridge.simulation.plant import Mechanics
 
 RO, RW, WO = Access.READ_ONLY, Access.READ_WRITE, Access.WRITE_ONLY
 RAM, EEPROM = Storage.RAM, Storage.EEPROM
@@ -41,23 +45,23 @@ CONTROL = ControlTable(
     enabled=StatusPattern(2, 2), fault=StatusPattern(8, 8))
 
 
-def profile(parameters: Iterable[Parameter] = EXAMPLE, control: ControlTable | None = None,
-            ) -> Profile:
-    """Make a profile."""
-    return Profile('example', '/example.yaml', '', ('datamodel_extended',),
-                   {p.name: p for p in parameters}, control)
-
-
 def configuration(parameters: Iterable[Parameter] = EXAMPLE, *, name: str = 'conveyor',
                   station: int = 1, control: ControlTable | None = None,
                   request: Iterable[Parameter] = (SPEED_SETPOINT, TORQUE_LIMIT),
                   response: Iterable[Parameter] = (ACTUAL_SPEED, MOTOR_CURRENT, STATUS_WORD),
-                  **options: Any) -> DriveConfiguration:
-    """Make the configuration of a drive; further keywords are family options."""
-    return DriveConfiguration(
-        name=name, bus='main', protocol='datamodel_extended', station=station,
-        profile=profile(parameters, control), cyclic_request=tuple(request),
-        cyclic_response=tuple(response), family_options=options)
+                  protocol: str = 'datamodel_extended', **options: Any) -> DriveConfiguration:
+    """Make the configuration of a drive; further keywords are its keys."""
+    return builders.drive(protocol, name=name, station=station, table=parameters, control=control,
+                          request=request, response=response, **options)
+
+
+def motor(parameters: Iterable[Parameter], control: ControlTable | None = None,
+          request: Iterable[Parameter] = (), response: Iterable[Parameter] = (),
+          **mechanics: Any) -> SimulatedDataModelDrive:
+    """Make a drive of which only registers and motor matter."""
+    return SimulatedDataModelDrive(
+        configuration(parameters, control=control, request=request, response=response),
+        Surroundings(mechanics=Mechanics(**mechanics)))
 
 
 def drive(*args: Any, **options: Any) -> SimulatedDataModelDrive:

@@ -137,6 +137,15 @@ def test_standard_input(start: Any) -> None:
     assert len(command.errors) == 1
 
 
+def test_axes_and_wear(start: Any) -> None:
+    command = start('--pty', '--axis', 'lift:load=0.3,noise=1')
+    command.line('drive lift')
+    command.write('status\n')
+    command.line('^conveyor: datamodel_extended')
+    assert command.end() == 0
+    assert command.errors == []
+
+
 @pytest.mark.parametrize('how', ['closed', 'nothing'])
 def test_without_standard_input(start: Any, how: str) -> None:
     options: dict[str, Any] = {'stdin': subprocess.DEVNULL}
@@ -163,6 +172,9 @@ def test_python_can_interface(start: Any) -> None:
     (('--fault', 'belt:silent'), 2, "no drive 'belt'; drives: conveyor, lift"),
     (('--fault', 'lift:later'), 2, "unknown fault 'later'"),
     (('--fault', 'lift:stuck=ramp'), 2, "lift has no parameter 'ramp'"),
+    (('--fault', 'lift:refuse=ramp'), 2, "lift has no parameter 'ramp'"),
+    (('--axis', 'lift'), 2, 'write DRIVE:KEY=VALUE'),
+    (('--axis', 'lift:load=2'), 2, "'load=2' is not possible; allowed: load=0…1"),
     (('--interface', 'nonsense'), 1, 'nonsense'),
     (('--pty-link', '/dev/null/x'), 1, '/dev/null'),
     (('--params-file', '/nowhere.yaml'), 1, '/nowhere.yaml'),

@@ -3,6 +3,7 @@
 
 from cannord_builders import asks, FREQUENCY, inverter, says, TABLE
 import pytest
+from simulation_builders import parameter
 
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.simulation.cannord import SimulatedCannordInverter
@@ -144,6 +145,24 @@ class TestRefusals:
         made = inverter()
         assert asks(made, f'66 {task:X}0 00 00 00 00 00 00') == '66 70 00 00 00 00 C9 00'
         assert made.violations == {'task identifier that does not exist (refused)': 1}
+
+    def test_scripted_refusal(self) -> None:
+        made = inverter()
+        made.fault('refuse=p411', 0.0)
+        assert asks(made, '9B 21 00 00 00 00 05 00') == '9B 71 00 00 00 00 01 00'
+        assert asks(made, '9B 11 00 00 00 00 00 00')[:5] == '9B 11'
+        made.fault('ok', 0.0)
+        assert asks(made, '9B 21 00 00 00 00 05 00') == '9B 11 00 00 00 00 05 00'
+        assert made.wear == {'offset': 1}
+
+    def test_minimum_above_the_maximum(self) -> None:
+        made = inverter(table=(*TABLE, parameter('minimum_frequency', 104, maximum=400),
+                               parameter('maximum_frequency', 105, maximum=400)))
+        asks(made, '69 20 00 00 00 00 32 00')                # P105 = 50
+        assert asks(made, '68 20 00 00 00 00 33 00') == '68 70 00 00 00 00 02 00'
+        asks(made, '69 20 00 00 00 00 64 00')
+        assert asks(made, '68 20 00 00 00 00 33 00') == '68 10 00 00 00 00 33 00'
+        assert asks(made, '69 20 00 00 00 00 32 00') == '69 70 00 00 00 00 02 00'
 
     def test_spontaneous_bit(self) -> None:
         made = inverter()

@@ -10,14 +10,12 @@ import json
 from pathlib import Path
 from typing import Any
 
-from cannord_builders import word
+from cannord_builders import configuration, word
 import pytest
 from simulation_builders import INT16, parameter, RO
 
-from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import ParameterType
-from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.simulation.cannord import SimulatedCannordInverter
 
 FILE = json.loads((Path(__file__).parents[1] / 'vectors' / 'cannord.json').read_text(
@@ -50,12 +48,10 @@ def made_for(row: dict[str, Any]) -> SimulatedCannordInverter:
                'swap_setpoints_2_3': row.get('swap', False),
                'value_order': row.get('value_order', 'high_first'),
                'index_byte': row.get('index_byte', 'low')}
-    profile = Profile('vectors', '/vectors.yaml', '', ('cannord',), {p.name: p for p in table})
-    made = SimulatedCannordInverter(DriveConfiguration(
-        name='conveyor', bus='main', protocol='cannord', station=row['station'], profile=profile,
-        cyclic_request=tuple(REQUEST), cyclic_response=tuple(REPORT), family_options=options))
+    made = SimulatedCannordInverter(configuration(
+        table=table, station=row['station'], request=REQUEST, response=REPORT, **options))
     for setpoint in REQUEST:
-        made.plant.write(setpoint.name, UNTOUCHED)
+        made.registers.write(setpoint.name, UNTOUCHED)
     return made
 
 
@@ -79,7 +75,7 @@ def test_takes_setpoints(row: dict[str, Any]) -> None:
     first = 3 if row['kind'] == 'extra_request' else 0
     expected = [UNTOUCHED] * 5
     expected[first:first + len(row['values'])] = row['values']
-    assert [made.plant.raw(setpoint.name) for setpoint in REQUEST] == expected
+    assert [made.registers.raw(setpoint.name) for setpoint in REQUEST] == expected
     answers = made.take_frames()
     if row['kind'].startswith('broadcast'):
         assert answers == []
@@ -97,7 +93,7 @@ def test_reports_actual_values(row: dict[str, Any]) -> None:
     made = made_for(row)
     first = 3 if row['kind'] == 'extra_response' else 0
     for reading, raw in zip(REPORT[first:], row['values'], strict=False):
-        made.plant.set_value(reading.name, reading.value_from_raw(raw))
+        made.registers.set_value(reading.name, reading.value_from_raw(raw))
     length = len(frame(row).data)
     request = int(row['can_id_hex'], 16) - (0x40000 if frame(row).extended else 1)
 
@@ -125,7 +121,7 @@ def test_lengths_that_do_not_exist(row: dict[str, Any]) -> None:
 def test_carries_out_tasks(row: dict[str, Any]) -> None:
     made = made_for(row)
     if row['code'] in (1, 6):
-        made.table.set_value('wanted', 103)
+        made.set_value('wanted', 103)
 
     made.receive_frame(frame(row), 0.0)
 
@@ -139,7 +135,7 @@ def test_carries_out_tasks(row: dict[str, Any]) -> None:
     if row['code'] not in (1, 6, 9):
         # a write is answered by the value that is there now
         assert answer.data[4:] == frame(row).data[4:]
-        assert made.table.value('wanted') == (
+        assert made.value('wanted') == (
             row['value'] - 2 ** 32 if row['value'] >= 2 ** 31 else row['value'])
         assert made.eeprom_writes == (row['code'] in (2, 3, 7, 8))
     assert not made.violations
@@ -151,7 +147,7 @@ def test_carries_out_tasks(row: dict[str, Any]) -> None:
 def test_answers(row: dict[str, Any]) -> None:
     made = made_for(row)
     value = row['value']
-    made.table.set_value('wanted', value)
+    made.set_value('wanted', value)
     task = 0x10 if row['code'] in (1, 2) else 0x60
     data = frame(row).data
     request = bytes([data[0], task | data[1] & 0x0F, data[2], data[3]]) + bytes(4)

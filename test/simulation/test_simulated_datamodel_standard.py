@@ -7,7 +7,6 @@ compared here are the literal bytes of the vectors and of the manual's tables.
 """
 
 from collections.abc import Iterable
-from dataclasses import replace
 import json
 from pathlib import Path
 from typing import Any
@@ -24,6 +23,7 @@ from drive_can_bridge.core.errors import LocalProtocolError, ValueRefused
 from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.simulation.datamodel_standard import SimulatedDataModelStandardDrive
+from drive_can_bridge.simulation.drive import Surroundings
 from drive_can_bridge.simulation.drives import make_drives
 
 VECTORS = json.loads((Path(__file__).parents[1] / 'vectors' / 'datamodel.json').read_text(
@@ -39,14 +39,14 @@ UNDEFINED = 'frame that the manual does not define (ignored)'
 
 def standard(parameters: Iterable[Parameter] = EXAMPLE, **options: Any) -> DriveConfiguration:
     """Make the configuration of an 11-bit drive."""
-    return replace(configuration(parameters, **options), protocol='datamodel_standard')
+    return configuration(parameters, protocol='datamodel_standard', **options)
 
 
 def drive(parameters: Iterable[Parameter] = EXAMPLE, *, neighbours: Iterable[Route] = (),
           **options: Any) -> SimulatedDataModelStandardDrive:
     """Make an 11-bit drive."""
     return SimulatedDataModelStandardDrive(
-        standard(parameters, **options), neighbours=tuple(neighbours))
+        standard(parameters, **options), Surroundings(neighbours=tuple(neighbours)))
 
 
 # -- golden vectors -------------------------------------------------------------------------------
@@ -480,9 +480,9 @@ def test_drives_of_a_bus_know_each_other() -> None:
     third = configuration(name='third', station=1)
     drives = make_drives(bridge(first, second, third))
     assert isinstance(drives['first'], SimulatedDataModelStandardDrive)
-    assert Route(0x7F9, 0x7FF, False) in drives['first'].neighbours
-    assert Route(0x3F9, 0x7FF, False) in drives['first'].neighbours
-    assert any(route.extended for route in drives['first'].neighbours)
+    assert Route(0x7F9, 0x7FF, False) in drives['first'].surroundings.neighbours
+    assert Route(0x3F9, 0x7FF, False) in drives['first'].surroundings.neighbours
+    assert any(route.extended for route in drives['first'].surroundings.neighbours)
     # the 29-bit drive of the same station hears nothing of it
     assert ask(drives['third'], READ_RAMP, 0.0) == []       # type: ignore[arg-type]
     assert not drives['third'].violations

@@ -149,6 +149,52 @@ class TestDrive:
         ask(made, '003001E1#00C8000000000000', 1.0)
         assert made.value('ramp_time') == 2.0
 
+    def test_refused_write_changes_nothing_and_is_not_told(self) -> None:
+        # the protocol has no way to say so
+        made = drive()
+        made.fault('refuse=ramp_time', 0.0)
+        assert ask(made, '003001E1#00C8000000000000', 0.0) == []
+        assert made.value('ramp_time') == 1.0
+        assert made.eeprom_writes == 0
+        assert made.faults_text == 'refuse=ramp_time'
+        made.fault('ok', 1.0)
+        ask(made, '003001E1#00C8000000000000', 1.0)
+        assert made.value('ramp_time') == 2.0
+
+    def test_power_cut(self) -> None:
+        made = drive([*EXAMPLE, parameter('gain', 60, storage=RAM)])
+        initial = made.value('gain')
+        ask(made, '003003C1#0007000000000000', 0.0)
+        ask(made, '003001E1#00C8000000000000', 0.0)
+        made.fault('power_cut=3', 1.0)
+        assert ask(made, POLL, 3.99) == []
+        assert ask(made, POLL, 4.0) == [ANSWER]
+        assert (made.value('gain'), made.value('ramp_time')) == (initial, 2.0)
+        assert made.faults_text == 'ok'
+        made.fault('power_cut', 10.0)
+        assert ask(made, POLL, 14.99) == []
+        assert ask(made, POLL, 15.0) == [ANSWER]
+
+    def test_wear_by_parameter(self) -> None:
+        made = drive()
+        for now in (0.0, 0.02):
+            ask(made, '003001E1#00C8000000000000', now)     # ramp time, twice
+        ask(made, '003007A2#0033003200000000', 0.04)        # two entries of a map
+        ask(made, '003FFFF0#0000000000000000', 0.06)        # no EEPROM
+        assert made.wear == {'ramp_time': 2, 'p122': 1, 'p123': 1}
+        assert made.eeprom_writes == 4
+
+    def test_settings_whose_order_matters(self) -> None:
+        made = drive([*EXAMPLE, parameter('minimum_gain', 60, storage=RAM, maximum=100),
+                      parameter('maximum_gain', 61, storage=RAM, maximum=100)])
+        assert (made.value('minimum_gain'), made.value('maximum_gain')) == (0, 100)
+        ask(made, '003003D1#0032000000000000', 0.0)         # maximum 50
+        ask(made, '003003C1#003C000000000000', 0.0)         # minimum 60: not above the maximum
+        assert (made.value('minimum_gain'), made.value('maximum_gain')) == (0, 50)
+        ask(made, '003003D1#0050000000000000', 0.0)         # maximum 80
+        ask(made, '003003C1#003C000000000000', 0.0)
+        assert (made.value('minimum_gain'), made.value('maximum_gain')) == (60, 80)
+
     def test_stuck_needs_a_parameter_of_the_drive(self) -> None:
         with pytest.raises(ValueRefused, match="conveyor has no parameter 'ramp'"):
             drive().fault('stuck=ramp', 0.0)

@@ -13,9 +13,10 @@ import pytest
 
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.frame import EXTENDED_IDENTIFIER_MAX, Frame, Route
-from drive_can_bridge.core.parameters import Access, Parameter, ParameterType
+from drive_can_bridge.core.parameters import Access, Parameter, ParameterType, Storage
 from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.simulation.canopen_pkw import SimulatedPkwDrive
+from drive_can_bridge.simulation.drive import Surroundings
 
 VECTORS = json.loads((Path(__file__).parents[1] / 'vectors' / 'canopen_pkw.json').read_text(
     encoding='utf-8'))
@@ -24,6 +25,9 @@ START = '000#0105'
 IDLE = '505#0000000000000000'
 READ_455 = '505#C701002500000000'
 READ_455_TOGGLED = '505#C70100A500000000'
+#: the shipped profile without the register of the configuration mode, if it has that
+PLAIN = replace(LTMR, parameters={name: parameter for name, parameter in LTMR.parameters.items()
+                                  if parameter.number != 601})
 NOT_OPERATIONAL = 'request while the node is not operational (ignored)'
 
 
@@ -354,11 +358,94 @@ class TestMailbox:
             with pytest.raises(ValueRefused, match=name):
                 made.drive.value(name)
 
+    def test_refused_register(self) -> None:
+        made = Ltmr()
+        made.fault('refuse=flc1_ratio', 0.0)
+        # "data cannot be stored in the present state of the device"
+        assert made.write(652, 50, 0.1) == ['485#8C02004E22000008']
+        assert made.read(652, 0.2) == 33
+        made.fault('ok', 0.3)
+        assert made.write(652, 50, 0.4) == ['485#8C02002A00000000']
+
+    def test_minimum_above_the_maximum(self) -> None:
+        parameters = {name: Parameter(name, number=number, maximum=100.0) for name, number in (
+            ('minimum_level', 20), ('maximum_level', 21))}
+        made = Ltmr(Profile('table', '/table.yaml', '', ('canopen_pkw',), parameters),
+                    response=('minimum_level',))
+        made.write(21, 50, 0.1)
+        assert made.write(20, 60, 0.2) == ['485#1400004E36000906']
+        # both together are no question of order
+        assert made.ask('505#1400002B3C005000', 0.3) == ['485#1400002B00000000']
+        assert (made.read(20, 0.4), made.read(21, 0.4)) == (60, 80)
+
     def test_stuck_register_is_acknowledged_and_keeps_its_value(self) -> None:
         made = Ltmr()
         made.fault('stuck=flc1_ratio', 0.0)
         assert made.write(652, 50, 0.1) == ['485#8C02002A00000000']
         assert made.read(652, 0.2) == 33
+
+
+class TestConfigurationMode:
+
+    def made(self) -> Ltmr:
+        """Return a controller whose profile has register 601."""
+        parameters = {**LTMR.parameters, 'configuration': Parameter(
+            'configuration', number=601, storage=Storage.EEPROM)}
+        return Ltmr(replace(LTMR, parameters=parameters))
+
+    def test_settings_are_taken_in_configuration_mode_only(self) -> None:
+        made = self.made()
+        # as it leaves the factory
+        assert made.read(601, 0.0) == 1
+        assert made.write(652, 50, 0.1) == ['485#8C02002A00000000']
+        assert made.read(652, 0.1) == 50
+        made.write(601, 0, 0.2)
+        # no exception, but the value stays as it was
+        assert made.write(652, 60, 0.3) == ['485#8C02002A00000000']
+        assert made.write(606, 10, 0.3) == ['485#5E02002A00000000']
+        assert (made.read(652, 0.4), made.read(606, 0.4)) == (50, 5)
+        assert made.drive.wear == {'flc1_ratio': 1, 'configuration': 1}
+        made.write(601, 1, 0.5)
+        made.write(652, 60, 0.6)
+        assert made.read(652, 0.7) == 60
+
+    def test_values_that_cannot_be_are_refused_all_the_same(self) -> None:
+        made = self.made()
+        made.write(601, 0, 0.1)
+        assert made.write(652, 0xFFFF, 0.2) == ['485#8C02004E30000906']
+
+    def test_the_motor_has_to_be_off(self) -> None:
+        made = self.made()
+        made.write(704, 1, 0.1)
+        assert made.write(652, 50, 0.2) == ['485#8C02002A00000000']
+        assert made.read(652, 0.3) == 33
+        # commands are no settings
+        made.write(704, 0, 0.4)
+        assert made.read(458, 0.4) == 0
+        made.write(652, 50, 0.5)
+        assert made.read(652, 0.5) == 50
+
+    def test_by_sdo_it_is_the_same(self) -> None:
+        made = self.made()
+        made.write(601, 0, 0.1)
+        assert made.ask('605#2B0720032D000000', 0.2) == ['585#6007200300000000']
+        assert made.read(652, 0.3) == 33
+
+    def test_a_power_cut_keeps_the_mode(self) -> None:
+        made = self.made()
+        made.write(652, 50, 0.1)
+        made.write(601, 0, 0.1)
+        made.write(704, 1, 0.1)
+        made.fault('power_cut=2', 1.0)
+        assert made.until(3.5) == [(3.0, '705#00')]
+        made.ask(START, 3.6)
+        assert [made.read(register, 3.7) for register in (601, 652, 704, 458)] == [0, 50, 0, 0]
+
+    def test_without_register_601_settings_can_always_be_changed(self) -> None:
+        assert 601 not in {parameter.number for parameter in PLAIN.parameters.values()}
+        made = Ltmr(PLAIN)
+        made.write(652, 50, 0.1)
+        assert made.read(652, 0.2) == 50
 
 
 class TestFaults:
@@ -408,7 +495,7 @@ class TestFaults:
     def test_foreign_frames_keep_clear_of_neighbours(self) -> None:
         neighbour = SimulatedPkwDrive.routes(configuration(name='fan', station=1))
         made = Ltmr()
-        made.drive.neighbours = tuple(neighbour)
+        made.drive.surroundings = Surroundings(neighbours=tuple(neighbour))
         made.fault('foreign', 0.0)
         assert made.ask(READ_455, 0.1)[0].startswith('482#')
 
@@ -499,8 +586,8 @@ class TestMotor:
         made.until(60.0)
         made.drive.take_frames()
         assert 10 < made.read(465, 60.0) < 50
-        # 10 % of 27 A: the motor takes 233 %
-        made.write(652, 10, 60.0)
+        # 10 % of 27 A: the motor takes 233 %. Over the bus it would have to stand
+        made.drive.set_value('flc1_ratio', 10.0, 60.0)
         left = made.read(511, 60.0)
         assert 5 < left < 60
         tripped = [now for now, text in made.until(200.0) if text == '085#00FF810400000000']
@@ -708,6 +795,6 @@ def test_whatever_comes_it_stays_a_good_node(steps: list[tuple[float, Frame]]) -
                 and frame.data[1] in (0, NODE):
             operational = frame.data[0] == 1 or operational and frame.data[0] not in (
                 2, 0x80, 0x81, 0x82)
-        raw = made.drive.plant.raw
+        raw = made.drive.registers.raw
         assert 5 <= raw('flc1_ratio') <= 100
         assert raw('motor_trip_class') % 5 == 0

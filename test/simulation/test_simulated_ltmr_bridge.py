@@ -228,7 +228,7 @@ def test_late_answers_are_never_taken_for_others(late: float) -> None:
         answer, = line.outcome(write((RATIO, value)), 60.0)
         assert answer == 'written' or str(answer).startswith('no answer')
         found, = line.outcome(read(RATIO), 60.0)
-        assert found == line.ltmr.plant.raw('flc1_ratio') or str(found).startswith('no answer')
+        assert found == line.ltmr.registers.raw('flc1_ratio') or str(found).startswith('no answer')
         if late < 0.5:
             assert (answer, found) == ('written', value)
 
@@ -258,7 +258,7 @@ def test_restart_in_the_middle_of_a_write(boot: float) -> None:
     assert line.writes('C002')[-1] == '0000'
     assert not line.ltmr.plant.operation.enabled
     assert line.ltmr.value('flc1_ratio') in (33.0, 50.0)
-    assert line.outcome(read(RATIO)) == [line.ltmr.plant.raw('flc1_ratio')]
+    assert line.outcome(read(RATIO)) == [line.ltmr.registers.raw('flc1_ratio')]
     assert line.control(ControlAction.ENABLE)[0]
 
 
@@ -364,6 +364,9 @@ def test_whatever_happens_answers_are_true_and_the_drive_comes_back(
     line.fault('ok')
     line.run(line.now + 10.0)
     assert line.session.online
+    # settings are taken while the motor is off
+    line.session.take_control_outcomes()
+    assert line.control(ControlAction.DISABLE)[0]
     assert line.outcome(write((RATIO, 42))) == ['written']
     assert line.ltmr.value('flc1_ratio') == 42.0
     assert line.outcome(read(RATIO)) == [42]

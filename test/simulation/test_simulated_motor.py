@@ -1,22 +1,23 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The motor of the simulated drives, and how its quantities get into parameters by their names."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
 from hypothesis import given, strategies as st
 import pytest
 from simulation_builders import (
-    ACTUAL_SPEED, CONTROL, CONTROL_WORD, EXAMPLE, INT16, parameter, profile, RAM, RO,
+    ACTUAL_SPEED, CONTROL, CONTROL_WORD, EXAMPLE, INT16, motor, parameter, RAM, RO,
     SPEED_SETPOINT, STATUS_WORD, WO,
 )
 
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.core.profile import StatusPattern
 from drive_can_bridge.simulation import names, scales
+from drive_can_bridge.simulation.datamodel_extended import SimulatedDataModelDrive
 from drive_can_bridge.simulation.motor import AMBIENT_TEMPERATURE, Motor, Ramp, Rates
 from drive_can_bridge.simulation.names import Quantity, RampKind, RampUse
-from drive_can_bridge.simulation.plant import Plant
 
 RATES = Rates(rising=10.0, falling=20.0)
 
@@ -87,7 +88,7 @@ class TestMotor:
     def test_without_torque(self) -> None:
         motor = Motor(3000.0, 1.0 / 60.0)
         motor.advance(1.0, 3000.0, Rates(3000.0, 3000.0), energised=False)
-        assert (motor.speed, motor.torque, motor.current) == (0.0, 0.0, 0.0)
+        assert (motor.torque, motor.current) == (0.0, 0.0)
 
 
 class TestNames:
@@ -149,21 +150,27 @@ class TestPlant:
         assert plant.value('position') == pytest.approx(100.0, abs=2.0)
 
     def test_position_is_that_of_the_shaft_where_a_speed_is_commanded(self) -> None:
-        plant = running(BOTH, 'speed_setpoint', 60.0, preferred=['speed_setpoint'])
+        plant = running(BOTH, 'speed_setpoint', 60.0, request=[SPEED_SETPOINT])
         assert plant.value('actual_speed') == 60.0
         before = plant.value('actual_position')
-        plant.advance(10.5)
+        plant.handle_timer(10.5)
         assert plant.value('actual_position') == pytest.approx(before + 180.0, abs=1.0)
 
     def test_position_is_followed_where_a_position_is_commanded(self) -> None:
-        plant = running(BOTH, 'position_setpoint', 90.0, preferred=['position_setpoint'])
+        plant = running(BOTH, 'position_setpoint', 90.0, request=[POSITION_SETPOINT])
         assert plant.value('actual_position') == 90.0
         assert plant.value('actual_speed') == 0.0
-        plant.write('position_setpoint', 30000)
-        plant.advance(10.1)
-        # 3000 degrees per second are 500 rpm
-        assert plant.value('actual_position') == 390.0
-        assert plant.value('actual_speed') == 500.0
+        plant.registers.write('position_setpoint', 30000)
+        # from rest with 3000 degrees per second squared, up to 3000 degrees per second: 500 rpm
+        plant.handle_timer(10.1)
+        assert plant.value('actual_position') == 105.0
+        assert plant.value('actual_speed') == 50.0
+        plant.handle_timer(10.5)
+        assert plant.value('actual_position') == 465.0
+        assert plant.value('actual_speed') == 250.0
+        plant.handle_timer(13.0)
+        assert plant.value('actual_position') == 3000.0
+        assert plant.value('actual_speed') == 0.0
 
     def test_position_wraps_where_the_parameter_ends(self) -> None:
         wrapped = parameter('position', 1, type=INT16, access=RO)
@@ -189,27 +196,27 @@ class TestPlant:
 
     def test_rate_parameters(self) -> None:
         rate = parameter('acceleration', 3, unit='rpm/s', storage=RAM)
-        plant = Plant(profile([*EXAMPLE[:-1], rate]))
+        plant = motor([*EXAMPLE[:-1], rate])
         assert plant.value('acceleration') == 3000.0
-        plant.write('acceleration', 600)
-        plant.write('speed_setpoint', 30000)
-        plant.advance(0.0)
-        plant.advance(1.0)
+        plant.registers.write('acceleration', 600)
+        plant.registers.write('speed_setpoint', 30000)
+        plant.handle_timer(0.0)
+        plant.handle_timer(1.0)
         assert plant.value('actual_speed') == 600.0
 
     def test_power_cycle_keeps_what_eeprom_keeps(self) -> None:
         gain = parameter('gain', 60, storage=RAM)
         unknown = parameter('offset_angle', 61)
-        plant = Plant(profile([*EXAMPLE, gain, unknown]))
-        initial = plant.raw('gain')
+        plant = motor([*EXAMPLE, gain, unknown])
+        initial = plant.registers.raw('gain')
         for name, raw in (('gain', 999), ('offset_angle', 999), ('ramp_time', 500),
                           ('speed_setpoint', 5000)):
-            plant.write(name, raw)
-        plant.power_on()
-        assert plant.raw('gain') == initial
-        assert plant.raw('offset_angle') == 999
-        assert plant.raw('ramp_time') == 500
-        assert plant.raw('speed_setpoint') == 0
+            plant.registers.write(name, raw)
+        plant.fault('restart=0', 1.0)
+        assert plant.registers.raw('gain') == initial
+        assert plant.registers.raw('offset_angle') == 999
+        assert plant.registers.raw('ramp_time') == 500
+        assert plant.registers.raw('speed_setpoint') == 0
 
     def test_every_kind_of_parameter_has_an_initial_value(self) -> None:
         table: list[Parameter] = [
@@ -221,7 +228,7 @@ class TestPlant:
             parameter('position_setpoint', 7, neutral=1e9),
             parameter('ramp_ms', 8, unit='ms'), parameter('warm_up', 9, minimum=200.0),
         ]
-        plant = Plant(profile(table))
+        plant = motor(table)
         assert [plant.value(p.name) for p in table] == [
             False, 0, 100, 100.0, 10.0, 1.0, 0, 1000.0, 200]
 
@@ -233,12 +240,12 @@ BOTH = [SPEED_SETPOINT, POSITION_SETPOINT, ACTUAL_SPEED, ACTUAL_POSITION]
 
 
 def running(table: list[Parameter], setpoint: str, value: float,
-            preferred: list[str] | None = None) -> Plant:
-    """Make a plant that has followed a setpoint for ten seconds."""
-    plant = Plant(profile(table), preferred=preferred or [])
+            request: Iterable[Parameter] = ()) -> SimulatedDataModelDrive:
+    """Make a drive that has followed a setpoint for ten seconds."""
+    plant = motor(table, request=request)
     plant.set_value(setpoint, value)
-    plant.advance(0.0)
-    plant.advance(10.0)
+    plant.handle_timer(0.0)
+    plant.handle_timer(10.0)
     return plant
 
 
@@ -266,8 +273,8 @@ def test_torque_setpoint_is_followed_and_ends_with_a_fault() -> None:
     actual = parameter('actual_torque', 4, unit='%', type=INT16, access=RO)
     plant = running([*EXAMPLE, setpoint, actual], 'torque_setpoint', 50.0)
     assert plant.value('actual_torque') == 50.0
-    plant.trip()
-    plant.advance(20.0)
+    plant.plant.trip()
+    plant.handle_timer(20.0)
     assert plant.value('actual_torque') == 0.0
 
 
@@ -275,16 +282,16 @@ def test_ramps_by_use() -> None:
     table = [SPEED_SETPOINT, ACTUAL_SPEED, parameter('ramp_up_time', 1, unit='s'),
              parameter('ramp_down_time', 2, unit='s'),
              parameter('quick_stop_ramp', 3, scale=0.1, unit='s')]
-    plant = Plant(profile(table))
+    plant = motor(table)
     assert plant.value('quick_stop_ramp') == pytest.approx(0.2)
-    plant.write('ramp_up_time', 2)
-    plant.write('ramp_down_time', 4)
+    plant.registers.write('ramp_up_time', 2)
+    plant.registers.write('ramp_down_time', 4)
     plant.set_value('speed_setpoint', 3000.0)
-    plant.advance(0.0)
-    plant.advance(1.0)
+    plant.handle_timer(0.0)
+    plant.handle_timer(1.0)
     assert plant.value('actual_speed') == 1500.0
     plant.set_value('speed_setpoint', 0.0)
-    plant.advance(2.0)
+    plant.handle_timer(2.0)
     assert plant.value('actual_speed') == 750.0
 
 
@@ -293,10 +300,10 @@ def test_overlapping_status_patterns() -> None:
     table = replace(CONTROL, ready=StatusPattern(7, 0), enabled=StatusPattern(7, 3),
                     fault=StatusPattern(7, 4))
     bare = replace(STATUS_WORD, bits=(('moving', 15),))
-    plant = Plant(profile([SPEED_SETPOINT, ACTUAL_SPEED, bare, CONTROL_WORD], table))
-    plant.advance(0.0)
-    assert plant.raw('status_word') == 0
-    plant.write('control_word', 1)
-    assert plant.raw('status_word') == 3
-    plant.trip()
-    assert plant.raw('status_word') == 4
+    plant = motor([SPEED_SETPOINT, ACTUAL_SPEED, bare, CONTROL_WORD], table)
+    plant.handle_timer(0.0)
+    assert plant.registers.raw('status_word') == 0
+    plant.registers.write('control_word', 1)
+    assert plant.registers.raw('status_word') == 3
+    plant.plant.trip()
+    assert plant.registers.raw('status_word') == 4

@@ -2,7 +2,8 @@
 """Drives played by threads: on python-can's virtual bus, on lost buses, by the console."""
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 import os
 import threading
 import time
@@ -10,15 +11,19 @@ from typing import Any
 
 import can
 import pytest
-from simulation_builders import bridge, configuration, frame
+from simulation_builders import bridge, configuration, frame, INT16, parameter, RO
 from waiting import wait_for
 
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import (
-    BusMisconfigured, BusUnavailable, TransportError, ValueRefused,
+    BusMisconfigured, BusUnavailable, ConfigurationError, TransportError, ValueRefused,
 )
 from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.simulation.console import Console, LineReader
+from drive_can_bridge.simulation.drives import make_drives
+from drive_can_bridge.simulation.motor_plant import MotorPlant
+from drive_can_bridge.simulation.registers import Refusal
 from drive_can_bridge.simulation.simulation import Simulation
 from drive_can_bridge.simulation.terminal import SlcanTerminal
 from drive_can_bridge.transport.end_point import EndPoint
@@ -202,6 +207,43 @@ def test_age_of_a_frame_counts() -> None:
         assert not made.simulation.drives['conveyor'].violations
 
 
+class Clock(MotorPlant):
+    """A plant that shows the time instead of a speed."""
+
+    def source(self, parameter: Parameter) -> Callable[[], int] | None:
+        if parameter.name == 'actual_speed':
+            return lambda: round(self.now or 0.0) % 1000
+        return super().source(parameter)
+
+
+def test_a_plant_of_ones_own() -> None:
+    made = make_drives(bridge(configuration(), configuration(name='lift', station=2)),
+                       plants={'lift': Clock})
+    for name in ('conveyor', 'lift'):
+        made[name].handle_timer(123.0)
+    assert made['lift'].value('actual_speed') == pytest.approx(12.3)
+    assert made['conveyor'].value('actual_speed') == 0.0
+    with pytest.raises(ConfigurationError, match='mixer: an inverter needs an InverterPlant'):
+        make_drives(bridge(configuration(name='mixer', protocol='cannord', request=(),
+                                         response=())), plants={'mixer': MotorPlant})
+
+
+@pytest.mark.parametrize('protocol', ['datamodel_extended', 'datamodel_standard', 'cannord',
+                                      'canopen_pkw'])
+def test_any_profile_is_plain_memory_at_least(protocol: str) -> None:
+    table = [parameter('blue', 10, type=INT16, minimum=-5, maximum=50), parameter('green', 11),
+             parameter('red', 12, access=RO, unit='furlong')]
+    made = make_drives(bridge(configuration(table, protocol=protocol, request=(), response=(
+        replace(table[2], number=None if protocol == 'cannord' else 12),))))['conveyor']
+    before = made.value('red')
+    made.registers.write('blue', -3)
+    assert (made.value('blue'), made.value('red')) == (-3, before)
+    assert made.registers.refusal({'blue': 51}) is Refusal.OUT_OF_RANGE
+    assert made.registers.refusal({'red': 1}) is Refusal.READ_ONLY
+    made.fault('restart=0', 1.0)
+    assert made.value('blue') == -3
+
+
 def test_virtual_bus() -> None:
     channel = 'test_simulation'
     with Simulation(bridge(channel=channel)) as simulation, can.Bus(
@@ -243,12 +285,21 @@ class TestConsole:
                 '0 EEPROM writes, faults: ok')
         assert lines('lift') == ([line], [])
         assert lines('list')[0][1] == line
-        assert '  drop=N             every Nth answer is lost (1: all)' in lines('help')[0]
+        assert '  drop=N               every Nth answer is lost (1: all)' in lines('help')[0]
         assert lines('') == ([], [])
 
+    def test_status_shows_wear(self, lines: Any, scripted: Scripted) -> None:
+        conveyor = scripted.simulation.drives['conveyor']
+        scripted.ports[0].put(frame('003001E1#00C8000000000000'))
+        wait_for(lambda: conveyor.eeprom_writes == 1, 'write')
+        assert conveyor.wear == {'ramp_time': 1}
+        assert lines('status')[0][1:] == ['conveyor: EEPROM writes: ramp_time 1',
+                                          lines('lift')[0][0]]
+        assert lines('conveyor')[0][1:] == ['conveyor: EEPROM writes: ramp_time 1']
+
     @pytest.mark.parametrize(('line', 'complaint'), [
-        ('lft silent', "no drive 'lft'; drives: conveyor, lift; also: list, help"),
-        ('list all', "no drive 'list'; drives: conveyor, lift; also: list, help"),
+        ('lft silent', "no drive 'lft'; drives: conveyor, lift; also: status, list, help"),
+        ('list all', "no drive 'list'; drives: conveyor, lift; also: status, list, help"),
         ('lift late', "'late' is not a fault, write late=SECONDS"),
         ('lift stuck=p999', "lift has no parameter 'p999'"),
     ])

@@ -8,8 +8,8 @@ and may be written.
 
 from abc import ABC, abstractmethod
 
+from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.protocols.canopen_pkw import abort_codes
-from drive_can_bridge.simulation.canopen_pkw_registers import Refused
 
 LENGTH = 8
 EXPEDITED_MAX = 4
@@ -21,6 +21,18 @@ DOWNLOAD, UPLOAD, UPLOAD_SEGMENT, ABORT = 1, 2, 3, 4
 EXPEDITED, SIZE_GIVEN, TOGGLE = 0x02, 0x01, 0x10
 RESPONSE_UPLOAD, RESPONSE_DOWNLOAD, RESPONSE_ABORT = 0x40, 0x60, 0x80
 TYPE_TOO_LONG, TYPE_TOO_SHORT = 0x06070012, 0x06070013
+
+
+class Refused(DriveCanError):
+    """
+    An access that the device does not carry out.
+
+    :param code: SDO abort code.
+    """
+
+    def __init__(self, code: int) -> None:
+        super().__init__(abort_codes.describe(code))
+        self.code = code
 
 
 class Objects(ABC):
@@ -80,11 +92,12 @@ class SdoServer:
             return (bytes((RESPONSE_ABORT,)) + self._address
                     + error.code.to_bytes(4, 'little'))
 
+    @property
     def _place(self) -> tuple[int, int]:
         return int.from_bytes(self._address[:2], 'little'), self._address[2]
 
     def _upload(self) -> bytes:
-        data = self._objects.read(*self._place())
+        data = self._objects.read(*self._place)
         if len(data) <= EXPEDITED_MAX:
             unused = EXPEDITED_MAX - len(data)
             head = RESPONSE_UPLOAD | unused << 2 | EXPEDITED | SIZE_GIVEN
@@ -108,7 +121,7 @@ class SdoServer:
         size = EXPEDITED_MAX
         if request[0] & SIZE_GIVEN:
             size -= request[0] >> 2 & 0x03
-        self._objects.write(*self._place(), request[4:4 + size])
+        self._objects.write(*self._place, request[4:4 + size])
         return bytes((RESPONSE_DOWNLOAD,)) + self._address + bytes(4)
 
 

@@ -1,0 +1,201 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The registers of a simulated drive: raw integers by the parameter names of its profile.
+
+A :class:`~.plant.Plant` computes some of them (actual values, status words). Every other one is
+plain memory with the type, the limits and the access of the profile: it keeps what is written,
+without power only what is in EEPROM.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Collection, Mapping
+from enum import Enum
+import zlib
+
+from drive_can_bridge.core.errors import ValueRefused
+from drive_can_bridge.core.parameters import Access, Parameter, ParameterType, Storage, Value
+from drive_can_bridge.simulation import names
+from drive_can_bridge.simulation.plant import Plant
+from drive_can_bridge.simulation.scales import RawRange
+
+
+class Refusal(Enum):
+    """Why a write is refused, where a protocol can say so."""
+
+    READ_ONLY = 'read-only'
+    OUT_OF_RANGE = 'out of range'
+    CROSSED = 'minimum above maximum'
+    FORBIDDEN = 'a scripted fault'
+
+
+class Registers:
+    """
+    All registers of one drive.
+
+    :param volatile: names of parameters that a power cycle resets although the profile does not
+        say where they are stored (those exchanged cyclically live in RAM).
+    :ivar stuck: names of parameters on which writes have no effect.
+    :ivar refused: names of parameters whose writes are refused.
+    :ivar wear: EEPROM writes by name.
+    :ivar stand_ins: name of the register that counts for the motor instead of another one.
+    """
+
+    def __init__(self, parameters: Mapping[str, Parameter], volatile: Collection[str]) -> None:
+        self.parameters = parameters
+        self.stuck: set[str] = set()
+        self.refused: set[str] = set()
+        self.wear: Counter[str] = Counter()
+        self.stand_ins: dict[str, str] = {}
+        self._volatile = volatile
+        self._limits = {name: RawRange(parameter, limits=True)
+                        for name, parameter in parameters.items()}
+        self._crossings = names.crossings(parameters)
+        self._raw: dict[str, int] = {}
+        self._initial: dict[str, int] = {}
+        self._kept: dict[str, int] = {}
+        self._held: dict[str, int] = {}
+        self._sources: dict[str, Callable[[], int]] = {}
+
+    def connect(self, plant: Plant) -> None:
+        """Fill the registers with what a new drive has, and let a plant compute the others."""
+        self._plant = plant
+        for name, parameter in self.parameters.items():
+            initial = plant.initial(parameter)
+            self._initial[name] = (initial_value(parameter, self._limits[name])
+                                   if initial is None else self._limits[name].clamp(initial))
+            source = None if parameter.writable else plant.source(parameter)
+            if source is not None:
+                self._sources[name] = source
+        self._raw.update(self._initial)
+
+    # -- from outside -----------------------------------------------------------------------------
+
+    def raw(self, name: str) -> int:
+        """Return a register, as of the last time that the plant moved."""
+        source = self._sources.get(name)
+        if source is None:
+            return self._raw[name]
+        held = self._held.get(name)
+        return source() if held is None else held
+
+    def plain(self, name: str) -> int:
+        """Return what stands in a register that is computed from it."""
+        return self._raw[name]
+
+    def clamped(self, name: str, raw: int) -> int:
+        """Return the allowed raw integer nearest to another one."""
+        return self._limits[name].clamp(raw)
+
+    def refusal(self, raws: Mapping[str, int]) -> Refusal | None:
+        """Say why registers that are written together refuse it; None: they do not."""
+        for name, raw in raws.items():
+            parameter = self.parameters[name]
+            if not parameter.writable:
+                return Refusal.READ_ONLY
+            if name in self.refused:
+                return Refusal.FORBIDDEN
+            if raw != self.clamped(name, raw) or not self._plant.allows(parameter, raw):
+                return Refusal.OUT_OF_RANGE
+            for ends in self._crossings.get(name, ()):
+                low, high = (self.parameters[end].value_from_raw(raws.get(end, self._raw[end]))
+                             for end in ends)
+                if low > high:
+                    return Refusal.CROSSED
+        return None
+
+    def write(self, name: str, raw: int, *, keep: bool | None = None, wear: int = 0) -> None:
+        """
+        Write a register as an accepted request does. Some are acknowledged and change nothing.
+
+        :param keep: survives a loss of power; None: as the profile says.
+        :param wear: EEPROM cells that it takes.
+        """
+        parameter = self.parameters[name]
+        if name in self.stuck or name in self.refused or not self._plant.takes(parameter):
+            return
+        if wear:
+            self.wear[name] += wear
+        self._store(name, raw, not self.is_volatile(parameter) if keep is None else keep)
+
+    def is_volatile(self, parameter: Parameter) -> bool:
+        """Tell whether a power cycle resets a register (of unknown storage: EEPROM)."""
+        if parameter.storage is not None:
+            return parameter.storage is Storage.RAM
+        return parameter.name in self._volatile or parameter.name in self._plant.volatile
+
+    def lose_power(self) -> None:
+        """Forget everything but what is in EEPROM."""
+        self._raw.update(self._initial)
+        self._raw.update(self._kept)
+        self._held.clear()
+
+    # -- by hand ----------------------------------------------------------------------------------
+
+    def value(self, name: str) -> Value:
+        """Return a register as a physical value."""
+        return self.parameters[name].value_from_raw(self.raw(name))
+
+    def set_value(self, name: str, value: Value) -> None:
+        """
+        Set any register, read-only ones included. A computed one is held at the value.
+
+        :raises ValueRefused: the value does not fit the parameter.
+        """
+        parameter = self.parameters[name]
+        raw = parameter.raw_from_value(value)
+        if name in self._sources:
+            self._held[name] = raw
+        else:
+            self._store(name, raw, not self.is_volatile(parameter))
+
+    def release(self, name: str) -> None:
+        """Compute a register again that was held."""
+        self._held.pop(name, None)
+
+    # -- for plants -------------------------------------------------------------------------------
+
+    def commanded(self, name: str) -> float:
+        """Return what counts for the motor: the value of a register or of its stand-in."""
+        name = self.stand_ins.get(name, name)
+        return float(self.parameters[name].value_from_raw(self._raw[name]))
+
+    def put(self, name: str, value: float) -> None:
+        """Change a register from inside: nobody is told."""
+        self._raw[name] = self._limits[name].nearest(value)
+
+    def reset(self, name: str) -> None:
+        """Give a register back what a new drive has in it."""
+        self._kept.pop(name, None)
+        self._raw[name] = self._initial[name]
+
+    def _store(self, name: str, raw: int, keep: bool) -> None:
+        before, self._raw[name] = self._raw[name], raw
+        if keep:
+            self._kept[name] = raw
+        self._plant.written(name, before, raw)
+
+
+def initial_value(parameter: Parameter, limits: RawRange) -> int:
+    """Return a value that a new drive might have; the same one each time."""
+    if parameter.neutral is not None:
+        return neutral_raw(parameter, limits)
+    words = set(parameter.name.split('_'))
+    if (parameter.bits or 'status' in words or parameter.type is ParameterType.BOOL
+            or parameter.access is Access.WRITE_ONLY):
+        return limits.clamp(0)
+    if {'limit', 'maximum', 'max'} & words:
+        return limits.nearest(100.0 if parameter.maximum is None else parameter.maximum)
+    if {'minimum', 'min'} & words:
+        return limits.nearest(0.0 if parameter.minimum is None else parameter.minimum)
+    if parameter.minimum is not None and parameter.maximum is not None:
+        return limits.nearest(parameter.minimum + (parameter.maximum - parameter.minimum) / 3.0)
+    # any figure will do, as long as it is not 0 and differs between parameters
+    return limits.clamp(10 + zlib.crc32(parameter.name.encode()) % 90)
+
+
+def neutral_raw(parameter: Parameter, limits: RawRange) -> int:
+    """Return where a setpoint begins."""
+    try:
+        return limits.clamp(parameter.neutral_raw)
+    except ValueRefused:
+        return limits.clamp(0)

@@ -1,0 +1,165 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+A motor starter with overload protection: contactors, currents, thermal image.
+
+Not a model of any real controller: an induction motor switched on directly, with an inrush
+current, a load current and a thermal image that trips. Time is an argument.
+"""
+
+import math
+
+from drive_can_bridge.core.profile import ControlTable
+from drive_can_bridge.simulation.control import Operation
+
+#: bits of control register 1
+RUN_FORWARD, RUN_REVERSE, RESET = 1 << 0, 1 << 1, 1 << 3
+
+#: A; the largest full load current of the controller, and what the motor takes
+CONTROLLER_CURRENT = 27.0
+LOAD_CURRENT = 6.3
+INRUSH_CURRENT = 45.0
+#: s
+INRUSH_TIME_CONSTANT = 0.4
+START_TIME = 2.0
+#: the motor may carry this share of its full load current for ever
+SERVICE_FACTOR = 1.1
+#: thermal image in s, per s of trip class: six times the full load current trips after the class
+CLASS_FACTOR = -1.0 / math.log1p(-(SERVICE_FACTOR / 6.0) ** 2)
+#: % of the thermal capacity
+TRIP_LEVEL, ALARM_LEVEL, RESET_LEVEL = 100.0, 85.0, 75.0
+#: longest step of the thermal image, s
+STEP = 0.05
+
+#: trip codes
+THERMAL_OVERLOAD, TEST_TRIP = 4, 10
+
+
+class StarterOperation(Operation):
+    """
+    Obeys single bits of the control word, unlike drives that know whole words.
+
+    :ivar reverse: the contactor for the other direction is closed.
+    """
+
+    def __init__(self, table: ControlTable | None) -> None:
+        self.reverse = False
+        super().__init__(table)
+
+    def power_on(self) -> None:
+        """Begin anew: no trip, off."""
+        super().power_on()
+        self.enabled = self.reverse = False
+
+    def word_written(self, word: int, now: float) -> None:
+        """Obey a control word: run while one run bit is set, reset when its bit appears."""
+        before, self._word = self._word or 0, word
+        run = word & (RUN_FORWARD | RUN_REVERSE)
+        if not run:
+            self._blocked = False
+        if self.faulted:
+            if word & ~before & RESET and self.reset_allowed(now):
+                self.faulted = False
+            return
+        self.enabled = run in (RUN_FORWARD, RUN_REVERSE) and not self._blocked
+        self.reverse = run == RUN_REVERSE
+
+    def reset_allowed(self, now: float) -> bool:
+        """Tell whether the cause of a trip is gone."""
+        return now >= self._cause_ends
+
+    def prolong(self, until: float) -> None:
+        """Take note that the cause lasts until some time at least."""
+        self._cause_ends = max(self._cause_ends, until)
+
+    def cause_gone(self) -> None:
+        """Take note that the cause has been removed."""
+        self._cause_ends = -math.inf
+
+    def repair(self) -> None:
+        """Clear a trip by hand; the motor stays off until it is commanded again."""
+        self.faulted = False
+        self.cause_gone()
+
+
+class Starter:
+    """
+    The motor behind the contactor: currents and thermal image.
+
+    :ivar current: A, mean of the three phases.
+    :ivar thermal: % of the thermal capacity.
+    """
+
+    def __init__(self) -> None:
+        self.thermal = 0.0
+        self.full_load_current = CONTROLLER_CURRENT / 3.0
+        self.time_constant = CLASS_FACTOR * 5.0
+        self._on_for: float | None = None
+
+    @property
+    def current(self) -> float:
+        """Mean current of the phases, in A."""
+        if self._on_for is None:
+            return 0.0
+        inrush = INRUSH_CURRENT - LOAD_CURRENT
+        return LOAD_CURRENT + inrush * math.exp(-self._on_for / INRUSH_TIME_CONSTANT)
+
+    @property
+    def ratio(self) -> float:
+        """Current as a share of the full load current."""
+        return self.current / self.full_load_current
+
+    @property
+    def starting(self) -> bool:
+        """The motor was switched on a moment ago."""
+        return self._on_for is not None and self._on_for < START_TIME
+
+    @property
+    def time_to_trip(self) -> float:
+        """Time in s until this current would trip; infinity: never."""
+        final = self._final_level
+        if final <= TRIP_LEVEL:
+            return math.inf
+        if self.thermal >= TRIP_LEVEL:
+            return 0.0
+        return self.time_constant * math.log((final - self.thermal) / (final - TRIP_LEVEL))
+
+    @property
+    def time_to_reset(self) -> float:
+        """Time in s until a motor that is off has cooled down enough."""
+        if self.thermal <= RESET_LEVEL:
+            return 0.0
+        return self.time_constant * math.log(self.thermal / RESET_LEVEL)
+
+    def settings(self, full_load_percent: float, trip_class: float) -> None:
+        """Take the settings of the overload protection."""
+        self.full_load_current = max(full_load_percent, 1.0) / 100.0 * CONTROLLER_CURRENT
+        self.time_constant = CLASS_FACTOR * max(trip_class, 1.0)
+
+    def switch(self, on: bool) -> None:
+        """Close or open the contactor."""
+        if not on:
+            self._on_for = None
+        elif self._on_for is None:
+            self._on_for = 0.0
+
+    def advance(self, duration: float) -> bool:
+        """
+        Let time pass.
+
+        :return: the thermal capacity is used up.
+        """
+        steps = max(math.ceil(duration / STEP), 1)
+        for _ in range(min(steps, 10_000)):
+            step = duration / steps
+            if self._on_for is not None:
+                self._on_for += step
+            self.thermal += (self._final_level - self.thermal) * -math.expm1(
+                -step / self.time_constant)
+            if self._on_for is not None and self.thermal >= TRIP_LEVEL:
+                return True
+        return False
+
+    @property
+    def _final_level(self) -> float:
+        """Thermal level that the present current leads to."""
+        return TRIP_LEVEL * (self.ratio / SERVICE_FACTOR) ** 2

@@ -1,0 +1,266 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+What the registers of a TeSys T LTMR show of a motor starter, and which writes they take.
+
+It is there so that the registers look alive, belong together and react to what is commanded.
+Which register means what is partly recollection; docs/protocol_canopen_pkw.md says how far it can
+be trusted.
+"""
+
+from collections.abc import Callable, Collection
+from dataclasses import replace
+import math
+
+from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.profile import Profile
+from drive_can_bridge.protocols.canopen_pkw.object_map import register_of
+from drive_can_bridge.simulation.plant import Mechanics
+from drive_can_bridge.simulation.registers import Registers
+from drive_can_bridge.simulation.scales import RawRange
+from drive_can_bridge.simulation.starter import (
+    ALARM_LEVEL, Starter, StarterOperation, TEST_TRIP, THERMAL_OVERLOAD,
+)
+from drive_can_bridge.simulation.status import State, StatusWord
+
+GENERAL_CONFIGURATION = 601
+TRIP_CLASS = 606
+FULL_LOAD_RATIO = 652
+NODE_ADDRESS = 696
+CONTROL_REGISTER_1 = 704
+CONTROL_REGISTER_2 = 705
+STATUS_1 = 455
+
+#: bit of the general configuration register: settings can be changed
+CONFIGURATION_MODE = 1 << 0
+#: bits of control register 2
+CLEAR_ALL, CLEAR_THERMAL_LEVEL, CLEAR_SETTINGS = 1 << 0, 1 << 2, 1 << 3
+
+#: registers that are written in configuration mode only
+SETTINGS = range(540, 700)
+#: what settings are in a new controller, by register: in configuration mode, as from the factory
+DEFAULTS = {GENERAL_CONFIGURATION: CONFIGURATION_MODE, TRIP_CLASS: 5, FULL_LOAD_RATIO: 33, 653: 33,
+            682: 0, 695: 0, CONTROL_REGISTER_1: 0, CONTROL_REGISTER_2: 0}
+#: settings that take only multiples of something, by register
+STEPS = {TRIP_CLASS: 5}
+
+MAINS_VOLTAGE = 400.0
+MAINS_FREQUENCY = 50.0
+POWER_FACTOR = 0.85
+#: share by which the mains swing, and how fast (rad/s)
+MAINS_SWING = 0.005
+MAINS_RATE = 2.0 * math.pi * 0.3
+NEVER = 9999
+
+
+def is_starter(profile: Profile) -> bool:
+    """Tell whether a profile is that of an LTMR: its control word is register 704."""
+    control = profile.control
+    word = profile.parameters.get(control.parameter) if control else None
+    return word is not None and register_number(word) == CONTROL_REGISTER_1
+
+
+class StarterPlant:
+    """A :class:`.Starter` behind registers that is a :class:`~.plant.Plant`."""
+
+    volatile: Collection[str] = ()
+
+    def __init__(self, registers: Registers, configuration: DriveConfiguration,
+                 mechanics: Mechanics) -> None:
+        self.operation = StarterOperation(configuration.profile.control)
+        self.starter = Starter()
+        self._registers = registers
+        self._node = configuration.station
+        self._control = configuration.profile.control
+        self._cause = 0
+        self._now: float | None = None
+        self._by_register = {register_number(p): p.name for p in registers.parameters.values()}
+
+    # -- what the registers accept ----------------------------------------------------------------
+
+    def initial(self, parameter: Parameter) -> int | None:
+        """Return what a new controller has in a register; None: any plausible value."""
+        return DEFAULTS.get(register_number(parameter) or 0)
+
+    def allows(self, parameter: Parameter, raw: int) -> bool:
+        """Tell whether a value is one of the register's steps."""
+        return raw % STEPS.get(register_number(parameter) or 0, 1) == 0
+
+    def takes(self, parameter: Parameter) -> bool:
+        """Take settings with the motor off and in configuration mode only; no word otherwise."""
+        register = register_number(parameter)
+        if register not in SETTINGS or register == GENERAL_CONFIGURATION:
+            return True
+        configuring = self._content(GENERAL_CONFIGURATION) & CONFIGURATION_MODE
+        return bool(configuring) and not self.operation.enabled
+
+    def written(self, name: str, before: int, raw: int) -> None:
+        """Obey the control registers and take over settings."""
+        if name == self._by_register[CONTROL_REGISTER_1]:
+            self.operation.word_written(raw, self._now or 0.0)
+        elif name == self._by_register.get(CONTROL_REGISTER_2):
+            self._clear(raw & ~before)
+        self._settings_changed()
+        self.starter.switch(self.operation.enabled)
+
+    def _clear(self, bits: int) -> None:
+        """Obey the clear commands whose bits have appeared."""
+        if bits & (CLEAR_ALL | CLEAR_THERMAL_LEVEL):
+            self.starter.thermal = 0.0
+            self.operation.cause_gone()
+        if bits & (CLEAR_ALL | CLEAR_SETTINGS):
+            for register in (TRIP_CLASS, FULL_LOAD_RATIO, 653):
+                if register in self._by_register:
+                    self._registers.reset(self._by_register[register])
+
+    def _settings_changed(self) -> None:
+        self.starter.settings(self._content(FULL_LOAD_RATIO), self._content(TRIP_CLASS))
+
+    def _content(self, register: int) -> int:
+        name = self._by_register.get(register)
+        return DEFAULTS[register] if name is None else self._registers.plain(name)
+
+    # -- time and events --------------------------------------------------------------------------
+
+    @property
+    def trip_code(self) -> int:
+        """Code of the trip; 0 without one."""
+        return self._cause if self.operation.faulted else 0
+
+    def advance(self, now: float) -> None:
+        """Let currents and temperature follow up to now."""
+        last = now if self._now is None else self._now
+        self._now = max(now, last)
+        self.starter.switch(self.operation.enabled)
+        if self.starter.advance(self._now - last):
+            self._cause = THERMAL_OVERLOAD
+            self.operation.trip(now)
+            self.operation.prolong(now + self.starter.time_to_reset)
+            self.starter.switch(False)
+
+    def trip(self, duration: float = 0.0) -> None:
+        """Trip as the test function of the controller does; the cause lasts for some seconds."""
+        self._cause = TEST_TRIP
+        self.operation.trip(self._now or 0.0, duration)
+        self.starter.switch(False)
+
+    def power_off(self) -> None:
+        """Open the contactors; the thermal image is kept."""
+        self.operation.power_on()
+        self.starter.switch(False)
+
+    def power_on(self) -> None:
+        """Begin anew; the registers have what EEPROM kept."""
+        self._settings_changed()
+
+    # -- what the registers show ------------------------------------------------------------------
+
+    def source(self, parameter: Parameter) -> Callable[[], int] | None:
+        """Return what computes a read-only register; None: it is plain memory."""
+        register = register_number(parameter)
+        if register == STATUS_1:
+            # the profile's own conditions are met in addition, whatever its bits are called
+            word = StatusWord(replace(parameter, bits=()), self._control)
+            return lambda: word.compose(self._state(), self._status())
+        figure = self._figures().get(register)
+        if figure is None:
+            return None
+        span, content = RawRange(parameter, limits=False), figure
+        return lambda: span.clamp(math.floor(content() + 0.5))
+
+    def _figures(self) -> dict[int | None, Callable[[], float]]:
+        """Return what gives the contents of registers."""
+        starter = self.starter
+        return {
+            450: lambda: math.ceil(self._wait_time()),
+            451: lambda: self.trip_code,
+            452: lambda: _bit_of(self.trip_code),
+            453: lambda: 0,
+            456: lambda: 0,
+            457: lambda: 0,
+            458: self._outputs,
+            459: self._outputs,
+            460: lambda: THERMAL_OVERLOAD if self._alarm() else 0,
+            461: lambda: _bit_of(THERMAL_OVERLOAD) if self._alarm() else 0,
+            462: lambda: 0,
+            463: lambda: 0,
+            465: lambda: starter.thermal,
+            466: lambda: 100.0 * starter.ratio,
+            467: lambda: 101.0 * starter.ratio,
+            468: lambda: 99.0 * starter.ratio,
+            469: lambda: 100.0 * starter.ratio,
+            470: lambda: 0,
+            471: lambda: 1 if starter.current else 0,
+            472: lambda: 32.0 + 0.1 * starter.thermal,
+            474: lambda: 100.0 * MAINS_FREQUENCY,
+            475: lambda: 10.0 * (100.0 + 0.8 * starter.thermal),
+            476: self._voltage,
+            477: lambda: 0.998 * self._voltage(),
+            478: lambda: 1.002 * self._voltage(),
+            479: self._voltage,
+            481: lambda: 100.0 * POWER_FACTOR if starter.current else 0,
+            482: lambda: self._power(POWER_FACTOR),
+            483: lambda: self._power(math.sqrt(1.0 - POWER_FACTOR ** 2)),
+            500: lambda: 100.0 * starter.current,
+            502: lambda: 101.0 * starter.current,
+            504: lambda: 99.0 * starter.current,
+            506: lambda: 100.0 * starter.current,
+            508: lambda: 0,
+            511: lambda: min(starter.time_to_trip, NEVER),
+            NODE_ADDRESS: lambda: self._node,
+        }
+
+    def _state(self) -> State:
+        operation = self.operation
+        return State(enabled=operation.enabled, stopping=False, fault=operation.faulted,
+                     warning=False, speed=0.0, setpoint_reached=False)
+
+    def _status(self) -> int:
+        """Return system status register 1."""
+        operation, ratio = self.operation, self.starter.ratio
+        bits = (
+            not operation.faulted,
+            operation.enabled,
+            operation.faulted,
+            self._alarm(),
+            operation.faulted,
+            operation.faulted and operation.reset_allowed(self._now or 0.0),
+            True,
+            ratio > 0.1,
+        )
+        word = sum(1 << number for number, wanted in enumerate(bits) if wanted)
+        word |= min(math.floor(32.0 * ratio + 0.5), 63) << 8
+        return word | (1 << 15 if self.starter.starting else 0)
+
+    def _outputs(self) -> int:
+        operation = self.operation
+        if not operation.enabled:
+            return 0
+        return 1 << 1 if operation.reverse else 1 << 0
+
+    def _alarm(self) -> bool:
+        return self.starter.thermal >= ALARM_LEVEL
+
+    def _wait_time(self) -> float:
+        return self.starter.time_to_reset if self.operation.faulted else 0.0
+
+    def _voltage(self) -> float:
+        return MAINS_VOLTAGE * (1.0 + MAINS_SWING * math.sin(MAINS_RATE * (self._now or 0.0)))
+
+    def _power(self, share: float) -> float:
+        """Return a power in 0.1 kW."""
+        return math.sqrt(3.0) * MAINS_VOLTAGE * self.starter.current * share / 100.0
+
+
+def register_number(parameter: Parameter) -> int | None:
+    """Return the register of a parameter, by its number or by its CANopen address."""
+    if parameter.number is not None:
+        return parameter.number
+    if parameter.index is None:
+        return None
+    return register_of(parameter.index, parameter.subindex or 0)
+
+
+def _bit_of(code: int) -> int:
+    """Return the bit of a trip code in its register; codes from 17 on stand in the next one."""
+    return 1 << code - 1 if 1 <= code <= 16 else 0
