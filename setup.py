@@ -71,6 +71,8 @@ setup(
             'ros-rclpy[fastrtps]==7.1.6',
             'ros-common-interfaces==5.3.6',
         ],
+        # EDS and DCF files as profiles. No rosdep key: without it, CSV tables can be imported.
+        'eds': ['canopen>=2.3'],
         'test': [
             # No rosdep keys for these two: the tests run without them, only fewer, or slower.
             'canopen>=2.3',

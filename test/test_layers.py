@@ -27,6 +27,7 @@ INTERNAL: dict[str, set[str]] = {
     'core': {''},
     'protocols': {'', 'core'},
     'configuration': {'', 'core', 'protocols', 'resources'},
+    'profiles': {'', 'core', 'configuration', 'protocols', 'resources'},
     'transport': {'', 'core'},
     'exchange': {'', 'core', 'protocols', 'transport'},
     'simulation': {'', 'core', 'configuration', 'protocols', 'resources', 'transport'},
@@ -37,7 +38,7 @@ INTERNAL: dict[str, set[str]] = {
         'exchange', 'process', 'simulation', 'ros'},
     'cli': {
         '', 'core', 'configuration', 'protocols', 'resources', 'transport',
-        'exchange', 'process', 'simulation', 'ros', 'ros.demo'},
+        'exchange', 'process', 'profiles', 'simulation', 'ros', 'ros.demo'},
 }
 
 ROS_PACKAGES = {
@@ -49,6 +50,8 @@ ROS_PACKAGES = {
 EXTERNAL: dict[str, set[str]] = {
     'resources': {'ament_index_python'},
     'configuration': {'jsonschema', 'yaml'},
+    # canopen: an optional extra, for EDS files
+    'profiles': {'canopen'},
     'transport': {'can', 'serial'},
     # yaml: only to tell which nodes a parameter file names when none of them is ours
     'ros': {*ROS_PACKAGES, 'yaml'},

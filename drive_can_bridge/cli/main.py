@@ -29,6 +29,8 @@ SUBCOMMANDS: dict[str, tuple[str, str]] = {
                  'play every drive of a parameter file on its bus'),
     'demo': ('drive_can_bridge.cli.demo',
              'run a bridge and simulated drives in one process'),
+    'profile': ('drive_can_bridge.cli.profile',
+                'list, show, check and import parameter tables'),
 }
 #: what runs until a signal comes: that is no failure
 ENDLESS = ('simulate', 'demo')

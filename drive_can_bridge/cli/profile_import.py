@@ -1,0 +1,141 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""``drive_can profile import``: a profile from an EDS, DCF or CSV file."""
+
+from argparse import Namespace
+import os
+from pathlib import Path
+import sys
+import tempfile
+
+from drive_can_bridge.cli.tables import print_json, printable
+from drive_can_bridge.profiles.draft import LeftOut
+from drive_can_bridge.profiles.importing import (
+    columns_from_option, FileFormat, import_file, Imported, WrongOption,
+)
+from drive_can_bridge.profiles.numerals import DecimalSign
+from drive_can_bridge.profiles.table import WrongColumns
+from drive_can_bridge.protocols.families import FAMILIES
+
+WRONG_USAGE = 2
+
+
+def run_import(args: Namespace) -> int:
+    """
+    Import a file.
+
+    :raises ImportFailed: nothing of it can be used.
+    :raises OSError: a file cannot be read or written.
+    """
+    try:
+        imported = import_file(
+            args.file, columns=columns_from_option(args.columns),
+            sign=DecimalSign[args.decimal.upper()] if args.decimal else DecimalSign.UNKNOWN,
+            protocols=_protocols(args.protocols), description=args.description,
+            file_format=FileFormat(args.format) if args.format else None)
+        if args.json and args.output is None:
+            raise WrongOption('--json says on standard output what became of the file: say where '
+                              'the profile goes with -o FILE')
+    except (WrongOption, WrongColumns) as error:
+        print(printable(f'drive_can profile import: {error}'), file=sys.stderr)
+        return WRONG_USAGE
+    if not args.json:
+        _report(args.file, imported)
+    if args.output is None:
+        print(imported.built.text, end='')
+        return 0
+    code = _write(args.output, imported.built.text, yes=args.yes)
+    if code:
+        return code
+    if args.json:
+        _report_json(args, imported)
+    else:
+        print(printable(f'{args.output}: {_counted(imported)}'))
+    return 0
+
+
+def _protocols(text: str) -> tuple[str, ...]:
+    names = tuple(name.strip() for name in text.split(',') if name.strip())
+    for name in names:
+        if name not in FAMILIES:
+            raise WrongOption(f"--protocols: '{name}' is unknown, there are: "
+                              f'{", ".join(FAMILIES)}')
+    if len(set(names)) < len(names):
+        raise WrongOption('--protocols: one of them stands twice')
+    return names
+
+
+# -- what is said ---------------------------------------------------------------------------------
+
+
+def _report(file: Path, imported: Imported) -> None:
+    """Say on standard error what the file was taken for, and what of it is left out and why."""
+    for note in imported.found.notes:
+        print(printable(f'{file}: {note}'), file=sys.stderr)
+    for each in imported.found.complaints:
+        print(printable(f'{file}:{each}'), file=sys.stderr)
+
+
+def _counted(imported: Imported) -> str:
+    built, found = imported.built, imported.found
+    text = f'{len(built.names)} of {built.entries} entries of the file'
+    if found.left_out:
+        text += f', {len(found.left_out)} left out (see above)'
+    if built.remarks:
+        text += f', {built.remarks} with a remark in the profile'
+    return f'{text}; {", ".join(built.protocols)}'
+
+
+def _report_json(args: Namespace, imported: Imported) -> None:
+    built, found = imported.built, imported.found
+    print_json({
+        'file': str(args.file), 'output': str(args.output), 'entries': built.entries,
+        'parameters': len(built.names), 'remarks': built.remarks,
+        'protocols': list(built.protocols), 'notes': found.notes,
+        'left_out': [_document(each) for each in found.left_out],
+        'oddities': [_document(each) for each in found.oddities]})
+
+
+def _document(each: LeftOut) -> dict[str, object]:
+    return {'line': each.place.line, 'section': each.place.section, 'what': each.what,
+            'reason': each.reason}
+
+
+# -- where it goes --------------------------------------------------------------------------------
+
+
+def _write(path: Path, text: str, *, yes: bool) -> int:
+    """
+    Write the profile, whole or not at all; an existing file that differs only after asking.
+
+    :return: exit code.
+    """
+    data = text.encode('utf-8')
+    if path.is_file() and path.read_bytes() != data and not yes:
+        question = f'{path} exists and holds something else. Overwrite it?'
+        if not sys.stdin.isatty():
+            print(printable(f'{question} Nothing was written; --yes overwrites it.'),
+                  file=sys.stderr)
+            return WRONG_USAGE
+        print(printable(f'{question} [y/N] '), end='', file=sys.stderr, flush=True)
+        if sys.stdin.readline().strip().lower() not in ('y', 'yes'):
+            print('Nothing was written.', file=sys.stderr)
+            return 1
+    if path.exists() and not path.is_file():  # /dev/stdout, a pipe
+        path.write_bytes(data)
+        return 0
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f'.{path.name}.')
+    try:
+        with os.fdopen(handle, 'wb') as file:
+            file.write(data)
+        os.chmod(name, 0o666 & ~_umask())
+        os.replace(name, path)
+    except BaseException:
+        os.unlink(name)
+        raise
+    return 0
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

@@ -1,0 +1,68 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+Tables for people, and JSON for programs.
+
+In a terminal a table fits its width and has a little colour (not with ``NO_COLOR``). What goes to
+a pipe or a file is plain text in columns, neither cut nor wrapped.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+import json
+import sys
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+#: between two columns
+_GAP = '  '
+
+
+def print_table(headings: Sequence[str], rows: Iterable[Sequence[str]], *,
+                numbers: Sequence[str] = ()) -> None:
+    """
+    Print a table on standard output.
+
+    :param numbers: headings of columns that are aligned to the right.
+    """
+    written = [[printable(cell) for cell in row] for row in rows]
+    if sys.stdout.isatty():
+        _print_fitting(headings, written, numbers)
+    else:
+        for line in plain_lines(headings, written, numbers=numbers):
+            print(line)
+
+
+def plain_lines(headings: Sequence[str], rows: Sequence[Sequence[str]], *,
+                numbers: Sequence[str] = ()) -> list[str]:
+    """Write a table as text in columns; nothing is cut."""
+    widths = [max(len(row[place]) for row in (headings, *rows))
+              for place in range(len(headings))]
+    lines = []
+    for row in (headings, *rows):
+        cells = [cell.rjust(width) if heading in numbers else cell.ljust(width)
+                 for cell, width, heading in zip(row, widths, headings, strict=True)]
+        lines.append(_GAP.join(cells).rstrip())
+    return lines
+
+
+def _print_fitting(headings: Sequence[str], rows: Sequence[Sequence[str]],
+                   numbers: Sequence[str]) -> None:
+    table = Table(box=None, pad_edge=False, header_style='bold')
+    for heading in headings:
+        table.add_column(heading, justify='right' if heading in numbers else 'left',
+                         overflow='fold')
+    for row in rows:
+        table.add_row(*(Text(cell) for cell in row))
+    Console().print(table)
+
+
+def print_json(document: Mapping[str, Any]) -> None:
+    """Print one JSON document as a line of standard output."""
+    print(json.dumps(document, ensure_ascii=False))
+
+
+def printable(text: str) -> str:
+    """Return a text that cannot upset a terminal."""
+    return ''.join(letter if letter.isprintable() else '?' for letter in text)

@@ -1,0 +1,117 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Which profiles there are, what is in one, and whether it is right."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from drive_can_bridge.configuration.problems import Problem
+from drive_can_bridge.configuration.profile_check import LoadedProfile
+from drive_can_bridge.configuration.profiles import ProfileStore, read_profile, SUFFIX
+from drive_can_bridge.core.errors import DriveCanError
+from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.profiles.family_check import family_complaints
+from drive_can_bridge.protocols.families import FAMILIES
+from drive_can_bridge.resources import profiles_directory
+
+
+class NoSuchProfile(DriveCanError):
+    """There is no profile of that name, or it cannot be read."""
+
+
+@dataclass(frozen=True, slots=True)
+class Checked:
+    """
+    A profile with everything that a bridge would say about it.
+
+    :param problems: in the order of the file.
+    """
+
+    path: Path
+    loaded: LoadedProfile
+    problems: tuple[Problem, ...]
+    warnings: tuple[Problem, ...]
+
+    @property
+    def entries(self) -> dict[str, dict[str, Any]]:
+        """The entries that are all right, as the file has them."""
+        parameters = self.loaded.tree.data.get('parameters', {})
+        return {name: parameters[name] for name in self.loaded.profile.parameters}
+
+    @property
+    def sources(self) -> dict[str, str]:
+        """Where the statements come from, by key."""
+        return dict(self.loaded.tree.data.get('sources', {}))
+
+    def count(self, verified: bool | None) -> int:
+        """Count the entries that say of themselves that they are verified, are not, or nothing."""
+        return sum(each.verified is verified for each in self.loaded.profile.parameters.values())
+
+
+def available(directories: Sequence[Path]) -> dict[str, Path]:
+    """
+    Return all profiles by name.
+
+    :param directories: searched before the shipped ones; the first of a name counts, as for a
+        bridge.
+    :raises NoSuchProfile: one of the directories is not there.
+    """
+    found: dict[str, Path] = {}
+    for directory in directories:
+        if not directory.is_dir():
+            raise NoSuchProfile(f'{directory} is no directory')
+    for directory in (*directories, profiles_directory()):
+        for path in sorted(directory.glob(f'*{SUFFIX}')):
+            found.setdefault(path.stem, path)
+    return dict(sorted(found.items()))
+
+
+def find(name: str, directories: Sequence[Path]) -> Path:
+    """
+    Return the file of a profile, given by its name or as a file.
+
+    :raises NoSuchProfile: there is none; the text names those that exist.
+    """
+    as_file = Path(name)
+    if '/' in name or name.endswith((SUFFIX, '.yml')):
+        if not as_file.is_file():
+            raise NoSuchProfile(f'{name}: no such file')
+        return as_file
+    found = ProfileStore([str(directory) for directory in directories]).load(name)
+    if isinstance(found, str):
+        raise NoSuchProfile(found)
+    return Path(found.profile.path)
+
+
+def check(path: Path) -> Checked:
+    """
+    Check a profile file for all protocols that it names.
+
+    :raises OSError: it cannot be read.
+    """
+    loaded = read_profile(path)
+    problems = list(loaded.problems)
+    tree = loaded.tree
+    if not tree.is_damaged(()):
+        for protocol in loaded.profile.protocols:
+            if protocol in FAMILIES:
+                problems += [tree.problem(tuple(complaint.key.split('.')), complaint.message)
+                             for complaint in family_complaints(loaded.profile, protocol)]
+    ordered = sorted(dict.fromkeys(problems), key=lambda problem: problem.line)
+    return Checked(path, loaded, tuple(ordered), tuple(loaded.warnings))
+
+
+def description(name: str, parameter: Parameter, entry: dict[str, Any]) -> dict[str, Any]:
+    """Describe an entry with all its keys, given ones and defaults: one JSON document."""
+    return {
+        'name': name, 'address': parameter.address, 'number': parameter.number,
+        'index': parameter.index, 'subindex': parameter.subindex, 'type': parameter.type.value,
+        'scale': parameter.scale, 'offset': parameter.offset, 'unit': parameter.unit,
+        'access': parameter.access.value,
+        'storage': parameter.storage.value if parameter.storage else None,
+        'minimum': parameter.minimum, 'maximum': parameter.maximum,
+        'neutral': parameter.neutral, 'bits': dict(parameter.bits),
+        'word_order': parameter.word_order, 'protected': parameter.protected,
+        'description': parameter.description, 'source': entry.get('source'),
+        'verified': parameter.verified, 'open': entry.get('open')}
