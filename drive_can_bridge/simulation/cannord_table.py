@@ -3,21 +3,7 @@
 The parameters of a simulated NORD inverter, by number and sub-index: sets, arrays, EEPROM.
 
 A sub-index counts in array tasks and in plain ones: the rule in the manuals wants array tasks,
-examples in the manuals use plain ones. entries                                      kind
-============================================ ======================================================
-one without ``subindex``                     simple
-all with ``subindex``                        array; element = sub-index
-one without, others with ``subindex``        one value per parameter set; the one without is set 1,
-                                             sub-index 1 to 3 are the sets 2 to 4
-============================================ ======================================================
-
-A sub-index counts in array tasks and in plain ones: the rule in the manuals wants array tasks,
-examples in the manuals use plain ones.
-
-The values of parameter sets are kept here; the register of set 1 in the plant always holds the
-value of the *active* set, so that the motor obeys it.
-=======
-The motor obeys the values of the *active* parameter set.
+examples in the manuals use plain ones. The motor obeys the values of the *active* parameter set.
 """
 
 from collections.abc import Mapping
