@@ -7,7 +7,7 @@ from typing import Any
 from builders import CONTROL, drive, GAIN, parameter, read, SPEED, STATUS, WORD
 import pytest
 
-from drive_can_bridge.core.control import ControlAction, ControlTicket, ProfileControl
+from drive_can_bridge.core.control import ControlAction, ControlTicket, ControlMachine
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.events import RequestCompleted, StationLost
 from drive_can_bridge.core.frame import Frame
@@ -64,7 +64,7 @@ class Idle(Session):
 def session(**options: object) -> Idle:
     configuration = drive(**options)
     table = configuration.profile.control
-    control = ProfileControl(table, timeout=2.0) if table is not None else None
+    control = ControlMachine(table, timeout=2.0) if table is not None else None
     return Idle(configuration, control)
 
 

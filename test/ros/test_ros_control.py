@@ -9,7 +9,7 @@ import pytest
 from std_msgs.msg import Float64
 from std_srvs.srv import SetBool, Trigger
 
-from drive_can_bridge.core.control import ProfileControl
+from drive_can_bridge.core.control import ControlMachine
 
 DRIVE = 'drive_can_bridge: drive lift'
 #: the control word has a slot, or is written on change
@@ -51,7 +51,7 @@ def test_a_drive_that_runs_on_under_disable_is_an_error(
         bridge: StartBridge, client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
     one = bridge(parameters(lift=LIFT))
     one.online()
-    monkeypatch.setattr(ProfileControl, 'disregard', 'still enabled: stop it by other means')
+    monkeypatch.setattr(ControlMachine, 'disregard', 'still enabled: stop it by other means')
     status = client.diagnostics(DRIVE, lambda drive: 'still enabled' in drive['message'])
     assert status['level'] == 'ERROR'
     assert status['message'].startswith('still enabled: stop it by other means')

@@ -26,6 +26,7 @@ from dataclasses import dataclass
 import math
 from typing import NamedTuple, Union
 
+from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.protocols.canopen_pkw import abort_codes, pkw
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Function, Message
 
@@ -81,9 +82,11 @@ class Silence(NamedTuple):
     Nobody answered.
 
     :param sent: False: it was not even sent, because the mailbox could not be synchronised.
+    :param refused: the bus did not take it.
     """
 
     sent: bool = True
+    refused: bool = False
 
 
 Reply = Union[Answered, Refused, Silence]
@@ -93,12 +96,12 @@ class Mailbox:
     """
     One exchange at a time.
 
-    :param send: takes a request that leaves now.
+    :param send: takes a request that leaves now, and who is told whether it did.
     :param order: of the halves of abort codes: ``auto``, ``low_first``, ``high_first``.
     :param timeout: s to wait for an answer.
     """
 
-    def __init__(self, send: Callable[[Message], None], *, order: str, timeout: float) -> None:
+    def __init__(self, send: Callable[[Message, Left], None], *, order: str, timeout: float) -> None:
         self.timeout = timeout
         self._send = send
         self._order = order
@@ -107,6 +110,8 @@ class Mailbox:
         self._step: Step | None = None
         self._request: Message | None = None
         self._deadline = math.inf
+        self._abandoned = False
+        self._refused = False
 
     @property
     def busy(self) -> bool:
@@ -128,7 +133,13 @@ class Mailbox:
             return
         self._request = pkw.idle_request()
         self._deadline = now + min(self.timeout, SYNCHRONISATION_TIMEOUT)
-        self._send(self._request)
+        self._send(self._request, self._left)
+
+    def abandon(self, until: float) -> None:
+        """Wait for the answer under way until then at most; the step is not gone on with."""
+        if self._step is not None:
+            self._abandoned = True
+            self._deadline = min(self._deadline, until)
 
     def receive(self, message: Message, now: float) -> Reply | bool:
         """
@@ -144,6 +155,9 @@ class Mailbox:
             if message.code != Function.NONE:
                 return False
             self._synchronised = True
+            if self._abandoned:
+                self._end()
+                return Silence(sent=False)
             self._send_step(step, now)
             return True
         if not pkw.answers(message, request):
@@ -157,8 +171,17 @@ class Mailbox:
     def handle_timer(self, now: float) -> Reply | None:
         """Return the reply that ends an overdue exchange; None: nothing ended."""
         request, step = self._request, self._step
-        if now < self._deadline or request is None or step is None:
+        if request is None or step is None:
             return None
+        if self._refused:
+            self.forget()
+            return Silence(sent=False, refused=True)
+        if now < self._deadline:
+            return None
+        if self._abandoned:
+            sent = request.code != Function.NONE
+            self.forget()
+            return Silence(sent)
         if request.code != Function.NONE:
             self.forget()
             return Silence()
@@ -177,6 +200,13 @@ class Mailbox:
         self._step = None
         self._request = None
         self._deadline = math.inf
+        self._abandoned = self._refused = False
+
+    def _left(self, sent: bool, now: float) -> None:
+        """Give up a write that the bus refused; a read ends when its time is over."""
+        if not sent and isinstance(self._step, Write):
+            self._refused = True
+            self._deadline = now
 
     def _send_step(self, step: Step, now: float) -> None:
         # inverted after function 00h, too: a late answer to the request before never fits
@@ -188,4 +218,4 @@ class Mailbox:
             self._request = pkw.write_request(step.address, step.words, self._toggle)
             timeout = timeout if step.timeout is None else step.timeout
         self._deadline = now + timeout
-        self._send(self._request)
+        self._send(self._request, self._left)

@@ -13,26 +13,29 @@ While running, a round of reads begins every period, as long as the node takes P
 rounds (``missed_limit``) with a read that nobody answered make it offline, and so do a boot-up
 frame, a heartbeat that says that the node is not operational, and heartbeats that cease. Whatever
 the reason: the control word goes back to ``disable``, setpoints go neutral and want re-arming. A
-drive that is only silent may still be listening; so it is told to stand still before rounds go on.
+drive that was told to run is told to stand still at once, whatever is known of the node: what is
+only silent may still be listening.
 
 Setpoints and the control word are written while the drive is online: when they change, and
 setpoints again after ``refresh_interval``.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from enum import Enum
 import math
 
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.control import ControlMachine, ProfileControl
+from drive_can_bridge.core.control import ControlMachine
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.events import (
     ForeignMasterSeen, Noted, ProcessDataReceived, SetpointsExpired, StationFound,
 )
 from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.requests import BRIDGE_INACTIVE, Failure, Request
 from drive_can_bridge.core.session import LOOKING, Session
+from drive_can_bridge.core.told import MAY_RUN
 from drive_can_bridge.protocols.canopen_pkw import addresses, network, pkw, procedures
 from drive_can_bridge.protocols.canopen_pkw.addresses import Span
 from drive_can_bridge.protocols.canopen_pkw.channel import Channel, Lane
@@ -68,7 +71,7 @@ class PkwSession(Session):
         table = drive.profile.control
         control: ControlMachine | None = None
         if table is not None:
-            control = ProfileControl(table, timeout=drive.control_timeout)
+            control = ControlMachine(table, timeout=drive.control_timeout)
         super().__init__(drive, control)
         options = drive.family_options
         self._identifiers = Identifiers.of(drive)
@@ -81,14 +84,14 @@ class PkwSession(Session):
             self._send, order=options['abort_code_order'], timeout=drive.parameter_timeout))
         self._conditions = self._make_conditions()
         self._setpoint_writer = SetpointWriter(
-            self._channel, self.setpoints, self._warn, addressing=self._addressing,
+            self._channel, self.setpoints, self._warn, self.told, addressing=self._addressing,
             word_order=self._word_order, refresh=options['refresh_interval'])
         self._control_writer: ControlWriter | None = None
         self._status: Parameter | None = None
         if control is not None and table is not None:
             word = drive.profile.parameters[table.parameter]
             self._control_writer = ControlWriter(
-                self._channel, control, word, self._control_changed, self._warn,
+                self._channel, control, word, self._control_changed, self._warn, self.told,
                 disable=table.disable, addressing=self._addressing,
                 word_order=self._word_order,
                 refresh=options['refresh_interval'] if word in drive.cyclic_request else 0.0)
@@ -100,33 +103,49 @@ class PkwSession(Session):
         self._beat = Beat(drive.period)
         self._phase = Phase.IDLE
         self._missed_in_row = 0
+        self._status_known = False  # it was read just now
+        self._owed = False  # there was something to be stopped when the stop began
         self._round_began = -math.inf
         self._received_at = -math.inf
 
     # -- life cycle -------------------------------------------------------------------------------
 
     def deactivate(self, now: float) -> None:
-        was_running = self._phase is Phase.RUNNING and self.ever_online
+        was_running = self._phase is not Phase.IDLE and self.ever_online and (
+            now >= self._node.free_at or self.told.owed)
         self.active = False
         self._fail_requests(BRIDGE_INACTIVE)
         self._withdraw(BRIDGE_INACTIVE, now)
         self._node.stop()
         self._beat.stop()
-        self._channel.clear()
-        if self._phase is Phase.STOPPING:
-            was_running = True
-        writes = self._neutral_writes()
-        if not was_running or not writes or now < self._node.free_at:
+        self._channel.drop(now)
+        if not was_running:
+            if not self.bus_available:
+                self._leave_owing()
             self._go_idle('deactivated')
             return
         self._phase = Phase.STOPPING
-        self._channel.run(Lane.CONTROL, self._farewell(writes, self._stop_time),
-                          self._farewell_ended, now)
+        self._stop_now(self._stop_time, now)
 
-    def _farewell_ended(self, failed: list[str]) -> None:
-        if failed:
-            self._warn(f'told to stop, but {"; ".join(failed)}: it may still be running')
-        self._go_idle('deactivated')
+    def _stop_now(self, time: float, now: float) -> None:
+        """Tell the drive to stand still, within so many s."""
+        writes = [] if self._control_writer is None else [self._control_writer.disable_write()]
+        writes += self._setpoint_writer.neutral_writes()
+        self._owed = self.told.owed
+        self._channel.cancel(Lane.STOP)
+        self._channel.make_room(now)
+        timeout = min(self.drive.parameter_timeout, time / (STOP_ATTEMPTS * max(1, len(writes))))
+        self._channel.run(
+            Lane.STOP, procedures.write_until_answered(writes, STOP_ATTEMPTS, timeout),
+            self._stop_ended, now)
+
+    def _stop_ended(self, failed: list[str]) -> None:
+        if not failed:
+            self.told.stopped()
+        elif self._owed:
+            self._warn(f'told to stop, but {"; ".join(failed)}: {MAY_RUN}')
+        if self._phase is Phase.STOPPING:
+            self._go_idle('deactivated')
 
     @property
     def stopped(self) -> bool:
@@ -155,12 +174,12 @@ class PkwSession(Session):
         self._lose('the drive is being reconnected', now)
         self._advice = LOOKING
         self._phase = Phase.RUNNING
-        self._channel.cancel(Lane.CONTROL)  # of a stop that was under way
         self._missed_in_row = 0
         self._refusals.clear()
         self._plan = addresses.round_plan(self.drive)
         self._node.begin(now)
         self._follow_node(now)
+        self._stop_if_owed(now)
 
     def _go_idle(self, advice: str) -> None:
         self._phase = Phase.IDLE
@@ -178,8 +197,6 @@ class PkwSession(Session):
         self.ever_online = True
         self._advice = ''
         self._node.online()
-        self.setpoints.disarm()
-        self.setpoints.enabled = True
         self._events.append(StationFound())
         self._setpoint_writer.forget()
         if self._control_writer is not None:
@@ -199,39 +216,34 @@ class PkwSession(Session):
 
     def _withdraw(self, reason: str, now: float) -> None:
         """Go neutral, and back to ``disable``."""
-        self.setpoints.disarm()
-        self.setpoints.enabled = False
+        self.setpoints.allow(False)
         if self.control is not None:
             self.control.withdraw(reason, now)
             self._tell_notes()
+
+    def _stop_if_owed(self, now: float) -> None:
+        if self.told.owed:
+            self._stop_now(STOP_TIME_SILENT, now)
 
     def _leave_alone(self, reason: str, now: float) -> None:
         """Handle a drive that is silent, but may be listening: it has to stand still."""
         was_online = self.online
         self._lose(reason, now)
         self._node.offline(now)
-        self._frames += self._node.take_frames()
-        writes = self._neutral_writes()
-        if was_online and writes:
-            self._channel.run(Lane.CONTROL, self._farewell(writes, STOP_TIME_SILENT),
-                              lambda _: None, now)
+        self._send_nmt()
+        if was_online:
+            self._stop_now(STOP_TIME_SILENT, now)
 
     def _cut_off(self, reason: str, answer: str, now: float) -> None:
         """Handle a node that takes no PDOs: nothing that was sent is answered any more."""
         self._lose(reason, now)
         self._channel.clear()
         self._fail_requests(answer)
+        self._stop_if_owed(now)
 
-    def _neutral_writes(self) -> list[procedures.LastWrite]:
-        """Return what makes a drive stand still."""
-        writes = [] if self._control_writer is None else [self._control_writer.disable_write()]
-        return writes + self._setpoint_writer.neutral_writes()
-
-    def _farewell(self, writes: Sequence[procedures.LastWrite], time: float,
-                  ) -> procedures.Farewell:
-        return procedures.write_until_answered(
-            writes, STOP_ATTEMPTS,
-            min(self.drive.parameter_timeout, time / (STOP_ATTEMPTS * len(writes))))
+    def _send_nmt(self) -> None:
+        for frame in self._node.take_frames():
+            self._outbox.put(frame)
 
     # -- the round --------------------------------------------------------------------------------
 
@@ -243,8 +255,7 @@ class PkwSession(Session):
         self._round_began = now
         if self.online:
             self._setpoint_writer.look(now)
-            if self._control_writer is not None:
-                self._control_writer.update(now)
+            self._see_to_control_word(now)
         self._channel.run(
             Lane.ROUND, procedures.read_round(self._plan, self._read_answered,
                                               self._read_refused), self._round_ended, now)
@@ -255,6 +266,7 @@ class PkwSession(Session):
         if self.online:
             self._take_status(dict(zip(span.addresses, words)))
             self._control_changed(self._channel.now)
+            self._status_known = False
 
     def _take_status(self, words: dict[Address, int]) -> None:
         status = self._status
@@ -263,6 +275,7 @@ class PkwSession(Session):
         wanted = addresses.span_of(status, self._addressing)
         if all(address in words for address in wanted.addresses):
             now = self._channel.now
+            self._status_known = True
             self.control.status_received(addresses.raw_from_words(
                 status, [words[address] for address in wanted.addresses], self._word_order), now)
 
@@ -294,6 +307,7 @@ class PkwSession(Session):
             self._found(now)
             self._take_status(words)
             self._control_changed(now)
+            self._status_known = False
         if any(address not in words for span in self._response_spans
                for address in span.addresses):
             return  # something was refused: there is no complete sample
@@ -326,9 +340,14 @@ class PkwSession(Session):
 
     # -- frames -----------------------------------------------------------------------------------
 
-    def _send(self, message: Message) -> None:
-        self._frames.append(Frame(self._identifiers.request, pkw.encode(message, self._layout),
-                                  False))
+    def _send(self, message: Message, left: Left) -> None:
+        self._outbox.put(Frame(self._identifiers.request, pkw.encode(message, self._layout),
+                               False), left)
+
+    def frames_left(self, now: float, refused: Collection[int] = ()) -> None:
+        super().frames_left(now, refused)
+        if refused:
+            self._channel.advance(now)
 
     def receive_frame(self, frame: Frame, now: float, age: float = 0.0) -> None:
         identifier, data, extended = frame
@@ -357,7 +376,7 @@ class PkwSession(Session):
     def _heartbeat(self, state: network.NmtState, now: float) -> None:
         running = self._phase is Phase.RUNNING
         change = self._node.receive_heartbeat(state, now, running)
-        if self._phase is Phase.STOPPING and now < self._node.free_at:
+        if self._phase is Phase.STOPPING and now < self._node.free_at and not self.told.owed:
             self._go_idle('deactivated')
         if not running:
             return
@@ -378,7 +397,7 @@ class PkwSession(Session):
         """
         if not self.online:
             self._node.offline(now)
-        self._frames += self._node.take_frames()
+        self._send_nmt()
         free_at = self._node.free_at
         self._channel.hold(free_at)
         if not self.online and (fresh or now < free_at):
@@ -392,7 +411,7 @@ class PkwSession(Session):
             if now >= self._node.next_timer():
                 if self._node.handle_timer(now) is Change.HEARTBEAT_LOST:
                     self._leave_alone(f'no heartbeat for {self._node.heartbeat_timeout:g} s', now)
-                self._frames += self._node.take_frames()
+                self._send_nmt()
             if self.control is not None and now >= self.control.next_timer():
                 self.control.handle_timer(now)
                 self._control_changed(now)
@@ -412,14 +431,10 @@ class PkwSession(Session):
 
     # -- control ----------------------------------------------------------------------------------
 
-    def _control_changed(self, now: float) -> None:
-        """Tell what the control machine noted; then see to its word."""
-        self._tell_notes()
+    def _see_to_control_word(self, now: float) -> None:
         if self._control_writer is not None and self.online:
-            self._control_writer.update(now)
-
-    def _warn(self, text: str) -> None:
-        self._events.append(Noted(text, warning=True))
+            self._control_writer.update(
+                now, known=self._status_known or self._status is None)
 
     # -- users ------------------------------------------------------------------------------------
 

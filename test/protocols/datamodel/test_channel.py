@@ -6,6 +6,7 @@ import math
 import pytest
 
 from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.outbox import Outbox
 from drive_can_bridge.protocols.datamodel.channel import (
     AcyclicChannel, Lane, Polling, Procedure, Read, Words, Write,
 )
@@ -16,16 +17,22 @@ class Line:
 
     def __init__(self, *, timeout: float = 0.1, attempts: int = 2, gap: float = 0.02,
                  quarantine: float | None = None) -> None:
+        self.outbox = Outbox()
         self.channel = AcyclicChannel(
             encode_read=lambda number, count: Frame(number, b'?' * count, True),
             encode_write=lambda number, words: Frame(number, bytes(words), True),
-            timeout=timeout, attempts=attempts, eeprom_gap=gap,
+            send=self.outbox.put, timeout=timeout, attempts=attempts, eeprom_gap=gap,
             polling=None if quarantine is None else Polling(quarantine))
         self.results: list[object] = []
 
-    def sent(self) -> list[str]:
-        return [f'{frame.identifier}{"?" if frame.data[:1] == b"?" else "!"}'
-                for frame in self.channel.take_frames()]
+    def sent(self, now: float | None = None) -> list[str]:
+        """Return what leaves; ``now``: when, if the bus was busy."""
+        found = []
+        while frames := self.outbox.take():
+            found += [f'{frame.identifier}{"?" if frame.data[:1] == b"?" else "!"}'
+                      for frame in frames]
+            self.outbox.left(self.channel.now if now is None else now)
+        return found
 
     def reads(self, *numbers: int, lane: Lane = Lane.OWN, now: float = 1.0) -> list[str]:
         self.channel.run(self.reading(numbers), self.results.append, now, lane)
@@ -198,8 +205,8 @@ def test_two_waiting_users() -> None:
 
 def test_the_pause_of_the_eeprom_begins_when_the_write_has_left() -> None:
     line = Line()
-    line.writes((30, True), now=1.0)
-    line.channel.frames_left(1.009)  # the bus was busy
+    line.channel.run(line.writing(((30, True),)), line.results.append, 1.0)
+    assert line.sent(1.009) == ['30!']  # the bus was busy
     assert line.reads(30, now=1.02) == []
     assert line.channel.next_timer() == pytest.approx(1.029)
 
