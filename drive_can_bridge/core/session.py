@@ -123,6 +123,7 @@ class Session(ABC):
         """Begin to exchange (as soon as the bus is there)."""
         self.active = True
         self.ever_online = False
+        self.told.stopped()  # what an activation before this one told is not ours to undo
         if self.bus_available:
             self._advice = LOOKING
             self._begin(now)

@@ -25,6 +25,10 @@ class Told:
         self._running: set[Hashable] = set()
         self.owed = False
 
+    def runs(self, what: Hashable) -> bool:
+        """Tell whether one of them was told to run, and not to stop since."""
+        return what in self._running
+
     def note(self, what: Hashable, *, runs: bool) -> None:
         """
         Take note of a frame that has left.

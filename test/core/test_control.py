@@ -242,17 +242,11 @@ def test_a_refusal_that_nobody_waits_for_changes_nothing() -> None:
 
 def test_starts_with_disable_and_knows_nothing() -> None:
     control = machine()
-    assert isinstance(control, ControlMachine)
     assert (control.word, control.word_due) == (OFF, True)
     assert (control.state, control.fault, control.pending) == ('unknown', False, False)
     assert control.next_timer() == math.inf
     assert control.take_completed() == []
     assert control.take_notes() == []
-
-
-def test_interface_is_abstract() -> None:
-    with pytest.raises(TypeError):
-        ControlMachine()  # type: ignore[abstract]
 
 
 def test_no_status_and_no_time_starts_a_drive() -> None:

@@ -134,7 +134,7 @@ def test_lost_time_is_noticed_by_the_timer() -> None:
 
     assert bench.notes[0].discarded == 2  # at activation, and now
     assert bench.notes[0].commands == []
-    assert sent == [ASK_MAP_1]
+    assert sent == ['00300321#0000000000000000']    # it was told to run, so it is stopped
     assert bench.notes[0].events[-1] == StationLost('the bridge stood still')
     assert not bench.sessions[0].online
 

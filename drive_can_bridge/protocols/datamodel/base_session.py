@@ -152,6 +152,8 @@ class DataModelSession(Session):
         if setpoints:
             writes += [self._stop_write(setpoint.parameter, setpoint.neutral)
                        for setpoint in self.setpoints.items]
+        # what is kept in RAM does not wait until an EEPROM is done
+        writes.sort(key=lambda each: each.write.eeprom)
         if writes and not self._safe_stop.running:
             self._owed, self._stops_all = self.told.owed, setpoints
             self._safe_stop.begin(writes, now)

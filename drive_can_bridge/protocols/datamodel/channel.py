@@ -45,6 +45,8 @@ from drive_can_bridge.protocols.quarantine import Quarantine
 #: receive buffer has fetched the first; and, where answers carry no address, between an answer and
 #: the next read
 SPACING = 0.001
+#: s that a stop waits for an EEPROM at most: it takes 20 ms
+STOP_EEPROM_WAIT = 0.025
 
 
 @dataclass(frozen=True)
@@ -190,6 +192,7 @@ class AcyclicChannel:
         self._serving = own  # whose step is under way, or was last
         self._first: tuple[Write, Left] | None = None
         self._urgent: deque[tuple[Write, Left]] = deque()
+        self._stop_wait_until = -math.inf  # whatever the EEPROM's gap may be
         self._leaving = False  # the write of the step under way was handed out
         self._busy = False  # something may be waiting or under way
         self._advancing = False
@@ -227,6 +230,7 @@ class AcyclicChannel:
         """
         self._first = None
         self._urgent.append((write, left))
+        self._stop_wait_until = now + STOP_EEPROM_WAIT
         self._busy = True
         self.advance(now)
 
@@ -308,7 +312,7 @@ class AcyclicChannel:
     def _advance_once(self, now: float) -> bool:
         """Do the next thing; False when it cannot be done yet."""
         if self._urgent:
-            if now < self._not_before:
+            if now < self._urgent_at:
                 return False
             self._send_write(*self._urgent.popleft(), now)
             return True
@@ -372,7 +376,7 @@ class AcyclicChannel:
         if not self._busy:
             return math.inf
         if self._urgent:
-            return self._not_before
+            return self._urgent_at
         if self._leaving:
             return math.inf
         if self._outstanding:
@@ -437,13 +441,22 @@ class AcyclicChannel:
         step = queue.step
         # "20 ms between one write and the next", says the manual of writes to the EEPROM, not that
         # the next has to go there, too. Setpoints and control words do not wait.
-        held = -math.inf if queue is self._stop else self._held_until
-        ready = max(held, self._not_before, self._eeprom_free_at)
+        if queue is self._stop:
+            ready = max(self._not_before, min(self._eeprom_free_at, self._stop_wait_until))
+        else:
+            ready = max(self._held_until, self._not_before, self._eeprom_free_at)
         if isinstance(step, Write):
             return ready
         if self._quarantined(queue):
             return max(ready, self._quarantine.ready_at(self._key(step)))
         return ready
+
+    @property
+    def _urgent_at(self) -> float:
+        """When the next write that stops the drive may leave."""
+        if not self._urgent[0][0].eeprom:
+            return self._not_before
+        return max(self._not_before, min(self._eeprom_free_at, self._stop_wait_until))
 
     def _writable_at(self, write: Write) -> float:
         ready = max(self._held_until, self._not_before)

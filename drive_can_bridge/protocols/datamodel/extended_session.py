@@ -260,10 +260,11 @@ class ExtendedSession(DataModelSession):
                 self._control_changed(now)
         if self._cycles_left > 0:  # the last cycles before silence
             self._cycles_left -= 1
-            if self._cycles_left == 0:
-                if self._differs and not self._stopping:
+            if self._cycles_left == 0 and (self._stopping or self._differs):
+                self._next_cycle = math.inf
+                if not self._stopping:
+                    self._stop_awaiting()
                     self._phase = Phase.DIFFERS
-                    self._next_cycle = math.inf
                 self._stop_ended()
 
     def _stop_ended(self) -> None:
@@ -309,17 +310,15 @@ class ExtendedSession(DataModelSession):
             return
         self._missed_in_row = 0
         reason = f'no cyclic response for {self.drive.missed_limit} cycles'
-        if not self._verify:
-            self._lose(reason, now)
-        elif self.online:
-            # it may still be listening: tell it to stand still before it is left alone
-            owed = self.told.owed
-            self._lose(reason, now)
-            self._start_leaving(self._next_cycle)
-            if owed:
-                self._stop_by_writes(now, setpoints=False)
-        else:
+        if self._verify and not self.online:
             self._begin(now)
+            return
+        owed = self.told.owed
+        self._lose(reason, now)
+        if owed:  # of the word that has no slot; setpoints go neutral with the next cycles
+            self._stop_by_writes(now, setpoints=False)
+        if self._verify:  # it may still be listening, before it is left alone
+            self._start_leaving(self._next_cycle)
 
     def _stop_awaiting(self) -> None:
         """Expect no answer any more; one that is on its way is no surprise, though."""
@@ -416,7 +415,8 @@ class ExtendedSession(DataModelSession):
             return
         if self._by_hand is not None and (self.online or self._phase is Phase.CYCLIC):
             self._by_hand.update(now)
-        if control.stopping and (self.setpoints.changed or control.word != self._sent_word):
+        if control.stopping and (self.setpoints.changed or (
+                self._control_slot is not None and control.word != self._sent_word)):
             self._hurry(now)
 
     @property
