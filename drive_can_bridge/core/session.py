@@ -362,6 +362,11 @@ class Session(ABC):
         """Tell whether setpoints may move the drive, as far as its control word is concerned."""
         return self.control is None or self.control.operating
 
+    @property
+    def how_to_enable(self) -> str:
+        """Say what to do about a drive that is disabled."""
+        return 'call ~/enable'
+
     # -- state ------------------------------------------------------------------------------------
 
     @property
