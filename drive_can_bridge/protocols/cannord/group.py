@@ -77,7 +77,7 @@ class LeaderSession(GroupSession):
     # -- sending ----------------------------------------------------------------------------------
 
     def _transmit(self, now: float) -> None:
-        self._put(self._broadcast, self._cycle_left)
+        self._put(self._broadcast)
         count = len(self.members)
         # a stop reaches also those that do not listen to broadcasts
         for _ in range(math.ceil(count / STOP_CYCLES) if self._stopping else 1):

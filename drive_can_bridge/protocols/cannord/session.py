@@ -96,6 +96,8 @@ class CannordSession(Session):
         self._cycles_left = 0               # before a stop is complete
         self._payloads: list[bytes] = []    # of the frames of a cycle, main frame first
         self._payloads_run = False          # they hold anything but neutral and disable
+        self._frames_out = 0                # of this cycle, of which nobody has said what became
+        self._whole = True                  # the bus has taken all frames of this cycle so far
         self._sent_word: int | None = None
         self._awaiting = False
         self._awaiting_extra = False
@@ -152,6 +154,8 @@ class CannordSession(Session):
         self._cycling = True
         self._in_pace = False
         self._next_cycle = self._first_cycle(now)
+        if self.told.owed:
+            self._hurry(now)
 
     def _first_cycle(self, now: float) -> float:
         return max(now, self._sent_at + self.drive.period)
@@ -194,6 +198,7 @@ class CannordSession(Session):
             self.statistics.period_error.add(abs(now - self._sent_at - period))
         self._in_pace = not self._stopping
         self._sent_at = now
+        self._frames_out, self._whole = 0, True
         self._transmit(now)
         if self._stopping:
             self._next_cycle = now + self._stop_spacing
@@ -205,24 +210,33 @@ class CannordSession(Session):
 
     def _transmit(self, now: float) -> None:
         """Hand out the frames of this cycle."""
-        self._put(self.request_identifier, self._cycle_left)
+        self._put(self.request_identifier)
         self.expect_answer(now)
 
-    def _put(self, addressed: int, left: Left | None = None) -> None:
-        """Hand out the frames of a cycle; ``left`` is told what became of the main one."""
+    def _put(self, addressed: int) -> None:
+        """Hand out main frame and additional frame to one identifier."""
         for payload in self._payloads:
-            self._outbox.put(Frame(addressed, payload, self._extended), left)
-            left = None
+            self._frames_out += 1
+            self._outbox.put(Frame(addressed, payload, self._extended), self._frame_left)
 
-    def _cycle_left(self, sent: bool, now: float) -> None:
-        """Take note of a cycle that left; what the bus refused does not count."""
+    def _frame_left(self, sent: bool, now: float) -> None:
+        """Take note of a frame; one that may start somebody counts even alone."""
+        self._frames_out -= 1
         if not sent:
-            return
+            self._whole = False
+        elif self._payloads_run:
+            self.told.note(CYCLE, runs=True)
+        if not self._frames_out and self._whole:
+            self._cycle_left(now)
+
+    def _cycle_left(self, now: float) -> None:
+        """Take note of a cycle of which the bus has taken every frame: only then it counts."""
         self.told.note(CYCLE, runs=self._payloads_run)
-        fresh = self._machine.word_due
-        self._machine.word_sent(now)
-        if fresh:
-            self._control_changed(now)
+        if self._machine.word == self._sent_word:   # nobody was lost meanwhile
+            fresh = self._machine.word_due
+            self._machine.word_sent(now)
+            if fresh:
+                self._control_changed(now)
         if self._stopping:
             self._cycles_left -= 1
             if self._cycles_left == 0:
@@ -236,7 +250,8 @@ class CannordSession(Session):
 
     def _see_to_control_word(self, now: float) -> None:
         if self._machine.stopping and not self._stopping and (
-                self.setpoints.changed or self._machine.word != self._sent_word):
+                self._machine.word != self._sent_word
+                or self.setpoints.changed and self.told.owed):
             self._hurry(now)
 
     def _encode(self) -> list[bytes]:
@@ -422,6 +437,7 @@ class CannordSession(Session):
             if isinstance(request, WriteRequest) and any(
                     parameter.number == TIMEOUT_NUMBER and isinstance(outcome, Written)
                     for (parameter, _), outcome in zip(request.items, outcomes)):
+                self._ask_timeout_at = -math.inf    # now it is known to answer
                 self._look_at_timeout(self._channel.now)
 
         self._channel.run(procedures.of_request(request, self._conditions), done, now)

@@ -5,9 +5,9 @@ Who may use the mailbox next.
 Anything that takes several requests is a *procedure*: a generator that yields steps (see
 :mod:`.mailbox`) and is sent the reply to each, so that it reads like the sequence it is. Every
 lane runs its procedures one after the other. A stop comes first, whatever holds the others back;
-then the control word, then setpoints; the
-reads of the round and the requests of users take turns after every exchange, so that neither a
-flood of users nor a parameter that nobody answers keeps the other waiting for more than one.
+then the control word, then setpoints; the reads of the round and the requests of users take turns
+after every exchange, so that neither a flood of users nor a parameter that nobody answers keeps
+the other waiting for more than one.
 """
 
 from collections import deque
@@ -126,6 +126,7 @@ class Channel:
             queue.clear()
         self.mailbox.forget()
         self._serving = None
+        self._hurried = False
 
     def make_room(self, now: float) -> None:
         """Let a stop follow soon: the answer under way is waited for a moment only."""

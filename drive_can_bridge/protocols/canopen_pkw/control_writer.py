@@ -46,7 +46,8 @@ class ControlWriter:
 
     def __init__(self, channel: Channel, control: ControlMachine, word: Parameter,
                  changed: Callable[[float], None], refused: Callable[[str], None],
-                 told: Told, *, disable: int, addressing: str, word_order: str, refresh: float) -> None:
+                 told: Told, *, disable: int, addressing: str, word_order: str,
+                 refresh: float) -> None:
         self.refusal = ''
         self._channel = channel
         self._control = control
@@ -80,7 +81,10 @@ class ControlWriter:
         word = self._control.word
         fresh = now < self._retry_at and (
             self._refresh <= 0.0 or now < self._settled_at + self._refresh)
-        if self._settled == word and (fresh or not known and word != self._disable):
+        if self._settled == word and fresh:
+            return
+        repeated = self._settled == word or self._control.operating
+        if repeated and not known and word != self._disable:
             return
         if self._control.stopping and word not in (self._hurried, self._settled):
             self._hurried = word
@@ -112,12 +116,16 @@ class ControlWriter:
                         return
                     continue
                 word = self._control.word
+            before = self._told.runs(CONTROL_WORD)
             if word != self._disable:
                 self._told.note(CONTROL_WORD, runs=True)
-            reply = yield Write(self._span.address, self._words(word))
+            reply = yield Write(self._span.address, self._words(word),
+                                blind=self._control.stopping)
             if isinstance(reply, Silence):
                 if reply.sent:
                     self._settled, self._doubtful = None, word
+                else:
+                    self._told.note(CONTROL_WORD, runs=before)
                 if word == self._control.word:
                     return
                 continue

@@ -32,6 +32,8 @@ from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Function, Messag
 
 #: s that an answer to function 00h is waited for at most
 SYNCHRONISATION_TIMEOUT = 0.1
+#: s until the bus is asked again to take a write that waits for nobody
+REFUSED_PAUSE = 0.01
 
 
 @dataclass(frozen=True)
@@ -48,6 +50,7 @@ class Write:
     Write one register, or two adjacent ones.
 
     :param blind: send it even though the device may take no notice; it may be executed twice.
+        When the bus refuses it, it is tried again until its time is over.
     :param timeout: s to wait for the answer; None: as configured.
     """
 
@@ -101,7 +104,8 @@ class Mailbox:
     :param timeout: s to wait for an answer.
     """
 
-    def __init__(self, send: Callable[[Message, Left], None], *, order: str, timeout: float) -> None:
+    def __init__(self, send: Callable[[Message, Left], None], *, order: str,
+                 timeout: float) -> None:
         self.timeout = timeout
         self._send = send
         self._order = order
@@ -111,7 +115,7 @@ class Mailbox:
         self._request: Message | None = None
         self._deadline = math.inf
         self._abandoned = False
-        self._refused = False
+        self._refused_at: float | None = None   # the bus did not take the request
 
     @property
     def busy(self) -> bool:
@@ -121,7 +125,9 @@ class Mailbox:
     @property
     def deadline(self) -> float:
         """When ``handle_timer`` has something to do; infinity: never."""
-        return self._deadline
+        if self._refused_at is None:
+            return self._deadline
+        return min(self._deadline, self._refused_at + REFUSED_PAUSE)
 
     def begin(self, step: Step, now: float) -> None:
         """Begin an exchange; none may be under way."""
@@ -173,9 +179,8 @@ class Mailbox:
         request, step = self._request, self._step
         if request is None or step is None:
             return None
-        if self._refused:
-            self.forget()
-            return Silence(sent=False, refused=True)
+        if self._refused_at is not None:
+            return self._try_again(step, self._refused_at, now)
         if now < self._deadline:
             return None
         if self._abandoned:
@@ -200,13 +205,28 @@ class Mailbox:
         self._step = None
         self._request = None
         self._deadline = math.inf
-        self._abandoned = self._refused = False
+        self._abandoned = False
+        self._refused_at = None
 
     def _left(self, sent: bool, now: float) -> None:
-        """Give up a write that the bus refused; a read ends when its time is over."""
-        if not sent and isinstance(self._step, Write):
-            self._refused = True
-            self._deadline = now
+        """Take note of a write that the bus refused; a read ends when its time is over."""
+        if sent or self._request is None or not isinstance(self._step, Write):
+            return
+        self._refused_at = now
+        if self._request.code != Function.NONE:
+            self._toggle = not self._toggle     # the device has not seen this one
+
+    def _try_again(self, step: Step, refused_at: float, now: float) -> Reply | None:
+        """Go on with a write that the bus has refused: it is no write."""
+        if not (isinstance(step, Write) and step.blind) or self._abandoned or (
+                now >= self._deadline):
+            self._end()     # what the device's last function byte is, is as known as before
+            return Silence(sent=False, refused=True)
+        if now >= refused_at + REFUSED_PAUSE:
+            deadline, self._refused_at = self._deadline, None
+            self._send_step(step, now)
+            self._deadline = deadline
+        return None
 
     def _send_step(self, step: Step, now: float) -> None:
         # inverted after function 00h, too: a late answer to the request before never fits

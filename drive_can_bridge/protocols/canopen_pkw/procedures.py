@@ -213,5 +213,6 @@ def write_until_answered(writes: Sequence[LastWrite], attempts: int, timeout: fl
         if isinstance(reply, Refused):
             failed.append(f'{name} {reply.text}')
         elif isinstance(reply, Silence):
-            failed.append(f'{name} not acknowledged in {attempts} attempts')
+            failed.append(f'{name} not taken by the bus' if reply.refused else
+                          f'{name} not acknowledged in {attempts} attempts')
     return failed

@@ -28,7 +28,7 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlMachine
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.events import (
-    ForeignMasterSeen, Noted, ProcessDataReceived, SetpointsExpired, StationFound,
+    ForeignMasterSeen, ProcessDataReceived, SetpointsExpired, StationFound,
 )
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.outbox import Left
@@ -43,6 +43,7 @@ from drive_can_bridge.protocols.canopen_pkw.control_writer import ControlWriter
 from drive_can_bridge.protocols.canopen_pkw.identifiers import Identifiers
 from drive_can_bridge.protocols.canopen_pkw.mailbox import Mailbox, Refused
 from drive_can_bridge.protocols.canopen_pkw.node import Change, Node
+from drive_can_bridge.protocols.canopen_pkw.notes import PacedNotes
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Layout, Message
 from drive_can_bridge.protocols.canopen_pkw.setpoint_writer import SetpointWriter
 from drive_can_bridge.protocols.polling import Beat
@@ -78,6 +79,7 @@ class PkwSession(Session):
         self._layout = Layout(options['layout'])
         self._addressing: str = options['addressing']
         self._word_order: str = options['word_order']
+        self._notes = PacedNotes(lambda note: self._events.append(note))
         self._node = Node(drive.station, nmt_start=options['nmt_start'],
                           heartbeat_timeout=options['heartbeat_timeout'])
         self._channel = Channel(Mailbox(
@@ -111,8 +113,8 @@ class PkwSession(Session):
     # -- life cycle -------------------------------------------------------------------------------
 
     def deactivate(self, now: float) -> None:
-        was_running = self._phase is not Phase.IDLE and self.ever_online and (
-            now >= self._node.free_at or self.told.owed)
+        was_running = self._phase is not Phase.IDLE and (
+            self.told.owed or self.ever_online and now >= self._node.free_at)
         self.active = False
         self._fail_requests(BRIDGE_INACTIVE)
         self._withdraw(BRIDGE_INACTIVE, now)
@@ -142,8 +144,9 @@ class PkwSession(Session):
     def _stop_ended(self, failed: list[str]) -> None:
         if not failed:
             self.told.stopped()
-        elif self._owed:
-            self._warn(f'told to stop, but {"; ".join(failed)}: {MAY_RUN}')
+        elif self._owed or self._phase is Phase.STOPPING:
+            tail = f': {MAY_RUN}' if self._owed else ''
+            self._warn(f'told to stop, but {"; ".join(failed)}{tail}')
         if self._phase is Phase.STOPPING:
             self._go_idle('deactivated')
 
@@ -186,6 +189,7 @@ class PkwSession(Session):
         self._node.stop()
         self._beat.stop()
         self._channel.clear()
+        self._notes.flush(self._channel.now)
         self._refusals.clear()
         self._advice = advice
         self._be_offline(advice)
@@ -235,11 +239,17 @@ class PkwSession(Session):
             self._stop_now(STOP_TIME_SILENT, now)
 
     def _cut_off(self, reason: str, answer: str, now: float) -> None:
-        """Handle a node that takes no PDOs: nothing that was sent is answered any more."""
+        """
+        Handle a node that takes no PDOs: nothing that was sent is answered any more.
+
+        A stop under way takes its course: however often a node starts anew, stops do not pile up.
+        """
+        self._send_nmt()    # a stop that comes before it is lost
         self._lose(reason, now)
-        self._channel.clear()
         self._fail_requests(answer)
-        self._stop_if_owed(now)
+        if self._channel.is_idle(Lane.STOP):
+            self._channel.clear()
+            self._stop_if_owed(now)
 
     def _send_nmt(self) -> None:
         for frame in self._node.take_frames():
@@ -365,8 +375,9 @@ class PkwSession(Session):
             elif identifier == identifiers.emergency:
                 text = self._node.receive_emergency(network.decode_emergency(data))
                 if text:
-                    self._events.append(Noted(
-                        text, warning=self._node.emergency is not None))
+                    ails = self._node.emergency is not None
+                    self._notes.note('emergency' if ails else 'emergency over', text, now,
+                                     warning=ails)
             elif identifier == identifiers.request:
                 self._events.append(ForeignMasterSeen(
                     f'another master sends PKW requests to node {self.drive.station}: {frame}'))
@@ -381,7 +392,7 @@ class PkwSession(Session):
         if not running:
             return
         if change is Change.RESTARTED:
-            self._events.append(Noted('boot-up: the device has started'))
+            self._notes.note('boot-up', 'boot-up: the device has started', now)
             self._cut_off('the device restarted', 'no answer: the device restarted', now)
             self._advice = 'the device restarted: waiting for it to answer'
         elif change is Change.NOT_OPERATIONAL:
@@ -407,6 +418,7 @@ class PkwSession(Session):
     # -- timer ------------------------------------------------------------------------------------
 
     def handle_timer(self, now: float) -> None:
+        self._notes.handle_timer(now)
         if self._phase is Phase.RUNNING:
             if now >= self._node.next_timer():
                 if self._node.handle_timer(now) is Change.HEARTBEAT_LOST:
@@ -426,15 +438,19 @@ class PkwSession(Session):
             return soonest
         if self._channel.is_idle(Lane.ROUND):
             soonest = min(soonest, self._beat.due)
-        soonest = min(soonest, self._node.next_timer())
+        soonest = min(soonest, self._node.next_timer(), self._notes.next_timer())
         return soonest if self.control is None else min(soonest, self.control.next_timer())
 
     # -- control ----------------------------------------------------------------------------------
 
     def _see_to_control_word(self, now: float) -> None:
-        if self._control_writer is not None and self.online:
+        if not self.online:
+            return
+        if self._control_writer is not None:
             self._control_writer.update(
                 now, known=self._status_known or self._status is None)
+        if self.setpoints.changed and not self.setpoints.enabled:
+            self._setpoint_writer.look(now)     # neutral follows the word at once
 
     # -- users ------------------------------------------------------------------------------------
 

@@ -46,6 +46,7 @@ class SetpointWriter:
 
     def look(self, now: float) -> None:
         """Write what is due."""
+        self._setpoints.changed = False
         if not self._setpoints.items:
             return
         self._schedule.look([setpoint.raw for setpoint in self._setpoints.items], now)
@@ -65,12 +66,15 @@ class SetpointWriter:
             parameter, raw = setpoint.parameter, setpoint.raw
             # at once: a look while the answer is awaited must not find it due again
             self._schedule.written(index, raw, self._channel.now)
+            before = self._told.runs(index)
             if raw != setpoint.neutral:
                 self._told.note(index, runs=True)
             reply = yield Write(self._spans[index].address, addresses.words_from_raw(
                 parameter, raw, self._word_order))
             if isinstance(reply, Silence):
                 self._schedule.failed(index)
+                if not reply.sent:
+                    self._told.note(index, runs=before)
             elif isinstance(reply, Answered):
                 self._told.note(index, runs=raw != setpoint.neutral)
                 self.refusals.pop(parameter.name, None)

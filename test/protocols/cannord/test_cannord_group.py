@@ -1,6 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Broadcast groups: stations 1, 2 and 3 are led by station 1 and share identifier 400h (408h)."""
 
+from collections.abc import Callable
 import math
 from typing import Any
 
@@ -34,6 +35,8 @@ class Bus:
         self.sessions = make_sessions(drives)
         self.now = 10.0
         self.log: list[tuple[str, Event]] = []
+        #: tells of a frame whether the bus refuses it
+        self.refusing: Callable[[str], bool] = lambda text: False
         #: station -> what it answers to its process frame; a missing one is silent
         self.answers: dict[int, str] = {drive.station: READY for drive in drives}
         for session in self.sessions:
@@ -45,9 +48,16 @@ class Bus:
         return next(session for session in self.sessions if session.drive.name == name)
 
     def pump(self) -> list[str]:
-        sent = []
+        """Fetch what all sessions give out, in the order of the exchange; return what left."""
+        sent: list[str] = []
         for session in self.sessions:
-            sent += [str(entry) for entry in session.take_frames()]
+            texts = [str(entry) for entry in session.take_frames()]
+            while texts:
+                refused = [place for place, text in enumerate(texts) if self.refusing(text)]
+                sent += [text for place, text in enumerate(texts) if place not in refused]
+                session.frames_left(self.now, refused)
+                texts = [str(entry) for entry in session.take_frames()]
+        for session in self.sessions:   # a partner's events may have come after its turn
             self.log += [(session.drive.name, event) for event in session.take_events()]
         return sent
 
@@ -175,15 +185,23 @@ def test_setpoints_and_extra_values_of_all() -> None:
     bus.hears('003#0100020000')
     assert bus.session('lift').online
     lift = bus.session('lift')
+    assert [text for _, text in bus.live(0.015)][2:] == [
+        '004#7E04000000000000', '004#0000000000']
+    bus.hears('005#310B000100020003')
+    bus.hears('005#0400FFFF00')
+    assert bus.events(ProcessDataReceived)[-1][1].raws == (0x0B31, 256, 512, 768, 4, -1)
+    bus.asks(ENABLE)
+    for number in (3, 5):
+        bus.live(0.02)
+        bus.hears(f'{number:03X}#370B000000000000')
+        bus.hears(f'{number:03X}#0000000000')
+    assert bus.outcomes() == [('enable', True, 'operation enabled')]
     for index in range(5):
         lift.command(index, 0.0, bus.now)
     lift.command(0, 50.0, bus.now)
     lift.command(4, -50.0, bus.now)
-    assert [text for _, text in bus.live(0.015)] == [
-        '400#7E04004000000000', '400#000000E000', '004#7E04004000000000', '004#000000E000']
-    bus.hears('005#310B000100020003')
-    bus.hears('005#0400FFFF00')
-    assert bus.events(ProcessDataReceived)[-1][1].raws == (0x0B31, 256, 512, 768, 4, -1)
+    assert [text for _, text in bus.live(0.02)] == [
+        '400#7F04004000000000', '400#000000E000', '002#7F04004000000000', '002#000000E000']
 
 
 def test_the_longest_lists_decide_for_all() -> None:
@@ -210,7 +228,7 @@ def test_each_counts_its_own_answers() -> None:
         ('hoist', StationLost('no answer to process data for 3 cycles'))]
     assert [session.statistics.missed for session in bus.sessions] == [0, 3, 0]
     assert [session.state for session in bus.sessions] == [
-        DriveState.NOT_ARMED, DriveState.OFFLINE, DriveState.ONLINE]
+        DriveState.DISABLED, DriveState.OFFLINE, DriveState.DISABLED]
     bus.answers[2] = READY
     bus.live(0.06)
     assert [name for name, _ in bus.events(StationFound)] == ['hoist']
@@ -233,31 +251,35 @@ def test_foreign_master() -> None:
 
 
 def test_the_leader_commands_all() -> None:
-    bus = three()
+    bus = enabled()
     lift = bus.session('lift')
     assert lift.state is DriveState.NOT_ARMED
     assert lift.command(0, 0.0, bus.now) is CommandOutcome.ARMED
     assert lift.command(0, 25.0, bus.now) is CommandOutcome.ACCEPTED
-    assert [text for _, text in bus.live(0.03)] == [
-        '400#7E040020', '002#7E040020', '400#7E040020', '004#7E040020']
+    assert [session.state for session in bus.sessions] == [DriveState.ONLINE] * 3
+    assert sorted(text for _, text in bus.live(0.06)) == [
+        '002#7F040020', '004#7F040020', '006#7F040020', *['400#7F040020'] * 3]
     assert bus.session('hoist').write_refusal(FREQUENCY) == (
         'sent cyclically by the broadcast group: publish lift/command/frequency_setpoint')
     assert bus.session('hoist').write_refusal(OFFSET) == ''
 
 
 def test_a_member_that_comes_back_disarms_all() -> None:
-    bus = three()
+    bus = enabled()
     lift = bus.session('lift')
+    lift.command(0, 0.0, bus.now)
+    lift.command(0, 25.0, bus.now)
     del bus.answers[3]
     bus.live(0.2)
     assert not bus.session('turn').online
-    lift.command(0, 0.0, bus.now)
-    lift.command(0, 25.0, bus.now)
-    bus.answers[3] = READY
+    assert lift.command(0, 0.0, bus.now) is CommandOutcome.DISABLED
+    assert lift.command(0, 25.0, bus.now) is CommandOutcome.DISABLED
+    bus.answers[3] = RUNNING
     bus.live(0.07)
     assert bus.session('turn').online
-    assert lift.state is DriveState.NOT_ARMED
-    assert words(bus.live(0.02)) == ['7E04']
+    assert lift.state is DriveState.DISABLED
+    assert {text for _, text in bus.live(0.06)} == {
+        '400#7E040000', '002#7E040000', '004#7E040000', '006#7E040000'}
 
 
 def test_parameters_are_everybodys_own() -> None:
@@ -283,6 +305,7 @@ def test_enable_brings_all_up() -> None:
     bus.live(0.06)
     assert bus.outcomes() == [('enable', True, 'operation enabled')]
     assert words(bus.live(0.1)) == ['7F04'] * 5
+    assert bus.session('lift').state is DriveState.NOT_ARMED
     control = bus.session('lift').control
     assert control is not None
     assert control.state == 'operation enabled'
@@ -455,7 +478,7 @@ def test_members_name_their_leader() -> None:
     control = bus.session('hoist').control
     assert control is not None
     assert control.state == 'ready to switch on'
-    assert bus.session('hoist').state is DriveState.ONLINE
+    assert bus.session('hoist').state is DriveState.DISABLED
 
 
 def test_refused_when_nobody_is_there() -> None:

@@ -3,6 +3,7 @@
 
 import pytest
 
+from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.protocols.canopen_pkw import pkw
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
     Answered, Mailbox, Read, Refused, Reply, Silence, Write,
@@ -20,10 +21,12 @@ class Box:
     def __init__(self, **options: object) -> None:
         self.sent: list[str] = []
         settings = {'order': 'auto', 'timeout': 0.5, **options}
-        self.box = Mailbox(
-            lambda message: self.sent.append(
-                pkw.encode(message, Layout.WORD_LE).hex(' ').upper()),
-            **settings)  # type: ignore[arg-type]
+        self.box = Mailbox(self.send, **settings)  # type: ignore[arg-type]
+        self.left: Left = lambda sent, now: None
+
+    def send(self, message: pkw.Message, left: Left) -> None:
+        self.sent.append(pkw.encode(message, Layout.WORD_LE).hex(' ').upper())
+        self.left = left
 
     def take(self) -> list[str]:
         sent, self.sent = self.sent, []
