@@ -88,8 +88,9 @@ def test_fault_and_reset(bridge: StartBridge, client: Client, lift: dict[str, An
     assert success, message
     wait_until(lambda: drive.value('control_word') == 0)
     assert not int(drive.value('status_word')) & 2  # nothing but a new enable starts it
-    client.diagnostics(DRIVE, lambda drive: drive['state'] == 'not armed')
+    client.diagnostics(DRIVE, lambda drive: drive['state'] == 'disabled')
     assert enable(client)[0]
+    client.diagnostics(DRIVE, lambda drive: drive['state'] == 'not armed')
 
 
 def test_a_fault_that_lasts_cannot_be_reset(bridge: StartBridge, client: Client) -> None:
