@@ -73,10 +73,12 @@ class LeaderSession(GroupSession):
         super().__init__(own, self._group, places=places)
         self.members: list[GroupSession] = [self]
         self._turn = 0
+        self._turn_begun = 0    # what it was when this cycle began
 
     # -- sending ----------------------------------------------------------------------------------
 
     def _transmit(self, now: float) -> None:
+        self._turn_begun = self._turn
         self._put(self._broadcast)
         count = len(self.members)
         # a stop reaches also those that do not listen to broadcasts
@@ -85,6 +87,11 @@ class LeaderSession(GroupSession):
             self._turn = (self._turn + 1) % count
             self._put(member.request_identifier)
             member.expect_answer(now, now + self.drive.period)
+
+    def _frame_left(self, sent: bool, now: float) -> None:
+        if not sent and self._stopping:     # the stop does not end without those left out
+            self._turn = self._turn_begun
+        super()._frame_left(sent, now)
 
     # -- the group --------------------------------------------------------------------------------
 

@@ -11,14 +11,16 @@ from cannord_session_builders import (
 )
 import pytest
 
-from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import (
     Event, ForeignMasterSeen, Noted, ProcessDataReceived, RequestCompleted, StationFound,
     StationLost,
 )
+from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.session import DriveState, Session
 from drive_can_bridge.core.setpoints import CommandOutcome
+from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.protocols.cannord.control import GroupControl
 from drive_can_bridge.protocols.families import FAMILIES, make_sessions
 
@@ -486,6 +488,189 @@ def test_refused_when_nobody_is_there() -> None:
     bus.answers = {}
     bus.live(0.5)
     assert bus.session('lift').request_control(ENABLE, bus.now) == 'drive offline'
+
+
+# -- stops ----------------------------------------------------------------------------------------
+
+
+def driven(**options: Any) -> Bus:
+    """Return a group that runs at 25 Hz."""
+    bus = enabled(**options)
+    lift = bus.session('lift')
+    assert lift.command(0, 0.0, bus.now) is CommandOutcome.ARMED
+    assert lift.command(0, 25.0, bus.now) is CommandOutcome.ACCEPTED
+    assert '400#7F040020' in [text for _, text in bus.live(0.06)]
+    bus.events()
+    return bus
+
+
+def worries(bus: Bus) -> list[tuple[str, str]]:
+    return [(name, event.text) for name, event in bus.events(Noted)
+            if 'may still be running' in event.text]
+
+
+def test_commands_count_from_the_last_operation_enabled_on() -> None:
+    bus = three()
+    lift = bus.session('lift')
+    bus.asks(ENABLE)
+    assert words(bus.live(0.02)) == ['7F04']
+    bus.answers = {1: RUNNING, 2: RUNNING, 3: '330B0000'}
+    bus.live(0.1)
+    assert [session.state for session in bus.sessions] == [DriveState.DISABLED] * 3
+    assert lift.command(0, 0.0, bus.now) is CommandOutcome.DISABLED, 'turn is switched on'
+    bus.answers[3] = RUNNING
+    bus.live(0.06)
+    assert bus.outcomes() == [('enable', True, 'operation enabled')]
+    assert lift.command(0, 25.0, bus.now) is CommandOutcome.NOT_ARMED
+    assert lift.command(0, 0.0, bus.now) is CommandOutcome.ARMED
+
+
+def test_a_member_that_comes_back_running_arms_nobody() -> None:
+    bus = driven()
+    bus.answers[2] = '330B0000'
+    bus.live(0.06)
+    assert bus.session('lift').state is DriveState.DISABLED
+    bus.answers[2] = RUNNING
+    bus.live(0.1)
+    assert bus.session('lift').command(0, 0.0, bus.now) is CommandOutcome.DISABLED
+    assert words(bus.live(0.02)) == ['7E04']
+
+
+def test_stop_of_a_slow_group_is_brought_forward() -> None:
+    bus = Bus(*members(period=0.1))
+    bus.live(0.25)
+    bus.asks(ENABLE)        # 10.25
+    bus.live(0.1)
+    bus.answers = dict.fromkeys((1, 2, 3), RUNNING)
+    bus.live(0.3)           # 10.65
+    assert bus.outcomes() == [('enable', True, 'operation enabled')]
+    lift = bus.session('lift')
+    lift.command(0, 0.0, bus.now)
+    lift.command(0, 25.0, bus.now)
+    assert (10.7, '400#7F040020') in bus.live(0.08)     # 10.73
+    bus.asks(QUICK_STOP)
+    when, text = bus.live(0.01)[0]
+    assert (when, text) == (pytest.approx(10.73, abs=0.001), '400#7A040000')
+
+
+def test_stop_frames_of_a_group_that_the_bus_refuses() -> None:
+    bus = driven()
+    bus.refusing = lambda text: text.startswith('400')
+    for session in bus.sessions:
+        session.deactivate(bus.now)
+    assert {text.split('#')[1] for _, text in bus.live(0.3)} == {'7E040000'}
+    assert [session.stopped for session in bus.sessions] == [False, True, True]
+    bus.session('lift').give_up(bus.now)
+    bus.pump()
+    assert worries(bus) == [('lift', 'could not be told to stop: it may still be running')]
+
+
+def test_member_whose_frame_is_refused_gets_one_before_the_stop_ends() -> None:
+    """It may be one that does not listen to broadcasts."""
+    bus = driven()
+    asked: list[str] = []
+
+    def refusing(text: str) -> bool:
+        asked.append(text)
+        return text.startswith('004') and asked.count(text) < 3
+    bus.refusing = refusing
+    for session in bus.sessions:
+        session.deactivate(bus.now)
+    sent = [text for _, text in bus.live(1.0)]
+    assert {text[:3] for text in sent} == {'400', '002', '004', '006'}
+    assert all(session.stopped for session in bus.sessions)
+    assert worries(bus) == []
+
+
+def test_enable_that_only_one_of_them_got_is_owed_a_stop() -> None:
+    bus = three()
+    bus.refusing = lambda text: text.startswith('400')
+    bus.asks(ENABLE)
+    assert [text for _, text in bus.live(0.02)] == ['002#7F040000']
+    for session in bus.sessions:
+        session.bus_down(bus.now, 'unplugged')
+    bus.pump()
+    assert worries(bus) == [
+        ('lift', 'the bus was lost before it could be told to stop: it may still be running')]
+
+
+def test_stall_reopened_bus_and_signal() -> None:
+    bus = driven()
+    for session in bus.sessions:
+        session.bus_down(bus.now, 'unplugged')
+    bus.pump()
+    assert len(worries(bus)) == 1
+    bus.now += 1.5
+    for session in bus.sessions:
+        session.bus_up(bus.now)
+    for session in bus.sessions:
+        session.deactivate(bus.now)
+    sent = bus.live(1.0)
+    assert [text for _, text in sent if text.startswith('400')] == ['400#7E040000'] * 3
+    assert {text for _, text in sent} == {
+        '400#7E040000', '002#7E040000', '004#7E040000', '006#7E040000'}
+    assert worries(bus) == []
+
+
+# -- as the exchange serves them ------------------------------------------------------------------
+
+
+class Ears:
+    """Whoever listens to a drive, or to the bus."""
+
+    def __init__(self) -> None:
+        self.events: list[Event] = []
+
+    def handle_event(self, event: Event) -> None:
+        self.events.append(event)
+
+    def process_data(self, *told: object) -> None:
+        """Take no notice."""
+
+    take_commands = discard_commands = bus_opened = process_data
+
+
+class Cable:
+    """A link that takes frames down."""
+
+    def __init__(self) -> None:
+        self.sent: list[str] = []
+
+    def send(self, sent: Frame) -> bool:
+        self.sent.append(str(sent))
+        return True
+
+
+def test_silent_member_is_offline_by_its_own_timer() -> None:
+    """Nothing but the leader's cycle tells it that an answer was due."""
+    now = 10.0
+    drives = members(2)
+    sessions = make_sessions(drives)
+    ears = [Ears(), Ears()]
+    exchange = BusExchange(
+        BusConfiguration('main', 'virtual', 'x'), sessions,
+        [[claim.route for claim in FAMILIES['cannord'].claims(entry)] for entry in drives],
+        Ears(), clock=lambda: now)  # type: ignore[arg-type]
+    cable = exchange.link = Cable()  # type: ignore[assignment]
+    for session, each in zip(sessions, ears):
+        exchange.attach(session, each)  # type: ignore[arg-type]
+    exchange.bus_opened()
+    exchange.activate()
+    asked: list[tuple[float, str]] = []
+    for tick in range(400):     # 0.4 s
+        now = round(10.0 + 0.001 * tick, 3)
+        exchange._pass()
+        asked += [(now, text) for text in cable.sent]
+        for text in cable.sent[:]:
+            if text.startswith('002') or text.startswith('004') and now < 10.05:
+                exchange.frame_received(frame(f'{int(text[:3], 16) + 1:03X}#{READY}'), 0.0)
+        cable.sent.clear()
+        if StationLost('no answer to process data for 3 cycles') in ears[1].events:
+            break
+    assert [when for when, text in asked if text.startswith('004')] == [10.02, 10.06, 10.1, 10.14]
+    assert now == pytest.approx(10.16, abs=0.002)
+    assert [session.online for session in sessions] == [True, False]
+    assert StationLost not in {type(event) for event in ears[0].events}
 
 
 # -- the life of a group --------------------------------------------------------------------------

@@ -2,12 +2,12 @@
 """Control register 704: written on change, acknowledged, never repeated blindly."""
 
 from dataclasses import replace
-from typing import Any
 
 from builders import Conversation
 from pkw_builders import (
-    ANSWER_0, ANSWER_1, CONTROL, DISABLE_0, DISABLE_1, DISABLED_0, DISABLED_1, IDLE, IDLE_ANSWER,
-    online, READ_0, READ_1, RUNS_0, RUNS_1, START, started, TABLE, TRIPPED_0, WORD,
+    ANSWER_0, ANSWER_1, CONTROL, DISABLE_0, DISABLE_1, DISABLED_0, DISABLED_1, ENABLE_0, ENABLE_1,
+    ENABLED_0, ENABLED_1, IDLE, IDLE_ANSWER, READ_0, READ_1, ready, running, RUNS_0, RUNS_1, START,
+    started, TABLE, TRIPPED_0, WORD,
 )
 import pytest
 
@@ -16,31 +16,6 @@ from drive_can_bridge.core.events import Noted, StationLost
 from drive_can_bridge.core.parameters import Access
 from drive_can_bridge.core.session import DriveState
 from drive_can_bridge.protocols.families import FAMILIES
-
-ENABLE_0 = '505#C002002A01000000'
-ENABLE_1 = '505#C00200AA01000000'
-ENABLED_0 = '485#C002002A00000000'
-ENABLED_1 = '485#C00200AA00000000'
-
-
-def ready(**options: Any) -> Conversation:
-    """Return a drive that is online, disabled and ready; the last read had toggle 1."""
-    talk = online(control=CONTROL, **options)
-    assert talk.until(10.0701) == [(10.07, READ_1)]
-    assert talk.hears(ANSWER_1, 10.071) == []
-    return talk
-
-
-def running(**options: Any) -> Conversation:
-    """Return a drive that was enabled; the last read had toggle 1."""
-    talk = ready(**options)
-    assert talk.asks(ControlAction.ENABLE, 10.075) == [ENABLE_0]
-    assert talk.hears(ENABLED_0, 10.076) == []
-    assert talk.until(10.0901) == [(10.09, READ_1)]
-    assert talk.hears(RUNS_1, 10.091) == []
-    assert talk.control_outcomes() == [('enable', True, 'enabled')]
-    talk.events()
-    return talk
 
 
 def test_disable_is_the_first_thing_that_is_written() -> None:

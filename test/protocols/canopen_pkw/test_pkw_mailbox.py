@@ -204,6 +204,37 @@ def test_blind_write_goes_at_once_with_its_own_time_out() -> None:
     assert box.begin(Write(REGISTER, (1,), blind=True), 1.0) == ['C7 01 00 2A 01 00 00 00']
 
 
+@pytest.mark.parametrize('step', [Write(REGISTER, (1,)), Write(REGISTER, (1,), blind=True)])
+def test_write_that_the_bus_refuses_was_not_sent(box: Box, step: Write) -> None:
+    assert box.begin(step, 1.0) == ['C7 01 00 2A 01 00 00 00']
+    box.left(False, 1.0)
+    if not step.blind:
+        assert box.box.handle_timer(1.0) == Silence(sent=False, refused=True)
+    else:
+        assert box.box.handle_timer(1.009) is None
+        assert box.box.deadline == pytest.approx(1.01)
+        assert box.box.handle_timer(1.01) is None
+        assert box.take() == ['C7 01 00 2A 01 00 00 00']
+        box.left(False, 1.01)
+        assert box.box.handle_timer(1.5) == Silence(sent=False, refused=True)
+    # the device has not seen it: nothing has to be synchronised, and its toggle is still new
+    assert box.begin(READ, 2.0) == ['C7 01 00 25 00 00 00 00']
+
+
+def test_refused_write_that_has_to_make_room_ends(box: Box) -> None:
+    box.begin(Write(REGISTER, (1,), blind=True), 1.0)
+    box.left(False, 1.0)
+    box.box.abandon(1.05)
+    assert box.box.handle_timer(1.0) == Silence(sent=False, refused=True)
+
+
+def test_read_that_the_bus_refuses_ends_when_its_time_is_over(box: Box) -> None:
+    box.begin(READ, 1.0)
+    box.left(False, 1.0)
+    assert box.box.handle_timer(1.499) is None
+    assert box.box.handle_timer(1.5) == Silence(sent=True)
+
+
 def test_short_time_out_counts_for_function_zero_too() -> None:
     box = Box(timeout=0.02)
     box.begin(READ, 0.0)

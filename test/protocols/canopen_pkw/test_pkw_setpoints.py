@@ -6,22 +6,15 @@ from typing import Any
 
 from builders import Conversation, read
 from pkw_builders import (
-    ANSWER_0, BOOT_UP, CLASS, CONTROL, DISABLE_0, DISABLE_1, DISABLED_1, IDLE, IDLE_ANSWER,
-    online, POSITION, READ_0, SPEED, START, STOPPED, TORQUE,
+    ANSWER_0, BOOT_UP, CLASS, DISABLE_0, DISABLE_1, DISABLED_1, driven, IDLE, IDLE_ANSWER, online,
+    POSITION, READ_0, SPEED, SPEED_0, SPEED_1, START, STILL_0, STILL_1, STOPPED, TORQUE,
 )
 import pytest
 
-from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import Noted, SetpointsExpired, StationLost
-from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.session import DriveState
 from drive_can_bridge.core.setpoints import CommandOutcome
 
-#: 710 = 100
-SPEED_0 = '505#C602002A64000000'
-SPEED_1 = '505#C60200AA64000000'
-STILL_0 = '505#C602002A00000000'
-STILL_1 = '505#C60200AA00000000'
 WITHDRAWN = Noted('enable withdrawn: bridge inactive; only ~/enable starts the drive again')
 
 
@@ -52,33 +45,6 @@ def armed(**options: Any) -> Conversation:
     talk = online(**options)
     assert talk.commands(0, 0.0, 10.06) is CommandOutcome.ARMED
     assert talk.commands(0, 10.0, 10.06) is CommandOutcome.ACCEPTED
-    return talk
-
-
-def echo(text: str, status: str = 'C320') -> str:
-    """Return the device's answer to a request; what it reads is the status register."""
-    reply = text.replace('505#', '485#')
-    return f'{reply[:12]}{status}0000' if text[10:12] in ('26', 'A6') else reply[:12] + '00000000'
-
-
-def driven(request: tuple[Parameter, ...] = (SPEED,), **options: Any) -> Conversation:
-    """Return a drive that was enabled and runs at 10 Hz; the next round is due at 10.13 s."""
-    talk = online(request=request, control=CONTROL, **options)
-    first, = talk.at(10.07)
-    assert talk.hears(echo(first, '4100'), 10.071) == []
-    enable, = talk.asks(ControlAction.ENABLE, 10.075)
-    assert enable in ('505#C002002A01000000', '505#C00200AA01000000')
-    assert talk.hears(echo(enable), 10.076) == []
-    text, = talk.at(10.09)
-    assert talk.hears(echo(text), 10.091) == []
-    assert talk.control_outcomes() == [('enable', True, 'enabled')]
-    assert talk.commands(0, 0.0, 10.095) is CommandOutcome.ARMED
-    assert talk.commands(0, 10.0, 10.095) is CommandOutcome.ACCEPTED
-    text, = talk.at(10.11)
-    assert text in (SPEED_0, SPEED_1)
-    text, = talk.hears(echo(text), 10.111)
-    assert talk.hears(echo(text), 10.112) == []
-    talk.events()
     return talk
 
 
