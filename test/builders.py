@@ -1,7 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Configurations, frames and conversations for the tests of sessions."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from drive_can_bridge.configuration.schema import family_defaults
@@ -113,19 +113,31 @@ class Conversation:
     A session, spoken to in hex and literal times.
 
     Every method that may cause frames returns them as candump writes them.
+
+    :ivar refusing: tells of a frame whether the bus refuses it.
     """
 
     def __init__(self, configuration: DriveConfiguration) -> None:
         self.session: Session = FAMILIES[configuration.protocol].make_session(configuration)
         self.log: list[Event] = []
+        self.now = 0.0
+        self.refusing: Callable[[str], bool] = lambda text: False
 
     def sent(self) -> list[str]:
-        """Return the frames since the last look, and keep the events."""
-        self.log += self.session.take_events()
-        return [str(entry) for entry in self.session.take_frames()]
+        """Return the frames since the last look that the bus took, and keep the events."""
+        found: list[str] = []
+        while True:
+            texts = [str(entry) for entry in self.session.take_frames()]
+            if not texts:
+                self.log += self.session.take_events()
+                return found
+            refused = [place for place, text in enumerate(texts) if self.refusing(text)]
+            found += [text for place, text in enumerate(texts) if place not in refused]
+            self.session.frames_left(self.now, refused)
 
     def at(self, now: float) -> list[str]:
         """Let the timer run once."""
+        self.now = now
         self.session.handle_timer(now)
         return self.sent()
 
@@ -141,41 +153,50 @@ class Conversation:
 
     def hears(self, text: str, now: float) -> list[str]:
         """Receive a frame."""
+        self.now = now
         self.session.receive_frame(frame(text), now)
         return self.sent()
 
     def bus_up(self, now: float) -> list[str]:
+        self.now = now
         self.session.bus_up(now)
         return self.sent()
 
     def bus_down(self, now: float, reason: str = 'unplugged') -> list[str]:
+        self.now = now
         self.session.bus_down(now, reason)
         return self.sent()
 
     def activate(self, now: float) -> list[str]:
+        self.now = now
         self.session.activate(now)
         return self.sent()
 
     def deactivate(self, now: float) -> list[str]:
+        self.now = now
         self.session.deactivate(now)
         return self.sent()
 
     def time_lost(self, now: float) -> list[str]:
+        self.now = now
         self.session.time_lost(now)
         return self.sent()
 
     def submits(self, request: Request, now: float) -> list[str]:
+        self.now = now
         self.session.submit(request, now)
         return self.sent()
 
     def asks(self, action: ControlAction, now: float) -> list[str]:
         """Ask for a control action, which has to be taken."""
+        self.now = now
         ticket = self.session.request_control(action, now)
         if isinstance(ticket, str):
             raise AssertionError(ticket)
         return self.sent()
 
     def commands(self, index: int, value: Value, now: float) -> CommandOutcome:
+        self.now = now
         return self.session.command(index, value, now)
 
     def events(self, *kinds: type) -> list[Any]:

@@ -55,7 +55,6 @@ that says that it refuses the word (:meth:`~ControlMachine.word_refused`) ends w
 with its reason.
 """
 
-from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from enum import Enum
 import math
@@ -98,105 +97,6 @@ class ControlCompleted:
     message: str
 
 
-class ControlMachine(ABC):
-    """
-    Bring one drive to the state that was asked for.
-
-    Without input or output: time is the argument ``now``, in seconds of a steady clock. After any
-    call, look at :attr:`word`, :meth:`take_completed`, :meth:`take_notes`, :meth:`next_timer`.
-    """
-
-    @property
-    @abstractmethod
-    def word(self) -> int:
-        """Control word to send now."""
-
-    @property
-    @abstractmethod
-    def word_due(self) -> bool:
-        """The current word has not left since it changed, or since :meth:`withdraw`."""
-
-    @property
-    @abstractmethod
-    def state(self) -> str:
-        """State of the drive in words, as far as it is known."""
-
-    @property
-    @abstractmethod
-    def fault(self) -> bool:
-        """The drive reports a fault, or did when it was last heard."""
-
-    @property
-    @abstractmethod
-    def pending(self) -> bool:
-        """A request, or a quick stop that is answered already, is under way."""
-
-    @property
-    @abstractmethod
-    def unconfirmed(self) -> bool:
-        """The drive has reported since the current word left, but not what the word wants."""
-
-    @property
-    @abstractmethod
-    def disregard(self) -> str:
-        """How the drive goes on running although it shall not, and what to do; '' if not."""
-
-    @abstractmethod
-    def request(self, action: ControlAction, now: float) -> ControlTicket:
-        """Ask for something; the outcome may be there when this returns."""
-
-    @abstractmethod
-    def word_sent(self, now: float) -> None:
-        """
-        Take note that the current word left.
-
-        Call it each time the word is sent, before the response can arrive; where a write is
-        acknowledged, at the acknowledgement. A word that meanwhile is not the current one any
-        more does not count.
-        """
-
-    @abstractmethod
-    def word_refused(self, word: int, reason: str, now: float) -> None:
-        """
-        Take note that the drive refused a control word: what is under way fails.
-
-        :param reason: what the drive says, in words.
-        """
-
-    @abstractmethod
-    def status_received(self, raw: int | None, now: float) -> None:
-        """
-        Take a status word.
-
-        :param raw: None when a response arrived that should hold a status word, but did not.
-        """
-
-    @abstractmethod
-    def handle_timer(self, now: float) -> None:
-        """End what is overdue. Calling it early or late does no harm."""
-
-    @abstractmethod
-    def next_timer(self) -> float:
-        """Return when :meth:`handle_timer` has something to do; ``math.inf`` if never."""
-
-    @abstractmethod
-    def withdraw(self, reason: str, now: float) -> None:
-        """
-        Go back to ``disable``: the drive went offline or restarted, or the bridge stops.
-
-        Open requests fail with the reason. The status is forgotten, and the word counts as not
-        sent: it is :attr:`word_due` again.
-        """
-
-    @abstractmethod
-    def take_completed(self) -> list[ControlCompleted]:
-        """Return the outcomes since the last call."""
-
-    @abstractmethod
-    def take_notes(self) -> list[str]:
-        """Return what the log should say of the drive since the last call."""
-
-
 @dataclass(slots=True)
 class _Operation:
     """What is under way, and the tickets that wait for it."""
@@ -206,15 +106,19 @@ class _Operation:
     tickets: list[ControlTicket] = field(default_factory=list)
 
 
-class ProfileControl(ControlMachine):
+class ControlMachine:
     """
-    The machine for a drive whose profile has a ``control`` section.
+    Bring one drive to the state that was asked for, by the words and conditions of a table.
+
+    Without input or output: time is the argument ``now``, in seconds of a steady clock. After any
+    call, look at :attr:`word`, :meth:`take_completed`, :meth:`take_notes`, :meth:`next_timer`.
 
     :param timeout: seconds until an unconfirmed request fails.
+    :ivar table: the words and conditions.
     """
 
     def __init__(self, table: ControlTable, *, timeout: float) -> None:
-        self._table = table
+        self.table = self._table = table
         self._timeout = timeout
         self._words = {
             ControlAction.DISABLE: table.disable,
@@ -241,10 +145,27 @@ class ProfileControl(ControlMachine):
 
     @property
     def word(self) -> int:
+        """Control word to send now."""
         return self._words[self._sending]
 
     @property
+    def at_rest(self) -> bool:
+        """The current word tells the drive to stand still: it has the bits of ``disable``."""
+        return self.word == self._words[ControlAction.DISABLE]
+
+    @property
+    def stopping(self) -> bool:
+        """The current word is there to stop a drive: it waits for nobody."""
+        return self._sending in _STOPS
+
+    @property
+    def operating(self) -> bool:
+        """``enable`` is the word sent, and the drive reports enabled (or cannot report it)."""
+        return self._reached
+
+    @property
     def word_due(self) -> bool:
+        """The current word has not left since it changed, or since :meth:`withdraw`."""
         return not self._sent
 
     @property
@@ -272,14 +193,17 @@ class ProfileControl(ControlMachine):
 
     @property
     def fault(self) -> bool:
+        """The drive reports a fault, or did when it was last heard."""
         return self._fault is True
 
     @property
     def pending(self) -> bool:
+        """A request, or a quick stop that is answered already, is under way."""
         return self._operation is not None
 
     @property
     def unconfirmed(self) -> bool:
+        """The drive has reported since the current word left, but not what the word wants."""
         if not self._sent or self._answer is None:
             return False
         if self._sending is ControlAction.DISABLE:
@@ -291,19 +215,23 @@ class ProfileControl(ControlMachine):
 
     @property
     def disregard(self) -> str:
+        """How the drive goes on running although it shall not, and what to do; '' if not."""
         return self._disregard
 
     def take_completed(self) -> list[ControlCompleted]:
+        """Return the outcomes since the last call."""
         completed, self._completed = self._completed, []
         return completed
 
     def take_notes(self) -> list[str]:
+        """Return what the log should say of the drive since the last call."""
         notes, self._notes = self._notes, []
         return notes
 
     # -- inputs -----------------------------------------------------------------------------------
 
     def request(self, action: ControlAction, now: float) -> ControlTicket:
+        """Ask for something; the outcome may be there when this returns."""
         self.handle_timer(now)
         ticket = ControlTicket(action)
         if action not in self._words and self._nothing_to_do(action):
@@ -336,11 +264,23 @@ class ProfileControl(ControlMachine):
         return ticket
 
     def word_sent(self, now: float) -> None:
+        """
+        Take note that the current word left.
+
+        Call it each time the bus has taken the word, before the response can arrive; where a write
+        is acknowledged, at the acknowledgement. A word that meanwhile is not the current one any
+        more does not count.
+        """
         self._sent = True           # before the timer, which may change the word
         self.handle_timer(now)
         self._advance()
 
     def status_received(self, raw: int | None, now: float) -> None:
+        """
+        Take a status word.
+
+        :param raw: None when a response arrived that should hold a status word, but did not.
+        """
         self.handle_timer(now)
         self._raw = raw
         if self._sent:
@@ -352,18 +292,31 @@ class ProfileControl(ControlMachine):
             self._watch_disabled(now)
 
     def word_refused(self, word: int, reason: str, now: float) -> None:
+        """
+        Take note that the drive refused a control word: what is under way fails.
+
+        :param reason: what the drive says, in words.
+        """
         self.handle_timer(now)
         if word == self.word and self._operation is not None:
             self._end(False, f'control word {word:04X}h {reason}')
 
     def handle_timer(self, now: float) -> None:
+        """End what is overdue. Calling it early or late does no harm."""
         if now >= self.next_timer():
             self._end(False, self._overdue_text())
 
     def next_timer(self) -> float:
+        """Return when :meth:`handle_timer` has something to do; ``math.inf`` if never."""
         return math.inf if self._operation is None else self._operation.deadline
 
     def withdraw(self, reason: str, now: float) -> None:
+        """
+        Go back to ``disable``: the drive went offline or restarted, or the bridge stops.
+
+        Open requests fail with the reason. The status is forgotten, and the word counts as not
+        sent: it is :attr:`word_due` again.
+        """
         self.handle_timer(now)
         if self._reached:
             self._notes.append(f'enable withdrawn: {reason}; only ~/enable starts the drive again')

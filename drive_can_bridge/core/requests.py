@@ -43,6 +43,7 @@ Outcome = Union[Failure, ReadValue, Written]
 SENT_UNACKNOWLEDGED = 'sent; this protocol does not acknowledge writes'
 NO_ANSWER_OFFLINE = 'no answer; drive offline'
 BUS_DOWN = 'bus down'
+NOT_SENT = 'not sent: the bus takes no frames'
 BRIDGE_INACTIVE = 'bridge inactive'
 BUSY = 'busy'
 

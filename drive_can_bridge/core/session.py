@@ -10,6 +10,7 @@ and collects frames to send and events:
     session.receive_frame(frame, now)
     session.handle_timer(now)          # when next_timer() says so
     for frame in session.take_frames(): ...
+    session.frames_left(now, refused)  # there may be more frames then
     for event in session.take_events(): ...
 
 A session never blocks, never raises on anything a drive sends, and sends nothing before
@@ -17,6 +18,7 @@ A session never blocks, never raises on anything a drive sends, and sends nothin
 """
 
 from abc import ABC, abstractmethod
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from enum import Enum
 
@@ -29,6 +31,7 @@ from drive_can_bridge.core.events import (
 )
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.last_sent import LastSent
+from drive_can_bridge.core.outbox import Outbox
 from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.requests import (
     BRIDGE_INACTIVE, BUS_DOWN, BUSY, Failure, Outcome, Request,
@@ -36,6 +39,7 @@ from drive_can_bridge.core.requests import (
 from drive_can_bridge.core.roles import Cells, Role, Roles
 from drive_can_bridge.core.setpoints import CommandOutcome, Setpoints
 from drive_can_bridge.core.statistics import DriveStatistics
+from drive_can_bridge.core.told import MAY_RUN, Told
 
 #: requests of one drive that may wait behind the one being served
 WAITING_REQUESTS_MAX = 64
@@ -43,6 +47,10 @@ WAITING_REQUESTS_MAX = 64
 STOP_CYCLES = 3
 #: s of pause between them at most, however long the period is
 STOP_SPACING_MAX = 0.1
+#: s that a cycle may be away when a stop is wanted; else it is brought forward
+STOP_WAIT_MAX = 0.025
+#: s between two cycles at least, however much a stop hurries
+CYCLE_SPACING_MIN = 0.005
 #: advice until more is known
 LOOKING = 'being looked for'
 
@@ -52,6 +60,7 @@ class DriveState(Enum):
 
     OFFLINE = 'offline'
     MAPPING_DIFFERS = 'mapping differs'
+    DISABLED = 'disabled'
     NOT_ARMED = 'not armed'
     ONLINE = 'online'
     FAULT = 'fault'
@@ -68,6 +77,9 @@ class Session(ABC):
     :ivar roles: what users may not write.
     :ivar online: the drive exchanges process data.
     :ivar ever_online: it did so at least once since activation.
+    :ivar told: whether the drive may be running by our word.
+    :ivar partners: sessions on the same bus whose timers and events may change with any call of
+        this one.
     :ivar phase: s, when in each period of the steady clock this drive has its turn, for drives
         that share a bus; None: whenever it is ready.
     """
@@ -91,7 +103,9 @@ class Session(ABC):
         self.active = False
         self.bus_available = False
         self.phase: float | None = None
-        self._frames: list[Frame] = []
+        self.told = Told()
+        self.partners: Sequence[Session] = ()
+        self._outbox = Outbox()
         self._events: list[Event] = []
         self._open_requests: list[Request] = []
         self._advice = 'not activated'
@@ -124,6 +138,7 @@ class Session(ABC):
         self.active = True
         self.ever_online = False
         self.sent.clear()
+        self.told.stopped()  # what an activation before this one told is not ours to undo
         if self.bus_available:
             self._advice = LOOKING
             self._begin(now)
@@ -155,7 +170,15 @@ class Session(ABC):
         self._fail_requests(BUS_DOWN)
         self._lose(f'bus down: {reason}', now)
         self._go_idle(f'bus down: {reason}')
-        self._frames.clear()
+        self._outbox.clear()
+        if self.told.owed:
+            self._warn(f'the bus was lost before it could be told to stop: {MAY_RUN}')
+
+    def give_up(self, now: float) -> None:
+        """Handle a stop that did not come to its end in time: the bus takes nothing."""
+        self._leave_owing()
+        self._go_idle('deactivated')
+        self._outbox.clear()
 
     @abstractmethod
     def time_lost(self, now: float) -> None:
@@ -206,13 +229,15 @@ class Session(ABC):
 
     def take_frames(self) -> list[Frame]:
         """Return the frames to be sent now, in order."""
-        frames = self._frames
-        if frames:
-            self._frames = []
-        return frames
+        return self._outbox.take()
 
-    def frames_left(self, now: float) -> None:  # noqa: B027  optional hook
-        """Take note that the frames last taken have been sent: pauses begin now, not before."""
+    def frames_left(self, now: float, refused: Collection[int] = ()) -> None:
+        """
+        Take note of what became of the frames last taken; there may be more to be sent then.
+
+        :param refused: places in the list of those that the bus did not take: they do not count.
+        """
+        self._outbox.left(now, refused)
 
     def take_events(self) -> list[Event]:
         """Return what happened since the last call."""
@@ -230,10 +255,13 @@ class Session(ABC):
         :raises ValueRefused: the value cannot be sent; counted, nothing else changes.
         """
         try:
-            return self.setpoints.command(index, value, now)
+            outcome = self.setpoints.command(index, value, now)
         except ValueError:
             self.statistics.commands_refused += 1
             raise
+        if outcome is CommandOutcome.NOT_ARMED and self.state is DriveState.DISABLED:
+            return CommandOutcome.DISABLED
+        return outcome
 
     def submit(self, request: Request, now: float) -> None:
         """Take a parameter request. It is answered by exactly one ``RequestCompleted``."""
@@ -358,8 +386,28 @@ class Session(ABC):
         """Return the control requests that ended since the last call."""
         return self.control.take_completed() if self.control is not None else []
 
-    def _control_changed(self, now: float) -> None:  # noqa: B027  optional hook
-        """React to a control word that may have changed."""
+    def _control_changed(self, now: float) -> None:
+        """React to a control word, or a state, that may have changed."""
+        self._tell_notes()
+        self._let_commands_through()
+        self._see_to_control_word(now)
+
+    def _see_to_control_word(self, now: float) -> None:  # noqa: B027  optional hook
+        """Have a control word sent that has changed."""
+
+    def _let_commands_through(self) -> None:
+        """Take commands while they may move the drive, and only then: otherwise it is neutral."""
+        self.setpoints.allow(self.active and self.online and self._operating)
+
+    @property
+    def _operating(self) -> bool:
+        """Tell whether setpoints may move the drive, as far as its control word is concerned."""
+        return self.control is None or self.control.operating
+
+    @property
+    def how_to_enable(self) -> str:
+        """Say what to do about a drive that is disabled."""
+        return 'call ~/enable'
 
     # -- state ------------------------------------------------------------------------------------
 
@@ -370,6 +418,8 @@ class Session(ABC):
             return DriveState.OFFLINE
         if self.control is not None and self.control.fault:
             return DriveState.FAULT
+        if not self._operating:
+            return DriveState.DISABLED
         if self.setpoints.waiting:
             return DriveState.NOT_ARMED
         return DriveState.ONLINE
@@ -405,6 +455,14 @@ class Session(ABC):
         """Count and tell a frame of the drive that is malformed or unasked."""
         self.statistics.rejected += 1
         self._events.append(FrameRejected(text))
+
+    def _warn(self, text: str) -> None:
+        self._events.append(Noted(text, warning=True))
+
+    def _leave_owing(self) -> None:
+        """Say at the end of an activation that the drive could not be told to stop."""
+        if self.told.owed:
+            self._warn(f'could not be told to stop: {MAY_RUN}')
 
     def _tell_notes(self) -> None:
         """Tell what the control machine noted; during a stop, it is what everybody expects."""

@@ -4,15 +4,18 @@ Setpoints: what the drive is told to do, and whether anybody still means it.
 
 A setpoint is *armed* when commands go through, and then it is *fresh* for ``command_timeout``
 seconds after each accepted command. Whatever is not armed or not fresh is sent as its neutral
-value. After start, after a time-out and after every reconnection a setpoint is not armed; with
-``rearm: neutral`` only a command that equals neutral (within one raw step) arms it, so that no
-motor jumps to a setpoint that was left standing somewhere.
+value. After start, after a time-out, after every reconnection and while the drive is not enabled a
+setpoint is not armed; with ``rearm: neutral`` only a command that equals neutral arms it, so that
+no motor jumps to a setpoint that was left standing somewhere.
 """
 
 from enum import Enum
 import math
 
-from drive_can_bridge.core.parameters import Parameter, Value
+from drive_can_bridge.core.parameters import Parameter, Value, ValueKind
+
+#: relative error of a difference of two values, far below anything that matters
+_ROUNDING = 1e-9
 
 
 class CommandOutcome(Enum):
@@ -21,6 +24,7 @@ class CommandOutcome(Enum):
     ACCEPTED = 'accepted'
     ARMED = 'armed'
     NOT_ARMED = 'not armed'
+    DISABLED = 'disabled'
 
 
 class Setpoint:
@@ -41,6 +45,18 @@ class Setpoint:
         self.armed = False
         self.commanded_at: float | None = None
 
+    def armed_by(self, value: Value) -> bool:
+        """
+        Tell whether a command of this (valid) value arms: it equals neutral.
+
+        A double does within one raw step, compared as values; a bool or an integer exactly.
+        """
+        parameter = self.parameter
+        neutral = parameter.value_from_raw(self.neutral)
+        if parameter.kind is not ValueKind.DOUBLE:
+            return value == neutral
+        return abs(value - neutral) <= abs(parameter.scale) * (1.0 + _ROUNDING)
+
     def disarm(self) -> None:
         """Send neutral until armed again."""
         self.raw = self.neutral
@@ -55,7 +71,9 @@ class Setpoints:
     :param timeout: s without a fresh command until a setpoint goes neutral; 0: never.
     :param rearm_immediate: any valid command arms, not only a neutral one.
     :ivar changed: some ``raw`` is not what it was; whoever encodes the telegram clears it.
-    :ivar enabled: commands are taken at all (the drive is online and nothing is stopping).
+    :ivar enabled: commands are taken at all: the drive is online, nothing is stopping, and a drive
+        with control is enabled.
+    :ivar ignored_at: ``now`` of the last command that came while they were not taken.
     """
 
     def __init__(self, parameters: tuple[Parameter, ...], *, timeout: float,
@@ -65,6 +83,7 @@ class Setpoints:
         self.rearm_immediate = rearm_immediate
         self.changed = True
         self.enabled = False
+        self.ignored_at = -math.inf
         self._oldest = math.inf
         self._expired: list[Setpoint] = []  # found overdue by a command, not told yet
 
@@ -77,6 +96,7 @@ class Setpoints:
         setpoint = self.items[index]
         raw = setpoint.parameter.raw_from_value(value)
         if not self.enabled:
+            self.ignored_at = now
             return CommandOutcome.NOT_ARMED
         if self._overdue(setpoint, now):  # however long it takes until the next cycle
             setpoint.disarm()
@@ -85,7 +105,7 @@ class Setpoints:
             self.changed = True
         outcome = CommandOutcome.ACCEPTED
         if not setpoint.armed:
-            if not self.rearm_immediate and abs(raw - setpoint.neutral) > 1:
+            if not self.rearm_immediate and not setpoint.armed_by(value):
                 return CommandOutcome.NOT_ARMED
             setpoint.armed = True
             outcome = CommandOutcome.ARMED
@@ -120,6 +140,19 @@ class Setpoints:
     def _overdue(self, setpoint: Setpoint, now: float) -> bool:
         return (setpoint.commanded_at is not None
                 and 0.0 < self.timeout < now - setpoint.commanded_at)
+
+    def allow(self, taken: bool) -> None:
+        """Take commands from now on, or not; while they are not taken, everything is neutral."""
+        if taken is not self.enabled:
+            self.enabled = taken
+            self.ignored_at = -math.inf
+            if not taken:
+                self.disarm()
+
+    @property
+    def at_rest(self) -> bool:
+        """Everything that is to be sent is neutral."""
+        return all(setpoint.raw == setpoint.neutral for setpoint in self.items)
 
     def disarm(self) -> None:
         """Send neutral everywhere until armed again."""

@@ -83,16 +83,18 @@ class Member:
     """
     A drive on the bus: its session and whoever listens to it.
 
+    :ivar partners: drives that share frames with this one: what happens to it may concern them.
     :ivar due: when the session wants to be called; kept here, so that a pass over all drives costs
         a comparison each.
     :ivar told: what the listener knows to have been sent.
     """
 
-    __slots__ = ('due', 'listener', 'session', 'told')
+    __slots__ = ('due', 'listener', 'partners', 'session', 'told')
 
     def __init__(self, session: Session, listener: DriveListener) -> None:
         self.session = session
         self.listener = listener
+        self.partners: list[Member] = []
         self.due = session.next_timer()
         self.told = session.sent.raws
 
@@ -144,6 +146,10 @@ class BusExchange:
     def attach(self, session: Session, listener: DriveListener) -> None:
         """Say who listens to a session. Once for each, before ``open``."""
         member = Member(session, listener)
+        for other in self._members:
+            if other.session in session.partners:
+                other.partners.append(member)
+                member.partners.append(other)
         self._members.append(member)
         self._router.add(self._routes[self._sessions.index(session)], member)
 
@@ -162,7 +168,7 @@ class BusExchange:
             for member in self._members:
                 member.listener.discard_commands()
                 member.session.activate(now)
-                self._pump(member, now)
+                self._pump(member)
         self._alarm.ring()
 
     def deactivate(self) -> bool:
@@ -173,21 +179,32 @@ class BusExchange:
         """
         with self.lock:
             now = self._clock()
+            self._notice_lost_time(now)  # a signal may come before anybody has noticed
             self.active = False
             for member in self._members:
                 member.session.deactivate(now)
-                self._pump(member, now)
+                self._pump(member)
         self._alarm.ring()
         end = now + STOP_MARGIN + max(
             (session.longest_stop for session in self._sessions), default=0.0)
         while not self._stopped():
             if self._clock() > end:
+                self._give_up()
                 return False
             if not self._thread.is_alive():  # the neutral frames go out all the same
                 with self.lock:
                     self._pass()
             time.sleep(0.002)
         return True
+
+    def _give_up(self) -> None:
+        """End stops that do not come to an end: nobody knows what the drives do."""
+        with self.lock:
+            now = self._clock()
+            for member in self._members:
+                if not member.session.stopped:
+                    member.session.give_up(now)
+                    self._pump(member)
 
     def close(self) -> None:
         """End both threads and close the bus."""
@@ -209,7 +226,7 @@ class BusExchange:
         with self.lock:
             now = self._clock()
             session.submit(request, now)
-            self._pump(member, now)
+            self._pump(member)
         if member.due < self._wake_at:
             self._alarm.ring()
 
@@ -228,7 +245,7 @@ class BusExchange:
             if isinstance(ticket, str):
                 return ticket
             register(ticket)
-            self._pump(member, now)
+            self._pump(member)
         self._alarm.ring()
         return ''
 
@@ -266,7 +283,8 @@ class BusExchange:
                 now = self._clock()  # the drives before took their time
                 member.listener.take_commands(now)
                 member.session.handle_timer(now)
-                self._pump(member, now)
+                self._pump(member)
+        for member in self._members:  # a partner's timer may have changed after its turn
             if member.due < soonest:
                 soonest = member.due
         return soonest
@@ -285,7 +303,7 @@ class BusExchange:
         for member in self._members:
             member.listener.discard_commands()
             member.session.time_lost(now)
-            self._pump(member, now)
+            self._pump(member)
 
     # -- the reader thread (LinkListener) ---------------------------------------------------------
 
@@ -302,7 +320,7 @@ class BusExchange:
                 self.frames_rejected += 1
                 return
             member.session.receive_frame(frame, now, now - arrived)
-            self._pump(member, now)
+            self._pump(member)
         if member.due < self._wake_at:
             self._alarm.ring()
 
@@ -313,7 +331,7 @@ class BusExchange:
             self.bus_state, self.bus_reason = 'up', ''
             for member in self._members:
                 member.session.bus_up(now)
-                self._pump(member, now)
+                self._pump(member)
         self._alarm.ring()
         self._listener.bus_opened(self.bus.name)
 
@@ -324,7 +342,7 @@ class BusExchange:
             self.bus_state, self.bus_reason = 'down', reason
             for member in self._members:
                 member.session.bus_down(now, reason)
-                self._pump(member, now)
+                self._pump(member)
         self._listener.bus_lost(self.bus.name, reason)
 
     def bus_misconfigured(self, reason: str) -> None:
@@ -342,18 +360,27 @@ class BusExchange:
 
     # -- from session to the outside --------------------------------------------------------------
 
-    def _pump(self, member: Member, now: float) -> None:
+    def _pump(self, member: Member) -> None:
         """Send what a session wants sent, and tell its listener what happened."""
+        self._pump_one(member)
+        for partner in member.partners:
+            self._pump_one(partner)
+
+    def _pump_one(self, member: Member) -> None:
         session = member.session
         frames = session.take_frames()
-        if frames:
-            for frame in frames:
+        while frames:
+            refused = []
+            for place, frame in enumerate(frames):
                 if self.link.send(frame):
                     self.sent_bits += _bits(frame)
-            session.frames_left(self._clock())
+                else:
+                    refused.append(place)
+            session.frames_left(self._clock(), refused)
+            frames = session.take_frames()
         if session.sent.raws is not member.told:
             member.told = session.sent.raws
-            member.listener.request_sent(now)
+            member.listener.request_sent(self._clock())
         for event in session.take_events():
             if type(event) is ProcessDataReceived:
                 member.listener.process_data(event)

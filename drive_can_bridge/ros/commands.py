@@ -194,6 +194,10 @@ class CommandIntake:
             name = session.setpoints.items[index].parameter.name
             self._warn(f'refused {name}', f'command {name} refused: {error}')
             return
+        if outcome is CommandOutcome.DISABLED:
+            name = session.setpoints.items[index].parameter.name
+            self._warn('disabled', f'command {name} has no effect: disabled, '
+                       f'{session.how_to_enable}', once=True)
         if outcome is CommandOutcome.NOT_ARMED and session.setpoints.enabled:
             parameter = session.setpoints.items[index].parameter
             neutral = value_text(

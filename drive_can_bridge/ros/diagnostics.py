@@ -22,6 +22,8 @@ from drive_can_bridge.transport.link import steady_now
 LOAD_WARNING = 70.0
 #: worst case over no stuff bits: an average frame lies between, this much above the shortest
 STUFFING = 1.11
+#: s for which a command that changed nothing is worth a warning
+COMMANDS_RECENT = 1.5
 
 _NAMES = {DiagnosticStatus.OK: 'OK', DiagnosticStatus.WARN: 'WARN',
           DiagnosticStatus.ERROR: 'ERROR', DiagnosticStatus.STALE: 'STALE'}
@@ -126,7 +128,7 @@ class DriveReporter:
         state = session.state
         rejected = statistics.rejected - self._rejected
         self._rejected = statistics.rejected
-        level, message = self._judge(state, rejected)
+        level, message = self._judge(state, rejected, now)
         self._latencies = statistics.latency.count, statistics.latency.total
         self._requests = statistics.requests_ok + statistics.requests_failed
         facts = {
@@ -148,7 +150,7 @@ class DriveReporter:
         facts.update(session.facts())
         return Report(f'drive {drive.name}', level, message, facts)
 
-    def _judge(self, state: DriveState, rejected: int) -> tuple[bytes, str]:
+    def _judge(self, state: DriveState, rejected: int, now: float) -> tuple[bytes, str]:
         drive, session = self._drive, self._drive.session
         if not session.active:
             return DiagnosticStatus.STALE, self.inactive
@@ -170,6 +172,14 @@ class DriveReporter:
         told = self._warnings(rejected)
         if session.control is not None and session.control.disregard:
             return DiagnosticStatus.ERROR, '; '.join((session.control.disregard, *told))
+        if state is DriveState.DISABLED:
+            advice = f'disabled: {session.how_to_enable}'
+            if now - session.setpoints.ignored_at < COMMANDS_RECENT:
+                told.append(f'{advice}; commands arrive, and change nothing')
+            elif not told:
+                return DiagnosticStatus.OK, advice
+            else:
+                told.append(advice)
         if state is DriveState.NOT_ARMED:
             told.append(self._how_to_arm())
         if told:

@@ -10,7 +10,7 @@ from hypothesis.stateful import initialize, invariant, rule, RuleBasedStateMachi
 import pytest
 
 from drive_can_bridge.core.control import (
-    ControlAction, ControlMachine, ControlTicket, ProfileControl)
+    ControlAction, ControlMachine, ControlTicket)
 from drive_can_bridge.core.profile import ControlTable, StatusPattern
 
 ENABLE = ControlAction.ENABLE
@@ -34,11 +34,11 @@ SILENT = replace(FULL, status_parameter=None, ready=None, enabled=None, fault=No
 BARE = ControlTable(parameter='control_word', disable=OFF, enable=RUN)
 
 
-def machine(table: ControlTable = FULL) -> ProfileControl:
-    return ProfileControl(table, timeout=2.0)
+def machine(table: ControlTable = FULL) -> ControlMachine:
+    return ControlMachine(table, timeout=2.0)
 
 
-def cycle(control: ProfileControl, raw: int | None, now: float) -> int:
+def cycle(control: ControlMachine, raw: int | None, now: float) -> int:
     """Send the current word, then receive a status; return the word that was sent."""
     word = control.word
     control.word_sent(now)
@@ -46,12 +46,12 @@ def cycle(control: ProfileControl, raw: int | None, now: float) -> int:
     return word
 
 
-def outcomes(control: ProfileControl) -> list[tuple[ControlAction, bool, str]]:
+def outcomes(control: ControlMachine) -> list[tuple[ControlAction, bool, str]]:
     return [(done.ticket.action, done.success, done.message)
             for done in control.take_completed()]
 
 
-def enabled(table: ControlTable = FULL) -> ProfileControl:
+def enabled(table: ControlTable = FULL) -> ControlMachine:
     """Return a machine whose drive was enabled at 0.06 s."""
     control = machine(table)
     cycle(control, READY, 0.0)
@@ -65,7 +65,7 @@ def enabled(table: ControlTable = FULL) -> ProfileControl:
     return control
 
 
-def faulted(table: ControlTable = FULL) -> ProfileControl:
+def faulted(table: ControlTable = FULL) -> ControlMachine:
     """Return a machine whose drive reported a fault at 0 s."""
     control = machine(table)
     cycle(control, FAULT, 0.0)
@@ -242,17 +242,11 @@ def test_a_refusal_that_nobody_waits_for_changes_nothing() -> None:
 
 def test_starts_with_disable_and_knows_nothing() -> None:
     control = machine()
-    assert isinstance(control, ControlMachine)
     assert (control.word, control.word_due) == (OFF, True)
     assert (control.state, control.fault, control.pending) == ('unknown', False, False)
     assert control.next_timer() == math.inf
     assert control.take_completed() == []
     assert control.take_notes() == []
-
-
-def test_interface_is_abstract() -> None:
-    with pytest.raises(TypeError):
-        ControlMachine()  # type: ignore[abstract]
 
 
 def test_no_status_and_no_time_starts_a_drive() -> None:
@@ -905,7 +899,7 @@ def test_fault_gone_before_the_pulse_left_confirms_nothing_yet() -> None:
 
 @pytest.mark.parametrize(('build', 'raw'), [(enabled, ENABLED), (machine, READY)])
 def test_reset_without_a_fault_succeeds_and_changes_nothing(
-        build: Callable[[], ProfileControl], raw: int) -> None:
+        build: Callable[[], ControlMachine], raw: int) -> None:
     control = build()
     cycle(control, raw, 1.0)
     word, state = control.word, control.state
@@ -1111,7 +1105,7 @@ class AnyConversation(RuleBasedStateMachine):
         [FULL, NO_READY, NO_FAULT, ONLY_READY, ONLY_FAULT, SILENT, BARE]))
     def start(self, table: ControlTable) -> None:
         self.table = table
-        self.control = ProfileControl(table, timeout=2.0)
+        self.control = ControlMachine(table, timeout=2.0)
         self.now = 0.0
         self.open: dict[ControlTicket, float] = {}
         self.closed: set[ControlTicket] = set()

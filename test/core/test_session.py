@@ -7,12 +7,13 @@ from typing import Any
 from builders import CONTROL, drive, GAIN, parameter, read, SPEED, STATUS, WORD
 import pytest
 
-from drive_can_bridge.core.control import ControlAction, ControlTicket, ProfileControl
+from drive_can_bridge.core.control import ControlAction, ControlTicket, ControlMachine
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.events import RequestCompleted, StationLost
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.requests import Failure, Request
 from drive_can_bridge.core.session import DriveState, Session
+from drive_can_bridge.core.setpoints import CommandOutcome
 
 
 class Idle(Session):
@@ -46,7 +47,7 @@ class Idle(Session):
         raise NotImplementedError
 
     def receive_frame(self, frame: Frame, now: float, age: float = 0.0) -> None:
-        self._frames.append(frame)
+        self._outbox.put(frame)
 
     def handle_timer(self, now: float) -> None:
         raise NotImplementedError
@@ -64,7 +65,7 @@ class Idle(Session):
 def session(**options: object) -> Idle:
     configuration = drive(**options)
     table = configuration.profile.control
-    control = ProfileControl(table, timeout=2.0) if table is not None else None
+    control = ControlMachine(table, timeout=2.0) if table is not None else None
     return Idle(configuration, control)
 
 
@@ -132,11 +133,19 @@ def test_states() -> None:
     made = session(control=CONTROL, request=(WORD, SPEED), rearm_immediate=True)
     assert made.state is DriveState.OFFLINE
     made.online = True
-    assert made.state is DriveState.NOT_ARMED
-    made.setpoints.enabled = True
-    made.command(0, 1.0, 1.0)
-    assert made.state is DriveState.ONLINE
+    assert made.state is DriveState.DISABLED
     assert made.control is not None
+    made.activate(0.5)
+    made.bus_available = True
+    made.request_control(ControlAction.ENABLE, 1.0)
+    for raw in (1, 3):
+        assert made.command(0, 1.0, 1.0) is CommandOutcome.DISABLED
+        made.control.word_sent(1.0)
+        made.control.status_received(raw, 1.0)
+        made._control_changed(1.0)
+    assert made.state is DriveState.NOT_ARMED
+    assert made.command(0, 1.0, 1.0) is CommandOutcome.ARMED
+    assert made.state is DriveState.ONLINE
     made.control.status_received(8, 1.0)
     assert made.state is DriveState.FAULT
     made.online = False

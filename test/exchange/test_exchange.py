@@ -3,14 +3,16 @@
 
 import threading
 
-from builders import CONTROL, drive, GAIN, RAMP, read, SPEED, WORD, write
+from builders import (
+    CONTROL, drive, GAIN, INT16, parameter, RAMP, read, SPEED, WORD, write,
+)
 from exchange_builders import all_routes, Bench, BusNotes
 import pytest
 from waiting import wait_for
 
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlTicket
-from drive_can_bridge.core.events import RequestCompleted, StationFound, StationLost
+from drive_can_bridge.core.events import Noted, RequestCompleted, StationFound, StationLost
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.requests import Failure, ReadValue
 from drive_can_bridge.exchange.exchange import BusExchange, PASS_PERIOD
@@ -134,7 +136,7 @@ def test_lost_time_is_noticed_by_the_timer() -> None:
 
     assert bench.notes[0].discarded == 2  # at activation, and now
     assert bench.notes[0].commands == []
-    assert sent == [ASK_MAP_1]
+    assert sent == ['00300321#0000000000000000']    # it was told to run, so it is stopped
     assert bench.notes[0].events[-1] == StationLost('the bridge stood still')
     assert not bench.sessions[0].online
 
@@ -215,6 +217,57 @@ def test_deactivate_gives_up_in_the_end() -> None:
     started = bench.now
     assert bench.exchange.deactivate() is False
     assert 0.5 < bench.now - started < 1.0
+
+
+def test_stop_frames_that_the_bus_refuses_are_no_stop() -> None:
+    bench = Bench(drive(rearm_immediate=True))
+    bench.online()
+    bench.notes[0].commands.append((0, 100.0))
+    assert bench.at(10.02) == ['003FFFF0#03E8000000000000']
+    bench.step = 0.001
+    bench.link.refusing = True
+    assert bench.exchange.deactivate() is False
+    assert bench.sessions[0].stopped
+    assert bench.notes[0].events[-2:] == [
+        Noted('could not be told to stop: it may still be running', warning=True),
+        StationLost('deactivated')]
+
+
+def test_stop_that_comes_with_the_end_of_a_stall() -> None:
+    bench = Bench(drive(rearm_immediate=True))
+    bench.online()
+    bench.notes[0].commands.append((0, 100.0))
+    assert bench.at(10.02) == ['003FFFF0#03E8000000000000']
+    bench.now, bench.step = 11.5, 0.001     # no pass has noticed it yet
+    assert bench.exchange.deactivate() is True
+    # nobody knows the maps any more: by number, three times, because nobody confirms it
+    assert bench.link.take().count('00300321#0000000000000000') >= 3
+    assert any(isinstance(event, Noted) and 'may still be running' in event.text
+               for event in bench.notes[0].events)
+
+
+def test_silent_member_of_a_broadcast_group_goes_offline() -> None:
+    setpoint = parameter('speed_setpoint', None, type=INT16, scale=0.1, unit='%')
+    group = [drive('cannord', name=name, station=station, broadcast='all', request=(setpoint,),
+                   response=(), table=(setpoint,)) for name, station in (('one', 1), ('two', 2))]
+    bench = Bench(*group)
+    bench.exchange.bus_opened()
+    bench.exchange.activate()
+    now = 10.0
+    answers = {'002': '003#310B0000', '004': '005#310B0000'}
+    for step in range(40):
+        now = 10.0 + 0.02 * step
+        for text in bench.at(now):
+            identifier = text.partition('#')[0]
+            if identifier in answers:
+                bench.hears(answers[identifier], now + 0.001)
+        if step == 20:
+            assert [session.online for session in bench.sessions] == [True, True]
+            del answers['004']      # its cable is cut
+    assert [session.online for session in bench.sessions].count(True) == 1
+    lost = [notes for notes in bench.notes if any(
+        isinstance(event, StationLost) for event in notes.events)]
+    assert len(lost) == 1
 
 
 def test_deactivate_without_a_bus_is_done_at_once() -> None:

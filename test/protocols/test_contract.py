@@ -18,9 +18,10 @@ from builders import (
 import pytest
 
 from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.events import (
-    FrameRejected, ProcessDataReceived, RequestCompleted, SetpointsExpired, StationFound,
+    FrameRejected, Noted, ProcessDataReceived, RequestCompleted, SetpointsExpired, StationFound,
     StationLost,
 )
 from drive_can_bridge.core.frame import Frame
@@ -38,10 +39,12 @@ class Partner(ABC):
 
     :cvar sample: the raw integers of every sample.
     :cvar unknown: what is said of a parameter that the drive does not have.
+    :cvar idle: state of a drive that has just been found.
     """
 
     sample: tuple[int, ...] = (1000, 250, 1)
     unknown = 'no answer'
+    idle = DriveState.NOT_ARMED
 
     def __init__(self, **options: Any) -> None:
         self.configuration = self.configure(**options)
@@ -64,6 +67,9 @@ class Partner(ABC):
     @abstractmethod
     def setpoints(self, sent: str) -> list[int]:
         """Return the raw setpoints that a frame carries; none if it carries none."""
+
+    def enable(self) -> None:
+        """Bring a drive that has a control word so far that it takes setpoints."""
 
     # -- the bus ----------------------------------------------------------------------------------
 
@@ -167,6 +173,12 @@ class CannordPartner(Partner):
     """CANnord, station 1; actual values are in parameters 209 and 210."""
 
     sample = (0x0B31, 1000, 250)
+    idle = DriveState.DISABLED
+
+    def enable(self) -> None:
+        self.deliver(self.talk.asks(ControlAction.ENABLE, self.now))
+        self.live(0.1)
+        assert self.talk.control_outcomes() == [('enable', True, 'operation enabled')]
 
     def configure(self, **options: Any) -> DriveConfiguration:
         options.setdefault('request', (SPEED,))
@@ -176,7 +188,9 @@ class CannordPartner(Partner):
         identifier, _, text = sent.partition('#')
         data = bytes.fromhex(text)
         if identifier == '002':
-            words = (self.sample[0], self.registers[209], self.registers[210], 0)
+            status = 0x0B37 if text.startswith('7F04') else 0x0B31
+            self.registers[50] = int.from_bytes(data[2:4], 'little')
+            words = (status, self.registers[209], self.registers[210], 0)
             return ['003#' + b''.join(word.to_bytes(2, 'little') for word in words).hex()]
         assert identifier == '202'
         key = int.from_bytes(data[:2], 'little')
@@ -263,9 +277,23 @@ def _partner(make: type[Partner]) -> Partner:
     partner = make()
     partner.start()
     assert partner.talk.session.online
+    partner.enable()
     partner.take()
     partner.talk.events()
     return partner
+
+
+def run(partner: Partner) -> None:
+    """Have the drive run."""
+    partner.talk.commands(0, 0.0, partner.now)
+    partner.talk.commands(0, 100.0, partner.now)
+    partner.live(0.1)
+    assert partner.registers[50] == 1000
+    partner.talk.events()
+
+
+def warnings(partner: Partner) -> list[str]:
+    return [note.text for note in partner.talk.events(Noted) if note.warning]
 
 
 # -- life cycle -----------------------------------------------------------------------------------
@@ -361,6 +389,91 @@ def test_bus_down_is_silence_at_once(partner: Partner) -> None:
     assert partner.talk.session.stopped
 
 
+# -- whatever was told to run is told to stop ------------------------------------------------------
+
+
+def test_stop_right_after_a_stall(partner: Partner) -> None:
+    run(partner)
+    partner.now += 1.5
+    partner.deliver(partner.talk.time_lost(partner.now))
+    partner.deliver(partner.talk.deactivate(partner.now))
+    partner.live(1.0)
+    assert partner.talk.session.stopped
+    assert partner.registers[50] == 0
+    assert not any('may still be running' in text for text in warnings(partner))
+
+
+def test_stop_right_after_the_bus_came_back(partner: Partner) -> None:
+    run(partner)
+    partner.talk.bus_down(partner.now)
+    assert any('may still be running' in text for text in warnings(partner))
+    partner.now += 1.5
+    partner.deliver(partner.talk.bus_up(partner.now))
+    partner.deliver(partner.talk.deactivate(partner.now))
+    partner.live(1.0)
+    assert partner.talk.session.stopped
+    assert partner.registers[50] == 0
+    assert not any('may still be running' in text for text in warnings(partner))
+
+
+def test_bus_that_comes_back_stops_the_drive_at_once(partner: Partner) -> None:
+    run(partner)
+    partner.talk.bus_down(partner.now)
+    partner.now += 1.5
+    partner.deliver(partner.talk.bus_up(partner.now))
+    partner.live(0.05)
+    assert partner.registers[50] == 0
+
+
+def test_end_while_the_bus_is_lost_is_told(partner: Partner) -> None:
+    run(partner)
+    partner.talk.bus_down(partner.now)
+    partner.talk.events()
+    partner.deliver(partner.talk.deactivate(partner.now))
+    assert partner.talk.session.stopped
+    assert warnings(partner) == ['could not be told to stop: it may still be running']
+
+
+def test_stop_frames_that_the_bus_refuses_are_no_stop(partner: Partner) -> None:
+    run(partner)
+    partner.talk.refusing = lambda text: True
+    partner.deliver(partner.talk.deactivate(partner.now))
+    partner.live(partner.talk.session.longest_stop + 0.5)
+    partner.talk.session.give_up(partner.now)
+    partner.deliver(partner.talk.sent())
+    assert partner.talk.session.stopped
+    assert partner.registers[50] == 1000
+    assert any('may still be running' in text for text in warnings(partner))
+
+
+def test_nobody_is_warned_of_a_drive_that_was_never_told_to_run(partner: Partner) -> None:
+    partner.mute = True
+    partner.talk.bus_down(partner.now)
+    partner.deliver(partner.talk.bus_up(partner.now))
+    partner.live(0.2)
+    partner.deliver(partner.talk.deactivate(partner.now))
+    partner.live(2.0)
+    assert partner.talk.session.stopped
+    told = any('may still be running' in text for text in warnings(partner))
+    assert told is (partner.idle is DriveState.DISABLED)    # that one was told to enable
+
+
+def test_acknowledged_or_not_a_refused_write_is_not_sent(make: type[Partner]) -> None:
+    partner = make(verify_writes=False)
+    partner.start()
+    partner.talk.events()
+    sent: list[str] = []
+
+    def refusing(text: str) -> bool:
+        sent.append(text)
+        return True
+    partner.talk.refusing = refusing
+    partner.deliver(partner.talk.submits(write((GAIN, 7)), partner.now))
+    partner.live(0.5)
+    assert partner.talk.outcomes() == [['not sent: the bus takes no frames']]
+    assert partner.registers[GAIN.number] == 0
+
+
 def test_life_can_be_repeated(partner: Partner) -> None:
     for _ in range(3):
         partner.deliver(partner.talk.deactivate(partner.now))
@@ -378,6 +491,17 @@ def test_life_can_be_repeated(partner: Partner) -> None:
 # -- setpoints ------------------------------------------------------------------------------------
 
 
+def test_nothing_moves_before_it_is_enabled(make: type[Partner]) -> None:
+    partner = make(rearm_immediate=True)
+    partner.start()
+    assert partner.talk.session.state is partner.idle
+    if partner.idle is DriveState.DISABLED:
+        assert partner.talk.commands(0, 100.0, partner.now) is CommandOutcome.DISABLED
+        partner.live(0.1)
+        partner.enable()
+        assert set(partner.commanded()) == {0}
+
+
 def test_only_neutral_until_armed(partner: Partner) -> None:
     assert partner.talk.session.state is DriveState.NOT_ARMED
     assert partner.talk.commands(0, 100.0, partner.now) is CommandOutcome.NOT_ARMED
@@ -393,6 +517,7 @@ def test_only_neutral_until_armed(partner: Partner) -> None:
 def test_immediate(make: type[Partner]) -> None:
     partner = make(rearm_immediate=True)
     partner.start()
+    partner.enable()
     assert partner.talk.commands(0, -100.0, partner.now) is CommandOutcome.ARMED
     partner.live(0.1)
     assert list(partner.commanded())[-1] == 0xFC18
@@ -429,6 +554,8 @@ def test_after_an_upset_it_wants_arming_again(partner: Partner, upset: str) -> N
     partner.live(1.0)
     assert talk.session.online
     assert set(partner.commanded()) <= {0}
+    assert talk.session.state is partner.idle
+    partner.enable()
     assert talk.session.state is DriveState.NOT_ARMED
     assert talk.commands(0, 100.0, partner.now) is CommandOutcome.NOT_ARMED
 

@@ -152,6 +152,7 @@ def test_integers_and_bools(bridge: StartBridge, client: Client, tmp_path: Any) 
     with one.record() as recorder:
         wait_until(recorder.words)
         assert recorder.words() == (5, 0, 0, 0)
+        client.publish('/conveyor/command/counts', Int64(data=5))   # neutral, exactly
         client.publish('/conveyor/command/counts', Int64(data=6))
         until_sent(recorder, 0, 6)
         client.publish('/conveyor/command/counts', Int64(data=-32768))
@@ -161,7 +162,7 @@ def test_integers_and_bools(bridge: StartBridge, client: Client, tmp_path: Any) 
                            '-32768 to 32767')
         client.publish('/conveyor/command/counts', Int64(data=2 ** 62))
         wait_until(lambda: refused(one) == 2)
-        # true is one raw step away from neutral, and arms
+        client.publish('/conveyor/command/brake', Bool(data=False))
         client.publish('/conveyor/command/brake', Bool(data=True))
         until_sent(recorder, 1, 1)
         client.publish('/conveyor/command/wide', Float64(data=0.0))

@@ -202,8 +202,16 @@ def test_bits_and_online_are_latched(start: Start, client: Client, facts: Facts)
 def test_diagnostics(start: Start, client: Client, facts: Facts) -> None:
     one = start(**facts.hasty)
     drive = one.played['conveyor']
-    status = client.diagnostics(STATUS, lambda drive: drive['state'] == 'not armed')
+    status = client.diagnostics(STATUS, lambda drive: drive['state'] == 'disabled')
     assert set(status) == DRIVE_KEYS | facts.diagnostics | {'level', 'message'}
+    assert (status['level'], status['message']) == ('OK', 'disabled: call ~/enable')
+    client.listen()
+    command(client, speed_setpoint=0.0)
+    client.wait_logged('disabled, call ~/enable', WARN)
+    status = client.diagnostics(STATUS, lambda drive: drive['level'] == 'WARN')
+    assert status['message'].startswith('disabled: call ~/enable')
+    assert enable(client) == (True, facts.states[0])
+    status = client.diagnostics(STATUS, lambda drive: drive['state'] == 'not armed')
     assert status['level'] == 'WARN' and status['command_age_s'] == 'nan'
     for name, neutral in (('speed_setpoint', '0'), ('mode', '0'), ('brake', 'false')):
         assert f'{neutral} to {DRIVE}/command/{name}' in status['message']
@@ -238,8 +246,7 @@ def test_commands(start: Start, client: Client, facts: Facts) -> None:
     client.publisher(f'{DRIVE}/command/speed_setpoint', Float64)
     command(client, speed_setpoint=300.0, mode=3, brake=True)  # not neutral: arms nothing
     settle(one)
-    # the bool is one raw step away from neutral, which is near enough
-    assert [item.armed for item in session.setpoints.items] == [False, False, True]
+    assert [item.armed for item in session.setpoints.items] == [False, False, False]
     assert drive.value('speed_setpoint') == 0.0
     command(client, speed_setpoint=0.0, mode=0, brake=False)
     command(client, speed_setpoint=-250.0, mode=3, brake=True)

@@ -9,7 +9,7 @@ import pytest
 from std_msgs.msg import Float64
 from std_srvs.srv import SetBool, Trigger
 
-from drive_can_bridge.core.control import ProfileControl
+from drive_can_bridge.core.control import ControlMachine
 
 DRIVE = 'drive_can_bridge: drive lift'
 #: the control word has a slot, or is written on change
@@ -51,7 +51,7 @@ def test_a_drive_that_runs_on_under_disable_is_an_error(
         bridge: StartBridge, client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
     one = bridge(parameters(lift=LIFT))
     one.online()
-    monkeypatch.setattr(ProfileControl, 'disregard', 'still enabled: stop it by other means')
+    monkeypatch.setattr(ControlMachine, 'disregard', 'still enabled: stop it by other means')
     status = client.diagnostics(DRIVE, lambda drive: 'still enabled' in drive['message'])
     assert status['level'] == 'ERROR'
     assert status['message'].startswith('still enabled: stop it by other means')
@@ -88,8 +88,9 @@ def test_fault_and_reset(bridge: StartBridge, client: Client, lift: dict[str, An
     assert success, message
     wait_until(lambda: drive.value('control_word') == 0)
     assert not int(drive.value('status_word')) & 2  # nothing but a new enable starts it
-    client.diagnostics(DRIVE, lambda drive: drive['state'] == 'not armed')
+    client.diagnostics(DRIVE, lambda drive: drive['state'] == 'disabled')
     assert enable(client)[0]
+    client.diagnostics(DRIVE, lambda drive: drive['state'] == 'not armed')
 
 
 def test_a_fault_that_lasts_cannot_be_reset(bridge: StartBridge, client: Client) -> None:

@@ -23,6 +23,7 @@ import math
 from typing import Any, NamedTuple
 
 from drive_can_bridge.core.errors import RemoteProtocolError
+from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.protocols.cannord.parameter_frame import (
     ParameterFrame, ParameterLayout, Response, RESPONSES, Task,
 )
@@ -53,13 +54,14 @@ class Reply(NamedTuple):
 
     :param response: None when nobody answered after all attempts.
     :param contrary: the response to a write that has another value than the one written.
+    :param sent: False for a write that the bus refused.
     """
 
     response: ParameterFrame | None
     contrary: ParameterFrame | None = None
+    sent: bool = True
 
 
-NO_REPLY = Reply(None)
 Procedure = Generator[Ask, Reply, Any]
 Done = Callable[[Any], None]
 
@@ -75,13 +77,13 @@ class TaskChannel:
     Runs procedures, one task at a time.
 
     :param layout: where the fields of a frame are.
-    :param send: takes the payload of a task.
+    :param send: takes the payload of a task, and who is told whether it left.
     :param timeout: s to wait for a response.
     :param attempts: how often a read is sent before it counts as unanswered.
     :ivar now: ``now`` of the call being served, for whoever is called back.
     """
 
-    def __init__(self, layout: ParameterLayout, send: Callable[[bytes], None], *,
+    def __init__(self, layout: ParameterLayout, send: Callable[[bytes, Left], None], *,
                  timeout: float, attempts: int) -> None:
         self._layout = layout
         self._send = send
@@ -237,7 +239,14 @@ class TaskChannel:
     def _transmit(self, task: Ask, now: float) -> None:
         self._attempts_left -= 1
         self._deadline = now + self.timeout
-        self._send(self._layout.encode(task.task, task.number, task.index, task.value))
+        self._send(self._layout.encode(task.task, task.number, task.index, task.value),
+                   self._left)
+
+    def _left(self, sent: bool, now: float) -> None:
+        """Give up a write that the bus refused; a read is repeated when its time is over."""
+        if not sent and self._task is not None and self._task.task not in READS:
+            self.now = now
+            self._finish(Reply(None, sent=False), now)
 
 
 def _echoes(response: ParameterFrame, task: Ask) -> bool:

@@ -19,7 +19,7 @@ holds when it holds for all of them, and a fault of one is a fault of the group.
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from drive_can_bridge.core.control import ControlAction, ControlTicket, ProfileControl
+from drive_can_bridge.core.control import ControlAction, ControlMachine, ControlTicket
 from drive_can_bridge.core.profile import ControlTable, StatusPattern
 from drive_can_bridge.protocols.cannord.states import (
     ACKNOWLEDGE, is_faulted, parameter_set_bits, QUICK_STOP, READY, RUN, State, state_of,
@@ -43,7 +43,7 @@ def control_table(parameter_set: int) -> ControlTable:
         fault=StatusPattern(0x0008, 0x0008))
 
 
-class CannordControl(ProfileControl):
+class CannordControl(ControlMachine):
     """
     The machine for one inverter.
 

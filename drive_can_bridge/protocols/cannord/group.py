@@ -38,6 +38,8 @@ def make_group(drives: Sequence[DriveConfiguration]) -> 'list[GroupSession]':
     leader = LeaderSession(drives, places=places)
     members = [MemberSession(drive, leader, places=places) for drive in drives[1:]]
     leader.members = [leader, *members]
+    for member in leader.members:
+        member.partners = [other for other in leader.members if other is not member]
     return leader.members
 
 
@@ -71,22 +73,34 @@ class LeaderSession(GroupSession):
         super().__init__(own, self._group, places=places)
         self.members: list[GroupSession] = [self]
         self._turn = 0
+        self._turn_begun = 0    # what it was when this cycle began
 
     # -- sending ----------------------------------------------------------------------------------
 
     def _transmit(self, now: float) -> None:
-        self._frames += self._framed(self._broadcast)
-        for member in self.members[1:]:
-            member.sent.raws = self.sent.raws
+        self._turn_begun = self._turn
+        self._put(self._broadcast)
         count = len(self.members)
         # a stop reaches also those that do not listen to broadcasts
         for _ in range(math.ceil(count / STOP_CYCLES) if self._stopping else 1):
             member = self.members[self._turn % count]
             self._turn = (self._turn + 1) % count
-            self._frames += self._framed(member.request_identifier)
+            self._put(member.request_identifier)
             member.expect_answer(now, now + self.drive.period)
 
+    def _frame_left(self, sent: bool, now: float) -> None:
+        if not sent and self._stopping:     # the stop does not end without those left out
+            self._turn = self._turn_begun
+        super()._frame_left(sent, now)
+        for member in self.members[1:]:
+            member.sent.raws = self.sent.raws
+
     # -- the group --------------------------------------------------------------------------------
+
+    @property
+    def operating(self) -> bool:
+        """The group is enabled, all of it."""
+        return self._group.operating
 
     def member_found(self, name: str) -> None:
         """Take note that an inverter of the group came online: it must not jump."""
@@ -97,6 +111,7 @@ class LeaderSession(GroupSession):
         """Take note that an inverter of the group is offline."""
         self._group.member_lost(name)
         self._tell_notes()
+        self._let_commands_through()
 
     def member_status(self, name: str, word: int, now: float) -> None:
         """Take the status word of an inverter of the group."""
@@ -145,6 +160,10 @@ class MemberSession(GroupSession):
 
     def _first_cycle(self, now: float) -> float:
         return math.inf
+
+    @property
+    def _operating(self) -> bool:
+        return self._leader.operating
 
     def _found(self, now: float) -> None:
         super()._found(now)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from drive_can_bridge.core.parameters import Parameter, Storage, Value
 from drive_can_bridge.core.requests import (
-    Failure, NO_ANSWER_OFFLINE, Outcome, ReadRequest, ReadValue, Request, Written,
+    Failure, NO_ANSWER_OFFLINE, NOT_SENT, Outcome, ReadRequest, ReadValue, Request, Written,
 )
 from drive_can_bridge.protocols.cannord.channel import Ask, Procedure, Reply
 from drive_can_bridge.protocols.cannord.parameter_frame import (
@@ -51,16 +51,16 @@ def read_parameters(parameters: Sequence[Parameter], conditions: Conditions,
                     ) -> Generator[Ask, Reply, tuple[Outcome, ...]]:
     """Read parameters one after the other; after one that an absent drive missed, none."""
     outcomes: list[Outcome] = []
-    absent = False
+    gone: Failure | None = None
     for parameter in parameters:
         outcome: Outcome
         if parameter.number is None:
             outcome = _received(parameter, conditions)
-        elif absent:
-            outcome = Failure(NO_ANSWER_OFFLINE)
+        elif gone is not None:
+            outcome = gone
         else:
             outcome = yield from read_parameter(parameter, conditions)
-            absent = _is_absent(outcome)
+            gone = _gone(outcome)
         outcomes.append(outcome)
     return tuple(outcomes)
 
@@ -81,16 +81,16 @@ def write_parameters(items: Sequence[tuple[Parameter, int]], conditions: Conditi
                      ) -> Generator[Ask, Reply, tuple[Outcome, ...]]:
     """Write parameters one after the other; after one that an absent drive missed, none."""
     outcomes: list[Outcome] = []
-    absent = False
+    gone: Failure | None = None
     for parameter, raw in items:
         outcome: Outcome
         if parameter.number is None:
             outcome = Failure(PROCESS_DATA_ONLY)
-        elif absent:
-            outcome = Failure(NO_ANSWER_OFFLINE)
+        elif gone is not None:
+            outcome = gone
         else:
             outcome = yield from write_parameter(parameter, raw, conditions)
-            absent = _is_absent(outcome)
+            gone = _gone(outcome)
         outcomes.append(outcome)
     return tuple(outcomes)
 
@@ -120,6 +120,8 @@ def write_parameter(parameter: Parameter, raw: int, conditions: Conditions,
             return Written()
         refusal = yield from _refusal(parameter, reply.response)
         return refusal
+    if not reply.sent:
+        return Failure(NOT_SENT)
     if reply.contrary is not None:
         found = parameter.raw_from_word(
             reply.contrary.value if double else reply.contrary.word)
@@ -172,8 +174,10 @@ def _received(parameter: Parameter, conditions: Conditions) -> Outcome:
     return Failure(f'{PROCESS_DATA_ONLY}, and none with it was received')
 
 
-def _is_absent(outcome: Outcome) -> bool:
-    return isinstance(outcome, Failure) and outcome.reason == NO_ANSWER_OFFLINE
+def _gone(outcome: Outcome) -> Failure | None:
+    """Return the failure that all others of a request would meet, too; None: it is no such."""
+    return outcome if isinstance(outcome, Failure) and outcome.reason in (
+        NO_ANSWER_OFFLINE, NOT_SENT) else None
 
 
 def _width_text(parameter: Parameter, answer: ParameterFrame) -> str:

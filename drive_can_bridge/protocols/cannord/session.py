@@ -24,13 +24,16 @@ from drive_can_bridge.core.events import (
     ForeignMasterSeen, Noted, ProcessDataReceived, SetpointsExpired, StationFound,
 )
 from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.parameters import Access, Parameter
 from drive_can_bridge.core.requests import (
     BRIDGE_INACTIVE, Failure, Outcome, ReadValue, Request, WriteRequest,
     Written,
 )
 from drive_can_bridge.core.roles import Cells
-from drive_can_bridge.core.session import Session, STOP_CYCLES
+from drive_can_bridge.core.session import (
+    CYCLE_SPACING_MIN, Session, STOP_CYCLES, STOP_WAIT_MAX,
+)
 from drive_can_bridge.protocols.cannord import procedures
 from drive_can_bridge.protocols.cannord.channel import TaskChannel
 from drive_can_bridge.protocols.cannord.control import CannordControl
@@ -45,6 +48,10 @@ from drive_can_bridge.protocols.cannord.process_data import (
 from drive_can_bridge.protocols.cannord.states import is_faulted, STATUS_BITS, STATUS_WORD
 
 NO_ANSWER = 'no answer to process data'
+#: what the inverter is told, for the books of what it was told
+CYCLE = 'cycle'
+#: s until a telegram time-out that nobody answered is asked for again
+UNKNOWN_TIMEOUT_PAUSE = 10.0
 
 STATUS_PARAMETER = Parameter(
     name=STATUS_WORD, access=Access.READ_ONLY, bits=tuple(STATUS_BITS.items()),
@@ -91,6 +98,9 @@ class CannordSession(Session):
         self._stopping = False
         self._cycles_left = 0               # before a stop is complete
         self._payloads: list[bytes] = []    # of the frames of a cycle, main frame first
+        self._payloads_run = False          # they hold anything but neutral and disable
+        self._frames_out = 0                # of this cycle, of which nobody has said what became
+        self._whole = True                  # the bus has taken all frames of this cycle so far
         self._sent_word: int | None = None
         self._awaiting = False
         self._awaiting_extra = False
@@ -104,6 +114,8 @@ class CannordSession(Session):
         self._next_cycle = math.inf
         self._missed_in_row = 0
         self._timeout_warning = ''
+        self._asking_timeout = False
+        self._ask_timeout_at = -math.inf
 
     @property
     def builtin_parameters(self) -> tuple[Parameter, ...]:
@@ -120,12 +132,15 @@ class CannordSession(Session):
         self._fail_requests(BRIDGE_INACTIVE)
         self._withdraw(BRIDGE_INACTIVE, now)
         if not self._cycling:
+            if not self.bus_available:
+                self._leave_owing()
             self._go_idle('deactivated')
             return
         self._stopping = True
         self._in_pace = False
         self._cycles_left = STOP_CYCLES
         self._next_cycle = min(self._next_cycle, max(now, self._sent_at + self._stop_spacing))
+        self._hurry(now)
 
     @property
     def stopped(self) -> bool:
@@ -146,13 +161,15 @@ class CannordSession(Session):
         self._cycling = True
         self._in_pace = False
         self._next_cycle = self._first_cycle(now)
+        if self.told.owed:
+            self._hurry(now)
 
     def _first_cycle(self, now: float) -> float:
         return max(now, self._sent_at + self.drive.period)
 
     def _go_idle(self, advice: str) -> None:
         self._cycling = self._stopping = False
-        self.setpoints.enabled = False
+        self.setpoints.allow(False)
         self._next_cycle = math.inf
         self._stop_awaiting()
         self._advice = advice
@@ -167,8 +184,7 @@ class CannordSession(Session):
 
     def _withdraw(self, reason: str, now: float) -> None:
         """Go neutral, and back to ``disable``."""
-        self.setpoints.disarm()
-        self.setpoints.enabled = False
+        self.setpoints.allow(False)
         self._machine.withdraw(reason, now)
         self._control_changed(now)
 
@@ -189,10 +205,10 @@ class CannordSession(Session):
             self.statistics.period_error.add(abs(now - self._sent_at - period))
         self._in_pace = not self._stopping
         self._sent_at = now
+        self._frames_out, self._whole = 0, True
         self._transmit(now)
-        self._machine.word_sent(now)
         if self._stopping:
-            self._count_down(now)
+            self._next_cycle = now + self._stop_spacing
             return
         soonest = now + 0.5 * period
         self._next_cycle += period
@@ -201,14 +217,53 @@ class CannordSession(Session):
 
     def _transmit(self, now: float) -> None:
         """Hand out the frames of this cycle."""
-        self._frames += self._framed(self.request_identifier)
+        self._put(self.request_identifier)
         self.expect_answer(now)
 
-    def _framed(self, addressed: int) -> list[Frame]:
-        return [Frame(addressed, payload, self._extended) for payload in self._payloads]
+    def _put(self, addressed: int) -> None:
+        """Hand out main frame and additional frame to one identifier."""
+        for payload in self._payloads:
+            self._frames_out += 1
+            self._outbox.put(Frame(addressed, payload, self._extended), self._frame_left)
+
+    def _frame_left(self, sent: bool, now: float) -> None:
+        """Take note of a frame; one that may start somebody counts even alone."""
+        self._frames_out -= 1
+        if not sent:
+            self._whole = False
+        elif self._payloads_run:
+            self.told.note(CYCLE, runs=True)
+        if not self._frames_out and self._whole:
+            self._cycle_left(now)
+
+    def _cycle_left(self, now: float) -> None:
+        """Take note of a cycle of which the bus has taken every frame: only then it counts."""
+        self.told.note(CYCLE, runs=self._payloads_run)
+        if self._machine.word == self._sent_word:   # nobody was lost meanwhile
+            fresh = self._machine.word_due
+            self._machine.word_sent(now)
+            if fresh:
+                self._control_changed(now)
+        if self._stopping:
+            self._cycles_left -= 1
+            if self._cycles_left == 0:
+                self._go_idle('deactivated')
+
+    def _hurry(self, now: float) -> None:
+        """Bring the next cycle forward: it stops the drive."""
+        if math.inf > self._next_cycle > now + STOP_WAIT_MAX:
+            self._in_pace = False
+            self._next_cycle = max(now, self._sent_at + CYCLE_SPACING_MIN)
+
+    def _see_to_control_word(self, now: float) -> None:
+        if self._machine.stopping and not self._stopping and (
+                self._machine.word != self._sent_word
+                or self.setpoints.changed and self.told.owed):
+            self._hurry(now)
 
     def _encode(self) -> list[bytes]:
         self._sent_word = self._machine.word
+        self._payloads_run = not (self._machine.at_rest and self.setpoints.at_rest)
         words = [setpoint.parameter.word_from_raw(setpoint.raw)
                  for setpoint in self.setpoints.items]
         self.setpoints.changed = False
@@ -218,13 +273,6 @@ class CannordSession(Session):
         if self._extra:
             payloads.append(encode_extra(words[MAIN_VALUES:]))
         return payloads
-
-    def _count_down(self, now: float) -> None:
-        """Handle the last cycles before silence."""
-        self._next_cycle = now + self._stop_spacing
-        self._cycles_left -= 1
-        if self._cycles_left == 0:
-            self._go_idle('deactivated')
 
     # -- process data, receiving ------------------------------------------------------------------
 
@@ -361,7 +409,6 @@ class CannordSession(Session):
         self.online = True
         self.ever_online = True
         self._advice = ''
-        self.setpoints.enabled = True
         self._events.append(StationFound())
         self._look_at_timeout(now)
 
@@ -373,13 +420,10 @@ class CannordSession(Session):
         self._events.append(ForeignMasterSeen(
             f'another master sends to station {self.drive.station}: {frame}'))
 
-    def _control_changed(self, now: float) -> None:
-        self._tell_notes()
-
     # -- parameters -------------------------------------------------------------------------------
 
-    def _send_task(self, payload: bytes) -> None:
-        self._frames.append(Frame(self._task_identifier, payload, self._extended))
+    def _send_task(self, payload: bytes, left: Left) -> None:
+        self._outbox.put(Frame(self._task_identifier, payload, self._extended), left)
 
     def _make_conditions(self) -> procedures.Conditions:
         drive = self.drive
@@ -401,6 +445,7 @@ class CannordSession(Session):
             if isinstance(request, WriteRequest) and any(
                     parameter.number == TIMEOUT_NUMBER and isinstance(outcome, Written)
                     for (parameter, _), outcome in zip(request.items, outcomes)):
+                self._ask_timeout_at = -math.inf    # now it is known to answer
                 self._look_at_timeout(self._channel.now)
 
         self._channel.run(procedures.of_request(request, self._conditions), done, now)
@@ -410,6 +455,7 @@ class CannordSession(Session):
 
     def _fail_requests(self, reason: str) -> None:
         self._channel.clear()
+        self._asking_timeout = False
         self._fail_open_requests(reason)
 
     def cells(self, parameter: Parameter) -> Cells:
@@ -436,16 +482,19 @@ class CannordSession(Session):
     def _look_at_timeout(self, now: float) -> None:
         """Read the telegram time-out, where the profile lists it."""
         parameter = timeout_parameter(self.drive.profile)
-        if parameter is None:
+        if parameter is None or self._asking_timeout or now < self._ask_timeout_at:
             return
+        self._asking_timeout = True
 
         def done(outcome: Outcome) -> None:
+            self._asking_timeout = False
             if isinstance(outcome, ReadValue):
                 self._timeout_warning = timeout_warning(
                     parameter, float(parameter.value_from_raw(outcome.raw)), self.drive.period)
                 if self._timeout_warning:
                     self._events.append(Noted(self._timeout_warning, warning=True))
             elif isinstance(outcome, Failure):
+                self._ask_timeout_at = self._channel.now + UNKNOWN_TIMEOUT_PAUSE
                 self._events.append(Noted(f'telegram time-out ({parameter.address}) unknown: '
                                           f'{outcome.reason}'))
 

@@ -4,9 +4,10 @@ Who may use the mailbox next.
 
 Anything that takes several requests is a *procedure*: a generator that yields steps (see
 :mod:`.mailbox`) and is sent the reply to each, so that it reads like the sequence it is. Every
-lane runs its procedures one after the other. The control word comes first, then setpoints; the
-reads of the round and the requests of users take turns after every exchange, so that neither a
-flood of users nor a parameter that nobody answers keeps the other waiting for more than one.
+lane runs its procedures one after the other. A stop comes first, whatever holds the others back;
+then the control word, then setpoints; the reads of the round and the requests of users take turns
+after every exchange, so that neither a flood of users nor a parameter that nobody answers keeps
+the other waiting for more than one.
 """
 
 from collections import deque
@@ -15,8 +16,11 @@ from enum import Enum
 import math
 from typing import Any
 
-from drive_can_bridge.protocols.canopen_pkw.mailbox import Mailbox, Reply, Step
+from drive_can_bridge.protocols.canopen_pkw.mailbox import Mailbox, Read, Reply, Silence, Step
 from drive_can_bridge.protocols.canopen_pkw.pkw import Message
+
+#: s that a stop waits for the answer under way: a device has one request at a time
+STOP_PATIENCE = 0.05
 
 Procedure = Generator[Step, Reply, Any]
 Done = Callable[[Any], None]
@@ -25,6 +29,7 @@ Done = Callable[[Any], None]
 class Lane(Enum):
     """Who a procedure works for; the first comes first."""
 
+    STOP = 'what makes the drive stand still'
     CONTROL = 'control word'
     SETPOINTS = 'setpoints'
     ROUND = 'reads of the round'
@@ -91,6 +96,7 @@ class Channel:
         self._queues = {lane: _Queue() for lane in Lane}
         self._users_next = False
         self._serving: Lane | None = None  # whose step is under way
+        self._hurried = False  # and it has to make room
         self._held_until = -math.inf
         self._advancing = False
 
@@ -120,6 +126,20 @@ class Channel:
             queue.clear()
         self.mailbox.forget()
         self._serving = None
+        self._hurried = False
+
+    def make_room(self, now: float) -> None:
+        """Let a stop follow soon: the answer under way is waited for a moment only."""
+        if self.mailbox.busy and not self._hurried:
+            self._hurried = True
+            self.mailbox.abandon(now + STOP_PATIENCE)
+
+    def drop(self, now: float) -> None:
+        """Forget everything but the exchange under way, for which a stop waits a moment."""
+        for queue in self._queues.values():
+            queue.clear()
+        self._serving = None
+        self.make_room(now)
 
     def hold(self, until: float) -> None:
         """Begin no exchange before ``until``."""
@@ -171,6 +191,11 @@ class Channel:
                 return False
             self._finish(reply)
             return True
+        step = self._queues[Lane.STOP].fetch()
+        if step is not None:
+            self._serving = Lane.STOP
+            self.mailbox.begin(step, now)
+            return True
         if now < self._held_until:
             return False
         for lane in self._order():
@@ -189,8 +214,12 @@ class Channel:
     def _finish(self, reply: Reply) -> None:
         """End the exchange under way; then it is another lane's turn."""
         lane, self._serving = self._serving, None
+        hurried, self._hurried = self._hurried, False
         if lane is None:
             return
         if lane in (Lane.ROUND, Lane.USERS):
             self._users_next = lane is Lane.ROUND
-        self._queues[lane].resume(reply)
+        queue = self._queues[lane]
+        if hurried and isinstance(reply, Silence) and isinstance(queue.step, Read):
+            return  # it had to make room: it is asked again
+        queue.resume(reply)

@@ -17,6 +17,7 @@ import math
 
 from drive_can_bridge.core.control import ControlMachine
 from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.told import Told
 from drive_can_bridge.protocols.canopen_pkw import addresses
 from drive_can_bridge.protocols.canopen_pkw.channel import Channel, Lane
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
@@ -26,6 +27,8 @@ from drive_can_bridge.protocols.canopen_pkw.procedures import LastWrite
 
 #: s until a ``disable`` that was refused is written again
 RETRY_AFTER = 0.25
+#: what the drive is told by it, for the books of what it was told
+CONTROL_WORD = 'control word'
 
 
 class ControlWriter:
@@ -35,20 +38,23 @@ class ControlWriter:
     :param word: parameter of the control word.
     :param changed: called after anything that may have changed the control word.
     :param refused: takes what the drive says to a word that it refuses, in words.
+    :param told: takes note of what the drive was told.
     :param disable: the word that may be written any number of times.
     :param refresh: s after which an unchanged word is written again; 0: never.
     :ivar refusal: what the drive says to a word that it refused; '' if it does not.
     """
 
     def __init__(self, channel: Channel, control: ControlMachine, word: Parameter,
-                 changed: Callable[[float], None], refused: Callable[[str], None], *,
-                 disable: int, addressing: str, word_order: str, refresh: float) -> None:
+                 changed: Callable[[float], None], refused: Callable[[str], None],
+                 told: Told, *, disable: int, addressing: str, word_order: str,
+                 refresh: float) -> None:
         self.refusal = ''
         self._channel = channel
         self._control = control
         self._parameter = word
         self._changed = changed
         self._refused = refused
+        self._told = told
         self._disable = disable
         self._word_order = word_order
         self._span = addresses.span_of(word, addressing)
@@ -57,19 +63,34 @@ class ControlWriter:
         self._settled_at = -math.inf
         self._retry_at = math.inf           # a refused disable
         self._doubtful: int | None = None   # sent, but not answered
+        self._hurried: int | None = None    # the stop that others have made room for
 
     def forget(self) -> None:
         """Take note that nothing is known of the drive."""
-        self._settled = self._doubtful = None
+        self._settled = self._doubtful = self._hurried = None
         self._retry_at = math.inf
         self.refusal = ''
 
-    def update(self, now: float) -> None:
-        """Write the word if the drive does not have it, or not lately."""
+    def update(self, now: float, *, known: bool) -> None:
+        """
+        Write the word if the drive does not have it, or not lately.
+
+        :param known: the status was read just now. A word that may start the drive is repeated
+            only then: a drive that was off meanwhile, unseen, must not start by a repetition.
+        """
+        word = self._control.word
         fresh = now < self._retry_at and (
             self._refresh <= 0.0 or now < self._settled_at + self._refresh)
-        if self._settled == self._control.word and fresh:
+        if self._settled == word and fresh:
             return
+        repeated = self._settled == word or self._control.operating
+        if repeated and not known and word != self._disable:
+            return
+        if self._control.stopping and word not in (self._hurried, self._settled):
+            self._hurried = word
+            self._channel.make_room(now)
+        elif not self._control.stopping:
+            self._hurried = None
         if self._channel.is_idle(Lane.CONTROL):
             self._channel.run(Lane.CONTROL, self._write(), lambda _: None, now)
 
@@ -95,10 +116,16 @@ class ControlWriter:
                         return
                     continue
                 word = self._control.word
-            reply = yield Write(self._span.address, self._words(word))
+            before = self._told.runs(CONTROL_WORD)
+            if word != self._disable:
+                self._told.note(CONTROL_WORD, runs=True)
+            reply = yield Write(self._span.address, self._words(word),
+                                blind=self._control.stopping)
             if isinstance(reply, Silence):
                 if reply.sent:
                     self._settled, self._doubtful = None, word
+                else:
+                    self._told.note(CONTROL_WORD, runs=before)
                 if word == self._control.word:
                     return
                 continue
@@ -139,6 +166,7 @@ class ControlWriter:
     def _settle(self, word: int) -> None:
         """Take note that the drive has a word."""
         self._doubtful = None
+        self._told.note(CONTROL_WORD, runs=word != self._disable)
         self._settled, self._settled_at = word, self._channel.now
         if word == self._control.word:
             self._control.word_sent(self._channel.now)

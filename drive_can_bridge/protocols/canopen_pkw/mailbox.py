@@ -26,11 +26,14 @@ from dataclasses import dataclass
 import math
 from typing import NamedTuple, Union
 
+from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.protocols.canopen_pkw import abort_codes, pkw
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Function, Message
 
 #: s that an answer to function 00h is waited for at most
 SYNCHRONISATION_TIMEOUT = 0.1
+#: s until the bus is asked again to take a write that waits for nobody
+REFUSED_PAUSE = 0.01
 
 
 @dataclass(frozen=True)
@@ -47,6 +50,7 @@ class Write:
     Write one register, or two adjacent ones.
 
     :param blind: send it even though the device may take no notice; it may be executed twice.
+        When the bus refuses it, it is tried again until its time is over.
     :param timeout: s to wait for the answer; None: as configured.
     """
 
@@ -81,9 +85,11 @@ class Silence(NamedTuple):
     Nobody answered.
 
     :param sent: False: it was not even sent, because the mailbox could not be synchronised.
+    :param refused: the bus did not take it.
     """
 
     sent: bool = True
+    refused: bool = False
 
 
 Reply = Union[Answered, Refused, Silence]
@@ -93,12 +99,13 @@ class Mailbox:
     """
     One exchange at a time.
 
-    :param send: takes a request that leaves now.
+    :param send: takes a request that leaves now, and who is told whether it did.
     :param order: of the halves of abort codes: ``auto``, ``low_first``, ``high_first``.
     :param timeout: s to wait for an answer.
     """
 
-    def __init__(self, send: Callable[[Message], None], *, order: str, timeout: float) -> None:
+    def __init__(self, send: Callable[[Message, Left], None], *, order: str,
+                 timeout: float) -> None:
         self.timeout = timeout
         self._send = send
         self._order = order
@@ -107,6 +114,8 @@ class Mailbox:
         self._step: Step | None = None
         self._request: Message | None = None
         self._deadline = math.inf
+        self._abandoned = False
+        self._refused_at: float | None = None   # the bus did not take the request
 
     @property
     def busy(self) -> bool:
@@ -116,7 +125,9 @@ class Mailbox:
     @property
     def deadline(self) -> float:
         """When ``handle_timer`` has something to do; infinity: never."""
-        return self._deadline
+        if self._refused_at is None:
+            return self._deadline
+        return min(self._deadline, self._refused_at + REFUSED_PAUSE)
 
     def begin(self, step: Step, now: float) -> None:
         """Begin an exchange; none may be under way."""
@@ -128,7 +139,13 @@ class Mailbox:
             return
         self._request = pkw.idle_request()
         self._deadline = now + min(self.timeout, SYNCHRONISATION_TIMEOUT)
-        self._send(self._request)
+        self._send(self._request, self._left)
+
+    def abandon(self, until: float) -> None:
+        """Wait for the answer under way until then at most; the step is not gone on with."""
+        if self._step is not None:
+            self._abandoned = True
+            self._deadline = min(self._deadline, until)
 
     def receive(self, message: Message, now: float) -> Reply | bool:
         """
@@ -144,6 +161,9 @@ class Mailbox:
             if message.code != Function.NONE:
                 return False
             self._synchronised = True
+            if self._abandoned:
+                self._end()
+                return Silence(sent=False)
             self._send_step(step, now)
             return True
         if not pkw.answers(message, request):
@@ -157,8 +177,16 @@ class Mailbox:
     def handle_timer(self, now: float) -> Reply | None:
         """Return the reply that ends an overdue exchange; None: nothing ended."""
         request, step = self._request, self._step
-        if now < self._deadline or request is None or step is None:
+        if request is None or step is None:
             return None
+        if self._refused_at is not None:
+            return self._try_again(step, self._refused_at, now)
+        if now < self._deadline:
+            return None
+        if self._abandoned:
+            sent = request.code != Function.NONE
+            self.forget()
+            return Silence(sent)
         if request.code != Function.NONE:
             self.forget()
             return Silence()
@@ -177,6 +205,28 @@ class Mailbox:
         self._step = None
         self._request = None
         self._deadline = math.inf
+        self._abandoned = False
+        self._refused_at = None
+
+    def _left(self, sent: bool, now: float) -> None:
+        """Take note of a write that the bus refused; a read ends when its time is over."""
+        if sent or self._request is None or not isinstance(self._step, Write):
+            return
+        self._refused_at = now
+        if self._request.code != Function.NONE:
+            self._toggle = not self._toggle     # the device has not seen this one
+
+    def _try_again(self, step: Step, refused_at: float, now: float) -> Reply | None:
+        """Go on with a write that the bus has refused: it is no write."""
+        if not (isinstance(step, Write) and step.blind) or self._abandoned or (
+                now >= self._deadline):
+            self._end()     # what the device's last function byte is, is as known as before
+            return Silence(sent=False, refused=True)
+        if now >= refused_at + REFUSED_PAUSE:
+            deadline, self._refused_at = self._deadline, None
+            self._send_step(step, now)
+            self._deadline = deadline
+        return None
 
     def _send_step(self, step: Step, now: float) -> None:
         # inverted after function 00h, too: a late answer to the request before never fits
@@ -188,4 +238,4 @@ class Mailbox:
             self._request = pkw.write_request(step.address, step.words, self._toggle)
             timeout = timeout if step.timeout is None else step.timeout
         self._deadline = now + timeout
-        self._send(self._request)
+        self._send(self._request, self._left)

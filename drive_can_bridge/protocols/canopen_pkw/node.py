@@ -17,7 +17,8 @@ heartbeat: operational          allowed
 =============================== ==================================================================
 
 NMT *start* goes out when the bridge starts, after a boot-up frame, when a heartbeat says that the
-node is not operational, and once a second while the drive is offline.
+node is not operational, and once a second while the drive is offline; never more than ten times a
+second, however often the node restarts: after a boot-up frame it is put off then, not left out.
 """
 
 from enum import Enum
@@ -31,7 +32,7 @@ from drive_can_bridge.protocols.canopen_pkw.network import Emergency, NmtCommand
 START_PAUSE = 0.05
 #: s between two *start* commands to a node that is offline
 START_PERIOD = 1.0
-#: least s between two *start* commands, however often heartbeats ask for them
+#: least s between two *start* commands, however often the node asks for them
 START_SPACING = 0.1
 #: s for which a heartbeat is believed at least, and intervals for which it is
 BELIEF_TIME = 1.0
@@ -126,11 +127,10 @@ class Node:
         if state is NmtState.BOOT_UP:
             self.state = NmtState.PRE_OPERATIONAL
             self.emergency = None
-            self.free_at = now + START_PAUSE
+            started_at = self._start_soon(now) if active else now
+            self.free_at = started_at + START_PAUSE
             if self._beating:
                 self.free_at = self._blocked_until = now + self._belief
-            if active:
-                self._start(now)
             return Change.RESTARTED
         self._beating = True
         self.state = state
@@ -203,6 +203,15 @@ class Node:
         if not self.heard_heartbeat or self.heartbeat_lost or self.heartbeat_timeout <= 0.0:
             return math.inf
         return self._heartbeat_at + self.heartbeat_timeout
+
+    def _start_soon(self, now: float) -> float:
+        """Send *start* now, or when enough time has passed since the last one; return when."""
+        due = self._started_at + START_SPACING
+        if now < due:
+            self._start_due = min(self._start_due, due)
+            return due
+        self._start(now)
+        return now
 
     def _start(self, now: float) -> None:
         if not self._nmt_start:

@@ -11,7 +11,7 @@ from typing import NamedTuple, Union
 
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.requests import (
-    Failure, NO_ANSWER_OFFLINE, Outcome, ReadRequest, ReadValue, Request, Written,
+    Failure, NO_ANSWER_OFFLINE, NOT_SENT, Outcome, ReadRequest, ReadValue, Request, Written,
 )
 from drive_can_bridge.protocols.canopen_pkw import addresses
 from drive_can_bridge.protocols.canopen_pkw.addresses import Span
@@ -102,7 +102,7 @@ def write_parameters(items: Sequence[tuple[Parameter, int]], conditions: Conditi
         words = addresses.words_from_raw(parameter, raw, conditions.word_order)
         outcome = yield from _write(conditions.span(parameter).address, words, conditions)
         outcomes.append(outcome)
-        if isinstance(outcome, Failure) and outcome.reason == NO_ANSWER_OFFLINE:
+        if isinstance(outcome, Failure) and outcome.reason in (NO_ANSWER_OFFLINE, NOT_SENT):
             outcomes += [outcome] * (len(items) - len(outcomes))
             break
     return tuple(outcomes)
@@ -139,6 +139,8 @@ def _write(address: Address, words: tuple[int, ...], conditions: Conditions,
             return Written()
         if isinstance(reply, Refused):
             return Failure(reply.text)
+        if reply.refused:
+            return Failure(NOT_SENT)
         if reply.sent:
             return conditions.unanswered(1)
     return conditions.unanswered()
@@ -211,5 +213,6 @@ def write_until_answered(writes: Sequence[LastWrite], attempts: int, timeout: fl
         if isinstance(reply, Refused):
             failed.append(f'{name} {reply.text}')
         elif isinstance(reply, Silence):
-            failed.append(f'{name} not acknowledged in {attempts} attempts')
+            failed.append(f'{name} not taken by the bus' if reply.refused else
+                          f'{name} not acknowledged in {attempts} attempts')
     return failed

@@ -13,27 +13,30 @@ While running, a round of reads begins every period, as long as the node takes P
 rounds (``missed_limit``) with a read that nobody answered make it offline, and so do a boot-up
 frame, a heartbeat that says that the node is not operational, and heartbeats that cease. Whatever
 the reason: the control word goes back to ``disable``, setpoints go neutral and want re-arming. A
-drive that is only silent may still be listening; so it is told to stand still before rounds go on.
+drive that was told to run is told to stand still at once, whatever is known of the node: what is
+only silent may still be listening.
 
 Setpoints and the control word are written while the drive is online: when they change, and
 setpoints again after ``refresh_interval``.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from enum import Enum
 import math
 
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.control import ControlMachine, ProfileControl
+from drive_can_bridge.core.control import ControlMachine
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.events import (
-    ForeignMasterSeen, Noted, ProcessDataReceived, SetpointsExpired, StationFound,
+    ForeignMasterSeen, ProcessDataReceived, SetpointsExpired, StationFound,
 )
 from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.requests import BRIDGE_INACTIVE, Failure, Request
 from drive_can_bridge.core.roles import Cells
 from drive_can_bridge.core.session import LOOKING, Session
+from drive_can_bridge.core.told import MAY_RUN
 from drive_can_bridge.protocols.canopen_pkw import addresses, network, pkw, procedures
 from drive_can_bridge.protocols.canopen_pkw.addresses import Span
 from drive_can_bridge.protocols.canopen_pkw.channel import Channel, Lane
@@ -41,6 +44,7 @@ from drive_can_bridge.protocols.canopen_pkw.control_writer import ControlWriter
 from drive_can_bridge.protocols.canopen_pkw.identifiers import Identifiers
 from drive_can_bridge.protocols.canopen_pkw.mailbox import Mailbox, Refused
 from drive_can_bridge.protocols.canopen_pkw.node import Change, Node
+from drive_can_bridge.protocols.canopen_pkw.notes import PacedNotes
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Layout, Message
 from drive_can_bridge.protocols.canopen_pkw.setpoint_writer import SetpointWriter
 from drive_can_bridge.protocols.polling import Beat
@@ -69,27 +73,28 @@ class PkwSession(Session):
         table = drive.profile.control
         control: ControlMachine | None = None
         if table is not None:
-            control = ProfileControl(table, timeout=drive.control_timeout)
+            control = ControlMachine(table, timeout=drive.control_timeout)
         super().__init__(drive, control)
         options = drive.family_options
         self._identifiers = Identifiers.of(drive)
         self._layout = Layout(options['layout'])
         self._addressing: str = options['addressing']
         self._word_order: str = options['word_order']
+        self._notes = PacedNotes(lambda note: self._events.append(note))
         self._node = Node(drive.station, nmt_start=options['nmt_start'],
                           heartbeat_timeout=options['heartbeat_timeout'])
         self._channel = Channel(Mailbox(
             self._send, order=options['abort_code_order'], timeout=drive.parameter_timeout))
         self._conditions = self._make_conditions()
         self._setpoint_writer = SetpointWriter(
-            self._channel, self.setpoints, self._warn, addressing=self._addressing,
+            self._channel, self.setpoints, self._warn, self.told, addressing=self._addressing,
             word_order=self._word_order, refresh=options['refresh_interval'])
         self._control_writer: ControlWriter | None = None
         self._status: Parameter | None = None
         if control is not None and table is not None:
             word = drive.profile.parameters[table.parameter]
             self._control_writer = ControlWriter(
-                self._channel, control, word, self._control_changed, self._warn,
+                self._channel, control, word, self._control_changed, self._warn, self.told,
                 disable=table.disable, addressing=self._addressing,
                 word_order=self._word_order,
                 refresh=options['refresh_interval'] if word in drive.cyclic_request else 0.0)
@@ -104,33 +109,50 @@ class PkwSession(Session):
         self._beat = Beat(drive.period)
         self._phase = Phase.IDLE
         self._missed_in_row = 0
+        self._status_known = False  # it was read just now
+        self._owed = False  # there was something to be stopped when the stop began
         self._round_began = -math.inf
         self._received_at = -math.inf
 
     # -- life cycle -------------------------------------------------------------------------------
 
     def deactivate(self, now: float) -> None:
-        was_running = self._phase is Phase.RUNNING and self.ever_online
+        was_running = self._phase is not Phase.IDLE and (
+            self.told.owed or self.ever_online and now >= self._node.free_at)
         self.active = False
         self._fail_requests(BRIDGE_INACTIVE)
         self._withdraw(BRIDGE_INACTIVE, now)
         self._node.stop()
         self._beat.stop()
-        self._channel.clear()
-        if self._phase is Phase.STOPPING:
-            was_running = True
-        writes = self._neutral_writes()
-        if not was_running or not writes or now < self._node.free_at:
+        self._channel.drop(now)
+        if not was_running:
+            if not self.bus_available:
+                self._leave_owing()
             self._go_idle('deactivated')
             return
         self._phase = Phase.STOPPING
-        self._channel.run(Lane.CONTROL, self._farewell(writes, self._stop_time),
-                          self._farewell_ended, now)
+        self._stop_now(self._stop_time, now)
 
-    def _farewell_ended(self, failed: list[str]) -> None:
-        if failed:
-            self._warn(f'told to stop, but {"; ".join(failed)}: it may still be running')
-        self._go_idle('deactivated')
+    def _stop_now(self, time: float, now: float) -> None:
+        """Tell the drive to stand still, within so many s."""
+        writes = [] if self._control_writer is None else [self._control_writer.disable_write()]
+        writes += self._setpoint_writer.neutral_writes()
+        self._owed = self.told.owed
+        self._channel.cancel(Lane.STOP)
+        self._channel.make_room(now)
+        timeout = min(self.drive.parameter_timeout, time / (STOP_ATTEMPTS * max(1, len(writes))))
+        self._channel.run(
+            Lane.STOP, procedures.write_until_answered(writes, STOP_ATTEMPTS, timeout),
+            self._stop_ended, now)
+
+    def _stop_ended(self, failed: list[str]) -> None:
+        if not failed:
+            self.told.stopped()
+        elif self._owed or self._phase is Phase.STOPPING:
+            tail = f': {MAY_RUN}' if self._owed else ''
+            self._warn(f'told to stop, but {"; ".join(failed)}{tail}')
+        if self._phase is Phase.STOPPING:
+            self._go_idle('deactivated')
 
     @property
     def stopped(self) -> bool:
@@ -159,18 +181,19 @@ class PkwSession(Session):
         self._lose('the drive is being reconnected', now)
         self._advice = LOOKING
         self._phase = Phase.RUNNING
-        self._channel.cancel(Lane.CONTROL)  # of a stop that was under way
         self._missed_in_row = 0
         self._refusals.clear()
         self._plan = addresses.round_plan(self.drive)
         self._node.begin(now)
         self._follow_node(now)
+        self._stop_if_owed(now)
 
     def _go_idle(self, advice: str) -> None:
         self._phase = Phase.IDLE
         self._node.stop()
         self._beat.stop()
         self._channel.clear()
+        self._notes.flush(self._channel.now)
         self._refusals.clear()
         self._advice = advice
         self._be_offline(advice)
@@ -182,8 +205,6 @@ class PkwSession(Session):
         self.ever_online = True
         self._advice = ''
         self._node.online()
-        self.setpoints.disarm()
-        self.setpoints.enabled = True
         self._events.append(StationFound())
         self._setpoint_writer.forget()
         if self._control_writer is not None:
@@ -203,39 +224,40 @@ class PkwSession(Session):
 
     def _withdraw(self, reason: str, now: float) -> None:
         """Go neutral, and back to ``disable``."""
-        self.setpoints.disarm()
-        self.setpoints.enabled = False
+        self.setpoints.allow(False)
         if self.control is not None:
             self.control.withdraw(reason, now)
             self._tell_notes()
+
+    def _stop_if_owed(self, now: float) -> None:
+        if self.told.owed:
+            self._stop_now(STOP_TIME_SILENT, now)
 
     def _leave_alone(self, reason: str, now: float) -> None:
         """Handle a drive that is silent, but may be listening: it has to stand still."""
         was_online = self.online
         self._lose(reason, now)
         self._node.offline(now)
-        self._frames += self._node.take_frames()
-        writes = self._neutral_writes()
-        if was_online and writes:
-            self._channel.run(Lane.CONTROL, self._farewell(writes, STOP_TIME_SILENT),
-                              lambda _: None, now)
+        self._send_nmt()
+        if was_online:
+            self._stop_now(STOP_TIME_SILENT, now)
 
     def _cut_off(self, reason: str, answer: str, now: float) -> None:
-        """Handle a node that takes no PDOs: nothing that was sent is answered any more."""
+        """
+        Handle a node that takes no PDOs: nothing that was sent is answered any more.
+
+        A stop under way takes its course: however often a node starts anew, stops do not pile up.
+        """
+        self._send_nmt()    # a stop that comes before it is lost
         self._lose(reason, now)
-        self._channel.clear()
         self._fail_requests(answer)
+        if self._channel.is_idle(Lane.STOP):
+            self._channel.clear()
+            self._stop_if_owed(now)
 
-    def _neutral_writes(self) -> list[procedures.LastWrite]:
-        """Return what makes a drive stand still."""
-        writes = [] if self._control_writer is None else [self._control_writer.disable_write()]
-        return writes + self._setpoint_writer.neutral_writes()
-
-    def _farewell(self, writes: Sequence[procedures.LastWrite], time: float,
-                  ) -> procedures.Farewell:
-        return procedures.write_until_answered(
-            writes, STOP_ATTEMPTS,
-            min(self.drive.parameter_timeout, time / (STOP_ATTEMPTS * len(writes))))
+    def _send_nmt(self) -> None:
+        for frame in self._node.take_frames():
+            self._outbox.put(frame)
 
     # -- the round --------------------------------------------------------------------------------
 
@@ -247,8 +269,7 @@ class PkwSession(Session):
         self._round_began = now
         if self.online:
             self._setpoint_writer.look(now)
-            if self._control_writer is not None:
-                self._control_writer.update(now)
+            self._see_to_control_word(now)
         self._channel.run(
             Lane.ROUND, procedures.read_round(self._plan, self._read_answered,
                                               self._read_refused), self._round_ended, now)
@@ -259,6 +280,7 @@ class PkwSession(Session):
         if self.online:
             self._take_status(dict(zip(span.addresses, words)))
             self._control_changed(self._channel.now)
+            self._status_known = False
 
     def _take_status(self, words: dict[Address, int]) -> None:
         status = self._status
@@ -267,6 +289,7 @@ class PkwSession(Session):
         wanted = addresses.span_of(status, self._addressing)
         if all(address in words for address in wanted.addresses):
             now = self._channel.now
+            self._status_known = True
             self.control.status_received(addresses.raw_from_words(
                 status, [words[address] for address in wanted.addresses], self._word_order), now)
 
@@ -298,6 +321,7 @@ class PkwSession(Session):
             self._found(now)
             self._take_status(words)
             self._control_changed(now)
+            self._status_known = False
         if any(address not in words for span in self._response_spans
                for address in span.addresses):
             return  # something was refused: there is no complete sample
@@ -330,7 +354,7 @@ class PkwSession(Session):
 
     # -- frames -----------------------------------------------------------------------------------
 
-    def _send(self, message: Message) -> None:
+    def _send(self, message: Message, left: Left) -> None:
         meaning = message.meaning
         if meaning is not None and meaning.writes:
             place = self._request_places.get(Span(message.address, meaning.count))
@@ -338,8 +362,13 @@ class PkwSession(Session):
                 self.sent.take((addresses.raw_from_words(
                     self.sent.parameters[place], message.words[:meaning.count],
                     self._word_order),), place)
-        self._frames.append(Frame(self._identifiers.request, pkw.encode(message, self._layout),
-                                  False))
+        self._outbox.put(Frame(self._identifiers.request, pkw.encode(message, self._layout),
+                               False), left)
+
+    def frames_left(self, now: float, refused: Collection[int] = ()) -> None:
+        super().frames_left(now, refused)
+        if refused:
+            self._channel.advance(now)
 
     def receive_frame(self, frame: Frame, now: float, age: float = 0.0) -> None:
         identifier, data, extended = frame
@@ -357,8 +386,9 @@ class PkwSession(Session):
             elif identifier == identifiers.emergency:
                 text = self._node.receive_emergency(network.decode_emergency(data))
                 if text:
-                    self._events.append(Noted(
-                        text, warning=self._node.emergency is not None))
+                    ails = self._node.emergency is not None
+                    self._notes.note('emergency' if ails else 'emergency over', text, now,
+                                     warning=ails)
             elif identifier == identifiers.request:
                 self._events.append(ForeignMasterSeen(
                     f'another master sends PKW requests to node {self.drive.station}: {frame}'))
@@ -368,12 +398,12 @@ class PkwSession(Session):
     def _heartbeat(self, state: network.NmtState, now: float) -> None:
         running = self._phase is Phase.RUNNING
         change = self._node.receive_heartbeat(state, now, running)
-        if self._phase is Phase.STOPPING and now < self._node.free_at:
+        if self._phase is Phase.STOPPING and now < self._node.free_at and not self.told.owed:
             self._go_idle('deactivated')
         if not running:
             return
         if change is Change.RESTARTED:
-            self._events.append(Noted('boot-up: the device has started'))
+            self._notes.note('boot-up', 'boot-up: the device has started', now)
             self._cut_off('the device restarted', 'no answer: the device restarted', now)
             self._advice = 'the device restarted: waiting for it to answer'
         elif change is Change.NOT_OPERATIONAL:
@@ -389,7 +419,7 @@ class PkwSession(Session):
         """
         if not self.online:
             self._node.offline(now)
-        self._frames += self._node.take_frames()
+        self._send_nmt()
         free_at = self._node.free_at
         self._channel.hold(free_at)
         if not self.online and (fresh or now < free_at):
@@ -399,11 +429,12 @@ class PkwSession(Session):
     # -- timer ------------------------------------------------------------------------------------
 
     def handle_timer(self, now: float) -> None:
+        self._notes.handle_timer(now)
         if self._phase is Phase.RUNNING:
             if now >= self._node.next_timer():
                 if self._node.handle_timer(now) is Change.HEARTBEAT_LOST:
                     self._leave_alone(f'no heartbeat for {self._node.heartbeat_timeout:g} s', now)
-                self._frames += self._node.take_frames()
+                self._send_nmt()
             if self.control is not None and now >= self.control.next_timer():
                 self.control.handle_timer(now)
                 self._control_changed(now)
@@ -418,19 +449,19 @@ class PkwSession(Session):
             return soonest
         if self._channel.is_idle(Lane.ROUND):
             soonest = min(soonest, self._beat.due)
-        soonest = min(soonest, self._node.next_timer())
+        soonest = min(soonest, self._node.next_timer(), self._notes.next_timer())
         return soonest if self.control is None else min(soonest, self.control.next_timer())
 
     # -- control ----------------------------------------------------------------------------------
 
-    def _control_changed(self, now: float) -> None:
-        """Tell what the control machine noted; then see to its word."""
-        self._tell_notes()
-        if self._control_writer is not None and self.online:
-            self._control_writer.update(now)
-
-    def _warn(self, text: str) -> None:
-        self._events.append(Noted(text, warning=True))
+    def _see_to_control_word(self, now: float) -> None:
+        if not self.online:
+            return
+        if self._control_writer is not None:
+            self._control_writer.update(
+                now, known=self._status_known or self._status is None)
+        if self.setpoints.changed and not self.setpoints.enabled:
+            self._setpoint_writer.look(now)     # neutral follows the word at once
 
     # -- users ------------------------------------------------------------------------------------
 

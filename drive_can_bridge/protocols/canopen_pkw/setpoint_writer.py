@@ -5,6 +5,7 @@ from collections.abc import Callable, Generator
 
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.setpoints import Setpoints
+from drive_can_bridge.core.told import Told
 from drive_can_bridge.protocols.canopen_pkw import addresses
 from drive_can_bridge.protocols.canopen_pkw.channel import Channel, Lane
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
@@ -20,16 +21,18 @@ class SetpointWriter:
 
     :param refresh: s after which an unchanged one is written again; 0: never.
     :param refused: takes what the drive says to a setpoint that it refuses, in words.
+    :param told: takes note of what the drive was told.
     :ivar refusals: what the drive says to setpoints that it refused, by name.
     """
 
-    def __init__(self, channel: Channel, setpoints: Setpoints, refused: Callable[[str], None], *,
-                 addressing: str, word_order: str, refresh: float) -> None:
+    def __init__(self, channel: Channel, setpoints: Setpoints, refused: Callable[[str], None],
+                 told: Told, *, addressing: str, word_order: str, refresh: float) -> None:
         self.refusals: dict[str, str] = {}
         self._channel = channel
         self._setpoints = setpoints
         self._refused = refused
-        self._told: dict[str, str] = {}
+        self._told = told
+        self._warned: dict[str, str] = {}
         self._word_order = word_order
         self._spans = [addresses.span_of(setpoint.parameter, addressing)
                        for setpoint in setpoints.items]
@@ -39,10 +42,11 @@ class SetpointWriter:
         """Take note that nothing is known of the drive."""
         self._schedule.forget()
         self.refusals.clear()
-        self._told.clear()
+        self._warned.clear()
 
     def look(self, now: float) -> None:
         """Write what is due."""
+        self._setpoints.changed = False
         if not self._setpoints.items:
             return
         self._schedule.look([setpoint.raw for setpoint in self._setpoints.items], now)
@@ -62,16 +66,22 @@ class SetpointWriter:
             parameter, raw = setpoint.parameter, setpoint.raw
             # at once: a look while the answer is awaited must not find it due again
             self._schedule.written(index, raw, self._channel.now)
+            before = self._told.runs(index)
+            if raw != setpoint.neutral:
+                self._told.note(index, runs=True)
             reply = yield Write(self._spans[index].address, addresses.words_from_raw(
                 parameter, raw, self._word_order))
             if isinstance(reply, Silence):
                 self._schedule.failed(index)
+                if not reply.sent:
+                    self._told.note(index, runs=before)
             elif isinstance(reply, Answered):
+                self._told.note(index, runs=raw != setpoint.neutral)
                 self.refusals.pop(parameter.name, None)
             else:
                 self._take_refusal(parameter, f'{parameter.name} {reply.text}')
 
     def _take_refusal(self, parameter: Parameter, text: str) -> None:
-        if self._told.get(parameter.name) != text:  # once: commands may go to and fro
+        if self._warned.get(parameter.name) != text:  # once: commands may go to and fro
             self._refused(f'write of {text}')
-        self._told[parameter.name] = self.refusals[parameter.name] = text
+        self._warned[parameter.name] = self.refusals[parameter.name] = text

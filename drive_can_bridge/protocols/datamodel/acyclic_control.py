@@ -2,8 +2,8 @@
 """
 The control word of a drive that does not get it cyclically, or does not answer cyclically.
 
-The control word is written when it changes, before everything else that waits. Nothing
-acknowledges that: as long as the status says that the drive takes no notice, the word is written
+The control word is written when it changes, before everything else that waits; one that stops the
+drive waits for nothing at all. Nothing acknowledges that: as long as the status says that the drive takes no notice, the word is written
 again, less and less often. Where that wears an EEPROM (or may), only a drive that runs on although
 it shall not gets its word again, a few times. The status word is read twice a second, and twenty
 times while a request is under way. What has its slot in the cyclic telegrams is none of this
@@ -16,6 +16,7 @@ import math
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlMachine
 from drive_can_bridge.core.parameters import Parameter, Storage
+from drive_can_bridge.core.told import Told
 from drive_can_bridge.protocols.datamodel.channel import AcyclicChannel, Procedure, Read, Write
 
 #: s between two looks at the status word, while a request is under way and otherwise
@@ -26,6 +27,10 @@ REPEAT_FIRST = 0.2
 REPEAT_LAST = 2.0
 #: how often at most where each write wears an EEPROM
 EEPROM_REPEATS = 3
+#: s until a word that the bus refused is written again
+REFUSED_PAUSE = 0.02
+#: what the drive is told by it, for the books of what it was told
+CONTROL_WORD = 'control word'
 
 
 class AcyclicControl:
@@ -36,19 +41,22 @@ class AcyclicControl:
     :param status: parameter of the status word; None: it comes cyclically, or there is none.
     :param offset: added to parameter numbers on the wire.
     :param changed: called after anything that may have changed the control word.
+    :param told: takes note of the words that left.
     :ivar look_at: when the status word is to be read; infinity: not planned.
+    :ivar retry_at: when a word that the bus refused is to be written again.
     """
 
     def __init__(self, channel: AcyclicChannel, control: ControlMachine, *,
                  word: Parameter | None, status: Parameter | None, offset: int,
-                 changed: Callable[[float], None]) -> None:
-        self.look_at = math.inf
+                 changed: Callable[[float], None], told: Told) -> None:
+        self.look_at = self.retry_at = math.inf
         self._channel = channel
         self._control = control
         self._word = word
         self._status = status
         self._offset = offset
         self._changed = changed
+        self._told = told
         self._written: int | None = None
         self._repeat_at = math.inf
         self._repeats = 0
@@ -66,7 +74,7 @@ class AcyclicControl:
     def end(self) -> None:
         """Leave the status of a lost drive alone."""
         self._watching = False
-        self.look_at = math.inf
+        self.look_at = self.retry_at = math.inf
 
     def stop(self) -> None:
         """Plan nothing any more. The channel was cleared."""
@@ -85,19 +93,14 @@ class AcyclicControl:
         else:
             return
         self._written = word
-        self._repeat_at = math.inf      # until it left
-        self._channel.write_first(self._write(self._word, word), self._sent, now)
+        self._repeat_at = self.retry_at = math.inf      # until it left
+        write = (self._channel.write_now if self._control.stopping
+                 else self._channel.write_first)
+        runs = not self._control.at_rest
+        write(self._write(self._word, word),
+              lambda sent, then: self._left(word, sent, then, runs=runs), now)
         if self._watching and self._status is not None:
             self.look_at = now
-
-    def write_at_once(self, now: float) -> bool:
-        """
-        Write the control word along with a cycle of a stop.
-
-        :return: False when the EEPROM wants more time.
-        """
-        return self._word is None or self._channel.write_at_once(
-            self._write(self._word, self._control.word), now)
 
     def look(self, now: float) -> None:
         """Read the status word, unless that is under way."""
@@ -120,12 +123,18 @@ class AcyclicControl:
         return Write((parameter.number or 0) + self._offset, (word,),
                      parameter.storage is not Storage.RAM)
 
-    def _sent(self) -> None:
+    def _left(self, word: int, sent: bool, now: float, *, runs: bool) -> None:
+        if not sent:
+            if word == self._written:
+                self._written = None
+                self.retry_at = now + REFUSED_PAUSE
+            return
+        self._told.note(CONTROL_WORD, runs=runs)
         self._outdated = self._reading
-        self._repeat_at = self._channel.now + min(
-            REPEAT_FIRST * 2 ** min(self._repeats, 10), REPEAT_LAST)
-        self._control.word_sent(self._channel.now)
-        self._changed(self._channel.now)
+        self._repeat_at = now + min(REPEAT_FIRST * 2 ** min(self._repeats, 10), REPEAT_LAST)
+        if word == self._control.word:
+            self._control.word_sent(now)
+        self._changed(now)
 
     def _read(self, status: Parameter) -> Procedure:
         words = yield Read((status.number or 0) + self._offset)
@@ -144,8 +153,8 @@ class AcyclicControl:
 
 
 def control_by_hand(drive: DriveConfiguration, channel: AcyclicChannel,
-                    control: ControlMachine | None, changed: Callable[[float], None], *,
-                    word: str, status: str) -> AcyclicControl | None:
+                    control: ControlMachine | None, changed: Callable[[float], None],
+                    told: Told, *, word: str, status: str) -> AcyclicControl | None:
     """
     Return what looks after the words that have no slot; None where there are none.
 
@@ -156,5 +165,5 @@ def control_by_hand(drive: DriveConfiguration, channel: AcyclicChannel,
     if control is None or not word and not status:
         return None
     return AcyclicControl(channel, control, word=parameters.get(word),
-                          status=parameters.get(status), changed=changed,
+                          status=parameters.get(status), changed=changed, told=told,
                           offset=drive.family_options['parameter_offset'])

@@ -1,21 +1,22 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """What sessions with DataModel drives share, whatever their identifiers look like."""
 
-from abc import abstractmethod
 from collections.abc import Callable
 import math
 
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.control import ControlMachine, ProfileControl
+from drive_can_bridge.core.control import ControlMachine
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.requests import Request
 from drive_can_bridge.core.roles import Cells
 from drive_can_bridge.core.session import DriveState, Session
+from drive_can_bridge.core.told import MAY_RUN
 from drive_can_bridge.protocols.datamodel import procedures
-from drive_can_bridge.protocols.datamodel.acyclic_control import control_by_hand
+from drive_can_bridge.protocols.datamodel.acyclic_control import CONTROL_WORD, control_by_hand
 from drive_can_bridge.protocols.datamodel.channel import AcyclicChannel, Lane, Polling, Words
 from drive_can_bridge.protocols.datamodel.extended import SLOTS
 from drive_can_bridge.protocols.datamodel.process_words import slot_of
+from drive_can_bridge.protocols.datamodel.safe_stop import SafeStop, StopWrite
 
 
 class DataModelSession(Session):
@@ -34,7 +35,7 @@ class DataModelSession(Session):
         table = drive.profile.control
         control: ControlMachine | None = None
         if table is not None:
-            control = ProfileControl(table, timeout=drive.control_timeout)
+            control = ControlMachine(table, timeout=drive.control_timeout)
         super().__init__(drive, control)
         options = drive.family_options
         self._offset: int = options['parameter_offset']
@@ -46,7 +47,7 @@ class DataModelSession(Session):
             for place, parameter in enumerate(self.sent.parameters)}
         self._encode_write = encode_write
         self._channel = AcyclicChannel(
-            encode_read=encode_read, encode_write=self._write,
+            encode_read=encode_read, encode_write=self._write, send=self._outbox.put,
             timeout=drive.parameter_timeout, attempts=drive.parameter_retries + 1,
             eeprom_gap=options['eeprom_write_gap'], polling=polling)
         self._together = together
@@ -55,17 +56,12 @@ class DataModelSession(Session):
         self._control_slot = slot_of(drive.cyclic_request, self._control_name)
         self._status_slot = slot_of(drive.cyclic_response, status_name)
         self._by_hand = control_by_hand(
-            drive, self._channel, self.control, self._control_changed,
+            drive, self._channel, self.control, self._control_changed, self.told,
             word=self._control_name if self._control_slot is None else '',
             status=status_name if self._status_slot is None else '')
-
-    def take_frames(self) -> list[Frame]:
-        frames = super().take_frames()
-        acyclic = self._channel.take_frames()
-        return frames + acyclic if acyclic else frames
-
-    def frames_left(self, now: float) -> None:
-        self._channel.frames_left(now)
+        self._safe_stop = SafeStop(self._channel, self._safe_stop_ended)
+        self._owed = False  # there was something to be stopped when the stop began
+        self._stops_all = False  # setpoints, too
 
     def _write(self, number: int, words: Words) -> Frame:
         """Make the frame of a write that leaves now."""
@@ -94,6 +90,7 @@ class DataModelSession(Session):
     def _clear_channel(self) -> None:
         """Forget everything acyclic, and whatever waits for its outcome."""
         self._channel.clear()
+        self._safe_stop.forget()
         if self._by_hand is not None:
             self._by_hand.stop()
 
@@ -122,8 +119,7 @@ class DataModelSession(Session):
 
     def _withdraw(self, reason: str, now: float) -> None:
         """Go neutral, and back to ``disable``."""
-        self.setpoints.disarm()
-        self.setpoints.enabled = False
+        self.setpoints.allow(False)
         if self.control is not None:
             self.control.withdraw(reason, now)
             self._control_changed(now)
@@ -134,8 +130,11 @@ class DataModelSession(Session):
         """Do what is due for the control and status word."""
         if self.control is None:
             return
-        if self._by_hand is not None and now >= self._by_hand.look_at:
-            self._by_hand.look(now)
+        if self._by_hand is not None:
+            if now >= self._by_hand.look_at:
+                self._by_hand.look(now)
+            if now >= self._by_hand.retry_at:
+                self._see_to_control_word(now)
         if now >= self.control.next_timer():
             self.control.handle_timer(now)
             self._control_changed(now)
@@ -145,14 +144,42 @@ class DataModelSession(Session):
         if self.control is None:
             return math.inf
         due = self.control.next_timer()
-        return due if self._by_hand is None else min(due, self._by_hand.look_at)
+        if self._by_hand is None:
+            return due
+        return min(due, self._by_hand.look_at, self._by_hand.retry_at)
 
-    def _control_changed(self, now: float) -> None:
-        """Tell what the control machine noted; then see to its word."""
-        if self.control is not None:
-            self._tell_notes()
-            self._update_control_word(now)
+    # -- stopping by acyclic writes ---------------------------------------------------------------
 
-    @abstractmethod
-    def _update_control_word(self, now: float) -> None:
-        """Write a control word that changed, unless it goes with the cycle."""
+    def _stop_by_writes(self, now: float, *, setpoints: bool = True) -> None:
+        """
+        Write ``disable``, and neutral setpoints, by their numbers, and see that the drive has them.
+
+        :param setpoints: False: what is in ``cyclic_request`` is stopped by cyclic frames.
+        """
+        writes = []
+        if self.control is not None and (setpoints or self._control_slot is None):
+            word = self.drive.profile.parameters[self._control_name]
+            writes.append(self._stop_write(word, self.control.word))
+        if setpoints:
+            writes += [self._stop_write(setpoint.parameter, setpoint.neutral)
+                       for setpoint in self.setpoints.items]
+        # what is kept in RAM does not wait until an EEPROM is done
+        writes.sort(key=lambda each: each.write.eeprom)
+        if writes and not self._safe_stop.running:
+            self._owed, self._stops_all = self.told.owed, setpoints
+            self._safe_stop.begin(writes, now)
+
+    def _stop_write(self, parameter: Parameter, raw: int) -> StopWrite:
+        return StopWrite(parameter, (parameter.number or 0) + self._offset, raw)
+
+    def _safe_stop_ended(self, failed: list[str]) -> None:
+        if not failed:
+            self.told.note(CONTROL_WORD, runs=False)
+            if self._stops_all:
+                self.told.stopped()
+        elif self._owed:
+            self._warn(f'told to stop, but {"; ".join(failed)}: {MAY_RUN}')
+        self._stop_ended()
+
+    def _stop_ended(self) -> None:  # noqa: B027  optional hook
+        """Go on after a stop by acyclic writes."""

@@ -9,14 +9,16 @@ generator that yields steps and is sent their results, so that it reads like the
 step                result sent back
 =================== ==================================================================
 ``Read(n, count)``  the words, or None when nobody answered after all attempts
-``Write(n, words)`` None, as soon as the frame is handed out (nobody acknowledges it)
+``Write(n, words)`` (), as soon as the bus has taken the frame (nobody acknowledges it); None when
+                    the bus refused it
 =================== ==================================================================
 
-Order: both lanes run their procedures one after the other. Our own and those of users take turns
+Order: stops first (:class:`Lane`). Both other lanes run their procedures one after the other. Our own and those of users take turns
 after every step, so that neither a flood of users nor a silent parameter keeps the other waiting
 for more than one read. Where our own are the exchange itself (:class:`Polling`), they run to their
 end, and users get one step in between and whatever time is left. A control word goes before all of
 them, and takes the place of one that has not left yet (:meth:`~AcyclicChannel.write_first`).
+What stops a drive waits for nothing but the spacing of frames (:meth:`~AcyclicChannel.write_now`).
 
 Pace: at least 20 ms lie between two EEPROM writes to a station and between such a write and the
 next read (manual, "Scrittura di un parametro": "almeno 20msec"); a frame leaves only while no
@@ -36,12 +38,15 @@ import math
 from typing import Any, Union
 
 from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.protocols.quarantine import Quarantine
 
 #: s between an unacknowledged write and the next acyclic frame, so that a drive with a single
 #: receive buffer has fetched the first; and, where answers carry no address, between an answer and
 #: the next read
 SPACING = 0.001
+#: s that a stop waits for an EEPROM at most: it takes 20 ms
+STOP_EEPROM_WAIT = 0.025
 
 
 @dataclass(frozen=True)
@@ -51,12 +56,14 @@ class Read:
 
     :param attempts: None: as configured.
     :param late_will_do: the late answer to the same question is as good as any: no quarantine.
+    :param timeout: s to wait for the answer; None: as configured.
     """
 
     number: int
     count: int = 1
     attempts: int | None = None
     late_will_do: bool = False
+    timeout: float | None = None
 
     @property
     def key(self) -> tuple[int, int]:
@@ -77,12 +84,15 @@ Step = Union[Read, Write]
 Words = tuple[int, ...]
 Procedure = Generator[Step, Union[Words, None], Any]
 Done = Callable[[Any], None]
-Sent = Callable[[], None]
+Send = Callable[[Frame, Union[Left, None]], None]
+#: what a procedure is told of a write that left
+SENT: Words = ()
 
 
 class Lane(Enum):
     """Who a procedure works for."""
 
+    STOP = 'the confirmation of stops'
     OWN = 'map checks and polling'
     USERS = 'parameter services'
 
@@ -152,6 +162,7 @@ class AcyclicChannel:
     :param timeout: s to wait for an answer.
     :param attempts: how often a read is sent before it counts as unanswered.
     :param eeprom_gap: s after an EEPROM write.
+    :param send: takes frames that are to leave now, and who is told whether they did.
     :param polling: given where the exchange itself goes through the channel. Writes that go first
         then do not wait for the answer of a read: nobody answers writes.
     :ivar now: ``now`` of the call being served, for whoever is called back.
@@ -159,11 +170,12 @@ class AcyclicChannel:
     """
 
     def __init__(self, *, encode_read: Callable[[int, int], Frame],
-                 encode_write: Callable[[int, Words], Frame],
+                 encode_write: Callable[[int, Words], Frame], send: Send,
                  timeout: float, attempts: int, eeprom_gap: float,
                  polling: Polling | None = None) -> None:
         self._encode_read = encode_read
         self._encode_write = encode_write
+        self._emit = send
         self.timeout = timeout
         self.attempts = attempts
         self.now = -math.inf
@@ -173,21 +185,22 @@ class AcyclicChannel:
         self._polled = polling is not None
         self._quarantine = Quarantine()
         self._queues = {lane: _Queue() for lane in Lane}
-        own, users = self._queues.values()
+        self._stop, own, users = self._queues.values()
         self._orders = (own, users), (users, own)
         self._own, self._users = own, users
         self._users_next = False
         self._serving = own  # whose step is under way, or was last
-        self._first: tuple[Write, Sent] | None = None
+        self._first: tuple[Write, Left] | None = None
+        self._urgent: deque[tuple[Write, Left]] = deque()
+        self._stop_wait_until = -math.inf  # whatever the EEPROM's gap may be
+        self._leaving = False  # the write of the step under way was handed out
         self._busy = False  # something may be waiting or under way
         self._advancing = False
         self._outstanding = False
         self._deadline = math.inf
         self._not_before = -math.inf
         self._eeprom_free_at = -math.inf
-        self._eeprom_leaving = False
         self._held_until = -math.inf
-        self._frames: list[Frame] = []
 
     # -- queueing ---------------------------------------------------------------------------------
 
@@ -197,28 +210,33 @@ class AcyclicChannel:
         self._busy = True
         self.advance(now)
 
-    def write_first(self, write: Write, sent: Sent, now: float) -> None:
+    def write_first(self, write: Write, left: Left, now: float) -> None:
         """
         Write something before everything that waits.
 
         It takes the place of such a write that has not left yet: what is outdated is not sent.
 
-        :param sent: called when the frame was handed out.
+        :param left: called when the bus has taken or refused the frame.
         """
-        self._first = (write, sent)
+        self._first = (write, left)
         self._busy = True
         self.advance(now)
 
-    def write_at_once(self, write: Write, now: float) -> bool:
+    def write_now(self, write: Write, left: Left, now: float) -> None:
         """
-        Write something without waiting for anything but the EEPROM.
+        Write what stops a drive: after nothing but other such writes, whatever is under way.
 
-        :return: False when it is too early, and nothing was written.
+        Such a write that waits with :meth:`write_first` is outdated: it is not sent any more.
         """
-        if write.eeprom and now < self._eeprom_free_at:
-            return False
-        self._send_write(write, now)
-        return True
+        self._first = None
+        self._urgent.append((write, left))
+        self._stop_wait_until = now + STOP_EEPROM_WAIT
+        self._busy = True
+        self.advance(now)
+
+    def write_at_once(self, write: Write, left: Left, now: float) -> None:
+        """Write something without waiting for anything."""
+        self._send_write(write, left, now)
 
     def clear(self) -> None:
         """
@@ -231,11 +249,11 @@ class AcyclicChannel:
         for queue in self._queues.values():
             queue.clear()
         self._first = None
-        self._busy = False
+        self._urgent.clear()
+        self._busy = self._leaving = False
         self._outstanding = False
         self._deadline = math.inf
         self._held_until = -math.inf
-        self._frames.clear()
 
     @property
     def waiting_users(self) -> int:
@@ -247,11 +265,6 @@ class AcyclicChannel:
         """The read that waits for its answer, if any."""
         step = self._serving.step
         return step if self._outstanding and isinstance(step, Read) else None
-
-    @property
-    def eeprom_free_at(self) -> float:
-        """When the next EEPROM write, or read, may follow."""
-        return self._eeprom_free_at
 
     @property
     def free_at(self) -> float:
@@ -298,6 +311,13 @@ class AcyclicChannel:
 
     def _advance_once(self, now: float) -> bool:
         """Do the next thing; False when it cannot be done yet."""
+        if self._urgent:
+            if now < self._urgent_at:
+                return False
+            self._send_write(*self._urgent.popleft(), now)
+            return True
+        if self._leaving:
+            return False
         if self._outstanding:
             if now < self._deadline:
                 return self._polled and self._advance_first(now)
@@ -312,7 +332,7 @@ class AcyclicChannel:
             return self._advance_first(now)
         queue = self._choose()
         if queue is None:
-            self._busy = self._first is not None
+            self._busy = self._first is not None or bool(self._urgent)
             return True
         ready_at = self._ready_at(queue)
         if now < ready_at or self._quarantined(queue) and (
@@ -344,17 +364,20 @@ class AcyclicChannel:
         """Write what goes before everything else, if there is such a thing and it may go."""
         if self._first is None:
             return False
-        write, sent = self._first
+        write, left = self._first
         if now < self._writable_at(write):
             return False
         self._first = None
-        self._send_write(write, now)
-        sent()
+        self._send_write(write, left, now)
         return True
 
     def next_timer(self) -> float:
         """Return when ``advance`` wants to be called."""
         if not self._busy:
+            return math.inf
+        if self._urgent:
+            return self._urgent_at
+        if self._leaving:
             return math.inf
         if self._outstanding:
             if self._first is not None and self._polled:
@@ -370,28 +393,18 @@ class AcyclicChannel:
                     break
         return soonest
 
-    def frames_left(self, now: float) -> None:
-        """Take note that the frames are on their way: the pause of the EEPROM begins now."""
-        if self._eeprom_leaving:
-            self._eeprom_leaving = False
-            self._eeprom_free_at = max(self._eeprom_free_at, now + self._eeprom_gap)
-
-    def take_frames(self) -> list[Frame]:
-        """Return the frames to be sent."""
-        frames = self._frames
-        if frames:
-            self._frames = []
-        return frames
-
     # -- inside -----------------------------------------------------------------------------------
 
-    def _order(self) -> tuple[_Queue, _Queue]:
+    def _order(self) -> tuple[_Queue, ...]:
         """Return the queues in the order in which they are served now."""
+        if self._stop.step is not None:
+            return (self._stop,)
         return self._orders[self._users_next]
 
     def _choose(self) -> _Queue | None:
         """Return the queue whose step is to be done next; None when there is nothing to do."""
         chosen: _Queue | None = None
+        self._stop.fetch(self.attempts)
         for queue in self._order():
             if queue.fetch(self.attempts) is None:
                 continue
@@ -428,12 +441,22 @@ class AcyclicChannel:
         step = queue.step
         # "20 ms between one write and the next", says the manual of writes to the EEPROM, not that
         # the next has to go there, too. Setpoints and control words do not wait.
-        ready = max(self._held_until, self._not_before, self._eeprom_free_at)
+        if queue is self._stop:
+            ready = max(self._not_before, min(self._eeprom_free_at, self._stop_wait_until))
+        else:
+            ready = max(self._held_until, self._not_before, self._eeprom_free_at)
         if isinstance(step, Write):
             return ready
         if self._quarantined(queue):
             return max(ready, self._quarantine.ready_at(self._key(step)))
         return ready
+
+    @property
+    def _urgent_at(self) -> float:
+        """When the next write that stops the drive may leave."""
+        if not self._urgent[0][0].eeprom:
+            return self._not_before
+        return max(self._not_before, min(self._eeprom_free_at, self._stop_wait_until))
 
     def _writable_at(self, write: Write) -> float:
         ready = max(self._held_until, self._not_before)
@@ -443,18 +466,32 @@ class AcyclicChannel:
         self._serving = queue
         step = queue.step
         if isinstance(step, Read):
-            self._frames.append(self._encode_read(step.number, step.count))
+            self._emit(self._encode_read(step.number, step.count), None)
             self._outstanding = True
             self.asked_at = now
             queue.attempts_left -= 1
-            self._deadline = now + self.timeout
+            self._deadline = now + (self.timeout if step.timeout is None else step.timeout)
         elif step is not None:
-            self._send_write(step, now)
-            self._finish(None)
+            self._leaving = True
+            self._send_write(step, self._step_left, now)
 
-    def _send_write(self, write: Write, now: float) -> None:
-        self._frames.append(self._encode_write(write.number, write.words))
+    def _step_left(self, sent: bool, now: float) -> None:
+        """Tell the procedure under way whether its write has left, and go on."""
+        if self._leaving:  # else it was forgotten meanwhile
+            self._leaving = False
+            self.now = now
+            self._finish(SENT if sent else None)
+            self.advance(now)
+
+    def _send_write(self, write: Write, told: Left, now: float) -> None:
         self._not_before = now + SPACING
-        if write.eeprom:
-            self._eeprom_free_at = now + self._eeprom_gap
-            self._eeprom_leaving = True
+        if not write.eeprom:
+            self._emit(self._encode_write(write.number, write.words), told)
+            return
+        self._eeprom_free_at = now + self._eeprom_gap
+
+        def left(sent: bool, then: float) -> None:
+            # the pause begins when the frame is on its way
+            self._eeprom_free_at = max(self._eeprom_free_at, then + self._eeprom_gap)
+            told(sent, then)
+        self._emit(self._encode_write(write.number, write.words), left)

@@ -9,6 +9,9 @@ The conversation with one DataModel drive that uses 29-bit identifiers.
       │                         │  └─┼──maps differ──► DIFFERS (looks again in 1 s) │
       └──deactivate / bus down──┘    └─────────3 neutral cycles, then silence──────┘
 
+Whatever was told to run is told to stop: by neutral cycles where the request map is known to agree,
+otherwise by acyclic writes (:mod:`.safe_stop`), whatever the session is about to do next.
+
 A drive reads cyclic words by *its own* maps. So the maps are read before the first cyclic frame,
 every second while cycling, and again after each loss; a drive that does not answer gets no cyclic
 frames beyond three with neutral setpoints, in case it only lost its voice. With
@@ -26,16 +29,21 @@ from drive_can_bridge.core.events import (
 )
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.requests import BRIDGE_INACTIVE
-from drive_can_bridge.core.session import DriveState, STOP_CYCLES, STOP_SPACING_MAX
+from drive_can_bridge.core.session import (
+    CYCLE_SPACING_MIN, DriveState, STOP_CYCLES, STOP_WAIT_MAX,
+)
 from drive_can_bridge.protocols.datamodel import extended
 from drive_can_bridge.protocols.datamodel.base_session import DataModelSession
 from drive_can_bridge.protocols.datamodel.map_supervision import MapSupervision, Verdict
 from drive_can_bridge.protocols.datamodel.process_words import (
     unpack_unusual, wire_numbers, words_struct,
 )
+from drive_can_bridge.protocols.datamodel.safe_stop import ANSWER_TIME, ATTEMPTS
 
 #: so many looks at the maps in a row may go unanswered until that is told
 SILENT_LOOKS = 3
+#: what the drive is told by cyclic requests, for the books of what it was told
+CYCLE = 'cycle'
 #: direction and station of an identifier
 FROM_WHOM = extended.DIR | extended.STATION_MASK
 
@@ -48,6 +56,7 @@ class Phase(Enum):
     DIFFERS = 'maps differ'
     CYCLIC = 'cycling'
     LEAVING = 'last neutral cycles'
+    STOPPING = 'stop by acyclic writes'
 
 
 class ExtendedSession(DataModelSession):
@@ -79,7 +88,9 @@ class ExtendedSession(DataModelSession):
         self._cycles_left = -1  # cycles still to be sent in LEAVING or before a stop; -1: no end
         self._silent_looks = 0
         self._stopping = False
+        self._differs = False  # what the last look at the maps found
         self._frame: Frame | None = None
+        self._frame_runs = False  # it holds anything but neutral and disable
         self._sent_word: int | None = None
         self._awaiting = False
         self._forgiven = False
@@ -93,19 +104,30 @@ class ExtendedSession(DataModelSession):
     def deactivate(self, now: float) -> None:
         self.active = False
         self._fail_requests(BRIDGE_INACTIVE)
-        if self._phase not in (Phase.CYCLIC, Phase.LEAVING):
-            self._withdraw(BRIDGE_INACTIVE, now)
-            self._go_idle('deactivated')
-            return
-        self._stopping = True  # from here on the control word goes along with the cycles
+        cycling = self._phase in (Phase.CYCLIC, Phase.LEAVING)
+        self._stopping = cycling or self._phase is not Phase.IDLE and self.told.owed
         self._withdraw(BRIDGE_INACTIVE, now)
-        self._in_pace = False
-        self._cycles_left = STOP_CYCLES
-        self._next_cycle = min(self._next_cycle, max(now, self._sent_at + self._stop_spacing))
+        if cycling:
+            self._in_pace = False
+            self._cycles_left = STOP_CYCLES
+            self._next_cycle = min(self._next_cycle, max(now, self._sent_at + self._stop_spacing))
+            self._hurry(now)
+            self._stop_by_writes(now, setpoints=False)
+        elif self._stopping:
+            self._phase = Phase.STOPPING
+            self._stop_by_writes(now)
+        else:
+            if not self.bus_available:
+                self._leave_owing()
+            self._go_idle('deactivated')
 
     @property
     def stopped(self) -> bool:
         return self._phase is Phase.IDLE
+
+    @property
+    def longest_stop(self) -> float:
+        return super().longest_stop + ATTEMPTS * ANSWER_TIME
 
     def time_lost(self, now: float) -> None:
         if self._phase is Phase.IDLE or self._stopping:
@@ -119,6 +141,9 @@ class ExtendedSession(DataModelSession):
         self._stopping = False
         self._stop_awaiting()
         self._missed_in_row = 0
+        self._differs = False
+        if self.told.owed:
+            self._stop_by_writes(now, setpoints=self._verify)
         if self._verify:
             self._phase = Phase.CHECKING
             self._next_cycle = math.inf
@@ -128,9 +153,9 @@ class ExtendedSession(DataModelSession):
 
     def _go_idle(self, advice: str) -> None:
         self._phase = Phase.IDLE
-        self._stopping = False
+        self._stopping = self._differs = False
         self._cycles_left = -1
-        self.setpoints.enabled = False
+        self.setpoints.allow(False)
         self._clear_channel()
         self._next_cycle = math.inf
         self._stop_awaiting()
@@ -146,13 +171,24 @@ class ExtendedSession(DataModelSession):
     def _maps_judged(self, verdict: Verdict, text: str, now: float) -> None:
         self._silent_looks = self._silent_looks + 1 if verdict is Verdict.SILENT else 0
         if verdict is Verdict.AGREE:
+            self._differs = False
             if self._phase is not Phase.CYCLIC:
                 self._start_cycling(now)
         elif verdict is Verdict.DIFFER:
+            self._differs = True
+            owed = self.told.owed
             self._lose(f'mapping differs: {text}', now)
-            self._phase = Phase.DIFFERS
-            self._next_cycle = math.inf
             self._stop_awaiting()
+            # a request map that is right still takes neutral cycles, unless it is to be rewritten
+            by_cycles = owed and self._maps.request_agrees
+            if owed:
+                self._stop_by_writes(now, setpoints=not by_cycles)
+            if by_cycles:
+                if self._phase is not Phase.LEAVING:
+                    self._start_leaving(max(now, self._sent_at + self._stop_spacing))
+            else:
+                self._phase = Phase.DIFFERS
+                self._next_cycle = math.inf
         elif self._phase is Phase.LEAVING:
             self._maps.look_at = math.inf  # that comes after the last neutral cycle
         elif self._phase is Phase.CYCLIC:  # there, the cyclic answers tell who is there
@@ -195,9 +231,7 @@ class ExtendedSession(DataModelSession):
         if (setpoints.changed or self._frame is None
                 or control is not None and control.word != self._sent_word):
             self._frame = self._encode()
-        self._frames.append(self._frame)
-        if self._control_slot is not None and control is not None:
-            control.word_sent(now)
+        self._outbox.put(self._frame, self._cycle_left)
         period = self.drive.period
         if self._in_pace:
             self.statistics.period_error.add(abs(now - self._sent_at - period))
@@ -206,31 +240,59 @@ class ExtendedSession(DataModelSession):
         self._sent_at = now
         soonest = now + 0.5 * period
         self._channel.hold(soonest)
-        if self._cycles_left > 0:
-            self._count_down(now)
+        if self._cycles_left >= 0:
+            self._next_cycle = now + self._stop_spacing
             return
         self._next_cycle += period
         if self._next_cycle < soonest:  # late: leave cycles out, keep the beat, never in a burst
             self._next_cycle += math.ceil((soonest - self._next_cycle) / period) * period
 
-    def _count_down(self, now: float) -> None:
-        """Handle the last cycles before silence."""
-        self._next_cycle = now + self._stop_spacing
-        if self._stopping and self._by_hand is not None:
-            written = self._by_hand.write_at_once(now)
-            self._frames += self._channel.take_frames()
-            if not written and self._channel.eeprom_free_at <= now + STOP_SPACING_MAX:
-                return  # an EEPROM is busy: the word goes with a later cycle
-        self._cycles_left -= 1
-        if self._cycles_left == 0 and self._stopping:
+    def _cycle_left(self, sent: bool, now: float) -> None:
+        """Take note of a cyclic request that left; what the bus refused does not count."""
+        if not sent:
+            return
+        self.told.note(CYCLE, runs=self._frame_runs)
+        control = self.control
+        if (control is not None and self._control_slot is not None
+                and control.word == self._sent_word):  # it may have changed since the frame was made
+            fresh = control.word_due
+            control.word_sent(now)
+            if fresh:
+                self._control_changed(now)
+        if self._cycles_left > 0:  # the last cycles before silence
+            self._cycles_left -= 1
+            if self._cycles_left == 0 and (self._stopping or self._differs):
+                self._next_cycle = math.inf
+                if not self._stopping:
+                    self._stop_awaiting()
+                    self._phase = Phase.DIFFERS
+                self._stop_ended()
+
+    def _stop_ended(self) -> None:
+        if (self._stopping and not self._safe_stop.running
+                and (self._cycles_left == 0 or self._phase is Phase.STOPPING)):
             self._go_idle('deactivated')
+
+    def _start_leaving(self, first: float) -> None:
+        """Send the last cycles to a drive that is to be left alone."""
+        self._phase = Phase.LEAVING
+        self._cycles_left = STOP_CYCLES
+        self._next_cycle = first
+
+    def _hurry(self, now: float) -> None:
+        """Bring the next cycle forward: it stops the drive."""
+        if math.inf > self._next_cycle > now + STOP_WAIT_MAX:
+            self._in_pace = False
+            self._next_cycle = max(now, self._sent_at + CYCLE_SPACING_MIN)
 
     def _encode(self) -> Frame:
         raws = [setpoint.raw for setpoint in self.setpoints.items]
+        self._frame_runs = not self.setpoints.at_rest
         if self.control is not None:
             self._sent_word = self.control.word
             if self._control_slot is not None:
                 raws.insert(self._control_slot, self._sent_word)
+                self._frame_runs = self._frame_runs or not self.control.at_rest
         self.setpoints.changed = False
         self.sent.take(raws)
         return Frame(self._request_identifier, self._pack(*raws) + self._padding, True)
@@ -250,15 +312,15 @@ class ExtendedSession(DataModelSession):
             return
         self._missed_in_row = 0
         reason = f'no cyclic response for {self.drive.missed_limit} cycles'
-        if not self._verify:
-            self._lose(reason, now)
-        elif self.online:
-            # it may still be listening: tell it to stand still before it is left alone
-            self._lose(reason, now)
-            self._phase = Phase.LEAVING
-            self._cycles_left = STOP_CYCLES
-        else:
+        if self._verify and not self.online:
             self._begin(now)
+            return
+        owed = self.told.owed
+        self._lose(reason, now)
+        if owed:  # of the word that has no slot; setpoints go neutral with the next cycles
+            self._stop_by_writes(now, setpoints=False)
+        if self._verify:  # it may still be listening, before it is left alone
+            self._start_leaving(self._next_cycle)
 
     def _stop_awaiting(self) -> None:
         """Expect no answer any more; one that is on its way is no surprise, though."""
@@ -313,8 +375,9 @@ class ExtendedSession(DataModelSession):
         latency = received_at - self._sent_at
         statistics.latency.add(latency if latency > 0.0 else 0.0)
         if not self.online and not self._stopping:
-            if self._phase is Phase.LEAVING:  # it is back: look at its maps before anything else
-                self._begin(now)
+            if self._phase is Phase.LEAVING:
+                if not self._differs:  # it is back: look at its maps before anything else
+                    self._begin(now)
                 return
             self._found(now)
         if self.control is not None and self._status_slot is not None:
@@ -328,8 +391,6 @@ class ExtendedSession(DataModelSession):
         self.online = True
         self.ever_online = True
         self._advice = ''
-        self.setpoints.disarm()
-        self.setpoints.enabled = True
         self._events.append(StationFound())
         if self._by_hand is not None:
             self._by_hand.begin(now)
@@ -350,10 +411,15 @@ class ExtendedSession(DataModelSession):
         return min(self._next_cycle, self._channel.next_timer(), self._maps.look_at,
                    self._control_timer())
 
-    def _update_control_word(self, now: float) -> None:
-        if self._by_hand is not None and not self._stopping and (
-                self.online or self._phase is Phase.CYCLIC):
+    def _see_to_control_word(self, now: float) -> None:
+        control = self.control
+        if control is None or self._stopping:
+            return
+        if self._by_hand is not None and (self.online or self._phase is Phase.CYCLIC):
             self._by_hand.update(now)
+        if control.stopping and (self.setpoints.changed or (
+                self._control_slot is not None and control.word != self._sent_word)):
+            self._hurry(now)
 
     @property
     def warning(self) -> str:
@@ -368,6 +434,6 @@ class ExtendedSession(DataModelSession):
 
     @property
     def state(self) -> DriveState:
-        if self._phase is Phase.DIFFERS:
+        if self._differs:
             return DriveState.MAPPING_DIFFERS
         return super().state

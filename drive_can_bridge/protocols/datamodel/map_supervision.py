@@ -18,7 +18,7 @@ import math
 from drive_can_bridge.core.events import Event, MappingDiffered, MappingWritten
 from drive_can_bridge.protocols.datamodel import procedures
 from drive_can_bridge.protocols.datamodel.channel import AcyclicChannel
-from drive_can_bridge.protocols.datamodel.mapping import differences
+from drive_can_bridge.protocols.datamodel.mapping import differences, effective
 
 #: s between two looks at the maps
 MAPPING_PERIOD = 1.0
@@ -42,6 +42,8 @@ class MapSupervision:
     :param judged: takes each verdict, with the difference in words and the time; it may move
         :attr:`look_at`.
     :ivar look_at: when the next look is due; infinity: none is planned.
+    :ivar request_agrees: the last look found the request map to be right, and it stays: cyclic
+        requests reach the parameters that they are meant for.
     """
 
     def __init__(self, channel: AcyclicChannel, *, request_base: int, response_base: int,
@@ -49,6 +51,7 @@ class MapSupervision:
                  emit: Callable[[Event], None],
                  judged: Callable[[Verdict, str, float], None]) -> None:
         self.look_at = math.inf
+        self.request_agrees = False
         self._channel = channel
         self._bases = request_base, response_base
         self._request = request
@@ -96,6 +99,8 @@ class MapSupervision:
         found = '' if maps is None else '; '.join(differences(
             maps.request, maps.response,
             wanted_request=self._request, wanted_response=self._response))
+        self.request_agrees = (maps is not None and effective(maps.request) == self._request
+                               and not self._rewrite)
         if not found and (maps is None or maps.response is None):
             self._judged(Verdict.SILENT, '', now)
             return

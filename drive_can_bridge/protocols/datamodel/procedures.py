@@ -11,7 +11,7 @@ from typing import NamedTuple, Union
 
 from drive_can_bridge.core.parameters import Parameter, ParameterType, Storage, Value
 from drive_can_bridge.core.requests import (
-    Failure, NO_ANSWER_OFFLINE, Outcome, ReadRequest, ReadValue, Request, SENT_UNACKNOWLEDGED,
+    Failure, NO_ANSWER_OFFLINE, NOT_SENT, Outcome, ReadRequest, ReadValue, Request, SENT_UNACKNOWLEDGED,
     Written,
 )
 from drive_can_bridge.protocols.datamodel.channel import Procedure, Read, Step, Words, Write
@@ -109,7 +109,7 @@ def write_parameters(items: Sequence[tuple[Parameter, int]], conditions: Conditi
     for parameter, raw in items:
         outcome = yield from write_parameter(parameter, raw, conditions)
         outcomes.append(outcome)
-        if isinstance(outcome, Failure) and outcome.reason == NO_ANSWER_OFFLINE:
+        if isinstance(outcome, Failure) and outcome.reason in (NO_ANSWER_OFFLINE, NOT_SENT):
             outcomes += [outcome] * (len(items) - len(outcomes))
             break
     return tuple(outcomes)
@@ -134,7 +134,9 @@ def write_parameter(parameter: Parameter, raw: int, conditions: Conditions,
             return conditions.unanswered()
         if reply[0] == word:
             return Written()
-    yield Write(number, (word,), eeprom)
+    sent = yield Write(number, (word,), eeprom)
+    if sent is None:
+        return Failure(NOT_SENT)
     if not (conditions.verify and parameter.readable):
         return Written(SENT_UNACKNOWLEDGED)
     reply = yield Read(number)
@@ -155,7 +157,9 @@ def write_together(items: Sequence[tuple[Parameter, int]], conditions: Condition
     ordered = sorted(items, key=lambda item: item[0].number or 0)
     first = conditions.wire_number(ordered[0][0])
     words = tuple(parameter.word_from_raw(raw) for parameter, raw in ordered)
-    yield Write(first, words, eeprom=False)
+    sent = yield Write(first, words, eeprom=False)
+    if sent is None:
+        return (Failure(NOT_SENT),) * len(items)
     if not (conditions.verify and all(parameter.readable for parameter, _ in ordered)):
         return (Written(SENT_UNACKNOWLEDGED),) * len(items)
     reply = yield Read(first, len(words))

@@ -4,8 +4,8 @@ The conversation with one DataModel drive that uses 11-bit identifiers.
 
 There is no cyclic service: once a period all of ``cyclic_response`` is read in one round, and what
 changed in ``cyclic_request`` is written, one parameter a frame. Rounds go on while the drive is
-silent; that is how it is found. Setpoints are written only to a drive that answers, and three
-times neutral to one that was lost or is to be left alone, since nobody acknowledges writes.
+silent; that is how it is found. Setpoints are written only to a drive that answers. One that was
+lost, or is to be left alone, is written neutral and read back (:mod:`.safe_stop`).
 
 Setpoints do not wait for answers: they go out while a read is under way, or in quarantine.
 """
@@ -20,10 +20,10 @@ from drive_can_bridge.core.events import (
 )
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.requests import BRIDGE_INACTIVE
-from drive_can_bridge.core.session import STOP_CYCLES, STOP_SPACING_MAX
 from drive_can_bridge.protocols.datamodel import standard
 from drive_can_bridge.protocols.datamodel.base_session import DataModelSession
 from drive_can_bridge.protocols.datamodel.channel import Polling, Procedure, Read, Write
+from drive_can_bridge.protocols.datamodel.safe_stop import ANSWER_TIME, ATTEMPTS
 from drive_can_bridge.protocols.datamodel.standard_round import places, reads
 from drive_can_bridge.protocols.polling import Beat, Chunk, Round, WriteSchedule
 
@@ -62,7 +62,6 @@ class StandardSession(DataModelSession):
         self._writes = WriteSchedule(len(drive.cyclic_request), options['refresh_interval'])
         self._phase = Phase.IDLE
         self._beat = Beat(drive.period)
-        self._farewells = 0  # how often everything is still to be written neutral
         self._in_round = False
         self._void = False  # this round began before the process stood still
         self._round_began = -math.inf
@@ -71,26 +70,38 @@ class StandardSession(DataModelSession):
         self._received_at = -math.inf
         self._expected = False  # the answer of a read that nobody wants any more may come
         self._missed_in_row = 0
+        self._doubt = False  # a read went unanswered since the status was read
         self._gap = ''  # what the last round asked for in vain, though others were answered
 
     # -- life cycle -------------------------------------------------------------------------------
 
     def deactivate(self, now: float) -> None:
         self.active = False
-        told = self.online or self._farewells > 0
+        stop = self._phase is not Phase.IDLE and (self.online or self.told.owed)
         self._fail_requests(BRIDGE_INACTIVE)
-        if self._phase is Phase.IDLE or not told:
-            self._withdraw(BRIDGE_INACTIVE, now)
-            self._go_idle('deactivated')
-            return
-        self._phase = Phase.STOPPING  # from here on the control word goes with the setpoints
+        if stop:
+            self._phase = Phase.STOPPING
         self._withdraw(BRIDGE_INACTIVE, now)
-        self._farewells = STOP_CYCLES
-        self._beat.start(now)
+        if stop:
+            self._beat.stop()
+            self._writes.forget()
+            self._stop_by_writes(now)
+        if not self._safe_stop.running:
+            if not self.bus_available:
+                self._leave_owing()
+            self._go_idle('deactivated')
+
+    def _stop_ended(self) -> None:
+        if self._phase is Phase.STOPPING:
+            self._go_idle('deactivated')
 
     @property
     def stopped(self) -> bool:
         return self._phase is Phase.IDLE
+
+    @property
+    def longest_stop(self) -> float:
+        return ATTEMPTS * (ANSWER_TIME + float(self.drive.family_options['quarantine']))
 
     def time_lost(self, now: float) -> None:
         if self._phase is Phase.POLLING:
@@ -107,17 +118,18 @@ class StandardSession(DataModelSession):
         self._beat.start(now)
 
     def _lose(self, reason: str, now: float) -> None:
-        if self.online:
-            # it may only have lost its voice: tell it to stand still before it is left alone
-            self._farewells = STOP_CYCLES
+        was_online = self.online
         super()._lose(reason, now)
+        self._writes.forget()
+        # it may only have lost its voice: it is told to stand still before it is left alone
+        if self.bus_available and (was_online or self.told.owed):
+            self._stop_by_writes(now)
 
     def _go_idle(self, advice: str) -> None:
         self._phase = Phase.IDLE
-        self._farewells = 0
         self._beat.stop()
         self._writes.forget()
-        self.setpoints.enabled = False
+        self.setpoints.allow(False)
         self._clear_channel()
         self._advice = advice
         self._be_offline(advice)
@@ -136,9 +148,6 @@ class StandardSession(DataModelSession):
         self._serve_control(now)
         if now >= self._channel.next_timer():
             self._channel.advance(now)
-        if self._phase is Phase.STOPPING and not self._farewells and not self._writes.waiting:
-            self._frames += self._channel.take_frames()
-            self._go_idle('deactivated')
 
     def next_timer(self) -> float:
         soonest = min(self._beat.due, self._channel.next_timer(), self._control_timer())
@@ -146,17 +155,12 @@ class StandardSession(DataModelSession):
 
     def _tick(self, now: float) -> None:
         """Begin a period: look what is to be written, then read."""
-        if self._farewells:
-            self._say_farewell(now)
-        elif self.online:
+        if self.online:
             expired = self.setpoints.expire(now)
             if expired:
                 self._events.append(SetpointsExpired(
                     tuple(setpoint.parameter.name for setpoint in expired)))
-            self._writes.look(self._raws(), now)
-        if self._phase is Phase.STOPPING:
-            self._beat.due = now + self._stop_spacing
-            return
+            self._look(now)
         error = self._beat.begun(now)
         if not self._in_round:
             if not math.isnan(error):
@@ -175,16 +179,6 @@ class StandardSession(DataModelSession):
         return 2 * (self.drive.period + self.drive.parameter_timeout
                     + float(self.drive.family_options['quarantine']))
 
-    def _say_farewell(self, now: float) -> None:
-        """Tell the drive to stand still, once more."""
-        self._writes.forget()
-        self._writes.look(self._raws(), now)
-        if self._by_hand is not None:
-            written = self._by_hand.write_at_once(now)
-            if not written and self._channel.eeprom_free_at <= now + STOP_SPACING_MAX:
-                return  # an EEPROM is busy: the word goes another time
-        self._farewells -= 1
-
     # -- setpoints --------------------------------------------------------------------------------
 
     def _raws(self) -> list[int]:
@@ -192,6 +186,12 @@ class StandardSession(DataModelSession):
         if self.control is not None and self._control_slot is not None:
             raws.insert(self._control_slot, self.control.word)
         return raws
+
+    def _look(self, now: float) -> None:
+        """Find out what is to be written."""
+        # nobody knows whether the drive was off meanwhile: it is not started by a repetition
+        starts = self.control is not None and not self.control.at_rest and self._doubt
+        self._writes.look(self._raws(), now, hold=self._control_slot if starts else None)
 
     def _write_setpoint(self, now: float) -> None:
         """Write one that is due, if there is one, with the value that it has now."""
@@ -202,19 +202,31 @@ class StandardSession(DataModelSession):
         # What is sent cyclically is volatile: EEPROM parameters are refused by the configuration.
         self._channel.write_at_once(
             Write((parameter.number or 0) + self._offset, (parameter.word_from_raw(raw),),
-                  eeprom=False), now)
-        self._writes.written(index, raw, now)
-        if index == self._control_slot and self.control is not None:
-            self._word_written_at = now
-            self.control.word_sent(now)
+                  eeprom=False),
+            lambda sent, then: self._written(index, raw, sent, then), now)
+        self._writes.written(index, raw, now)  # at once: a look meanwhile must not find it due
+
+    def _written(self, index: int, raw: int, sent: bool, now: float) -> None:
+        """Take note of a setpoint, or control word, that left; the refused ones are due again."""
+        if not sent:
+            self._writes.failed(index)
+            return
+        control = self.control
+        if index != self._control_slot or control is None:
+            self.told.note(index, runs=raw != self.drive.cyclic_request[index].neutral_raw)
+            return
+        self.told.note(index, runs=raw != control.table.disable)
+        self._word_written_at = now
+        if raw == control.word:
+            control.word_sent(now)
             self._control_changed(now)
 
-    def _update_control_word(self, now: float) -> None:
-        if not self.online or self._phase is not Phase.POLLING:
+    def _see_to_control_word(self, now: float) -> None:
+        if self.control is None or not self.online or self._phase is not Phase.POLLING:
             return
         if self._control_slot is not None:
             # a stop does not wait for the next period, nor for setpoints
-            self._writes.look(self._raws(), now)
+            self._look(now)
             self._writes.hurry(self._control_slot)
             self._write_setpoint(now)
         elif self._by_hand is not None:
@@ -255,6 +267,7 @@ class StandardSession(DataModelSession):
             return
         statistics = self.statistics
         self._missed_in_row = 0
+        self._doubt = False
         statistics.exchanges += 1
         statistics.latency.add(max(0.0, self._received_at - self._round_began))
         if not self.online:
@@ -270,12 +283,9 @@ class StandardSession(DataModelSession):
         self.online = True
         self.ever_online = True
         self._advice = ''
-        self._farewells = 0
-        self.setpoints.disarm()
-        self.setpoints.enabled = True
         self._events.append(StationFound())
         self._writes.forget()
-        self._writes.look(self._raws(), now)
+        self._look(now)
         if self._by_hand is not None:
             self._by_hand.begin(now)
         self._control_changed(now)
@@ -283,6 +293,7 @@ class StandardSession(DataModelSession):
     def _miss(self, now: float) -> None:
         self.statistics.missed += 1
         self._missed_in_row += 1
+        self._doubt = True
         if self.online and self._missed_in_row >= self.drive.missed_limit:
             reason = f'no complete round of reads for {self.drive.missed_limit} periods'
             self._lose(f'{reason}: {self._gap}' if self._gap else reason, now)

@@ -6,7 +6,9 @@ from typing import Any
 from builders import Conversation, drive, EEPROM, INT16, INT32, parameter, RAM, RO
 
 from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.parameters import ParameterType
+from drive_can_bridge.core.setpoints import CommandOutcome
 
 PERCENT = 100 / 16384
 
@@ -39,7 +41,8 @@ PARAMETERS = (ACCELERATION, ACCELERATION_2, OFFSET, POSITION, COUNTER, FAULT_NUM
 READY_FRAME = '002#7E040000'
 #: ready to switch on, standing still
 READY = '003#310B0000'
-#: operation enabled at 50 %
+#: operation enabled, standing still; the same at 50 %
+ENABLED = '003#370B0000'
 RUNNING = '003#370F0020'
 FAULT = '003#380B0000'
 #: more than what sums of periods are wrong by
@@ -70,6 +73,32 @@ def online(answer: str = READY, **options: Any) -> Conversation:
     talk.hears(answer, 10.002)
     assert talk.session.online
     talk.events()
+    return talk
+
+
+def enabled(ready: str = READY, **options: Any) -> Conversation:
+    """
+    Return a conversation with an inverter that said "operation enabled" at 10.022 s.
+
+    It is not armed. The next cycle is due at 10.04 s.
+
+    :param ready: its first answer, which also says how long its answers are.
+    """
+    talk = online(ready, **options)
+    assert talk.asks(ControlAction.ENABLE, 10.003) == []
+    (_, request), *_ = talk.until(10.02 + TICK)
+    assert request.startswith('002#7F04')
+    talk.hears(f'003#370B{ready[8:]}', 10.022)
+    assert talk.control_outcomes() == [('enable', True, 'operation enabled')]
+    talk.events()
+    return talk
+
+
+def commanded(hertz: float, **options: Any) -> Conversation:
+    """Return a conversation with an enabled inverter that was commanded 0 and then this."""
+    talk = enabled(**options)
+    assert talk.commands(0, 0.0, 10.023) is CommandOutcome.ARMED
+    assert talk.commands(0, hertz, 10.024) is CommandOutcome.ACCEPTED
     return talk
 
 

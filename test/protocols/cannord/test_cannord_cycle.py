@@ -6,11 +6,12 @@ from typing import Any
 
 from builders import Conversation, frame
 from cannord_session_builders import (
-    ACTUAL, CURRENT, exchange, FAULT, FREQUENCY, INPUTS, inverter, online, READY, READY_FRAME,
-    RUNNING, SECOND, SETPOINTS, started, THIRD, VALUES,
+    ACTUAL, commanded, CURRENT, ENABLED, enabled, exchange, FAULT, FREQUENCY, INPUTS, inverter,
+    online, READY, READY_FRAME, RUNNING, SECOND, SETPOINTS, started, THIRD, VALUES,
 )
 import pytest
 
+from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import (
     ForeignMasterSeen, FrameRejected, Noted, ProcessDataReceived, SetpointsExpired, StationFound,
     StationLost,
@@ -27,7 +28,7 @@ def test_first_exchange() -> None:
     assert talk.hears(READY, 10.002) == []
     assert talk.events() == [StationFound(), ProcessDataReceived((0x0B31, 0), 10.002)]
     assert talk.session.offline_advice == ''
-    assert talk.session.state is DriveState.NOT_ARMED
+    assert talk.session.state is DriveState.DISABLED
     assert talk.session.control is not None
     assert talk.session.control.state == 'ready to switch on'
     assert talk.session.next_timer() == pytest.approx(10.02)
@@ -45,11 +46,12 @@ def test_sample_parameters() -> None:
 @pytest.mark.parametrize(('hertz', 'data'), [
     (0.0, '0000'), (25.0, '0020'), (50.0, '0040'), (-25.0, '00E0'), (-50.0, '00C0')])
 def test_setpoint(hertz: float, data: str) -> None:
-    talk = online()
-    assert talk.commands(0, 0.0, 10.003) is CommandOutcome.ARMED
-    assert talk.commands(0, hertz, 10.004) is CommandOutcome.ACCEPTED
+    talk = enabled()
+    assert talk.session.state is DriveState.NOT_ARMED
+    assert talk.commands(0, 0.0, 10.023) is CommandOutcome.ARMED
+    assert talk.commands(0, hertz, 10.024) is CommandOutcome.ACCEPTED
     assert talk.session.state is DriveState.ONLINE
-    assert exchange(talk, 10.02) == f'002#7E04{data}'
+    assert exchange(talk, 10.04, ENABLED) == f'002#7F04{data}'
 
 
 @pytest.mark.parametrize(('requests', 'responses', 'sent'), [
@@ -62,34 +64,34 @@ def test_the_longer_list_decides_the_length(requests: int, responses: int, sent:
 
 
 def test_three_values_each_way() -> None:
-    talk = online('003#310B000034120000', request=(FREQUENCY, SECOND, THIRD),
-                  response=(ACTUAL, CURRENT, INPUTS))
+    talk = enabled('003#310B000034120000', request=(FREQUENCY, SECOND, THIRD),
+                   response=(ACTUAL, CURRENT, INPUTS))
     for index, value in enumerate((50.0, 50.0, -25.0)):
-        talk.commands(index, 0.0, 10.003)
-        talk.commands(index, value, 10.004)
-    assert talk.until(10.021) == [(10.02, '002#7E040040002000F0')]
-    talk.hears('003#370F00C0CEFF1F80', 10.022)
+        talk.commands(index, 0.0, 10.023)
+        talk.commands(index, value, 10.024)
+    assert talk.until(10.041) == [(10.04, '002#7F040040002000F0')]
+    talk.hears('003#370F00C0CEFF1F80', 10.042)
     assert talk.samples() == [(0x0F37, -16384, -50, 0x801F)]
 
 
 def test_swapped_words() -> None:
-    talk = online('003#310B000000000000', request=(FREQUENCY, SECOND, THIRD),
-                  response=(ACTUAL, CURRENT, INPUTS), swap_setpoints_2_3=True)
+    talk = enabled('003#310B000000000000', request=(FREQUENCY, SECOND, THIRD),
+                   response=(ACTUAL, CURRENT, INPUTS), swap_setpoints_2_3=True)
     for index, value in enumerate((50.0, 50.0, -25.0)):
-        talk.commands(index, 0.0, 10.003)
-        talk.commands(index, value, 10.004)
-    assert talk.until(10.021) == [(10.02, '002#7E04004000F00020')]
-    talk.hears('003#370F00C01F80CEFF', 10.022)
+        talk.commands(index, 0.0, 10.023)
+        talk.commands(index, value, 10.024)
+    assert talk.until(10.041) == [(10.04, '002#7F04004000F00020')]
+    talk.hears('003#370F00C01F80CEFF', 10.042)
     assert talk.samples() == [(0x0F37, -16384, -50, 0x801F)]
 
 
 def test_with_two_entries_the_swapped_second_is_in_the_last_word() -> None:
-    talk = online('003#310B000000000000', request=(FREQUENCY, SECOND), response=(ACTUAL, CURRENT),
-                  swap_setpoints_2_3=True)
-    talk.commands(1, 0.0, 10.003)
-    talk.commands(1, 50.0, 10.004)
-    assert talk.until(10.021) == [(10.02, '002#7E04000000000020')]
-    talk.hears('003#310B00000000CEFF', 10.022)
+    talk = enabled('003#310B000000000000', request=(FREQUENCY, SECOND),
+                   response=(ACTUAL, CURRENT), swap_setpoints_2_3=True)
+    talk.commands(1, 0.0, 10.023)
+    talk.commands(1, 50.0, 10.024)
+    assert talk.until(10.041) == [(10.04, '002#7F04000000000020')]
+    talk.hears('003#310B00000000CEFF', 10.042)
     assert talk.samples() == [(0x0B31, 0, -50)]
 
 
@@ -143,18 +145,30 @@ def five(**options: Any) -> Conversation:
     return talk
 
 
-def test_five_values_each_way() -> None:
+def enabled_five() -> Conversation:
+    """Return the same, enabled; the next cycle is due at 10.04 s."""
     talk = five()
+    talk.asks(ControlAction.ENABLE, 10.004)
+    assert talk.until(10.021) == [(10.02, '002#7F04000000000000'), (10.02, '002#0000000000')]
+    talk.hears('003#370B000000000000', 10.022)
+    talk.hears('003#0000000000', 10.023)
+    assert talk.session.state is DriveState.NOT_ARMED
+    talk.events()
+    return talk
+
+
+def test_five_values_each_way() -> None:
+    talk = enabled_five()
     for index, value in enumerate((50.0, 25.0, 0.0, 50.0, -50.0)):
-        talk.commands(index, 0.0, 10.003)
-        talk.commands(index, value, 10.004)
-    assert talk.until(10.021) == [(10.02, '002#7E04004000100000'), (10.02, '002#002000E000')]
-    talk.hears('003#370F000400030002', 10.0215)
+        talk.commands(index, 0.0, 10.023)
+        talk.commands(index, value, 10.024)
+    assert talk.until(10.041) == [(10.04, '002#7F04004000100000'), (10.04, '002#002000E000')]
+    talk.hears('003#370F000400030002', 10.0415)
     assert talk.samples() == []
-    talk.hears('003#3412FFFFA5', 10.022)
+    talk.hears('003#3412FFFFA5', 10.042)
     assert talk.events(ProcessDataReceived) == [
-        ProcessDataReceived((0x0F37, 0x400, 0x300, 0x200, 0x1234, -1), 10.0215)]
-    assert talk.session.statistics.exchanges == 2
+        ProcessDataReceived((0x0F37, 0x400, 0x300, 0x200, 0x1234, -1), 10.0415)]
+    assert talk.session.statistics.exchanges == 3
     assert talk.session.statistics.rejected == 0
     assert talk.session.warning == ''
 
@@ -329,22 +343,20 @@ def test_a_fault_before_the_first_exchange_waits_for_it() -> None:
 
 
 def test_silence_is_offline_and_cycling_goes_on() -> None:
-    talk = online()
-    talk.commands(0, 0.0, 10.003)
-    talk.commands(0, 50.0, 10.004)
-    assert talk.until(10.061) == [
-        (10.02, '002#7E040040'), (10.04, '002#7E040040'), (10.06, '002#7E040040')]
+    talk = commanded(50.0)
+    assert talk.until(10.081) == [
+        (10.04, '002#7F040040'), (10.06, '002#7F040040'), (10.08, '002#7F040040')]
     assert talk.events(StationLost) == []
-    assert talk.until(10.081) == [(10.08, '002#7E040000')]
+    assert talk.until(10.101) == [(10.1, '002#7E040000')]
     lost, = talk.events(StationLost)
     assert lost.reason == 'no answer to process data for 3 cycles'
     assert 'P509' in talk.session.offline_advice
     assert talk.session.statistics.missed == 3
-    assert talk.commands(0, 0.0, 10.09) is CommandOutcome.NOT_ARMED
-    assert talk.until(10.101) == [(10.1, '002#7E040000')]
-    talk.hears(RUNNING, 10.102)
+    assert talk.commands(0, 0.0, 10.11) is CommandOutcome.NOT_ARMED
+    assert talk.until(10.121) == [(10.12, '002#7E040000')]
+    talk.hears(RUNNING, 10.122)
     assert talk.events(StationFound) == [StationFound()]
-    assert talk.session.state is DriveState.NOT_ARMED
+    assert talk.session.state is DriveState.DISABLED
 
 
 def test_one_lost_answer_does_no_harm() -> None:
@@ -384,12 +396,10 @@ def test_beat_is_kept_without_bursts() -> None:
 
 
 def test_setpoints_expire() -> None:
-    talk = online(command_timeout=0.05)
-    talk.commands(0, 0.0, 10.003)
-    talk.commands(0, 50.0, 10.004)
-    assert exchange(talk, 10.02) == '002#7E040040'
-    assert exchange(talk, 10.04) == '002#7E040040'
-    assert exchange(talk, 10.06) == '002#7E040000'
+    talk = commanded(50.0, command_timeout=0.05)
+    assert exchange(talk, 10.04, RUNNING) == '002#7F040040'
+    assert exchange(talk, 10.06, RUNNING) == '002#7F040040'
+    assert exchange(talk, 10.08, RUNNING) == '002#7F040000'
     assert talk.events(SetpointsExpired) == [SetpointsExpired(('frequency_setpoint',))]
 
 
@@ -397,18 +407,17 @@ def test_setpoints_expire() -> None:
 
 
 def test_stop() -> None:
-    talk = online(RUNNING)
-    talk.commands(0, 0.0, 10.003)
-    talk.commands(0, 50.0, 10.004)
-    assert talk.deactivate(10.01) == []
+    talk = commanded(50.0)
+    assert exchange(talk, 10.04, RUNNING) == '002#7F040040'
+    assert talk.deactivate(10.05) == []
     assert talk.until(11.0) == [
-        (10.02, READY_FRAME), (10.04, READY_FRAME), (10.06, READY_FRAME)]
+        (10.06, READY_FRAME), (10.08, READY_FRAME), (10.1, READY_FRAME)]
     assert talk.session.stopped
     assert talk.session.next_timer() == math.inf
     assert talk.events(StationLost) == [StationLost('deactivated')]
-    talk.hears(READY, 10.062)    # the answer to the last frame
+    talk.hears(READY, 10.102)    # the answer to the last frame
     assert talk.events() == []
-    talk.hears(READY, 10.07)
+    talk.hears(READY, 10.11)
     assert talk.events() == [FrameRejected('process data that nobody asked for')]
 
 
@@ -430,24 +439,24 @@ def test_stop_of_a_drive_that_is_not_there() -> None:
 
 
 def test_additional_frames_go_with_the_stop() -> None:
-    talk = five()
+    talk = enabled_five()
     for index in range(5):
-        talk.commands(index, 0.0, 10.003)
-    talk.commands(4, 50.0, 10.004)
-    talk.deactivate(10.01)
+        talk.commands(index, 0.0, 10.023)
+    talk.commands(4, 50.0, 10.024)
+    assert talk.until(10.041)[1] == (10.04, '002#0000002000')
+    talk.deactivate(10.05)
     assert [text for _, text in talk.until(11.0)] == [
         '002#7E04000000000000', '002#0000000000'] * 3
 
 
 def test_lost_time() -> None:
-    talk = online()
-    talk.commands(0, 0.0, 10.003)
-    talk.commands(0, 50.0, 10.004)
+    talk = commanded(50.0)
+    assert exchange(talk, 10.04, RUNNING) == '002#7F040040'
     talk.time_lost(15.0)
     assert talk.events(StationLost) == [StationLost('the bridge stood still')]
     assert talk.until(15.001) == [(15.0, READY_FRAME)]
     talk.hears(READY, 15.002)
-    assert talk.session.state is DriveState.NOT_ARMED
+    assert talk.session.state is DriveState.DISABLED
 
 
 def test_bus_down_is_silence() -> None:

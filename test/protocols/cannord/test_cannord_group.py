@@ -1,6 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Broadcast groups: stations 1, 2 and 3 are led by station 1 and share identifier 400h (408h)."""
 
+from collections.abc import Callable
 from dataclasses import replace
 import math
 from typing import Any
@@ -11,14 +12,16 @@ from cannord_session_builders import (
 )
 import pytest
 
-from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import (
     Event, ForeignMasterSeen, Noted, ProcessDataReceived, RequestCompleted, StationFound,
     StationLost,
 )
+from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.session import DriveState, Session
 from drive_can_bridge.core.setpoints import CommandOutcome
+from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.protocols.cannord.control import GroupControl
 from drive_can_bridge.protocols.families import FAMILIES, make_sessions
 
@@ -35,6 +38,8 @@ class Bus:
         self.sessions = make_sessions(drives)
         self.now = 10.0
         self.log: list[tuple[str, Event]] = []
+        #: tells of a frame whether the bus refuses it
+        self.refusing: Callable[[str], bool] = lambda text: False
         #: station -> what it answers to its process frame; a missing one is silent
         self.answers: dict[int, str] = {drive.station: READY for drive in drives}
         for session in self.sessions:
@@ -46,9 +51,16 @@ class Bus:
         return next(session for session in self.sessions if session.drive.name == name)
 
     def pump(self) -> list[str]:
-        sent = []
+        """Fetch what all sessions give out, in the order of the exchange; return what left."""
+        sent: list[str] = []
         for session in self.sessions:
-            sent += [str(entry) for entry in session.take_frames()]
+            texts = [str(entry) for entry in session.take_frames()]
+            while texts:
+                refused = [place for place, text in enumerate(texts) if self.refusing(text)]
+                sent += [text for place, text in enumerate(texts) if place not in refused]
+                session.frames_left(self.now, refused)
+                texts = [str(entry) for entry in session.take_frames()]
+        for session in self.sessions:   # a partner's events may have come after its turn
             self.log += [(session.drive.name, event) for event in session.take_events()]
         return sent
 
@@ -176,15 +188,23 @@ def test_setpoints_and_extra_values_of_all() -> None:
     bus.hears('003#0100020000')
     assert bus.session('lift').online
     lift = bus.session('lift')
+    assert [text for _, text in bus.live(0.015)][2:] == [
+        '004#7E04000000000000', '004#0000000000']
+    bus.hears('005#310B000100020003')
+    bus.hears('005#0400FFFF00')
+    assert bus.events(ProcessDataReceived)[-1][1].raws == (0x0B31, 256, 512, 768, 4, -1)
+    bus.asks(ENABLE)
+    for number in (3, 5):
+        bus.live(0.02)
+        bus.hears(f'{number:03X}#370B000000000000')
+        bus.hears(f'{number:03X}#0000000000')
+    assert bus.outcomes() == [('enable', True, 'operation enabled')]
     for index in range(5):
         lift.command(index, 0.0, bus.now)
     lift.command(0, 50.0, bus.now)
     lift.command(4, -50.0, bus.now)
-    assert [text for _, text in bus.live(0.015)] == [
-        '400#7E04004000000000', '400#000000E000', '004#7E04004000000000', '004#000000E000']
-    bus.hears('005#310B000100020003')
-    bus.hears('005#0400FFFF00')
-    assert bus.events(ProcessDataReceived)[-1][1].raws == (0x0B31, 256, 512, 768, 4, -1)
+    assert [text for _, text in bus.live(0.02)] == [
+        '400#7F04004000000000', '400#000000E000', '002#7F04004000000000', '002#000000E000']
 
 
 def test_the_longest_lists_decide_for_all() -> None:
@@ -211,7 +231,7 @@ def test_each_counts_its_own_answers() -> None:
         ('hoist', StationLost('no answer to process data for 3 cycles'))]
     assert [session.statistics.missed for session in bus.sessions] == [0, 3, 0]
     assert [session.state for session in bus.sessions] == [
-        DriveState.NOT_ARMED, DriveState.OFFLINE, DriveState.ONLINE]
+        DriveState.DISABLED, DriveState.OFFLINE, DriveState.DISABLED]
     bus.answers[2] = READY
     bus.live(0.06)
     assert [name for name, _ in bus.events(StationFound)] == ['hoist']
@@ -234,31 +254,35 @@ def test_foreign_master() -> None:
 
 
 def test_the_leader_commands_all() -> None:
-    bus = three()
+    bus = enabled()
     lift = bus.session('lift')
     assert lift.state is DriveState.NOT_ARMED
     assert lift.command(0, 0.0, bus.now) is CommandOutcome.ARMED
     assert lift.command(0, 25.0, bus.now) is CommandOutcome.ACCEPTED
-    assert [text for _, text in bus.live(0.03)] == [
-        '400#7E040020', '002#7E040020', '400#7E040020', '004#7E040020']
+    assert [session.state for session in bus.sessions] == [DriveState.ONLINE] * 3
+    assert sorted(text for _, text in bus.live(0.06)) == [
+        '002#7F040020', '004#7F040020', '006#7F040020', *['400#7F040020'] * 3]
     assert bus.session('hoist').write_refusal(FREQUENCY) == (
         'sent cyclically by the broadcast group: publish lift/command/frequency_setpoint')
     assert bus.session('hoist').write_refusal(OFFSET) == ''
 
 
 def test_a_member_that_comes_back_disarms_all() -> None:
-    bus = three()
+    bus = enabled()
     lift = bus.session('lift')
+    lift.command(0, 0.0, bus.now)
+    lift.command(0, 25.0, bus.now)
     del bus.answers[3]
     bus.live(0.2)
     assert not bus.session('turn').online
-    lift.command(0, 0.0, bus.now)
-    lift.command(0, 25.0, bus.now)
-    bus.answers[3] = READY
+    assert lift.command(0, 0.0, bus.now) is CommandOutcome.DISABLED
+    assert lift.command(0, 25.0, bus.now) is CommandOutcome.DISABLED
+    bus.answers[3] = RUNNING
     bus.live(0.07)
     assert bus.session('turn').online
-    assert lift.state is DriveState.NOT_ARMED
-    assert words(bus.live(0.02)) == ['7E04']
+    assert lift.state is DriveState.DISABLED
+    assert {text for _, text in bus.live(0.06)} == {
+        '400#7E040000', '002#7E040000', '004#7E040000', '006#7E040000'}
 
 
 def test_parameters_are_everybodys_own() -> None:
@@ -284,6 +308,7 @@ def test_enable_brings_all_up() -> None:
     bus.live(0.06)
     assert bus.outcomes() == [('enable', True, 'operation enabled')]
     assert words(bus.live(0.1)) == ['7F04'] * 5
+    assert bus.session('lift').state is DriveState.NOT_ARMED
     control = bus.session('lift').control
     assert control is not None
     assert control.state == 'operation enabled'
@@ -456,7 +481,7 @@ def test_members_name_their_leader() -> None:
     control = bus.session('hoist').control
     assert control is not None
     assert control.state == 'ready to switch on'
-    assert bus.session('hoist').state is DriveState.ONLINE
+    assert bus.session('hoist').state is DriveState.DISABLED
 
 
 def test_refused_when_nobody_is_there() -> None:
@@ -464,6 +489,189 @@ def test_refused_when_nobody_is_there() -> None:
     bus.answers = {}
     bus.live(0.5)
     assert bus.session('lift').request_control(ENABLE, bus.now) == 'drive offline'
+
+
+# -- stops ----------------------------------------------------------------------------------------
+
+
+def driven(**options: Any) -> Bus:
+    """Return a group that runs at 25 Hz."""
+    bus = enabled(**options)
+    lift = bus.session('lift')
+    assert lift.command(0, 0.0, bus.now) is CommandOutcome.ARMED
+    assert lift.command(0, 25.0, bus.now) is CommandOutcome.ACCEPTED
+    assert '400#7F040020' in [text for _, text in bus.live(0.06)]
+    bus.events()
+    return bus
+
+
+def worries(bus: Bus) -> list[tuple[str, str]]:
+    return [(name, event.text) for name, event in bus.events(Noted)
+            if 'may still be running' in event.text]
+
+
+def test_commands_count_from_the_last_operation_enabled_on() -> None:
+    bus = three()
+    lift = bus.session('lift')
+    bus.asks(ENABLE)
+    assert words(bus.live(0.02)) == ['7F04']
+    bus.answers = {1: RUNNING, 2: RUNNING, 3: '330B0000'}
+    bus.live(0.1)
+    assert [session.state for session in bus.sessions] == [DriveState.DISABLED] * 3
+    assert lift.command(0, 0.0, bus.now) is CommandOutcome.DISABLED, 'turn is switched on'
+    bus.answers[3] = RUNNING
+    bus.live(0.06)
+    assert bus.outcomes() == [('enable', True, 'operation enabled')]
+    assert lift.command(0, 25.0, bus.now) is CommandOutcome.NOT_ARMED
+    assert lift.command(0, 0.0, bus.now) is CommandOutcome.ARMED
+
+
+def test_a_member_that_comes_back_running_arms_nobody() -> None:
+    bus = driven()
+    bus.answers[2] = '330B0000'
+    bus.live(0.06)
+    assert bus.session('lift').state is DriveState.DISABLED
+    bus.answers[2] = RUNNING
+    bus.live(0.1)
+    assert bus.session('lift').command(0, 0.0, bus.now) is CommandOutcome.DISABLED
+    assert words(bus.live(0.02)) == ['7E04']
+
+
+def test_stop_of_a_slow_group_is_brought_forward() -> None:
+    bus = Bus(*members(period=0.1))
+    bus.live(0.25)
+    bus.asks(ENABLE)        # 10.25
+    bus.live(0.1)
+    bus.answers = dict.fromkeys((1, 2, 3), RUNNING)
+    bus.live(0.3)           # 10.65
+    assert bus.outcomes() == [('enable', True, 'operation enabled')]
+    lift = bus.session('lift')
+    lift.command(0, 0.0, bus.now)
+    lift.command(0, 25.0, bus.now)
+    assert (10.7, '400#7F040020') in bus.live(0.08)     # 10.73
+    bus.asks(QUICK_STOP)
+    when, text = bus.live(0.01)[0]
+    assert (when, text) == (pytest.approx(10.73, abs=0.001), '400#7A040000')
+
+
+def test_stop_frames_of_a_group_that_the_bus_refuses() -> None:
+    bus = driven()
+    bus.refusing = lambda text: text.startswith('400')
+    for session in bus.sessions:
+        session.deactivate(bus.now)
+    assert {text.split('#')[1] for _, text in bus.live(0.3)} == {'7E040000'}
+    assert [session.stopped for session in bus.sessions] == [False, True, True]
+    bus.session('lift').give_up(bus.now)
+    bus.pump()
+    assert worries(bus) == [('lift', 'could not be told to stop: it may still be running')]
+
+
+def test_member_whose_frame_is_refused_gets_one_before_the_stop_ends() -> None:
+    """It may be one that does not listen to broadcasts."""
+    bus = driven()
+    asked: list[str] = []
+
+    def refusing(text: str) -> bool:
+        asked.append(text)
+        return text.startswith('004') and asked.count(text) < 3
+    bus.refusing = refusing
+    for session in bus.sessions:
+        session.deactivate(bus.now)
+    sent = [text for _, text in bus.live(1.0)]
+    assert {text[:3] for text in sent} == {'400', '002', '004', '006'}
+    assert all(session.stopped for session in bus.sessions)
+    assert worries(bus) == []
+
+
+def test_enable_that_only_one_of_them_got_is_owed_a_stop() -> None:
+    bus = three()
+    bus.refusing = lambda text: text.startswith('400')
+    bus.asks(ENABLE)
+    assert [text for _, text in bus.live(0.02)] == ['002#7F040000']
+    for session in bus.sessions:
+        session.bus_down(bus.now, 'unplugged')
+    bus.pump()
+    assert worries(bus) == [
+        ('lift', 'the bus was lost before it could be told to stop: it may still be running')]
+
+
+def test_stall_reopened_bus_and_signal() -> None:
+    bus = driven()
+    for session in bus.sessions:
+        session.bus_down(bus.now, 'unplugged')
+    bus.pump()
+    assert len(worries(bus)) == 1
+    bus.now += 1.5
+    for session in bus.sessions:
+        session.bus_up(bus.now)
+    for session in bus.sessions:
+        session.deactivate(bus.now)
+    sent = bus.live(1.0)
+    assert [text for _, text in sent if text.startswith('400')] == ['400#7E040000'] * 3
+    assert {text for _, text in sent} == {
+        '400#7E040000', '002#7E040000', '004#7E040000', '006#7E040000'}
+    assert worries(bus) == []
+
+
+# -- as the exchange serves them ------------------------------------------------------------------
+
+
+class Ears:
+    """Whoever listens to a drive, or to the bus."""
+
+    def __init__(self) -> None:
+        self.events: list[Event] = []
+
+    def handle_event(self, event: Event) -> None:
+        self.events.append(event)
+
+    def process_data(self, *told: object) -> None:
+        """Take no notice."""
+
+    take_commands = discard_commands = bus_opened = process_data
+
+
+class Cable:
+    """A link that takes frames down."""
+
+    def __init__(self) -> None:
+        self.sent: list[str] = []
+
+    def send(self, sent: Frame) -> bool:
+        self.sent.append(str(sent))
+        return True
+
+
+def test_silent_member_is_offline_by_its_own_timer() -> None:
+    """Nothing but the leader's cycle tells it that an answer was due."""
+    now = 10.0
+    drives = members(2)
+    sessions = make_sessions(drives)
+    ears = [Ears(), Ears()]
+    exchange = BusExchange(
+        BusConfiguration('main', 'virtual', 'x'), sessions,
+        [[claim.route for claim in FAMILIES['cannord'].claims(entry)] for entry in drives],
+        Ears(), clock=lambda: now)  # type: ignore[arg-type]
+    cable = exchange.link = Cable()  # type: ignore[assignment]
+    for session, each in zip(sessions, ears):
+        exchange.attach(session, each)  # type: ignore[arg-type]
+    exchange.bus_opened()
+    exchange.activate()
+    asked: list[tuple[float, str]] = []
+    for tick in range(400):     # 0.4 s
+        now = round(10.0 + 0.001 * tick, 3)
+        exchange._pass()
+        asked += [(now, text) for text in cable.sent]
+        for text in cable.sent[:]:
+            if text.startswith('002') or text.startswith('004') and now < 10.05:
+                exchange.frame_received(frame(f'{int(text[:3], 16) + 1:03X}#{READY}'), 0.0)
+        cable.sent.clear()
+        if StationLost('no answer to process data for 3 cycles') in ears[1].events:
+            break
+    assert [when for when, text in asked if text.startswith('004')] == [10.02, 10.06, 10.1, 10.14]
+    assert now == pytest.approx(10.16, abs=0.002)
+    assert [session.online for session in sessions] == [True, False]
+    assert StationLost not in {type(event) for event in ears[0].events}
 
 
 # -- the life of a group --------------------------------------------------------------------------

@@ -6,8 +6,10 @@ from typing import Any
 from builders import Conversation, drive, INT32, parameter, RAM, RO, WO
 
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.parameters import ParameterType
+from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.core.profile import ControlTable, StatusPattern
+from drive_can_bridge.core.setpoints import CommandOutcome
 
 UINT32 = ParameterType.UINT32
 
@@ -51,11 +53,26 @@ ANSWER_0 = '485#C701002641000000'
 #: the same of a tripped device
 TRIPPED_1 = '485#C70100A644000000'
 TRIPPED_0 = '485#C701002644000000'
+#: the same of a motor that runs: ready, on, controller power, running
+RUNS_1 = '485#C70100A6C3200000'
+RUNS_0 = '485#C7010026C3200000'
 #: 704 = 0
 DISABLE_0 = '505#C002002A00000000'
 DISABLE_1 = '505#C00200AA00000000'
 DISABLED_0 = '485#C002002A00000000'
 DISABLED_1 = '485#C00200AA00000000'
+
+
+#: 704 = 1
+ENABLE_0 = '505#C002002A01000000'
+ENABLE_1 = '505#C00200AA01000000'
+ENABLED_0 = '485#C002002A00000000'
+ENABLED_1 = '485#C00200AA00000000'
+#: 710 = 100
+SPEED_0 = '505#C602002A64000000'
+SPEED_1 = '505#C60200AA64000000'
+STILL_0 = '505#C602002A00000000'
+STILL_1 = '505#C60200AA00000000'
 
 
 def configuration(**options: Any) -> DriveConfiguration:
@@ -93,5 +110,53 @@ def online(**options: Any) -> Conversation:
         text, = sent
         assert text[12:] == '00000000'
         sent = talk.hears(text.replace('505#', '485#'), begin + 0.003)
+    talk.events()
+    return talk
+
+
+def ready(**options: Any) -> Conversation:
+    """Return a drive that is online, disabled and ready; the last read had toggle 1."""
+    options.setdefault('control', CONTROL)
+    talk = online(**options)
+    assert talk.until(10.0701) == [(10.07, READ_1)]
+    assert talk.hears(ANSWER_1, 10.071) == []
+    return talk
+
+
+def running(**options: Any) -> Conversation:
+    """Return a drive that was enabled; the last read had toggle 1."""
+    talk = ready(**options)
+    assert talk.asks(ControlAction.ENABLE, 10.075) == [ENABLE_0]
+    assert talk.hears(ENABLED_0, 10.076) == []
+    assert talk.until(10.0901) == [(10.09, READ_1)]
+    assert talk.hears(RUNS_1, 10.091) == []
+    assert talk.control_outcomes() == [('enable', True, 'enabled')]
+    talk.events()
+    return talk
+
+
+def echo(text: str, status: str = 'C320') -> str:
+    """Return the device's answer to a request; what it reads is the status register."""
+    reply = text.replace('505#', '485#')
+    return f'{reply[:12]}{status}0000' if text[10:12] in ('26', 'A6') else reply[:12] + '00000000'
+
+
+def driven(request: tuple[Parameter, ...] = (SPEED,), **options: Any) -> Conversation:
+    """Return a drive that was enabled and runs at 10 Hz; the next round is due at 10.13 s."""
+    talk = online(request=request, control=CONTROL, **options)
+    first, = talk.at(10.07)
+    assert talk.hears(echo(first, '4100'), 10.071) == []
+    enable, = talk.asks(ControlAction.ENABLE, 10.075)
+    assert enable in ('505#C002002A01000000', '505#C00200AA01000000')
+    assert talk.hears(echo(enable), 10.076) == []
+    text, = talk.at(10.09)
+    assert talk.hears(echo(text), 10.091) == []
+    assert talk.control_outcomes() == [('enable', True, 'enabled')]
+    assert talk.commands(0, 0.0, 10.095) is CommandOutcome.ARMED
+    assert talk.commands(0, 10.0, 10.095) is CommandOutcome.ACCEPTED
+    text, = talk.at(10.11)
+    assert text in (SPEED_0, SPEED_1)
+    text, = talk.hears(echo(text), 10.111)
+    assert talk.hears(echo(text), 10.112) == []
     talk.events()
     return talk

@@ -2,12 +2,12 @@
 """Control register 704: written on change, acknowledged, never repeated blindly."""
 
 from dataclasses import replace
-from typing import Any
 
 from builders import Conversation
 from pkw_builders import (
-    ANSWER_0, ANSWER_1, CONTROL, DISABLE_0, DISABLE_1, DISABLED_0, DISABLED_1, IDLE, IDLE_ANSWER,
-    online, READ_0, READ_1, started, TABLE, TRIPPED_0, WORD,
+    ANSWER_0, ANSWER_1, CONTROL, DISABLE_0, DISABLE_1, DISABLED_0, DISABLED_1, ENABLE_0, ENABLE_1,
+    ENABLED_0, ENABLED_1, IDLE, IDLE_ANSWER, READ_0, READ_1, ready, running, RUNS_0, RUNS_1, START,
+    started, TABLE, TRIPPED_0, WORD,
 )
 import pytest
 
@@ -16,34 +16,6 @@ from drive_can_bridge.core.events import Noted, StationLost
 from drive_can_bridge.core.parameters import Access
 from drive_can_bridge.core.session import DriveState
 from drive_can_bridge.protocols.families import FAMILIES
-
-ENABLE_0 = '505#C002002A01000000'
-ENABLE_1 = '505#C00200AA01000000'
-ENABLED_0 = '485#C002002A00000000'
-ENABLED_1 = '485#C00200AA00000000'
-#: ready, on, controller power, motor running
-RUNS_0 = '485#C7010026C3200000'
-RUNS_1 = '485#C70100A6C3200000'
-
-
-def ready(**options: Any) -> Conversation:
-    """Return a drive that is online, disabled and ready; the last read had toggle 1."""
-    talk = online(control=CONTROL, **options)
-    assert talk.until(10.0701) == [(10.07, READ_1)]
-    assert talk.hears(ANSWER_1, 10.071) == []
-    return talk
-
-
-def running(**options: Any) -> Conversation:
-    """Return a drive that was enabled; the last read had toggle 1."""
-    talk = ready(**options)
-    assert talk.asks(ControlAction.ENABLE, 10.075) == [ENABLE_0]
-    assert talk.hears(ENABLED_0, 10.076) == []
-    assert talk.until(10.0901) == [(10.09, READ_1)]
-    assert talk.hears(RUNS_1, 10.091) == []
-    assert talk.control_outcomes() == [('enable', True, 'enabled')]
-    talk.events()
-    return talk
 
 
 def test_disable_is_the_first_thing_that_is_written() -> None:
@@ -311,16 +283,16 @@ def test_a_drive_that_runs_on_under_disable_is_told_of() -> None:
 
 def test_restart_puts_the_word_back() -> None:
     talk = running()
-    assert talk.hears('705#00', 10.1) == ['000#0105']
+    assert talk.hears('705#00', 10.1) == [START, DISABLE_0], 'it was told to run'
     lost, = talk.events(StationLost)
     assert lost.reason == 'the device restarted'
-    assert talk.until(10.151) == [(10.15, IDLE)]
-    assert talk.hears(IDLE_ANSWER, 10.152) == [READ_0]
-    assert talk.hears(ANSWER_0, 10.153) == [DISABLE_1]
-    talk.hears(DISABLED_1, 10.154)
-    assert [text for _, text in talk.until(10.1701)] == [READ_0]
-    talk.hears(ANSWER_0, 10.171)
-    assert talk.until(10.1901) == [(10.19, READ_1)]
+    assert talk.hears(DISABLED_0, 10.11) == []
+    assert talk.until(10.151) == [(10.15, READ_1)]
+    assert talk.hears(ANSWER_1, 10.153) == [DISABLE_0]
+    talk.hears(DISABLED_0, 10.154)
+    assert [text for _, text in talk.until(10.1701)] == [READ_1]
+    talk.hears(ANSWER_1, 10.171)
+    assert talk.until(10.1901) == [(10.19, READ_0)]
 
 
 def test_silent_drive_is_told_to_stand_still() -> None:

@@ -3,6 +3,7 @@
 
 import pytest
 
+from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.protocols.canopen_pkw import pkw
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
     Answered, Mailbox, Read, Refused, Reply, Silence, Write,
@@ -20,10 +21,12 @@ class Box:
     def __init__(self, **options: object) -> None:
         self.sent: list[str] = []
         settings = {'order': 'auto', 'timeout': 0.5, **options}
-        self.box = Mailbox(
-            lambda message: self.sent.append(
-                pkw.encode(message, Layout.WORD_LE).hex(' ').upper()),
-            **settings)  # type: ignore[arg-type]
+        self.box = Mailbox(self.send, **settings)  # type: ignore[arg-type]
+        self.left: Left = lambda sent, now: None
+
+    def send(self, message: pkw.Message, left: Left) -> None:
+        self.sent.append(pkw.encode(message, Layout.WORD_LE).hex(' ').upper())
+        self.left = left
 
     def take(self) -> list[str]:
         sent, self.sent = self.sent, []
@@ -199,6 +202,37 @@ def test_blind_write_goes_at_once_with_its_own_time_out() -> None:
     assert box.box.deadline == 0.05
     assert box.box.handle_timer(0.05) == Silence(sent=True)
     assert box.begin(Write(REGISTER, (1,), blind=True), 1.0) == ['C7 01 00 2A 01 00 00 00']
+
+
+@pytest.mark.parametrize('step', [Write(REGISTER, (1,)), Write(REGISTER, (1,), blind=True)])
+def test_write_that_the_bus_refuses_was_not_sent(box: Box, step: Write) -> None:
+    assert box.begin(step, 1.0) == ['C7 01 00 2A 01 00 00 00']
+    box.left(False, 1.0)
+    if not step.blind:
+        assert box.box.handle_timer(1.0) == Silence(sent=False, refused=True)
+    else:
+        assert box.box.handle_timer(1.009) is None
+        assert box.box.deadline == pytest.approx(1.01)
+        assert box.box.handle_timer(1.01) is None
+        assert box.take() == ['C7 01 00 2A 01 00 00 00']
+        box.left(False, 1.01)
+        assert box.box.handle_timer(1.5) == Silence(sent=False, refused=True)
+    # the device has not seen it: nothing has to be synchronised, and its toggle is still new
+    assert box.begin(READ, 2.0) == ['C7 01 00 25 00 00 00 00']
+
+
+def test_refused_write_that_has_to_make_room_ends(box: Box) -> None:
+    box.begin(Write(REGISTER, (1,), blind=True), 1.0)
+    box.left(False, 1.0)
+    box.box.abandon(1.05)
+    assert box.box.handle_timer(1.0) == Silence(sent=False, refused=True)
+
+
+def test_read_that_the_bus_refuses_ends_when_its_time_is_over(box: Box) -> None:
+    box.begin(READ, 1.0)
+    box.left(False, 1.0)
+    assert box.box.handle_timer(1.499) is None
+    assert box.box.handle_timer(1.5) == Silence(sent=True)
 
 
 def test_short_time_out_counts_for_function_zero_too() -> None:

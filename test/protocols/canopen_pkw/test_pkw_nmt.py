@@ -26,9 +26,10 @@ def test_start_is_the_first_frame_and_pdos_wait() -> None:
 
 def test_boot_up_before_the_first_round() -> None:
     talk = started()
-    assert talk.hears(BOOT_UP, 10.02) == [START]
-    assert talk.until(10.0699) == []
-    assert talk.until(10.0701) == [(10.07, IDLE)]
+    assert talk.hears(BOOT_UP, 10.02) == [], 'started 20 ms ago'
+    assert talk.until(10.0999) == []
+    assert talk.until(10.1499) == [(10.1, START)]
+    assert talk.until(10.1501) == [(10.15, IDLE)]
     assert talk.events() == [Noted('boot-up: the device has started')]
 
 

@@ -69,6 +69,21 @@ def test_boot_up_is_answered_by_start() -> None:
     assert watched.refusal(10.5) == ''
 
 
+def test_start_after_a_boot_up_frame_is_put_off_but_not_left_out() -> None:
+    watched = node()
+    sent(watched)
+    assert hears(watched, BOOT_UP, 10.04) == (Change.RESTARTED, [])
+    assert watched.next_timer() == pytest.approx(10.1)
+    assert watched.free_at == pytest.approx(10.15)
+    assert hears(watched, BOOT_UP, 10.09) == (Change.RESTARTED, [])
+    assert watched.next_timer() == pytest.approx(10.1)
+    watched.offline(10.09)
+    watched.handle_timer(10.1001)
+    assert sent(watched) == ['000#0105']
+    assert watched.next_timer() == pytest.approx(11.1001), 'and then once a second'
+    assert hears(watched, BOOT_UP, 10.3) == (Change.RESTARTED, ['000#0105'])
+
+
 @pytest.mark.parametrize('state, text', [
     (PRE_OPERATIONAL, 'node is pre-operational'), (STOPPED, 'node is stopped')])
 def test_heartbeats_say_when_pdos_may_be_sent(state: NmtState, text: str) -> None:

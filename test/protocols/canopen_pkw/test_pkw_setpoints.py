@@ -6,8 +6,8 @@ from typing import Any
 
 from builders import Conversation, read
 from pkw_builders import (
-    ANSWER_0, BOOT_UP, CLASS, CONTROL, IDLE, IDLE_ANSWER, online, POSITION, READ_0,
-    SPEED, STOPPED, TORQUE,
+    ANSWER_0, BOOT_UP, CLASS, DISABLE_0, DISABLE_1, DISABLED_1, driven, IDLE, IDLE_ANSWER, online,
+    POSITION, READ_0, SPEED, SPEED_0, SPEED_1, START, STILL_0, STILL_1, STOPPED, TORQUE,
 )
 import pytest
 
@@ -15,11 +15,7 @@ from drive_can_bridge.core.events import Noted, SetpointsExpired, StationLost
 from drive_can_bridge.core.session import DriveState
 from drive_can_bridge.core.setpoints import CommandOutcome
 
-#: 710 = 100
-SPEED_0 = '505#C602002A64000000'
-SPEED_1 = '505#C60200AA64000000'
-STILL_0 = '505#C602002A00000000'
-STILL_1 = '505#C60200AA00000000'
+WITHDRAWN = Noted('enable withdrawn: bridge inactive; only ~/enable starts the drive again')
 
 
 def answered(talk: Conversation, sent: list[str], now: float) -> list[str]:
@@ -166,14 +162,15 @@ def test_refused_setpoint_is_shown_until_one_is_taken() -> None:
 def test_restart_disarms() -> None:
     talk = armed(command_timeout=0.0)
     cycle(talk, 10.07)
-    talk.hears(BOOT_UP, 10.075)
+    assert talk.hears(BOOT_UP, 10.11) == [START, STILL_1], 'it was told to run'
     assert talk.session.state is DriveState.OFFLINE
     assert [item.armed for item in talk.session.setpoints.items] == [False]
-    assert talk.commands(0, 10.0, 10.08) is CommandOutcome.NOT_ARMED
-    assert answered(talk, talk.at(10.13), 10.13) == ['C60200000000']
+    assert talk.commands(0, 10.0, 10.12) is CommandOutcome.NOT_ARMED
+    assert talk.hears('485#C60200AA00000000', 10.13) == []
+    assert answered(talk, talk.at(10.17), 10.17) == ['C60200000000'], 'once more when it is back'
     assert talk.session.state is DriveState.NOT_ARMED
-    assert talk.commands(0, 10.0, 10.14) is CommandOutcome.NOT_ARMED
-    assert cycle(talk, 10.16) == []
+    assert talk.commands(0, 10.0, 10.18) is CommandOutcome.NOT_ARMED
+    assert cycle(talk, 10.2) == []
 
 
 def test_silent_drive_gets_neutral_before_it_is_left_alone() -> None:
@@ -188,12 +185,11 @@ def test_silent_drive_gets_neutral_before_it_is_left_alone() -> None:
 
 
 def test_stop_is_acknowledged_and_then_silent() -> None:
-    talk = armed(control=CONTROL)
-    cycle(talk, 10.07)
-    assert talk.deactivate(10.075) == ['505#C002002A00000000']
+    talk = driven()
+    assert talk.deactivate(10.115) == [DISABLE_1]
     assert not talk.session.stopped
-    assert talk.hears('485#C002002A00000000', 10.076) == [STILL_1]
-    assert talk.hears('485#C60200AA00000000', 10.077) == []
+    assert talk.hears(DISABLED_1, 10.116) == [STILL_0]
+    assert talk.hears('485#C602002A00000000', 10.117) == []
     assert talk.session.stopped
     assert talk.session.next_timer() == math.inf
     assert talk.events(StationLost) == [StationLost('deactivated')]
@@ -203,56 +199,66 @@ def test_stop_is_acknowledged_and_then_silent() -> None:
 
 def test_stop_is_tried_three_times() -> None:
     """Each attempt has the time that any request has: a slow device is no silent one."""
-    talk = armed(control=CONTROL)
-    cycle(talk, 10.07)
-    sent = [(10.075, *talk.deactivate(10.075)), *talk.until(20.0)]
+    talk = driven()
+    sent = [(10.115, *talk.deactivate(10.115)), *talk.until(20.0)]
     assert [text for _, text in sent] == [
-        '505#C002002A00000000', '505#C00200AA00000000', '505#C002002A00000000',
-        STILL_1, STILL_0, STILL_1]
-    assert [round(now - 10.075, 3) for now, _ in sent] == [0.0, 0.5, 1.0, 1.5, 2.0, 2.5]
+        DISABLE_1, DISABLE_0, DISABLE_1, STILL_0, STILL_1, STILL_0]
+    assert [round(now - 10.115, 3) for now, _ in sent] == [0.0, 0.5, 1.0, 1.5, 2.0, 2.5]
     assert talk.session.stopped
-    assert talk.events(Noted) == [Noted(
+    assert talk.events(Noted) == [WITHDRAWN, Noted(
         'told to stop, but control_register_1 0000h not acknowledged in 3 attempts; speed not '
         'acknowledged in 3 attempts: it may still be running', warning=True)]
 
 
 def test_stop_of_many_setpoints_has_its_limit() -> None:
     """3 s all together."""
-    talk = armed(request=(SPEED, TORQUE), control=CONTROL)
-    cycle(talk, 10.07)
-    talk.deactivate(10.075)
+    talk = driven((SPEED, TORQUE))
+    talk.deactivate(10.115)
     assert talk.session.longest_stop == 3.0
-    talk.until(13.07)
+    talk.until(13.11)
     assert not talk.session.stopped
-    talk.until(13.08)
+    talk.until(13.12)
     assert talk.session.stopped
     assert talk.session.longest_stop == 0.0
 
 
 def test_slow_device_acknowledges_each_stop_once() -> None:
     """It takes 0.3 s for each answer."""
-    talk = armed(control=CONTROL)
-    cycle(talk, 10.07)
-    assert talk.deactivate(10.075) == ['505#C002002A00000000']
-    assert talk.until(10.374) == []
-    assert talk.hears('485#C002002A00000000', 10.375) == [STILL_1]
-    assert talk.until(10.674) == []
-    assert talk.hears('485#C60200AA00000000', 10.675) == []
+    talk = driven()
+    assert talk.deactivate(10.115) == [DISABLE_1]
+    assert talk.until(10.414) == []
+    assert talk.hears(DISABLED_1, 10.415) == [STILL_0]
+    assert talk.until(10.714) == []
+    assert talk.hears('485#C602002A00000000', 10.715) == []
     assert talk.session.stopped
-    assert talk.events(Noted) == []
+    assert talk.events(Noted) == [WITHDRAWN]
 
 
-def test_stop_does_not_wait_for_a_request_under_way() -> None:
+def test_stop_waits_for_the_answer_to_the_request_under_way() -> None:
+    """The mailbox takes one request at a time."""
     talk = armed()
     assert talk.submits(read(CLASS), 10.061) == ['505#5E0200A500000000']
-    assert talk.deactivate(10.062) == [STILL_0]
+    assert talk.deactivate(10.062) == []
     assert talk.outcomes() == [['bridge inactive']]
+    assert talk.until(10.1) == []
+    assert talk.hears('485#5E0200A507000000', 10.1) == [STILL_0]
+    assert talk.session.statistics.rejected == 0
+
+
+def test_stop_waits_50_ms_at_most() -> None:
+    talk = armed()
+    assert talk.submits(read(CLASS), 10.061) == ['505#5E0200A500000000']
+    assert talk.deactivate(10.062) == []
+    assert talk.until(10.13) == [(10.112, STILL_0)]
+    assert talk.hears('485#C602002A00000000', 10.131) == []
+    assert talk.session.stopped
 
 
 def test_refused_stop_is_an_answer() -> None:
     talk = armed()
-    assert talk.deactivate(10.061) == [STILL_1]
-    assert talk.hears('485#C60200CE22000008', 10.062) == []
+    assert cycle(talk, 10.07) == ['C60264000000']
+    assert talk.deactivate(10.075) == [STILL_1]
+    assert talk.hears('485#C60200CE22000008', 10.076) == []
     assert talk.session.stopped
     note, = talk.events(Noted)
     assert note.warning
@@ -294,8 +300,9 @@ def test_activation_during_the_stop() -> None:
 def test_lost_time_means_neutral() -> None:
     talk = armed(command_timeout=0.0)
     cycle(talk, 10.07)
-    assert talk.time_lost(15.0) == ['000#0105']
+    assert talk.time_lost(15.0) == [START, STILL_1]
     assert talk.events(StationLost) == [StationLost('the bridge stood still')]
+    assert talk.hears('485#C60200AA00000000', 15.001) == []
     assert answered(talk, talk.at(15.05), 15.05) == ['C60200000000']
     assert talk.session.state is DriveState.NOT_ARMED
 

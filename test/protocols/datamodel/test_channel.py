@@ -6,9 +6,14 @@ import math
 import pytest
 
 from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.outbox import Outbox
 from drive_can_bridge.protocols.datamodel.channel import (
     AcyclicChannel, Lane, Polling, Procedure, Read, Words, Write,
 )
+
+
+def nobody(sent: bool, now: float) -> None:
+    """Be told of a frame that left, and do nothing."""
 
 
 class Line:
@@ -16,16 +21,22 @@ class Line:
 
     def __init__(self, *, timeout: float = 0.1, attempts: int = 2, gap: float = 0.02,
                  quarantine: float | None = None) -> None:
+        self.outbox = Outbox()
         self.channel = AcyclicChannel(
             encode_read=lambda number, count: Frame(number, b'?' * count, True),
             encode_write=lambda number, words: Frame(number, bytes(words), True),
-            timeout=timeout, attempts=attempts, eeprom_gap=gap,
+            send=self.outbox.put, timeout=timeout, attempts=attempts, eeprom_gap=gap,
             polling=None if quarantine is None else Polling(quarantine))
         self.results: list[object] = []
 
-    def sent(self) -> list[str]:
-        return [f'{frame.identifier}{"?" if frame.data[:1] == b"?" else "!"}'
-                for frame in self.channel.take_frames()]
+    def sent(self, now: float | None = None) -> list[str]:
+        """Return what leaves; ``now``: when, if the bus was busy."""
+        found = []
+        while frames := self.outbox.take():
+            found += [f'{frame.identifier}{"?" if frame.data[:1] == b"?" else "!"}'
+                      for frame in frames]
+            self.outbox.left(self.channel.now if now is None else now)
+        return found
 
     def reads(self, *numbers: int, lane: Lane = Lane.OWN, now: float = 1.0) -> list[str]:
         self.channel.run(self.reading(numbers), self.results.append, now, lane)
@@ -114,8 +125,8 @@ def test_write_first_overtakes_and_replaces() -> None:
     line = Line()
     done: list[str] = []
     line.reads(1, 2, lane=Lane.USERS)
-    line.channel.write_first(Write(52, (1,), False), lambda: done.append('one'), 1.01)
-    line.channel.write_first(Write(53, (0,), False), lambda: done.append('two'), 1.02)
+    line.channel.write_first(Write(52, (1,), False), lambda *_: done.append('one'), 1.01)
+    line.channel.write_first(Write(53, (0,), False), lambda *_: done.append('two'), 1.02)
     assert line.sent() == []
     assert line.answer(0, 1.03) == ['53!']
     assert done == ['two']
@@ -125,30 +136,76 @@ def test_write_first_overtakes_and_replaces() -> None:
 def test_write_first_waits_for_its_eeprom() -> None:
     line = Line()
     line.writes((30, True))
-    line.channel.write_first(Write(52, (1,), True), lambda: None, 1.001)
+    line.channel.write_first(Write(52, (1,), True), nobody, 1.001)
     assert line.channel.next_timer() == pytest.approx(1.02)
     assert line.at(1.0199) == []
     assert line.at(1.0201) == ['52!']
 
 
-def test_write_at_once_asks_only_the_eeprom() -> None:
+def test_what_stops_a_drive_waits_for_spacing_only() -> None:
+    line = Line()
+    assert line.reads(1) == ['1?']          # not answered yet
+    line.channel.hold(5.0)
+    line.channel.write_now(Write(52, (0,), False), nobody, 1.01)
+    line.channel.write_now(Write(50, (0,), False), nobody, 1.01)
+    assert line.sent() == ['52!']
+    assert line.channel.next_timer() == pytest.approx(1.011)
+    assert line.at(1.0111) == ['50!']
+    assert line.channel.outstanding is not None
+
+
+@pytest.mark.parametrize('gap, left_at', [(0.02, 1.02), (60.0, 1.03)])
+def test_what_stops_a_drive_waits_for_its_eeprom_but_not_for_long(
+        gap: float, left_at: float) -> None:
+    line = Line(gap=gap)
+    line.writes((30, True))
+    line.channel.write_now(Write(52, (0,), True), nobody, 1.005)
+    assert line.at(left_at - 0.0001) == []
+    assert line.at(left_at + 0.0001) == ['52!']
+
+
+def test_what_stops_a_drive_makes_a_word_that_waits_outdated() -> None:
     line = Line()
     assert line.reads(1) == ['1?']
-    line.channel.hold(5.0)
-    assert line.channel.write_at_once(Write(52, (0,), False), 1.01)
+    line.channel.write_first(Write(52, (1,), False), nobody, 1.001)
+    line.channel.write_now(Write(52, (0,), False), nobody, 1.002)
     assert line.sent() == ['52!']
-    assert line.channel.write_at_once(Write(52, (0,), True), 1.01)
-    assert line.channel.eeprom_free_at == pytest.approx(1.03)
-    assert not line.channel.write_at_once(Write(52, (0,), True), 1.02)
-    assert line.channel.write_at_once(Write(52, (0,), False), 1.02)
-    assert line.sent() == ['52!', '52!']
+    assert line.answer(0, 1.01) == []
+
+
+def test_the_confirmation_of_a_stop_goes_before_everything_and_is_not_held() -> None:
+    line = Line()
+    line.channel.hold(5.0)
+    line.reads(1, lane=Lane.USERS)
+    line.reads(2)
+    assert line.reads(3, lane=Lane.STOP) == ['3?']
+    assert line.answer(7, 1.01) == []
+    assert line.results == [[(7,)]]
+
+
+def test_write_that_the_bus_refuses_was_not_sent() -> None:
+    line = Line()
+    found: list[object] = []
+
+    def writing() -> Procedure:
+        found.append((yield Write(30, (1,), eeprom=False)))
+        found.append((yield Write(31, (1,), eeprom=False)))
+    line.channel.run(writing(), found.append, 1.0)
+    assert [frame.identifier for frame in line.outbox.take()] == [30]
+    line.outbox.left(1.0, refused={0})
+    assert [frame.identifier for frame in line.outbox.take()] == []    # the spacing
+    line.channel.advance(1.001)
+    assert [frame.identifier for frame in line.outbox.take()] == [31]
+    line.outbox.left(1.001)
+    assert found == [None, (), None]
 
 
 def test_what_is_sent_called_back_may_write_again() -> None:
     line = Line()
 
-    def again() -> None:
-        line.channel.write_first(Write(53, (0,), False), lambda: None, line.channel.now)
+    def again(sent: bool, now: float) -> None:
+        assert sent
+        line.channel.write_first(Write(53, (0,), False), nobody, now)
 
     line.channel.write_first(Write(52, (0,), False), again, 1.0)
     assert line.sent() == ['52!']
@@ -198,8 +255,8 @@ def test_two_waiting_users() -> None:
 
 def test_the_pause_of_the_eeprom_begins_when_the_write_has_left() -> None:
     line = Line()
-    line.writes((30, True), now=1.0)
-    line.channel.frames_left(1.009)  # the bus was busy
+    line.channel.run(line.writing(((30, True),)), line.results.append, 1.0)
+    assert line.sent(1.009) == ['30!']  # the bus was busy
     assert line.reads(30, now=1.02) == []
     assert line.channel.next_timer() == pytest.approx(1.029)
 
@@ -235,9 +292,9 @@ def test_users_are_owed_a_step_after_each_round() -> None:
 def test_writes_that_go_first_do_not_wait_for_answers() -> None:
     line = Line(quarantine=0.1)
     line.reads(1)
-    line.channel.write_first(Write(52, (1,), False), lambda: None, 1.01)
+    line.channel.write_first(Write(52, (1,), False), nobody, 1.01)
     assert line.sent() == ['52!']
-    line.channel.write_first(Write(52, (0,), False), lambda: None, 1.0105)
+    line.channel.write_first(Write(52, (0,), False), nobody, 1.0105)
     assert line.channel.next_timer() == pytest.approx(1.011)
     assert line.at(1.011) == ['52!']
     assert line.channel.outstanding is not None

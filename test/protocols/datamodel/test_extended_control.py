@@ -15,6 +15,7 @@ import pytest
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import FrameRejected, Noted, StationLost
 from drive_can_bridge.core.session import DriveState
+from drive_can_bridge.core.setpoints import CommandOutcome
 
 READY, ENABLED, FAULT = (
     ANSWER, '103FFFF0#03E800FA00030000', '103FFFF0#03E800FA00080000')
@@ -22,6 +23,7 @@ DISABLE = '00300341#0000000000000000'
 ENABLE = '00300341#0001000000000000'
 QUICK_STOP = '00300341#0002000000000000'
 RESET = '00300341#0080000000000000'
+ASK_WORD = f'00200341#{ZEROS}'
 ASK_STATUS = f'00200D31#{ZEROS}'
 
 
@@ -47,8 +49,53 @@ def at_once(talk: Conversation, now: float, answer: str) -> list[str]:
 
 def test_word_starts_as_disable_and_takes_its_slot() -> None:
     talk = inside(rearm_immediate=True)
-    talk.commands(0, 100.0, 10.003)
-    assert exchange(talk, 10.02) == '003FFFF0#000003E800000000'
+    assert exchange(talk, 10.02) == NEUTRAL
+    talk.asks(ControlAction.ENABLE, 10.023)
+    exchange(talk, 10.04, READY)
+    exchange(talk, 10.06, ENABLED)
+    talk.commands(0, 100.0, 10.063)
+    assert exchange(talk, 10.08, ENABLED) == '003FFFF0#000103E800000000'
+
+
+def test_commands_before_it_is_enabled_do_not_count() -> None:
+    talk = inside(rearm_immediate=True)
+    assert talk.session.state is DriveState.DISABLED
+    assert talk.commands(0, 100.0, 10.003) is CommandOutcome.DISABLED
+    assert exchange(talk, 10.02, READY) == NEUTRAL
+    talk.asks(ControlAction.ENABLE, 10.023)
+    assert talk.commands(0, 100.0, 10.03) is CommandOutcome.DISABLED
+    assert exchange(talk, 10.04, READY) == '003FFFF0#0001000000000000'
+    # enable was sent, but the drive does not say yet that it is enabled
+    assert talk.commands(0, 100.0, 10.05) is CommandOutcome.DISABLED
+    assert exchange(talk, 10.06, ENABLED) == '003FFFF0#0001000000000000'
+    assert talk.session.state is DriveState.NOT_ARMED
+    assert exchange(talk, 10.08, ENABLED) == '003FFFF0#0001000000000000'    # nothing was kept
+
+
+@pytest.mark.parametrize('action, word', [
+    (ControlAction.DISABLE, '0000'), (ControlAction.QUICK_STOP, '0002')])
+def test_any_other_word_disarms(action: ControlAction, word: str) -> None:
+    talk = inside(rearm_immediate=True)
+    talk.asks(ControlAction.ENABLE, 10.003)
+    exchange(talk, 10.02, READY)
+    exchange(talk, 10.04, ENABLED)
+    talk.commands(0, 100.0, 10.05)
+    assert exchange(talk, 10.06, ENABLED) == '003FFFF0#000103E800000000'
+    talk.asks(action, 10.07)
+    assert talk.commands(0, 100.0, 10.071) is CommandOutcome.DISABLED
+    assert exchange(talk, 10.08, ENABLED) == f'003FFFF0#{word}000000000000'
+
+
+def test_stop_brings_the_cycle_forward() -> None:
+    talk = inside(period=0.5)
+    talk.asks(ControlAction.ENABLE, 10.003)
+    exchange(talk, 10.5, READY)
+    exchange(talk, 11.0, ENABLED)
+    talk.asks(ControlAction.DISABLE, 11.003)
+    assert talk.until(11.1) == [(11.005, NEUTRAL)]      # 5 ms after the last one
+    talk.hears(READY, 11.006)
+    assert talk.control_outcomes()[-1] == ('disable', True, 'ready')
+    assert talk.until(11.6) == [(11.505, NEUTRAL)]
 
 
 def test_enable_in_the_cycle() -> None:
@@ -66,10 +113,12 @@ def test_enable_in_the_cycle() -> None:
 def test_slot_in_the_middle() -> None:
     talk = online(control=CONTROL, request=(SPEED, WORD, LIMIT), mapping='assume',
                   rearm_immediate=True)
-    talk.commands(0, 100.0, 10.003)
-    talk.commands(1, 50.0, 10.003)
     talk.asks(ControlAction.ENABLE, 10.003)
-    assert exchange(talk, 10.02, READY) == '003FFFF0#03E8000101F40000'
+    assert exchange(talk, 10.02, READY) == '003FFFF0#0000000100000000'
+    exchange(talk, 10.04, ENABLED)
+    talk.commands(0, 100.0, 10.043)
+    talk.commands(1, 50.0, 10.043)
+    assert exchange(talk, 10.06, ENABLED) == '003FFFF0#03E8000101F40000'
 
 
 def test_word_with_its_top_bit_set_in_a_signed_parameter() -> None:
@@ -229,15 +278,18 @@ def test_disable_that_gets_lost_when_a_drive_comes_back_is_written_again() -> No
     assert talk.session.state is DriveState.OFFLINE
     talk.events()
     assert talk.hears(ENABLED, 10.162) == [DISABLE]                # lost
-    written = cycles(talk, 9, 200, ENABLED)
-    assert {text for _, text in written} == {DISABLE}
-    # 0.2, 0.4, 0.8, 1.6 s: less and less often
-    assert [number for number, _ in written] == [18, 38, 78, 158]
+    sent = cycles(talk, 9, 200, ENABLED)
+    # it was told to run, so that it is told to stop and asked for its word, three times at most
+    assert [text for number, text in sent if number < 30].count(ASK_WORD) <= 3
+    written = [number for number, text in sent if text == DISABLE]
+    # and as long as it goes on running: less and less often
+    assert written[-2:] == [78, 158]
     assert talk.session.control is not None
     text = ('still enabled (status word 0003h) although its control word is disable (0000h): stop '
             'it by other means, or set a control_timeout longer than its ramp')
     assert talk.session.control.disregard == text
-    assert [note.text for note in talk.events(Noted)] == [text]
+    assert [note.text for note in talk.events(Noted)] == [
+        'told to stop, but control_word (P52): no answer: it may still be running', text]
     assert cycles(talk, 201, 400, READY) == []
     assert talk.session.control.disregard == ''
 
@@ -270,7 +322,7 @@ def test_word_that_is_outdated_is_not_sent() -> None:
     exchange(talk, 10.02)
     talk.until(10.04 + TICK)
     assert talk.asks(ControlAction.ENABLE, 10.041) == []
-    assert talk.asks(ControlAction.DISABLE, 10.0415) == []
+    assert talk.asks(ControlAction.DISABLE, 10.0415) == [DISABLE]   # it waits for nobody
     assert ENABLE not in talk.hears(READY, 10.042)
     assert all(text != ENABLE for _, text in talk.until(10.2))
 
@@ -280,23 +332,16 @@ def test_stop_goes_before_everything_that_waits() -> None:
     for _ in range(20):
         talk.submits(read(GAIN), 10.1)
     talk.submits(write((RAMP, 5), (DAMPING, 6)), 10.1)
-    assert talk.asks(ControlAction.QUICK_STOP, 10.101) == []
-    assert talk.hears('10200281#0001000000000000', 10.102) == [QUICK_STOP]
-    # neither does an answer that does not come hold it up for longer than one attempt
-    talk.until(10.11)
-    talk.asks(ControlAction.DISABLE, 10.12)
-    found = talk.until(10.25)
-    assert found[0][1] == DISABLE
-    assert found[0][0] <= 10.203 + TICK
+    # not even for the answer to a read
+    assert talk.asks(ControlAction.QUICK_STOP, 10.101) == [QUICK_STOP]
+    assert talk.asks(ControlAction.DISABLE, 10.12) == [DISABLE]
 
 
 def test_stop_of_a_drive_whose_user_request_is_unanswered_and_long() -> None:
     talk = beside(period=10.0, parameter_retries=9)
     exchanged = [parameter(f'r{number}', number) for number in range(300, 320, 2)]
     talk.submits(read(*exchanged), 10.1)
-    talk.asks(ControlAction.QUICK_STOP, 10.11)
-    found = talk.until(10.21)
-    assert QUICK_STOP in [text for _, text in found]
+    assert talk.asks(ControlAction.QUICK_STOP, 10.11) == [QUICK_STOP]
 
 
 def test_word_does_not_wait_for_the_eeprom() -> None:
@@ -322,7 +367,9 @@ def test_loss_writes_disable() -> None:
         talk.until(10.0 + 0.02 * cycle + TICK)
         talk.hears(answer, 10.002 + 0.02 * cycle)
     found = talk.until(10.16)
-    assert [text for _, text in found] == [NEUTRAL] * 3 + [NEUTRAL, DISABLE] + [NEUTRAL]
+    # disable at once when it is lost, and read back
+    assert [text for _, text in found if text != ASK_WORD] == (
+        [NEUTRAL] * 3 + [DISABLE, NEUTRAL, DISABLE, NEUTRAL])
     assert talk.events(StationLost) == [StationLost('no cyclic response for 3 cycles')]
 
 

@@ -417,12 +417,16 @@ def test_lost_time_starts_over() -> None:
     talk.commands(0, 20.0, 10.003)
     assert exchange(talk, 10.02) == '003FFFF0#00C8000000000000'
     talk.events()
-    assert talk.time_lost(15.0) == [ASK_REQUEST_MAP]
+    # it was told to run: nobody knows its maps any more, so it is stopped by number
+    assert talk.time_lost(15.0) == ['00300321#0000000000000000']
+    assert talk.until(15.0021) == [
+        (15.001, '00300331#0000000000000000'), (15.002, '00200321#0000000000000000')]
     assert talk.events() == [StationLost('the bridge stood still')]
-    assert talk.at(15.0) == []
-    checked(talk, 15.0)
-    assert talk.at(15.002) == [NEUTRAL]
-    talk.hears(ANSWER, 15.004)
+    assert talk.hears('10200321#0000000000000000', 15.003) == ['00200331#0000000000000000']
+    assert talk.hears('10200331#0000000000000000', 15.004) == [ASK_REQUEST_MAP]
+    checked(talk, 15.004)
+    assert talk.at(15.006) == [NEUTRAL]
+    talk.hears(ANSWER, 15.008)
     assert talk.session.state is DriveState.NOT_ARMED
 
 

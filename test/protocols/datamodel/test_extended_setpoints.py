@@ -2,13 +2,17 @@
 """Conversations about setpoints: neutral until armed, fresh or neutral, refused, not bent."""
 
 import math
+from typing import Any
 
-from builders import CONTROL, Conversation, drive, FLAG, parameter, SPEED, WORD
+from builders import (
+    BOOL, CONTROL, Conversation, drive, FLAG, INT16, parameter, RAM, SPEED, WORD,
+)
 from extended_builders import ANSWER, checked, exchange, NEUTRAL, online, TICK
 import pytest
 
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.events import SetpointsExpired
+from drive_can_bridge.core.parameters import Value
 from drive_can_bridge.core.session import DriveState
 from drive_can_bridge.core.setpoints import CommandOutcome
 
@@ -32,9 +36,26 @@ def test_neutral_that_is_not_zero() -> None:
     talk = online(request=(parameter('level', 60, neutral=50.0),), mapping='assume')
     assert exchange(talk, 10.02) == '003FFFF0#0032000000000000'
     assert talk.commands(0, 0, 10.03) is NOT_ARMED
-    assert talk.commands(0, 52, 10.03) is NOT_ARMED
-    assert talk.commands(0, 51, 10.03) is ARMED
+    assert talk.commands(0, 51, 10.03) is NOT_ARMED     # an integer arms exactly
+    assert talk.commands(0, 50, 10.03) is ARMED
+    assert talk.commands(0, 51, 10.03) is ACCEPTED
     assert exchange(talk, 10.04) == '003FFFF0#0033000000000000'
+
+
+@pytest.mark.parametrize('options, value, outcome', [
+    # true and 1 may be "run"
+    ({'type': BOOL}, True, NOT_ARMED), ({'type': BOOL}, False, ARMED),
+    ({}, 1, NOT_ARMED), ({}, 0, ARMED),
+    # within one raw step, compared as values and not after rounding
+    ({'scale': 10.0}, 14.9, NOT_ARMED), ({'scale': 10.0}, 10.0, ARMED),
+    ({'scale': 10.0}, 10.1, NOT_ARMED), ({'scale': -10.0, 'type': INT16}, 10.0, ARMED),
+    ({'scale': 0.1, 'neutral': 1.0}, 1.1, ARMED), ({'scale': 0.1, 'neutral': 1.0}, 1.2, NOT_ARMED),
+    ({'scale': 0.1, 'offset': -5.0, 'type': INT16}, 0.0, NOT_ARMED),
+    ({'scale': 0.1, 'offset': -5.0, 'type': INT16}, -5.0, ARMED),
+])
+def test_what_arms(options: dict[str, Any], value: Value, outcome: CommandOutcome) -> None:
+    talk = online(request=(parameter('level', 60, storage=RAM, **options),), mapping='assume')
+    assert talk.commands(0, value, 10.003) is outcome
 
 
 def test_immediate() -> None:
@@ -213,5 +234,4 @@ def test_reconnection_disarms() -> None:
 def test_control_word_is_no_setpoint() -> None:
     talk = online(request=(WORD, SPEED), control=CONTROL, mapping='assume', rearm_immediate=True)
     assert [item.parameter.name for item in talk.session.setpoints.items] == ['speed_setpoint']
-    talk.commands(0, 100.0, 10.003)
-    assert exchange(talk, 10.02) == '003FFFF0#000003E800000000'
+    assert exchange(talk, 10.02) == NEUTRAL

@@ -13,10 +13,11 @@ from extended_builders import (
 import pytest
 
 from drive_can_bridge.core.control import ControlAction
-from drive_can_bridge.core.events import FrameRejected, MappingDiffered, StationLost
+from drive_can_bridge.core.events import FrameRejected, MappingDiffered, Noted, StationLost
 
 DISABLE = '00300341#0000000000000000'
 ENABLE = '00300341#0001000000000000'
+ASK_WORD = '00200341#0000000000000000'
 #: an EEPROM cell is the default where the profile does not say
 SLOW_WORD = parameter('control_word', 52)
 SLOW_TABLE = (*(entry for entry in TABLE if entry.name != 'control_word'), SLOW_WORD)
@@ -82,10 +83,13 @@ def test_long_periods_do_not_make_the_stop_long() -> None:
     silent(talk, 12.0)
 
 
-def test_first_neutral_cycle_keeps_its_distance() -> None:
+@pytest.mark.parametrize('asked, first', [(10.01, 10.01), (10.003, 10.005), (14.98, 14.98)])
+def test_first_neutral_cycle_is_brought_forward(asked: float, first: float) -> None:
+    # not under 5 ms after the last one
     talk = online(period=5.0)
-    talk.deactivate(10.01)
-    assert talk.until(12.0) == [(10.1, NEUTRAL), (10.2, NEUTRAL), (10.3, NEUTRAL)]
+    talk.deactivate(asked)
+    assert talk.until(16.0) == [
+        (first, NEUTRAL), (round(first + 0.1, 6), NEUTRAL), (round(first + 0.2, 6), NEUTRAL)]
 
 
 def test_drive_that_never_answered_is_stopped_too() -> None:
@@ -140,7 +144,7 @@ def test_no_look_at_the_maps_while_stopping() -> None:
         exchange(talk, 10.0 + 0.1 * cycle)
     talk.deactivate(10.95)
     # a look was due at 11.0; what it might find must not keep the session from its end
-    assert talk.until(12.0) == [(11.0, NEUTRAL), (11.1, NEUTRAL), (11.2, NEUTRAL)]
+    assert talk.until(12.0) == [(10.95, NEUTRAL), (11.05, NEUTRAL), (11.15, NEUTRAL)]
     silent(talk, 12.0)
 
 
@@ -152,7 +156,7 @@ def test_look_that_is_under_way_when_the_stop_begins() -> None:
     assert talk.hears(ANSWER, 11.001) == [ASK_REQUEST_MAP]
     talk.deactivate(11.002)
     assert talk.hears('102007A4#0000000000000000', 11.003) == []
-    assert talk.until(12.0) == [(11.1, NEUTRAL), (11.2, NEUTRAL), (11.3, NEUTRAL)]
+    assert talk.until(12.0) == [(11.005, NEUTRAL), (11.105, NEUTRAL), (11.205, NEUTRAL)]
     assert talk.events(MappingDiffered) == []
     silent(talk, 12.0)
 
@@ -201,17 +205,58 @@ def test_disable_goes_with_the_cycles() -> None:
     silent(talk, beat + 6.0)
 
 
-def test_disable_is_written_with_each_of_the_last_cycles() -> None:
+def warnings(talk: Conversation) -> list[str]:
+    return [note.text for note in talk.events(Noted) if note.warning]
+
+
+def written_word() -> tuple[Conversation, float]:
+    """Return an enabled drive whose control word is written, and the time."""
     talk = enabled(mapping='assume')
     beat = talk.session.next_timer()
     talk.until(beat)
     talk.hears('103FFFF0#03E800FA00030000', beat + 0.002)
-    talk.deactivate(beat + 0.05)
-    found = talk.until(beat + 5.0)
-    assert [text for _, text in found] == [NEUTRAL, DISABLE] * 3
-    assert [now for now, _ in found] == pytest.approx(
-        [beat + 0.1, beat + 0.1, beat + 0.2, beat + 0.2, beat + 0.3, beat + 0.3])
-    silent(talk, beat + 6.0)
+    talk.events()
+    return talk, beat + 0.05
+
+
+def test_disable_is_written_at_once_and_read_back() -> None:
+    talk, now = written_word()
+    assert talk.deactivate(now) == [DISABLE]
+    assert [text for _, text in talk.until(now + 0.001 + TICK)] == [NEUTRAL, ASK_WORD]
+    talk.hears('10200341#0000000000000000', now + 0.003)
+    assert [text for _, text in talk.until(now + 5.0)] == [NEUTRAL, NEUTRAL]
+    silent(talk, now + 6.0)
+    assert warnings(talk) == []
+
+
+def test_disable_that_the_drive_does_not_have_is_written_again() -> None:
+    talk, now = written_word()
+    assert talk.deactivate(now) == [DISABLE]
+    talk.until(now + 0.002)
+    found = talk.hears('10200341#0001000000000000', now + 0.003)
+    found += [text for _, text in talk.until(now + 0.0041)]
+    assert found == [DISABLE, ASK_WORD]
+    talk.hears('10200341#0000000000000000', now + 0.005)
+    talk.until(now + 5.0)
+    silent(talk, now + 6.0)
+    assert warnings(talk) == []
+
+
+@pytest.mark.parametrize('answer, text', [
+    ('', 'no answer'), ('10200341#0001000000000000', 'read back 1 instead of 0')])
+def test_disable_that_is_not_confirmed_is_told(answer: str, text: str) -> None:
+    talk, now = written_word()
+    sent = [(now, frame) for frame in talk.deactivate(now)]
+    for step in range(1, 1000):
+        sent += talk.until(now + 0.001 * step)
+        if answer and sent[-1][1] == ASK_WORD:
+            sent += [(now + 0.001 * step, frame)
+                     for frame in talk.hears(answer, now + 0.001 * step)]
+    assert [frame for _, frame in sent if frame != NEUTRAL] == [DISABLE, ASK_WORD] * 3
+    assert sent[-1][0] < now + 0.4
+    silent(talk, now + 6.0)
+    assert warnings(talk) == [
+        f'told to stop, but control_word (P52): {text}: it may still be running']
 
 
 @pytest.mark.parametrize('period, gap', [(0.02, 0.02), (0.005, 0.02), (0.02, 0.1)])
@@ -221,13 +266,13 @@ def test_control_word_in_an_eeprom_keeps_the_pace(period: float, gap: float) -> 
     # at the start disable was written; now the stop comes at once
     first = [text for _, text in talk.until(10.0 + period - TICK)]
     assert first.count(DISABLE) <= 1
-    talk.deactivate(10.0 + period - TICK)
-    found = talk.until(12.0)
+    end = 10.0 + period - TICK
+    found = [(end, text) for text in talk.deactivate(end)] + talk.until(12.0)
     times = [now for now, text in found if text == DISABLE]
-    assert len(times) == 3
-    assert all(b - a >= gap - TICK for a, b in zip(times, times[1:]))
+    assert len(times) == 3     # nobody confirms it
+    assert all(b - a >= min(gap, 0.025) - TICK for a, b in zip(times, times[1:]))
     cycles = [now for now, text in found if text == NEUTRAL]
-    assert len(cycles) >= 3
+    assert len(cycles) == 3
     assert all(b - a >= period - TICK for a, b in zip(cycles, cycles[1:]))
     assert found[-1][0] < 10.5
     silent(talk, 13.0)
@@ -237,7 +282,9 @@ def test_stop_does_not_wait_for_an_eeprom_that_takes_minutes() -> None:
     talk = online(control=CONTROL, table=SLOW_TABLE, mapping='assume', eeprom_write_gap=60.0)
     assert talk.until(10.019) == []
     talk.deactivate(10.019)
-    assert [text for _, text in talk.until(12.0)] == [NEUTRAL] * 3
+    found = [text for now, text in talk.until(12.0)]
+    assert found.count(NEUTRAL) == 3
+    assert found.count(DISABLE) == 3    # nobody confirms it
     silent(talk, 13.0)
 
 

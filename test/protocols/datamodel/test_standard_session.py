@@ -14,7 +14,7 @@ from standard_builders import (
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import (
-    ForeignMasterSeen, FrameRejected, ProcessDataReceived, SetpointsExpired, StationFound,
+    ForeignMasterSeen, FrameRejected, Noted, ProcessDataReceived, SetpointsExpired, StationFound,
     StationLost,
 )
 from drive_can_bridge.core.session import DriveState
@@ -123,24 +123,49 @@ def test_it_comes_back_neutral() -> None:
     talk.until(10.9)
     assert not talk.session.online
     talk.events()
-    sent = talk.until(11.1)
+    talk.until(11.2)            # the stop was told, and not confirmed
+    sent = talk.until(12.0)
     assert {text for _, text in sent} == {ASK}
-    ask = sent[-1][0]
+    ask = 12.0
+    while not talk.at(ask):
+        ask = talk.session.next_timer()
     assert talk.hears(ANSWER, ask + 0.002) == []
     assert talk.session.online
     assert [text for _, text in talk.until(ask + 0.006)] == [SPEED_ZERO, LIMIT_ZERO]
 
 
+ASK_SPEED, ASK_LIMIT = '3F1#0332000100000000', '3F1#0333000100000000'
+MAY_RUN = 'it may still be running'
+
+
+def warnings(talk: Conversation) -> list[str]:
+    return [note.text for note in talk.events(Noted) if note.warning]
+
+
 def test_a_lost_drive_is_told_three_times_to_stand_still() -> None:
-    talk = online(rearm_immediate=True)
+    talk = online(rearm_immediate=True, command_timeout=0.0, refresh_interval=0.0)
     talk.commands(0, 150.0, 10.01)
-    sent = [(when, text) for when, text in talk.until(11.5) if text != ASK]
-    told = [text for _, text in sent]
-    # 150 rpm, and again after refresh_interval unless the command expired before
-    assert told[0] == '3F1#063200DC05000000'
-    lost = told[1:]
-    assert lost[-6:] == [SPEED_ZERO, LIMIT_ZERO] * 3
-    assert '3F1#063200DC05000000' not in lost
+    told = [text for _, text in talk.until(12.0) if text != ASK]
+    assert told == ['3F1#063200DC05000000', *[SPEED_ZERO, LIMIT_ZERO, ASK_SPEED] * 3]
+    assert warnings(talk) == [
+        'told to stop, but speed_setpoint (P50): no answer; torque_limit (P51): no answer: '
+        f'{MAY_RUN}']
+
+
+def test_a_lost_drive_that_says_it_stands_is_told_once() -> None:
+    talk = online(rearm_immediate=True, command_timeout=0.0, refresh_interval=0.0)
+    talk.commands(0, 150.0, 10.01)
+    sent = []
+    while ASK_SPEED not in sent:
+        now = talk.session.next_timer()
+        sent += talk.at(now)
+    assert not talk.session.online
+    talk.hears('7F1#0000000000000000', now + 0.001)
+    assert [text for _, text in talk.until(now + 0.003)] == [ASK_LIMIT]
+    talk.hears('7F1#0000000000000000', now + 0.004)
+    assert {text for _, text in talk.until(now + 5.0)} == {ASK}
+    assert warnings(talk) == []
+    assert not talk.session.told.owed
 
 
 # -- setpoints ------------------------------------------------------------------------------------
@@ -247,10 +272,9 @@ def test_a_second_answer_does_not_meet_the_next_read() -> None:
 def test_quarantine_outlives_a_restart_of_the_exchange() -> None:
     talk = online()
     assert talk.until(10.0205) == [(10.02, ASK)]
-    talk.deactivate(10.03)
-    talk.until(10.1)
+    talk.bus_down(10.03)
     assert talk.session.stopped
-    talk.activate(10.1)
+    talk.bus_up(10.1)
     assert talk.until(10.219) == []
     # what was on its way is no surprise, but nobody's answer
     talk.events()
@@ -437,22 +461,108 @@ def test_mapping_parameters_are_left_alone_here_too() -> None:
 # -- stopping -------------------------------------------------------------------------------------
 
 
-def test_the_stop_writes_neutral_three_times_and_is_silent_then() -> None:
-    talk = online(rearm_immediate=True)
+def moving(**options: object) -> Conversation:
+    """Return a drive that was told 150 rpm, at 10.03 s."""
+    talk = online(rearm_immediate=True, **options)
     talk.commands(0, 150.0, 10.01)
     round_of(talk, 10.02)
-    assert talk.deactivate(10.03) == []
-    sent = talk.until(11.0)
-    assert [text for _, text in sent] == [SPEED_ZERO, LIMIT_ZERO] * 3
-    assert [when for when, _ in sent[::2]] == pytest.approx([10.03, 10.05, 10.07])
+    talk.until(10.03)
+    talk.events()
+    return talk
+
+
+def test_the_stop_writes_neutral_and_reads_it_back() -> None:
+    talk = moving()
+    assert talk.deactivate(10.03) == [SPEED_ZERO]
+    assert talk.until(10.033) == [(10.031, LIMIT_ZERO), (10.032, ASK_SPEED)]
+    talk.hears('7F1#0000000000000000', 10.034)
+    assert talk.until(10.036) == [(10.035, ASK_LIMIT)]
+    assert not talk.session.stopped
+    talk.hears('7F1#0000000000000000', 10.037)
     assert talk.session.stopped
     assert talk.session.next_timer() == math.inf
+    assert warnings(talk) == []
 
 
-def test_a_long_period_does_not_make_a_long_stop() -> None:
-    talk = online(period=1.0)
-    talk.deactivate(10.5)
-    assert [when for when, _ in talk.until(12.0)][::2] == pytest.approx([10.5, 10.6, 10.7])
+def test_a_stop_that_does_not_take_is_repeated_and_told() -> None:
+    talk = moving()
+    sent = talk.deactivate(10.03)
+    for step in range(1, 1000):
+        now = 10.03 + 0.001 * step
+        found = [text for _, text in talk.until(now)]
+        sent += found
+        if ASK_SPEED in found:
+            talk.hears('7F1#DC05000000000000', now)     # still 150 rpm
+        elif ASK_LIMIT in found:
+            talk.hears('7F1#0000000000000000', now)
+    assert sent == [SPEED_ZERO, LIMIT_ZERO, ASK_SPEED, ASK_LIMIT, *[SPEED_ZERO, ASK_SPEED] * 2]
+    assert talk.session.stopped
+    assert warnings(talk) == [
+        f'told to stop, but speed_setpoint (P50): read back 1500 instead of 0: {MAY_RUN}']
+
+
+def test_a_stop_that_nobody_answers_ends_and_is_told() -> None:
+    talk = moving()
+    sent = talk.deactivate(10.03)
+    sent += [text for _, text in talk.until(10.03 + talk.session.longest_stop)]
+    assert sent == [SPEED_ZERO, LIMIT_ZERO, ASK_SPEED] * 3
+    assert talk.session.stopped
+    assert warnings(talk) == [
+        'told to stop, but speed_setpoint (P50): no answer; torque_limit (P51): no answer: '
+        f'{MAY_RUN}']
+
+
+def test_nobody_is_warned_of_a_drive_that_was_never_told_to_run() -> None:
+    talk = online()
+    talk.deactivate(10.03)
+    talk.until(11.0)
+    assert talk.session.stopped
+    assert warnings(talk) == []
+
+
+def test_a_bus_that_comes_back_stops_what_was_running() -> None:
+    talk = moving()
+    assert talk.bus_down(10.03) == []
+    assert warnings(talk) == [f'the bus was lost before it could be told to stop: {MAY_RUN}']
+    assert talk.bus_up(12.0) == [SPEED_ZERO]
+    assert [text for _, text in talk.until(12.0025)] == [LIMIT_ZERO, ASK_SPEED]
+
+
+def test_the_end_while_the_bus_is_lost_is_told() -> None:
+    talk = moving()
+    talk.bus_down(10.03)
+    talk.events()
+    assert talk.deactivate(10.04) == []
+    assert talk.session.stopped
+    assert warnings(talk) == [f'could not be told to stop: {MAY_RUN}']
+
+
+def test_a_stop_while_the_stop_after_a_stall_is_under_way() -> None:
+    talk = moving()
+    assert talk.time_lost(12.0) == [SPEED_ZERO]
+    assert talk.deactivate(12.0005) == []
+    assert talk.until(12.004) == [
+        (12.001, SPEED_ZERO), (12.002, LIMIT_ZERO), (12.003, ASK_SPEED)]
+
+
+def test_a_setpoint_that_the_bus_refused_is_written_again() -> None:
+    talk = moving(refresh_interval=0.0, command_timeout=0.0)
+    talk.refusing = lambda text: text == SPEED_ZERO
+    talk.commands(0, 0.0, 10.031)
+    round_of(talk, 10.04)
+    assert talk.session.told.owed
+    talk.refusing = lambda text: False
+    assert round_of(talk, 10.06) == [SPEED_ZERO]
+    assert not talk.session.told.owed
+    assert round_of(talk, 10.08) == []
+
+
+def test_unacknowledged_write_that_the_bus_refused_was_not_sent() -> None:
+    talk = online(verify_writes=False)
+    talk.refusing = lambda text: text.startswith('3F1#0628')
+    talk.submits(write((GAIN, 7), (DAMPING, 8)), 10.005)
+    talk.until(10.01)
+    assert talk.outcomes() == [['not sent: the bus takes no frames'] * 2]
 
 
 def test_a_drive_that_never_answered_gets_nothing_at_the_stop() -> None:
@@ -466,13 +576,13 @@ def test_a_process_that_stood_still_sends_nothing_stale() -> None:
     talk = online(rearm_immediate=True)
     talk.commands(0, 150.0, 10.01)
     assert talk.until(10.0225)[-1] == (10.021, ASK)
-    assert talk.time_lost(15.0) == []
+    assert talk.time_lost(15.0) == [SPEED_ZERO]
     # the answer to the last read lay in a buffer all the while
     talk.hears(ANSWER, 15.0)
     assert talk.events(ProcessDataReceived) == []
     sent = [text for _, text in talk.until(15.1)]
     assert '3F1#063200DC05000000' not in sent
-    assert sent.count(SPEED_ZERO) == 3
+    assert sent[0] == LIMIT_ZERO
 
 
 def test_a_parameter_that_nobody_has_is_named() -> None:
@@ -573,10 +683,53 @@ def test_the_stop_disables() -> None:
     round_of(talk, 10.02, READY)
     talk.until(10.03)
     round_of(talk, 10.04, ENABLED)
-    talk.deactivate(10.05)
+    assert talk.deactivate(10.05) == [DISABLE_WORD]
     sent = [text for _, text in talk.until(11.0)]
-    assert sent == [SPEED_ZERO, DISABLE_WORD] * 3
+    assert sent[:2] == [SPEED_ZERO, '3F1#0334000100000000']
+    assert sent.count(SPEED_ZERO) == 3
     assert talk.session.stopped
+
+
+def test_commands_are_taken_while_it_is_enabled_only() -> None:
+    talk = controlled(rearm_immediate=True)
+    assert talk.session.state is DriveState.DISABLED
+    assert talk.commands(0, 150.0, 10.005) is CommandOutcome.DISABLED
+    talk.asks(ControlAction.ENABLE, 10.01)
+    assert talk.commands(0, 150.0, 10.011) is CommandOutcome.DISABLED
+    round_of(talk, 10.02, READY)
+    assert ENABLE_WORD in [text for _, text in talk.until(10.03)]
+    assert talk.commands(0, 150.0, 10.031) is CommandOutcome.DISABLED
+    round_of(talk, 10.04, ENABLED)
+    assert talk.session.state is DriveState.NOT_ARMED
+    assert talk.commands(0, 150.0, 10.045) is CommandOutcome.ARMED
+    assert '3F1#063200DC05000000' in round_of(talk, 10.06, ENABLED)
+    talk.asks(ControlAction.DISABLE, 10.065)
+    assert talk.commands(0, 150.0, 10.066) is CommandOutcome.DISABLED
+    assert SPEED_ZERO in round_of(talk, 10.08, ENABLED)
+
+
+def test_enable_is_not_repeated_before_the_status_was_read() -> None:
+    """A restart that nobody saw: one read goes unanswered, the device has forgotten its word."""
+    talk = controlled(refresh_interval=0.1)
+    talk.asks(ControlAction.ENABLE, 10.01)
+    round_of(talk, 10.02, READY)
+    talk.until(10.03)
+    round_of(talk, 10.04, ENABLED)
+    assert talk.control_outcomes() == [('enable', True, 'enabled')]
+    sent = []
+    for begin in (10.06, 10.08, 10.1):
+        sent += round_of(talk, begin, ENABLED)
+    assert ENABLE_WORD not in sent
+    talk.until(10.3)                # nobody answers the round of 10.12; the word is due since
+    assert talk.session.online
+    now = 10.32
+    sent = [text for _, text in talk.until(now + 0.0055)]
+    assert ASK in sent
+    assert ENABLE_WORD not in sent
+    found = talk.hears(READY, now + 0.006)      # not enabled any more
+    found += [text for _, text in talk.until(now + 0.1)]
+    assert DISABLE_WORD in found
+    assert ENABLE_WORD not in found
 
 
 # -- configuration --------------------------------------------------------------------------------

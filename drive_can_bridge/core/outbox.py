@@ -1,0 +1,60 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+Frames on their way out, and who wants to know whether they left.
+
+A bus may refuse a frame. What was refused was not sent: it is no stop cycle, no control word, no
+write. So nothing counts when a frame is made, but when whoever drives the session says what became
+of it:
+
+.. code-block:: python
+
+    frames = session.take_frames()
+    session.frames_left(now, refused={place for place, frame in ... if not sent})
+"""
+
+from collections.abc import Callable, Collection
+
+from drive_can_bridge.core.frame import Frame
+
+#: takes (the bus took it, now)
+Left = Callable[[bool, float], None]
+
+
+class Outbox:
+    """The frames of one session, in order."""
+
+    __slots__ = ('_frames', '_leaving', '_left')
+
+    def __init__(self) -> None:
+        self._frames: list[Frame] = []
+        self._left: list[Left | None] = []
+        self._leaving: list[Left | None] = []
+
+    def put(self, frame: Frame, left: Left | None = None) -> None:
+        """Have a frame sent now; ``left`` is told what became of it."""
+        self._frames.append(frame)
+        self._left.append(left)
+
+    def take(self) -> list[Frame]:
+        """Return the frames to be sent now, in order."""
+        frames = self._frames
+        if frames:
+            self._leaving += self._left
+            self._frames, self._left = [], []
+        return frames
+
+    def left(self, now: float, refused: Collection[int] = ()) -> None:
+        """
+        Tell everybody what became of the frames last taken.
+
+        :param refused: places, in the list last taken, of what the bus did not take.
+        """
+        leaving, self._leaving = self._leaving, []
+        for place, left in enumerate(leaving):
+            if left is not None:
+                left(place not in refused, now)
+
+    def clear(self) -> None:
+        """Forget frames that nobody has fetched; whoever made them is about to forget, too."""
+        self._frames.clear()
+        self._left.clear()

@@ -1,0 +1,48 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+What a drive was told: may it be running by our word?
+
+Whatever was told to run is told to stop. A session notes here each frame that the bus has taken;
+whenever it cannot go on as before (a stall, a lost bus, maps that differ, the end), it looks here
+whether it still owes the drive a stop.
+"""
+
+from collections.abc import Hashable
+
+MAY_RUN = 'it may still be running'
+
+
+class Told:
+    """
+    What the last word to a drive was, for everything that it is told separately.
+
+    :ivar owed: it was told to run by at least one of them, and not to stop since.
+    """
+
+    __slots__ = ('_running', 'owed')
+
+    def __init__(self) -> None:
+        self._running: set[Hashable] = set()
+        self.owed = False
+
+    def runs(self, what: Hashable) -> bool:
+        """Tell whether one of them was told to run, and not to stop since."""
+        return what in self._running
+
+    def note(self, what: Hashable, *, runs: bool) -> None:
+        """
+        Take note of a frame that has left.
+
+        :param what: which of the things that travel separately: the cyclic frame, one setpoint.
+        :param runs: it holds anything but neutral and ``disable``.
+        """
+        if runs:
+            self._running.add(what)
+        else:
+            self._running.discard(what)
+        self.owed = bool(self._running)
+
+    def stopped(self) -> None:
+        """Take note that the drive has confirmed to have nothing but neutral and ``disable``."""
+        self._running.clear()
+        self.owed = False

@@ -1,0 +1,103 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+Stop a drive by acyclic writes: ``disable`` and neutral by parameter number, which no map misroutes.
+
+The writes go at once, whatever is under way and wherever the drive keeps the values. Nobody
+acknowledges them, so each is read back, and written again where that does not bring what it should.
+"""
+
+from collections.abc import Callable, Generator, Sequence
+from typing import NamedTuple
+
+from drive_can_bridge.core.parameters import Parameter, Storage
+from drive_can_bridge.protocols.datamodel.channel import (
+    AcyclicChannel, Lane, Read, Step, Words, Write,
+)
+
+#: how often everything is written at most
+ATTEMPTS = 3
+#: s that an answer is waited for at most
+ANSWER_TIME = 0.1
+
+
+class StopWrite(NamedTuple):
+    """
+    What makes a drive stand still.
+
+    :param number: of the parameter, on the wire.
+    """
+
+    parameter: Parameter
+    number: int
+    raw: int
+
+    @property
+    def write(self) -> Write:
+        """The step."""
+        return Write(self.number, (self.parameter.word_from_raw(self.raw),),
+                     self.parameter.storage is not Storage.RAM)
+
+    @property
+    def name(self) -> str:
+        """What is written, for people."""
+        return f'{self.parameter.name} ({self.parameter.address})'
+
+
+class SafeStop:
+    """
+    The acyclic stop of one drive.
+
+    :param ended: takes what failed, in words; nothing: the drive has confirmed it all.
+    :ivar running: it is under way.
+    """
+
+    def __init__(self, channel: AcyclicChannel, ended: Callable[[list[str]], None]) -> None:
+        self.running = False
+        self._channel = channel
+        self._ended = ended
+
+    def begin(self, writes: Sequence[StopWrite], now: float) -> None:
+        """Write everything now, and read it back. One that is under way goes on as it is."""
+        if self.running:
+            return
+        self.running = True
+        for each in writes:
+            self._channel.write_now(each.write, lambda sent, then: None, now)
+        self._channel.run(_confirm(writes, min(self._channel.timeout, ANSWER_TIME)), self._done,
+                          now, Lane.STOP)
+
+    def forget(self) -> None:
+        """Take note that the channel was cleared."""
+        self.running = False
+
+    def _done(self, failed: list[str]) -> None:
+        self.running = False
+        self._ended(failed)
+
+
+def _confirm(writes: Sequence[StopWrite], timeout: float,
+             ) -> Generator[Step, Words | None, list[str]]:
+    """Read back what was written, and write it again as needed; return what failed, in words."""
+    blind = [each for each in writes if not each.parameter.readable]
+    wrong = [each for each in writes if each.parameter.readable]
+    failed: list[str] = []
+    for attempt in range(ATTEMPTS):
+        for each in (*blind, *wrong) if attempt else ():
+            yield each.write
+        doubtful, failed, silent = wrong, [], False
+        wrong = []
+        for each in doubtful:
+            reply = None if silent else (yield Read(
+                each.number, attempts=1, late_will_do=True, timeout=timeout))
+            silent = reply is None
+            if reply is None:
+                failed.append(f'{each.name}: no answer')
+            elif reply[0] != each.write.words[0]:
+                failed.append(f'{each.name}: read back {reply[0]} instead of '
+                              f'{each.write.words[0]}')
+            else:
+                continue
+            wrong.append(each)
+        if not wrong and not blind:
+            break
+    return failed

@@ -1,0 +1,469 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Whatever was told to run is told to stop, soon, and by frames that really left."""
+
+from dataclasses import replace
+import math
+from typing import Any
+
+from builders import BOOL, Conversation, parameter, RAM, read, write
+from pkw_builders import (
+    ANSWER_0, ANSWER_1, BOOT_UP, CLASS, CONTROL, DISABLE_0, DISABLE_1, DISABLED_0, DISABLED_1,
+    driven, ENABLE_0, ENABLED_0, FLC, IDLE, IDLE_ANSWER, online, OPERATIONAL, PRE_OPERATIONAL,
+    READ_0, READ_1, ready, running, RUNS_0, RUNS_1, SPEED, SPEED_1, START, STILL_0, STILL_1,
+    STOPPED, TABLE, WORD,
+)
+import pytest
+
+from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.events import Noted
+from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.session import DriveState
+from drive_can_bridge.core.setpoints import CommandOutcome
+
+READ_CLASS_0 = '505#5E02002500000000'
+READ_CLASS_1 = '505#5E0200A500000000'
+CLASS_0 = '485#5E02002507000000'
+CLASS_1 = '485#5E0200A507000000'
+RUNNING_ON = 'it may still be running'
+
+
+def worries(talk: Conversation) -> list[str]:
+    return [note.text for note in talk.events(Noted) if RUNNING_ON in note.text]
+
+
+# -- in every state -------------------------------------------------------------------------------
+
+
+def test_stall() -> None:
+    talk = running()
+    assert talk.time_lost(15.0) == [START, DISABLE_0]
+    assert talk.hears(DISABLED_0, 15.003) == []
+    assert talk.until(15.0501) == [(15.05, READ_1)], 'the answer has synchronised the mailbox'
+    assert worries(talk) == []
+
+
+def test_signal_right_after_a_stall() -> None:
+    talk = running()
+    assert talk.time_lost(15.0) == [START, DISABLE_0]
+    assert talk.deactivate(15.0) == []
+    assert talk.hears(DISABLED_0, 15.003) == [DISABLE_1]
+    assert not talk.session.stopped
+    assert talk.hears(DISABLED_1, 15.006) == []
+    assert talk.session.stopped
+    assert worries(talk) == []
+
+
+def test_signal_that_comes_before_anybody_noticed_the_stall() -> None:
+    talk = running()
+    assert talk.until(10.1101) == [(10.11, READ_0)]
+    assert talk.deactivate(15.0) == [DISABLE_1], 'nobody waits for that answer any more'
+
+
+def test_signal_right_after_the_bus_came_back() -> None:
+    talk = running()
+    assert talk.bus_down(10.1) == []
+    assert worries(talk) == [f'the bus was lost before it could be told to stop: {RUNNING_ON}']
+    assert talk.bus_up(12.0) == [START, DISABLE_0]
+    assert talk.deactivate(12.0) == []
+    assert talk.hears(DISABLED_0, 12.003) == [DISABLE_1]
+    assert talk.hears(DISABLED_1, 12.006) == []
+    assert talk.session.stopped
+    assert worries(talk) == []
+
+
+def test_nobody_answers_after_the_bus_came_back() -> None:
+    talk = running()
+    talk.bus_down(10.1)
+    talk.events()
+    talk.bus_up(12.0)
+    assert talk.deactivate(12.0) == []
+    sent = talk.until(20.0)
+    assert sent == [(12.05, DISABLE_1), (12.183333, DISABLE_0), (12.316667, DISABLE_1)]
+    assert talk.session.stopped
+    assert worries(talk) == [
+        f'told to stop, but control_register_1 0000h not acknowledged in 3 attempts: {RUNNING_ON}']
+
+
+def test_bus_that_comes_back_stops_setpoints_without_control_too() -> None:
+    talk = online(request=(SPEED,), command_timeout=0.0)
+    talk.commands(0, 0.0, 10.06)
+    talk.commands(0, 10.0, 10.06)
+    assert talk.at(10.07) == [SPEED_1]
+    assert talk.bus_down(10.075) == []
+    assert len(worries(talk)) == 1, 'sent, if not answered'
+    assert talk.bus_up(12.0) == [START, STILL_0]
+
+
+def test_end_while_the_bus_is_lost() -> None:
+    talk = running()
+    talk.bus_down(10.1)
+    talk.events()
+    assert talk.deactivate(11.0) == []
+    assert talk.session.stopped
+    assert worries(talk) == [f'could not be told to stop: {RUNNING_ON}']
+
+
+def test_bus_that_is_lost_during_the_stop() -> None:
+    talk = running()
+    assert talk.deactivate(10.1) == [DISABLE_0]
+    talk.bus_down(10.101)
+    assert talk.session.stopped
+    assert len(worries(talk)) == 1
+
+
+@pytest.mark.parametrize('heard', [PRE_OPERATIONAL, STOPPED])
+def test_stop_while_the_heartbeat_holds_rounds_back(heard: str) -> None:
+    """The network module says so; what the motor does is another matter."""
+    talk = running()
+    assert talk.hears(heard, 10.3) == [START, DISABLE_0]
+    assert talk.until(10.319) == []
+    assert talk.deactivate(10.32) == []
+    assert talk.until(10.371) == [(10.37, DISABLE_1)], '50 ms for the answer under way'
+    assert talk.hears(DISABLED_1, 10.38) == []
+    assert talk.session.stopped
+    assert worries(talk) == []
+
+
+def test_nothing_more_to_a_node_that_is_held_back_and_has_stopped() -> None:
+    talk = running()
+    assert talk.hears(PRE_OPERATIONAL, 10.3) == [START, DISABLE_0]
+    assert talk.hears(DISABLED_0, 10.302) == []
+    assert talk.until(11.0) == []
+    assert talk.deactivate(11.0) == []
+    assert talk.session.stopped
+    assert worries(talk) == []
+
+
+def test_held_back_and_silent_is_told() -> None:
+    talk = running()
+    talk.hears(PRE_OPERATIONAL, 10.3)
+    sent = talk.until(11.0)
+    assert sent == [(10.433333, DISABLE_1), (10.566667, DISABLE_0)]
+    assert worries(talk) == [
+        f'told to stop, but control_register_1 0000h not acknowledged in 3 attempts: {RUNNING_ON}']
+
+
+def test_drive_that_was_told_nothing_but_neutral_is_no_worry() -> None:
+    talk = ready()
+    assert talk.time_lost(15.0) == [START]
+    talk.bus_down(15.01)
+    talk.deactivate(16.0)
+    assert worries(talk) == []
+
+
+# -- frames that the bus refuses ------------------------------------------------------------------
+
+
+def refuse(talk: Conversation, part: str = '505#') -> None:
+    talk.refusing = lambda text: part in text
+
+
+def accept(talk: Conversation) -> None:
+    talk.refusing = lambda text: False
+
+
+def test_refused_stop_is_tried_until_the_bus_takes_it() -> None:
+    talk = running()
+    refuse(talk)
+    assert talk.deactivate(10.1) == []
+    assert talk.until(10.135) == []
+    accept(talk)
+    assert talk.until(10.2) == [(10.14, DISABLE_0)], 'every 10 ms'
+    assert not talk.session.stopped
+    assert talk.hears(DISABLED_0, 10.201) == []
+    assert talk.session.stopped
+    assert worries(talk) == []
+
+
+def test_bus_that_takes_no_stop_at_all() -> None:
+    talk = running()
+    refuse(talk)
+    assert talk.deactivate(10.1) == []
+    assert talk.until(11.59) == []
+    assert not talk.session.stopped
+    assert talk.until(11.7) == []
+    assert talk.session.stopped, '0.5 s for each of three attempts'
+    assert worries(talk) == [
+        f'told to stop, but control_register_1 0000h not taken by the bus: {RUNNING_ON}']
+
+
+def test_stop_that_is_given_up() -> None:
+    talk = running()
+    refuse(talk)
+    talk.deactivate(10.1)
+    talk.session.give_up(10.2)
+    assert talk.sent() == []
+    assert talk.session.stopped
+    assert talk.session.next_timer() == math.inf
+    assert worries(talk) == [f'could not be told to stop: {RUNNING_ON}']
+
+
+def test_refused_disable_of_a_user_is_tried_until_the_bus_takes_it() -> None:
+    talk = running()
+    refuse(talk)
+    assert talk.asks(ControlAction.DISABLE, 10.095) == []
+    assert talk.until(10.12) == []
+    accept(talk)
+    assert talk.until(10.126) == [(10.125, DISABLE_0)], 'no beat is waited for'
+    assert talk.hears(DISABLED_0, 10.127) == [READ_1], 'which was due at 10.11'
+    assert talk.hears(ANSWER_1, 10.128) == []
+    assert talk.control_outcomes() == [('disable', True, 'ready')]
+
+
+def test_refused_enable_was_never_told() -> None:
+    talk = ready()
+    refuse(talk)
+    assert talk.asks(ControlAction.ENABLE, 10.075) == []
+    talk.bus_down(10.08)
+    assert worries(talk) == []
+
+
+def test_refused_enable_is_written_with_the_next_round() -> None:
+    talk = ready()
+    refuse(talk)
+    assert talk.asks(ControlAction.ENABLE, 10.075) == []
+    accept(talk)
+    assert talk.until(10.0901) == [(10.09, ENABLE_0)], 'as if nothing had been'
+    assert talk.hears(ENABLED_0, 10.091) == [READ_1]
+    assert talk.hears(RUNS_1, 10.092) == []
+    assert talk.control_outcomes() == [('enable', True, 'enabled')]
+
+
+def test_refused_neutral_at_a_command_time_out_is_written_although_nothing_refreshes() -> None:
+    talk = online(request=(SPEED,), command_timeout=0.05, refresh_interval=0.0)
+    talk.commands(0, 0.0, 10.06)
+    talk.commands(0, 10.0, 10.06)
+    assert talk.at(10.07) == [SPEED_1]
+    assert talk.hears('485#C60200AA00000000', 10.071) == [READ_0]
+    assert talk.hears(ANSWER_0, 10.072) == []
+    refuse(talk, 'C602')
+    assert talk.until(10.0901) == [(10.09, READ_1)]
+    assert talk.hears(ANSWER_1, 10.091) == []
+    assert talk.until(10.1101) == [(10.11, READ_0)]
+    assert talk.hears(ANSWER_0, 10.1111) == [], 'the time-out was at 10.11'
+    assert [text for _, text in talk.until(10.1301)] == [READ_1]
+    assert talk.hears(ANSWER_1, 10.131) == []
+    accept(talk)
+    assert talk.until(10.1501) == [(10.15, STILL_0)]
+    assert talk.hears('485#C602002A00000000', 10.151) == [READ_1]
+    assert worries(talk) == []
+
+
+def test_refused_write_was_not_sent_and_leaves_the_mailbox_in_step() -> None:
+    talk = online()
+    refuse(talk)
+    assert talk.submits(write((FLC, 90)), 10.055) == []
+    assert talk.outcomes() == [['not sent: the bus takes no frames']]
+    accept(talk)
+    assert talk.submits(write((FLC, 91)), 10.056) == ['505#8C02002A5B000000']
+    talk.hears('485#8C02002A00000000', 10.057)
+    assert talk.outcomes() == [['written']]
+
+
+# -- soon -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('action', [ControlAction.DISABLE, ControlAction.QUICK_STOP])
+def test_control_stop_waits_for_the_answer_under_way(action: ControlAction) -> None:
+    talk = running_with_quick_stop()
+    stop = f'505#C00200AA{"0000" if action is ControlAction.DISABLE else "0200"}0000'
+    assert talk.submits(read(CLASS), 10.093) == [READ_CLASS_0]
+    assert talk.asks(action, 10.095) == []
+    assert talk.hears(CLASS_0, 10.1) == [stop]
+    assert talk.outcomes() == [[7]]
+
+
+@pytest.mark.parametrize('action', [ControlAction.DISABLE, ControlAction.QUICK_STOP])
+def test_control_stop_waits_50_ms_at_most(action: ControlAction) -> None:
+    """Function 00h does not go first: its answer might be waited for as well."""
+    talk = running_with_quick_stop()
+    stop = f'505#C00200AA{"0000" if action is ControlAction.DISABLE else "0200"}0000'
+    assert talk.submits(read(CLASS), 10.093) == [READ_CLASS_0]
+    assert talk.asks(action, 10.095) == []
+    assert talk.until(10.16) == [(10.145, stop)]
+    # the round's turn, and then the read again that made room: it was not its fault
+    assert talk.hears('485#C00200AA00000000', 10.161) == [READ_0]
+    assert talk.hears(RUNS_0, 10.162) == [READ_CLASS_1]
+    assert talk.hears(CLASS_1, 10.163) == []
+    assert talk.outcomes() == [[7]]
+
+
+def running_with_quick_stop() -> Conversation:
+    return running(control=replace(CONTROL, quick_stop=0x0002))
+
+
+def test_read_of_the_round_makes_room_too() -> None:
+    talk = running()
+    assert talk.until(10.1101) == [(10.11, READ_0)]
+    assert talk.asks(ControlAction.DISABLE, 10.115) == []
+    assert talk.until(10.17) == [(10.165, DISABLE_1)]
+    assert talk.hears(DISABLED_1, 10.171) == [READ_0]
+    assert talk.hears(ANSWER_0, 10.172) == []
+    assert talk.control_outcomes() == [('disable', True, 'ready')]
+    assert talk.session.statistics.missed == 0
+
+
+def test_disable_goes_before_setpoints_and_neutral_right_behind() -> None:
+    talk = driven()
+    assert talk.session.state is DriveState.ONLINE
+    assert talk.submits(read(CLASS), 10.114) == [READ_CLASS_1]
+    assert talk.asks(ControlAction.DISABLE, 10.115) == []
+    assert talk.hears(CLASS_1, 10.116) == [DISABLE_0]
+    assert talk.hears(DISABLED_0, 10.117) == [STILL_1]
+    assert talk.hears('485#C60200AA00000000', 10.118) == []
+
+
+# -- nothing starts by itself ---------------------------------------------------------------------
+
+
+def test_restart_that_nobody_saw() -> None:
+    """The boot-up frame and one answer got lost; the word is among the cyclic requests."""
+    talk = running(request=(WORD,), refresh_interval=0.05, parameter_timeout=0.05)
+    assert talk.until(10.1101) == [(10.11, READ_0)]
+    assert talk.until(10.1601) == [(10.16, IDLE)], 'no answer; and the refresh is due'
+    assert talk.hears(IDLE_ANSWER, 10.171) == [READ_1], 'the status first'
+    assert talk.hears(ANSWER_1, 10.172) == [DISABLE_0], 'it is off: it stays off'
+    assert talk.hears(DISABLED_0, 10.173) == []
+    assert talk.session.state is DriveState.DISABLED
+    for beat in range(20):
+        now = 10.19 + 0.02 * beat
+        for _, text in talk.until(now + 1e-6):
+            assert text[:16] not in ('505#C002002A0100', '505#C00200AA0100')
+            for more in talk.hears(_answer(text), now + 0.001):
+                talk.hears(_answer(more), now + 0.002)
+
+
+def test_restart_in_the_middle_of_a_refresh() -> None:
+    """Nobody knows whether the word arrived: not even that is a reason to look only there."""
+    talk = running(request=(WORD,), refresh_interval=0.05, parameter_timeout=0.05)
+    assert talk.until(10.1101) == [(10.11, READ_0)]
+    assert talk.hears(RUNS_0, 10.111) == []
+    assert talk.until(10.1301) == [(10.13, READ_1)]
+    assert talk.hears(RUNS_1, 10.131) == [ENABLE_0], 'the refresh: it was seen running'
+    assert talk.until(10.19) == [(10.181, IDLE)]    # no answer; the device has restarted
+    assert talk.hears(IDLE_ANSWER, 10.191) == [READ_1], 'no read-back that would find nothing'
+    assert talk.hears(ANSWER_1, 10.192) == [DISABLE_0]
+
+
+def test_refresh_goes_on_while_the_drive_is_seen_running() -> None:
+    talk = running(request=(WORD,), refresh_interval=0.05)
+    written = []
+    for beat in range(10):
+        now = 10.11 + 0.02 * beat
+        sent = [text for _, text in talk.until(now + 1e-6)]
+        while sent:
+            text = sent.pop()
+            if text[4:8] == 'C002':
+                written.append((beat, text[12:]))
+            sent += talk.hears(_answer(text, 'C320'), now + 0.001)
+    assert written == [(1, '01000000'), (4, '01000000'), (7, '01000000')]
+
+
+def _answer(text: str, status: str = '4100') -> str:
+    reply = text.replace('505#', '485#')
+    return f'{reply[:12]}{status}0000' if text[4:8] == 'C701' else reply
+
+
+# -- nothing jumps --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(('what', 'value', 'arms'), [
+    (WORD, 0, True), (WORD, 1, False),      # LTMR: 704 = 1 is "run forward"
+    (parameter('lamp', 731, type=BOOL, storage=RAM), False, True),
+    (parameter('lamp', 731, type=BOOL, storage=RAM), True, False),
+    (SPEED, 0.1, True), (SPEED, 0.149, False), (SPEED, 0.04, True)])
+def test_what_arms(what: Parameter, value: float, arms: bool) -> None:
+    talk = online(request=(what,), table=(*TABLE, what), command_timeout=0.0)
+    assert talk.commands(0, value, 10.06) is (
+        CommandOutcome.ARMED if arms else CommandOutcome.NOT_ARMED)
+    sent = [text for _, text in talk.until(10.0701)]
+    assert not any(text[10:12] in ('2A', 'AA') and text[12:16] == '0100' for text in sent
+                   ) or value == 0.1
+
+
+@pytest.mark.parametrize('immediate', [False, True])
+def test_what_was_left_standing_does_not_move_it_when_it_is_enabled(immediate: bool) -> None:
+    talk = online(request=(SPEED,), control=CONTROL, rearm_immediate=immediate)
+    for place in range(10):
+        assert talk.commands(0, 10.0, 10.06 + 0.001 * place) is CommandOutcome.DISABLED
+    assert talk.until(10.0701) == [(10.07, READ_0)]
+    assert talk.hears(ANSWER_0, 10.071) == []
+    assert talk.asks(ControlAction.ENABLE, 10.075) == ['505#C00200AA01000000']
+    assert talk.hears(DISABLED_1, 10.076) == []
+    assert talk.commands(0, 10.0, 10.08) is CommandOutcome.DISABLED, 'not seen running yet'
+    assert talk.until(10.0901) == [(10.09, READ_0)]
+    assert talk.hears(RUNS_0, 10.091) == []
+    assert talk.session.state is DriveState.NOT_ARMED
+    assert talk.until(10.1101) == [(10.11, READ_1)], 'no setpoint'
+    assert talk.hears(RUNS_1, 10.111) == []
+    outcome = talk.commands(0, 10.0, 10.12)
+    assert outcome is (CommandOutcome.ARMED if immediate else CommandOutcome.NOT_ARMED)
+
+
+# -- a node in a loop -----------------------------------------------------------------------------
+
+
+def boot_ups(talk: Conversation, begin: float) -> list[tuple[float, str]]:
+    """Let 1,000 boot-up frames arrive in 0.1 s."""
+    sent = []
+    for place in range(1000):
+        now = begin + 0.0001 * place
+        sent += talk.until(now)
+        sent += [(now, text) for text in talk.hears(BOOT_UP, now)]
+    return sent
+
+
+@pytest.mark.parametrize('runs', [False, True])
+def test_boot_up_frames_in_a_flood(runs: bool) -> None:
+    talk: Any = running() if runs else online()
+    now = 10.9
+    talk.events()
+    sent = boot_ups(talk, now) + talk.until(11.9)
+    starts = [when for when, text in sent if text == START]
+    assert starts[:2] == [10.9, pytest.approx(11.0)], 'put off, not left out'
+    assert all(later - sooner > 0.0999 for sooner, later in zip(starts, starts[1:]))
+    stops = [when for when, text in sent if text in (DISABLE_0, DISABLE_1)]
+    assert len(stops) == (3 if runs else 0), 'three attempts, and not three for each frame'
+    notes = [note.text for note in talk.events(Noted) if note.text.startswith('boot-up')]
+    assert notes == ['boot-up: the device has started',
+                     'boot-up: the device has started (999 more)']
+    assert talk.session.facts()['nmt_state'] == 'pre-operational'
+
+
+def test_boot_up_soon_after_a_start_is_answered_when_its_time_has_come() -> None:
+    talk = online()
+    assert talk.hears(BOOT_UP, 11.0) == [START]
+    assert talk.hears(BOOT_UP, 11.03) == []
+    assert talk.until(11.1499) == [(11.1, START)]
+    assert talk.until(11.1501) == [(11.15, IDLE)], 'and then the moment that any start takes'
+
+
+def test_emergencies_in_a_flood() -> None:
+    talk = online()
+    for place in range(1000):
+        talk.hears('085#1023020A00000000' if place % 2 == 0 else '085#0000000000000000',
+                   10.06 + 0.000005 * place)
+    assert len(talk.events(Noted)) == 2
+    end = 11.1
+    while (due := talk.session.next_timer()) < end:
+        for text in talk.at(due):
+            while text:
+                text, *_ = talk.hears(_answer(text), due + 0.0001) or ['']
+    text = 'emergency 2310h (current, output side), error register 02h, manufacturer 0A 00 00 00 00'
+    assert talk.events(Noted) == [
+        Noted(f'{text} (499 more)', warning=True),
+        Noted('emergency over: the node reports no error any more (499 more)')]
+    assert talk.session.facts()['emergency'] == 'none'
+    assert talk.session.online
+    assert talk.hears(OPERATIONAL, 11.11) == []
+
+
+def test_what_was_held_back_is_told_at_the_end() -> None:
+    talk = online(request=(SPEED,))
+    for now in (10.06, 10.061, 10.062):
+        talk.hears(BOOT_UP, now)
+    talk.events()
+    talk.deactivate(10.07)
+    talk.until(20.0)
+    assert Noted('boot-up: the device has started (2 more)') in talk.events(Noted)
+    assert talk.session.next_timer() == math.inf

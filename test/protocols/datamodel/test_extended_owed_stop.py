@@ -1,0 +1,368 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+Whatever was told to run is told to stop, in every state of the conversation.
+
+The drive was told 100 rpm. Then the bridge stands still, the bus goes, the maps change, or the bus
+refuses frames: there is always a frame that stops it, or a warning that it may still be running.
+"""
+
+from collections.abc import Callable
+
+from builders import CONTROL, Conversation, drive, GAIN, parameter, SPEED, WORD, write
+from extended_builders import (
+    ANSWER, ASK_REQUEST_MAP, ASK_RESPONSE_MAP, checked, cycling, exchange, NEUTRAL, online,
+    REQUEST_MAP, RESPONSE_MAP, TICK,
+)
+import pytest
+
+from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.events import Noted
+from drive_can_bridge.core.session import DriveState
+
+RUNNING = '003FFFF0#03E8000000000000'
+#: speed_setpoint (50) and torque_limit (51) by number, and what asks for them
+SPEED_ZERO, LIMIT_ZERO = '00300321#0000000000000000', '00300331#0000000000000000'
+ASK_SPEED, ASK_LIMIT = '00200321#0000000000000000', '00200331#0000000000000000'
+SPEED_IS_ZERO, LIMIT_IS_ZERO = '10200321#0000000000000000', '10200331#0000000000000000'
+ENABLED = '103FFFF0#03E800FA00030000'
+MAY_RUN = 'it may still be running'
+STOPPED_BY_NUMBER = [SPEED_ZERO, LIMIT_ZERO, ASK_SPEED]
+
+
+def warnings(talk: Conversation) -> list[str]:
+    return [note.text for note in talk.events(Noted) if note.warning]
+
+
+def running(**options: object) -> Conversation:
+    """Return a drive that was told 100 rpm at 10.02 s."""
+    talk = online(rearm_immediate=True, **options)
+    talk.commands(0, 100.0, 10.003)
+    assert exchange(talk, 10.02) == RUNNING
+    talk.events()
+    return talk
+
+
+def confirmed(talk: Conversation, now: float) -> list[str]:
+    """Let a drive that has just been asked for its speed confirm the stop."""
+    assert talk.hears(SPEED_IS_ZERO, now) == [ASK_LIMIT]
+    return talk.hears(LIMIT_IS_ZERO, now + 0.001)
+
+
+# -- the process stood still ----------------------------------------------------------------------
+
+
+def test_stop_right_after_a_stall() -> None:
+    """What a closing terminal does: SIGSTOP, then SIGTERM together with SIGCONT."""
+    talk = running()
+    sent = talk.time_lost(12.0)
+    sent += talk.deactivate(12.0001)
+    assert not talk.session.stopped
+    sent += [text for _, text in talk.until(12.004)]
+    assert [text for text in sent if text != ASK_REQUEST_MAP] == [
+        SPEED_ZERO, *STOPPED_BY_NUMBER]
+    assert confirmed(talk, 12.005) == []
+    assert talk.session.stopped
+    assert talk.until(20.0) == []
+    assert warnings(talk) == []
+
+
+def test_stop_right_after_a_stall_that_nobody_confirms() -> None:
+    talk = running()
+    talk.time_lost(12.0)
+    talk.deactivate(12.0001)
+    talk.until(12.0 + talk.session.longest_stop)
+    assert talk.session.stopped
+    assert warnings(talk) == [
+        'told to stop, but speed_setpoint (P50): no answer; torque_limit (P51): no answer: '
+        f'{MAY_RUN}']
+
+
+def test_drive_that_was_only_told_neutral_is_not_written_to_after_a_stall() -> None:
+    talk = online()
+    assert talk.time_lost(12.0) == [ASK_REQUEST_MAP]
+    assert talk.deactivate(12.0001) == []
+    assert talk.session.stopped
+    assert warnings(talk) == []
+
+
+def test_stall_with_assumed_maps_needs_no_writes() -> None:
+    talk = running(mapping='assume')
+    assert talk.time_lost(12.0) == []
+    assert talk.at(12.0) == [NEUTRAL]
+    assert not talk.session.told.owed
+
+
+# -- the bus went, and came back ------------------------------------------------------------------
+
+
+def test_bus_that_comes_back_stops_the_drive_before_its_maps_are_read() -> None:
+    talk = running()
+    assert talk.bus_down(10.03) == []
+    assert warnings(talk) == [f'the bus was lost before it could be told to stop: {MAY_RUN}']
+    assert talk.bus_up(12.0) == [SPEED_ZERO]
+    assert [text for _, text in talk.until(12.002)] == [LIMIT_ZERO, ASK_SPEED]
+    assert confirmed(talk, 12.003) == [ASK_REQUEST_MAP]
+    checked(talk, 12.004)
+    assert talk.at(12.006) == [NEUTRAL]
+    assert warnings(talk) == []
+
+
+def test_stop_while_the_maps_are_read_again() -> None:
+    talk = running()
+    talk.bus_down(10.03)
+    talk.bus_up(12.0)
+    talk.until(12.0021)
+    assert confirmed(talk, 12.003) == [ASK_REQUEST_MAP]
+    assert talk.deactivate(12.05) == []     # it has confirmed to stand still
+    assert talk.session.stopped
+
+
+def test_stop_while_nobody_answers_after_the_bus_came_back() -> None:
+    talk = running()
+    talk.bus_down(10.03)
+    talk.bus_up(12.0)
+    talk.until(12.35)
+    assert warnings(talk)[-1].endswith(MAY_RUN)
+    assert talk.deactivate(12.4) == [SPEED_ZERO]    # still owed
+    talk.until(14.0)
+    assert talk.session.stopped
+    assert warnings(talk) == [
+        'told to stop, but speed_setpoint (P50): no answer; torque_limit (P51): no answer: '
+        f'{MAY_RUN}']
+
+
+def test_end_while_the_bus_is_lost() -> None:
+    talk = running()
+    talk.bus_down(10.03)
+    talk.events()
+    assert talk.deactivate(10.1) == []
+    assert talk.session.stopped
+    assert warnings(talk) == [f'could not be told to stop: {MAY_RUN}']
+
+
+def test_bus_that_goes_during_the_stop() -> None:
+    talk = running()
+    talk.time_lost(12.0)
+    talk.deactivate(12.0001)
+    talk.events()
+    talk.bus_down(12.0002)
+    assert talk.session.stopped
+    assert warnings(talk) == [f'the bus was lost before it could be told to stop: {MAY_RUN}']
+
+
+# -- the maps differ ------------------------------------------------------------------------------
+
+OTHER_RESPONSE = '102007E4#00D200D100D30000'
+OTHER_REQUEST = '102007A4#0033003200000000'
+
+
+def look(talk: Conversation) -> None:
+    """Cycle until the maps are looked at, at 11.002 s."""
+    for cycle in range(2, 50):
+        talk.commands(0, 100.0, 10.0 + 0.02 * cycle)
+        assert exchange(talk, 10.0 + 0.02 * cycle) == RUNNING
+    talk.commands(0, 100.0, 11.0)
+    talk.until(11.0 + TICK)
+    assert talk.hears(ANSWER, 11.002) == [ASK_REQUEST_MAP]
+    talk.events()
+
+
+def test_response_map_that_differs_ends_with_neutral_cycles() -> None:
+    talk = running()
+    look(talk)
+    assert talk.hears(REQUEST_MAP, 11.003) == [ASK_RESPONSE_MAP]
+    assert talk.hears(OTHER_RESPONSE, 11.004) == []
+    assert talk.session.state is DriveState.MAPPING_DIFFERS
+    assert talk.until(11.9) == [(11.02, NEUTRAL), (11.04, NEUTRAL), (11.06, NEUTRAL)]
+    assert not talk.session.told.owed
+    # what is answered by another map is not understood
+    talk.events()
+    assert talk.hears(ANSWER, 11.902) == []
+    assert talk.samples() == []
+    assert talk.session.state is DriveState.MAPPING_DIFFERS
+
+
+def test_response_map_that_differs_disables_too() -> None:
+    talk = cycling_with_word()
+    assert talk.hears('102007A4#0034003200000000', 11.003) == [ASK_RESPONSE_MAP]
+    assert talk.hears(OTHER_RESPONSE, 11.004) == []
+    assert [text for _, text in talk.until(11.9)] == [NEUTRAL] * 3
+    assert not talk.session.told.owed
+
+
+def cycling_with_word() -> Conversation:
+    """Return an enabled drive with its word in slot 0, asked for its request map at 11.002 s."""
+    talk = cycling_raw()
+    talk.asks(ControlAction.ENABLE, 10.003)
+    for cycle in range(1, 50):
+        talk.until(10.0 + 0.02 * cycle + TICK)
+        talk.hears(ENABLED if cycle > 1 else ANSWER, 10.002 + 0.02 * cycle)
+    talk.until(11.0 + TICK)
+    assert talk.hears(ENABLED, 11.002) == [ASK_REQUEST_MAP]
+    assert talk.control_outcomes() == [('enable', True, 'enabled')]
+    assert talk.session.told.owed
+    talk.events()
+    return talk
+
+
+def cycling_raw() -> Conversation:
+    talk = Conversation(drive(control=CONTROL, request=(WORD, SPEED)))
+    talk.bus_up(9.0)
+    assert talk.activate(9.998) == [ASK_REQUEST_MAP]
+    assert talk.hears('102007A4#0034003200000000', 9.999) == [ASK_RESPONSE_MAP]
+    assert talk.hears(RESPONSE_MAP, 10.0) == []
+    assert talk.at(10.0) == [NEUTRAL]
+    talk.hears(ANSWER, 10.002)
+    return talk
+
+
+def test_request_map_that_differs_ends_with_writes_by_number() -> None:
+    talk = running()
+    look(talk)
+    assert talk.hears(OTHER_REQUEST, 11.003) == [SPEED_ZERO]
+    assert talk.session.state is DriveState.MAPPING_DIFFERS
+    assert [text for _, text in talk.until(11.006)] == [LIMIT_ZERO, ASK_SPEED]
+    assert confirmed(talk, 11.007) == []
+    assert not talk.session.told.owed
+    assert warnings(talk) == []
+
+
+def test_maps_are_rewritten_after_the_stop() -> None:
+    talk = running(mapping='configure')
+    look(talk)
+    assert talk.hears(REQUEST_MAP, 11.003) == [ASK_RESPONSE_MAP]
+    assert talk.hears(OTHER_RESPONSE, 11.004) == [SPEED_ZERO]
+    assert [text for _, text in talk.until(11.007)] == [LIMIT_ZERO, ASK_SPEED]
+    # the rewrite begins with map slot 0, and only now
+    assert confirmed(talk, 11.008) == ['002007A1#0000000000000000']
+
+
+def test_map_that_differs_under_a_drive_at_rest_needs_no_stop() -> None:
+    talk = online()
+    for cycle in range(1, 50):
+        exchange(talk, 10.0 + 0.02 * cycle)
+    talk.until(11.0 + TICK)
+    assert talk.hears(ANSWER, 11.002) == [ASK_REQUEST_MAP]
+    assert talk.hears(OTHER_REQUEST, 11.003) == []
+    assert talk.until(11.9) == []
+
+
+def test_end_while_maps_differ_and_the_stop_is_not_confirmed() -> None:
+    talk = running()
+    look(talk)
+    talk.hears(OTHER_REQUEST, 11.003)
+    talk.deactivate(11.0035)
+    assert not talk.session.stopped
+    talk.until(12.0)
+    assert talk.session.stopped
+    assert warnings(talk)[-1].endswith(MAY_RUN)
+
+
+# -- frames that the bus refuses ------------------------------------------------------------------
+
+
+def everything(text: str) -> bool:
+    return True
+
+
+def test_stop_frames_that_are_refused_are_no_stop() -> None:
+    talk = running()
+    talk.refusing = everything
+    talk.deactivate(10.03)
+    assert talk.until(11.0) == []
+    assert not talk.session.stopped
+    talk.session.give_up(11.0)
+    assert talk.session.stopped
+    assert warnings(talk) == [f'could not be told to stop: {MAY_RUN}']
+
+
+def test_stop_goes_on_until_three_frames_were_taken() -> None:
+    talk = running()
+    talk.refusing = everything
+    talk.deactivate(10.03)
+    talk.until(10.09)
+    talk.refusing = lambda text: False
+    assert [text for _, text in talk.until(10.5)] == [NEUTRAL] * 3
+    assert talk.session.stopped
+    assert warnings(talk) == []
+
+
+def test_stop_of_a_lost_drive_counts_frames_that_were_taken() -> None:
+    talk = running()
+    talk.until(10.06 + TICK)        # two answers are missing
+    talk.refusing = everything
+    talk.until(10.2)
+    talk.refusing = lambda text: False
+    found = talk.until(10.4)
+    assert [text for _, text in found[:3]] == [NEUTRAL] * 3
+
+
+def test_word_that_was_refused_confirms_nothing() -> None:
+    talk = online(control=CONTROL, request=(WORD, SPEED), mapping='assume')
+    talk.asks(ControlAction.ENABLE, 10.003)
+    talk.refusing = lambda text: text.startswith('003FFFF0#0001')
+    assert talk.until(10.02 + TICK) == []
+    talk.hears(ENABLED, 10.022)     # an answer to nothing that we know of
+    assert talk.control_outcomes() == []
+    assert not talk.session.told.owed
+
+
+@pytest.mark.parametrize('refuses', [
+    lambda text: text == '00300341#0000000000000000', everything])
+def test_written_disable_that_was_refused_is_written_again(
+        refuses: Callable[[str], bool]) -> None:
+    talk = online(control=CONTROL, mapping='assume')
+    talk.asks(ControlAction.ENABLE, 10.01)
+    for cycle, answer in ((1, ANSWER), (2, ENABLED), (3, ENABLED)):
+        talk.until(10.0 + 0.02 * cycle + TICK)
+        talk.hears(answer, 10.002 + 0.02 * cycle)
+    assert talk.control_outcomes() == [('enable', True, 'enabled')]
+    talk.refusing = refuses
+    assert talk.asks(ControlAction.DISABLE, 10.063) == []
+    talk.refusing = lambda text: False
+    assert '00300341#0000000000000000' in [text for _, text in talk.until(10.09)]
+
+
+def test_unacknowledged_write_that_was_refused_was_not_sent() -> None:
+    talk = online(verify_writes=False)
+    talk.refusing = lambda text: text.startswith('00300281')
+    talk.submits(write((GAIN, 7)), 10.003)
+    assert talk.outcomes() == [['not sent: the bus takes no frames']]
+
+
+def test_many_writes_that_are_refused_end_with_the_first() -> None:
+    talk = online(verify_writes=False)
+    refused: list[str] = []
+
+    def refusing(text: str) -> bool:
+        refused.append(text)
+        return True
+    talk.refusing = refusing
+    others = [parameter(f'g{number}', number, storage=GAIN.storage) for number in range(300, 320)]
+    talk.submits(write(*((other, 1) for other in others)), 10.003)
+    assert talk.outcomes() == [['not sent: the bus takes no frames'] * 20]
+    assert len(refused) == 1
+
+
+# -- what the drive is not told again -------------------------------------------------------------
+
+
+def test_new_activation_owes_nothing() -> None:
+    talk = running()
+    talk.bus_down(10.03)
+    talk.deactivate(10.04)
+    talk.bus_up(11.0)
+    assert talk.activate(12.0) == [ASK_REQUEST_MAP]
+
+
+def test_neutral_by_command_is_a_stop() -> None:
+    talk = running()
+    talk.commands(0, 0.0, 10.03)
+    assert exchange(talk, 10.04) == NEUTRAL
+    assert talk.time_lost(12.0) == [ASK_REQUEST_MAP]
+
+
+def test_cycling_that_begins_again_makes_writes_needless() -> None:
+    talk = cycling()
+    assert talk.at(10.0) == [NEUTRAL]
+    assert not talk.session.told.owed
