@@ -7,7 +7,7 @@ from typing import Any
 from builders import CONTROL, drive, GAIN, parameter, read, SPEED, STATUS, WORD
 import pytest
 
-from drive_can_bridge.core.control import ControlAction, ControlTicket, ControlMachine
+from drive_can_bridge.core.control import ControlAction, ControlMachine, ControlTicket
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.events import RequestCompleted, StationLost
 from drive_can_bridge.core.frame import Frame

@@ -68,7 +68,7 @@ class Partner(ABC):
     def setpoints(self, sent: str) -> list[int]:
         """Return the raw setpoints that a frame carries; none if it carries none."""
 
-    def enable(self) -> None:
+    def enable(self) -> None:  # noqa: B027  most have none
         """Bring a drive that has a control word so far that it takes setpoints."""
 
     # -- the bus ----------------------------------------------------------------------------------
@@ -389,7 +389,7 @@ def test_bus_down_is_silence_at_once(partner: Partner) -> None:
     assert partner.talk.session.stopped
 
 
-# -- whatever was told to run is told to stop ------------------------------------------------------
+# -- whatever was told to run is told to stop -----------------------------------------------------
 
 
 def test_stop_right_after_a_stall(partner: Partner) -> None:

@@ -12,6 +12,7 @@ from drive_can_bridge.protocols.families import make_sessions
 
 #: what the families start with: cannord builds its control word in
 DISABLE = {'cannord': 0x047E}
+ENABLE = {'cannord': 0x047F}
 
 
 @pytest.fixture(params=sorted(PARTNERS), name='family')
@@ -46,6 +47,8 @@ def test_setpoints_as_the_drive_got_them(family: str) -> None:
     same = partner.talk.session.sent.raws
     partner.live(0.1)
     assert partner.talk.session.sent.raws is same, 'nothing changed'
+    partner.enable()
+    word = {'control_word': ENABLE[family]} if family in ENABLE else {}
     session = partner.talk.session
     session.setpoints.items[0].armed = True
     session.command(0, -150.0, partner.now)
@@ -56,6 +59,7 @@ def test_setpoints_as_the_drive_got_them(family: str) -> None:
     assert list(partner.commanded())[-1] == -1500 & 0xFFFF
     partner.deliver(partner.talk.deactivate(partner.now))
     partner.live(1.0)
+    word = {'control_word': DISABLE[family]} if family in DISABLE else {}
     assert told(partner) == {**word, 'speed_setpoint': 0}
 
 
@@ -101,6 +105,7 @@ def test_all_members_of_a_broadcast_group_are_told_the_same() -> None:
         session.activate(9.0)
     sessions[0].handle_timer(9.1)
     assert sessions[0].take_frames()
+    sessions[0].frames_left(9.1)
     assert [session.sent.raws for session in sessions] == [(0x047E, 0)] * 2
     assert [parameter.name for parameter in sessions[1].sent.parameters] == [
         'control_word', 'speed_setpoint']

@@ -7,12 +7,13 @@ import math
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlMachine
 from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.requests import Request
 from drive_can_bridge.core.roles import Cells
 from drive_can_bridge.core.session import DriveState, Session
 from drive_can_bridge.core.told import MAY_RUN
 from drive_can_bridge.protocols.datamodel import procedures
-from drive_can_bridge.protocols.datamodel.acyclic_control import CONTROL_WORD, control_by_hand
+from drive_can_bridge.protocols.datamodel.acyclic_control import control_by_hand, CONTROL_WORD
 from drive_can_bridge.protocols.datamodel.channel import AcyclicChannel, Lane, Polling, Words
 from drive_can_bridge.protocols.datamodel.extended import SLOTS
 from drive_can_bridge.protocols.datamodel.process_words import slot_of

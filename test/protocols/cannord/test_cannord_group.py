@@ -628,7 +628,7 @@ class Ears:
     def process_data(self, *told: object) -> None:
         """Take no notice."""
 
-    take_commands = discard_commands = bus_opened = process_data
+    take_commands = discard_commands = request_sent = bus_opened = process_data
 
 
 class Cable:

@@ -1,6 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Whatever was told to run is told to stop, soon, and by frames that really left."""
 
+from dataclasses import replace
 import math
 
 from builders import Conversation, read, write
@@ -334,7 +335,7 @@ def test_what_is_neutral_of_a_double(hertz: float, arms: bool) -> None:
 
 @pytest.mark.parametrize(('value', 'arms'), [(0, True), (1, False), (-1, False)])
 def test_what_is_neutral_of_an_integer(value: int, arms: bool) -> None:
-    counted = FREQUENCY.__class__(**{**vars(FREQUENCY), 'scale': 1.0, 'unit': '', 'scaled': False})
+    counted = replace(FREQUENCY, scale=1.0, unit='', scaled=False)
     talk = enabled(request=(counted,), table=(counted, *VALUES))
     assert talk.commands(0, value, 10.023) is (
         CommandOutcome.ARMED if arms else CommandOutcome.NOT_ARMED)
