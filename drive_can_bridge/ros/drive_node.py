@@ -29,12 +29,14 @@ from drive_can_bridge.core.requests import (
     BRIDGE_INACTIVE, Failure, Outcome, ReadRequest, Request,
 )
 from drive_can_bridge.core.session import Session
+from drive_can_bridge.core.text import printable
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.protocols.family import Family
 from drive_can_bridge.ros.commands import CommandIntake
 from drive_can_bridge.ros.control_services import ControlServices
 from drive_can_bridge.ros.event_topic import RequestTopic
 from drive_can_bridge.ros.identity import IdentityReader
+from drive_can_bridge.ros.log import Log
 from drive_can_bridge.ros.mailbox import Mailbox
 from drive_can_bridge.ros.parameter_services import ParameterServices
 from drive_can_bridge.ros.quality import latched_quality, overriding, quality_overrides
@@ -50,18 +52,19 @@ class DriveNode:
     One drive in the ROS graph (a ``DriveListener`` of its exchange).
 
     :param bridge: the bridge's node; the drive lives in its namespace.
+    :param log: of the bridge.
     :param identified: takes the drive's identity in words whenever it changes.
     """
 
     def __init__(self, bridge: Node, drive: DriveConfiguration, session: Session, family: Family,
-                 exchange: BusExchange, mailbox: Mailbox, executor: Executor,
+                 exchange: BusExchange, mailbox: Mailbox, executor: Executor, log: Log,
                  identified: Callable[[str], None]) -> None:
         self.drive = drive
         self.session = session
         self.exchange = exchange
         self._mailbox = mailbox
         self._executor = executor
-        self._logger = bridge.get_logger()
+        self._log = log
         self._throttle = Throttle(self._warn_now)
         self._requests: dict[int, tuple[Request, Future]] = {}
         self._tickets: dict[ControlTicket, Future] = {}
@@ -149,7 +152,7 @@ class DriveNode:
         self._throttle(topic, text, once=once)
 
     def _warn_now(self, text: str) -> None:
-        self._logger.warning(f'{self.name}: {text}')
+        self._log.warning(f'{self.name}: {text}')
 
     # -- from the exchange (DriveListener): the bus lock is held ----------------------------------
 
@@ -189,24 +192,24 @@ class DriveNode:
         elif isinstance(event, StationFound):
             self._online.publish(Bool(data=True))
             self._throttle.reset()
-            self._logger.info(f'{self.name}: online')
+            self._log.info(f'{self.name}: online')
             self._mailbox.post(self._identity.read)
         elif isinstance(event, StationLost):
             self._online.publish(Bool(data=False))
             self.samples.forget()
             if self.session.active:
-                self._logger.warning(f'{self.name}: offline: {event.reason}')
+                self._log.warning(f'{self.name}: offline: {event.reason}')
             else:
-                self._logger.info(f'{self.name}: stopped')
+                self._log.info(f'{self.name}: stopped')
         elif isinstance(event, SetpointsExpired):
             self.warn('command timeout',
                       f'no command for {self.session.drive.command_timeout:g} s: '
                       f'{", ".join(event.names)} neutral until armed again')
         elif isinstance(event, MappingDiffered):
-            self._logger.error(f'{self.name}: mapping differs, no cyclic frame is sent: '
+            self._log.error(f'{self.name}: mapping differs, no cyclic frame is sent: '
                                f'{event.text}')
         elif isinstance(event, MappingWritten):
-            self._logger.warning(f'{self.name}: maps of the drive rewritten: {event.text}')
+            self._log.warning(f'{self.name}: maps of the drive rewritten: {event.text}')
         elif isinstance(event, FrameRejected):
             self.rejected_text = event.text
             self.warn('rejected', f'frame rejected: {event.text}')
@@ -217,7 +220,7 @@ class DriveNode:
             if event.warning:
                 self._warn_now(event.text)
             else:
-                self._logger.info(f'{self.name}: {event.text}')
+                self._log.info(f'{self.name}: {event.text}')
 
     def control_completed(self, outcome: ControlCompleted) -> None:
         """Answer a control request."""
@@ -263,7 +266,7 @@ class DriveNode:
         return answer
 
     def _parameter_failed(self, what: str, reason: str, uncounted: int) -> None:
-        text = f'{what}: {reason}'
+        text = printable(f'{what}: {reason}')
         self.requests_refused += uncounted
         self.session.statistics.last_request_error = text
         self.warn(f'parameter {text}', text)
