@@ -39,6 +39,7 @@ from drive_can_bridge.ros.log import Log
 from drive_can_bridge.ros.mailbox import Mailbox
 from drive_can_bridge.ros.node_parameters import NodeParameters
 from drive_can_bridge.ros.periodic_thread import PeriodicThread
+from drive_can_bridge.ros.service_thread import ServiceThread
 from drive_can_bridge.ros.transition_guard import guard_transitions
 from drive_can_bridge.transport import adapters
 from drive_can_bridge.transport.link import steady_now
@@ -72,6 +73,8 @@ class BridgeNode(LifecycleNode):
             Path(file), self.get_fully_qualified_name())]
         self._transition_lock = threading.RLock()
         self._mailbox = Mailbox(self)
+        self._control_thread = ServiceThread('control', self.context, self.log.error,
+                                             raise_priority)
         self._diagnostics: Diagnostics | None = None
         self._diagnostics_thread: PeriodicThread | None = None
         self._configuring = False
@@ -208,6 +211,7 @@ class BridgeNode(LifecycleNode):
             for drive, session, family in zip(drives, sessions, families):
                 node = DriveNode(
                     self, drive, session, family, exchange, self._mailbox, self._spinner, self.log,
+                    self._control_thread,
                     partial(self._node_parameters.announce, identity_name(drive.name)))
                 self.drives[drive.name] = node
                 exchange.attach(session, node)
@@ -310,6 +314,7 @@ class BridgeNode(LifecycleNode):
         self._clean_up()
         while self._leaving:
             self._leaving.pop().destroy()
+        self._control_thread.stop()
 
     def destroy_node(self) -> None:
         """Take the node out of the graph, when everything is written that it had to say."""

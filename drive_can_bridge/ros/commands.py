@@ -20,7 +20,6 @@ from collections.abc import Callable
 import math
 from typing import Any, Protocol
 
-from rclpy.callback_groups import CallbackGroup
 from rclpy.event_handler import QoSSubscriptionEventType, SubscriptionEventCallbacks
 from rclpy.exceptions import InvalidHandle
 from rclpy.impl.implementation_singleton import rclpy_implementation
@@ -34,6 +33,7 @@ from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import Value, ValueKind
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.setpoints import CommandOutcome
+from drive_can_bridge.ros.polled_group import PolledGroup
 from drive_can_bridge.ros.quality import command_quality, overriding
 from drive_can_bridge.ros.values import TOPIC_TYPES, value_text
 
@@ -43,19 +43,6 @@ RCLError = rclpy_implementation.RCLError
 COUNT_PERIOD = 0.05
 #: s between two looks at events of subscriptions
 EVENT_PERIOD = 1.0
-
-
-class PolledGroup(CallbackGroup):
-    """Subscriptions of this group are taken by hand; an executor never waits for them."""
-
-    def can_execute(self, entity: Any) -> bool:
-        return False
-
-    def beginning_execution(self, entity: Any) -> bool:
-        return False
-
-    def ending_execution(self, entity: Any) -> None:
-        pass
 
 
 class Warn(Protocol):

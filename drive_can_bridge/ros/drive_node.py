@@ -2,8 +2,8 @@
 """
 The node of one drive: what its session says becomes topics, what users want goes to the session.
 
-Samples are published in the thread that received the frame; service calls are served in the
-executor thread and get their answers through the mailbox.
+Samples are published in the thread that received the frame; parameter services are served in the
+executor thread and get their answers through the mailbox, control services in a thread of theirs.
 """
 
 from collections.abc import Callable
@@ -18,7 +18,7 @@ from rclpy.task import Future
 from std_msgs.msg import Bool
 
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlTicket
+from drive_can_bridge.core.control import ControlCompleted
 from drive_can_bridge.core.directory import ParameterDirectory
 from drive_can_bridge.core.events import (
     Event, ForeignMasterSeen, FrameRejected, MappingDiffered, MappingWritten, Noted,
@@ -41,6 +41,7 @@ from drive_can_bridge.ros.mailbox import Mailbox
 from drive_can_bridge.ros.parameter_services import ParameterServices
 from drive_can_bridge.ros.quality import latched_quality, overriding, quality_overrides
 from drive_can_bridge.ros.samples import SamplePublisher
+from drive_can_bridge.ros.service_thread import ServiceThread
 from drive_can_bridge.ros.stamps import Stamps
 from drive_can_bridge.ros.throttle import Throttle
 
@@ -53,12 +54,13 @@ class DriveNode:
 
     :param bridge: the bridge's node; the drive lives in its namespace.
     :param log: of the bridge.
+    :param control_thread: serves ``~/enable`` and its like.
     :param identified: takes the drive's identity in words whenever it changes.
     """
 
     def __init__(self, bridge: Node, drive: DriveConfiguration, session: Session, family: Family,
                  exchange: BusExchange, mailbox: Mailbox, executor: Executor, log: Log,
-                 identified: Callable[[str], None]) -> None:
+                 control_thread: ServiceThread, identified: Callable[[str], None]) -> None:
         self.drive = drive
         self.session = session
         self.exchange = exchange
@@ -67,7 +69,7 @@ class DriveNode:
         self._log = log
         self._throttle = Throttle(self._warn_now)
         self._requests: dict[int, tuple[Request, Future]] = {}
-        self._tickets: dict[ControlTicket, Future] = {}
+        self._control: ControlServices | None = None
         self._calls = 0  # service calls that wait for their answer
         self.requests_refused = 0
         self._identity = IdentityReader(drive.profile, self._submit_quietly, identified,
@@ -86,7 +88,7 @@ class DriveNode:
         try:
             self.commands = CommandIntake(self.node, drive, session, self.warn)
             try:
-                self._populate(bridge.get_clock(), family)
+                self._populate(bridge.get_clock(), family, control_thread)
             except BaseException:
                 self.commands.destroy()
                 raise
@@ -95,7 +97,7 @@ class DriveNode:
             raise
         executor.add_node(self.node)
 
-    def _populate(self, clock: Clock, family: Family) -> None:
+    def _populate(self, clock: Clock, family: Family, control_thread: ServiceThread) -> None:
         """Make the topics and services."""
         drive, session = self.drive, self.session
         stamps = Stamps(clock)
@@ -111,7 +113,9 @@ class DriveNode:
                           write_refusal=session.write_refusal, role=session.role,
                           active=lambda: session.active, failed=self._parameter_failed)
         if session.control is not None:
-            ControlServices(self.node, self._ask)
+            self._control = ControlServices(
+                self.node, control_thread, lambda action, register: self.exchange.request_control(
+                    session, action, register))
 
     @property
     def name(self) -> str:
@@ -131,14 +135,15 @@ class DriveNode:
         while self._requests:
             request, future = self._requests.popitem()[1]
             self._mailbox.complete(future, (Failure(BRIDGE_INACTIVE),) * len(request))
-        while self._tickets:
-            self._mailbox.complete(self._tickets.popitem()[1], (False, BRIDGE_INACTIVE))
-        return not self._calls
+        answered = self._control is None or self._control.answer_all()
+        return answered and not self._calls
 
     def destroy(self) -> None:
         """Take the drive out of the graph. The exchange must be closed."""
         self._executor.remove_node(self.node)
         self.commands.destroy()
+        if self._control is not None:
+            self._control.destroy()
         self.node.destroy_node()
 
     # -- log --------------------------------------------------------------------------------------
@@ -224,8 +229,8 @@ class DriveNode:
 
     def control_completed(self, outcome: ControlCompleted) -> None:
         """Answer a control request."""
-        future = self._tickets.pop(outcome.ticket)
-        self._mailbox.complete(future, (outcome.success, outcome.message))
+        if self._control is not None:
+            self._control.completed(outcome)
 
     def _cannot_publish(self, error: Exception) -> None:
         if self.node.context.ok():
@@ -251,19 +256,6 @@ class DriveNode:
         future.add_done_callback(lambda done: completed(done.result()))
         self._requests[id(request)] = (request, future)
         self.exchange.submit(self.session, request)
-
-    async def _ask(self, action: ControlAction) -> tuple[bool, str]:
-        future = Future(executor=self._executor)
-        refusal = self.exchange.request_control(
-            self.session, action, lambda ticket: self._tickets.update({ticket: future}))
-        if refusal:
-            return False, refusal
-        self._calls += 1
-        try:
-            answer: tuple[bool, str] = await future
-        finally:
-            self._calls -= 1
-        return answer
 
     def _parameter_failed(self, what: str, reason: str, uncounted: int) -> None:
         text = printable(f'{what}: {reason}')
