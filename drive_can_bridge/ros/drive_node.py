@@ -86,7 +86,7 @@ class DriveNode:
                                  NodeParameter('use_sim_time', value=False),
                                  *quality_overrides(bridge)])
         try:
-            self.commands = CommandIntake(self.node, drive, session, self.warn)
+            self.commands = CommandIntake(self.node, drive, session, self.warn, self._inform)
             try:
                 self._populate(bridge.get_clock(), family, control_thread)
             except BaseException:
@@ -156,6 +156,9 @@ class DriveNode:
         """
         self._throttle(topic, text, once=once)
 
+    def _inform(self, text: str) -> None:
+        self._log.info(f'{self.name}: {text}')
+
     def _warn_now(self, text: str) -> None:
         self._log.warning(f'{self.name}: {text}')
 
@@ -165,9 +168,9 @@ class DriveNode:
         """Hand the newest commands to the session."""
         self.commands.take(now)
 
-    def discard_commands(self) -> None:
+    def discard_commands(self, why: str) -> None:
         """Throw waiting commands away."""
-        self.commands.discard()
+        self.commands.discard(why)
 
     def process_data(self, event: ProcessDataReceived) -> None:
         """Publish a sample."""
@@ -197,7 +200,7 @@ class DriveNode:
         elif isinstance(event, StationFound):
             self._online.publish(Bool(data=True))
             self._throttle.reset()
-            self._log.info(f'{self.name}: online')
+            self._inform('online')
             self._mailbox.post(self._identity.read)
         elif isinstance(event, StationLost):
             self._online.publish(Bool(data=False))
@@ -205,7 +208,7 @@ class DriveNode:
             if self.session.active:
                 self._log.warning(f'{self.name}: offline: {event.reason}')
             else:
-                self._log.info(f'{self.name}: stopped')
+                self._inform('stopped')
         elif isinstance(event, SetpointsExpired):
             self.warn('command timeout',
                       f'no command for {self.session.drive.command_timeout:g} s: '
@@ -225,7 +228,7 @@ class DriveNode:
             if event.warning:
                 self._warn_now(event.text)
             else:
-                self._log.info(f'{self.name}: {event.text}')
+                self._inform(event.text)
 
     def control_completed(self, outcome: ControlCompleted) -> None:
         """Answer a control request."""
