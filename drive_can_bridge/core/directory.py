@@ -14,11 +14,14 @@ from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import (
     Access, Parameter, ParameterType, Storage, ValueKind,
 )
+from drive_can_bridge.core.text import printable
 
 
 # Strictest first: where several listed parameters have one address, a raw name obeys them all.
 _ACCESS = (Access.READ_ONLY, Access.WRITE_ONLY, Access.READ_WRITE)
 _STORAGE = (Storage.EEPROM, None, Storage.RAM)
+#: characters of a name that nobody knows: it stands beside another in one line
+NAME_SHOWN = 80
 
 
 class ParameterDirectory:
@@ -60,10 +63,11 @@ class ParameterDirectory:
             return [parameter]
         return [other for other in self.listed.values() if _place(other) == _place(parameter)]
 
-    def unknown(self, name: str) -> str:
-        """Say that a name is unknown, with the nearest known one."""
-        near = difflib.get_close_matches(name, self.listed, n=1)
-        return f'unknown parameter {name}' + (f', did you mean {near[0]}?' if near else '')
+    def unknown(self, name: str, *, hint: bool = True) -> str:
+        """Say that a name is unknown, with the nearest known one (which takes milliseconds)."""
+        near = difflib.get_close_matches(name, self.listed, n=1) if hint else []
+        shown = printable(name, NAME_SHOWN)
+        return f'unknown parameter {shown}' + (f', did you mean {near[0]}?' if near else '')
 
     def raw_from_user(self, parameter: Parameter, value: object) -> int:
         """

@@ -33,6 +33,8 @@ from drive_can_bridge.transport.link import Link, steady_now
 PASS_PERIOD = 0.25
 #: s without a pass after which nothing is believed any more: the process stood still
 LOST_TIME = 1.0
+#: s by which a pass may be late until commands that wait are not believed any more
+LATENESS_MAX = 0.25
 #: s until what was last sent is told again
 REQUEST_PERIOD = 1.0
 #: s that a stop may take beyond its neutral cycles
@@ -50,8 +52,12 @@ class DriveListener(Protocol):
     def take_commands(self, now: float) -> None:
         """Hand the newest setpoint commands to the session: a cycle may be due."""
 
-    def discard_commands(self) -> None:
-        """Throw away commands that are waiting: the process stood still, they are stale."""
+    def discard_commands(self, why: str) -> None:
+        """
+        Throw away commands that are waiting: they are stale.
+
+        :param why: in words; '' where nobody has to be told.
+        """
 
     def process_data(self, event: ProcessDataReceived) -> None:
         """Publish a sample. The fast path."""
@@ -129,6 +135,7 @@ class BusExchange:
             session.phase = phase
         self._alarm = Alarm()
         self._wake_at = 0.0
+        self._meant_at = 0.0    # when the next pass was to be
         self._last_pass = 0.0
         self._tell_at = 0.0
         self._closing = False
@@ -155,7 +162,7 @@ class BusExchange:
 
     def open(self) -> None:
         """Start both threads; the bus opens in the background. Nothing is sent."""
-        self._last_pass = self._clock()
+        self._last_pass = self._meant_at = self._clock()
         self.link.start()
         self._thread.start()
 
@@ -163,10 +170,10 @@ class BusExchange:
         """Begin the exchange with every drive."""
         with self.lock:
             now = self._clock()
-            self._last_pass = now
+            self._last_pass = self._meant_at = now
             self.active = True
             for member in self._members:
-                member.listener.discard_commands()
+                member.listener.discard_commands('')
                 member.session.activate(now)
                 self._pump(member)
         self._alarm.ring()
@@ -274,7 +281,10 @@ class BusExchange:
     def _pass(self) -> float:
         """Serve every session that is due; return when the next one is."""
         now = self._clock()
-        self._notice_lost_time(now)
+        late = now - self._meant_at
+        if not self._notice_lost_time(now) and late > LATENESS_MAX and self.active:
+            for member in self._members:
+                member.listener.discard_commands(f'the exchange was {late:.2f} s late')
         if now >= self._tell_at:
             self._tell_again(now)
         soonest = min(now + PASS_PERIOD, self._tell_at)
@@ -287,6 +297,7 @@ class BusExchange:
         for member in self._members:  # a partner's timer may have changed after its turn
             if member.due < soonest:
                 soonest = member.due
+        self._meant_at = soonest
         return soonest
 
     def _tell_again(self, now: float) -> None:
@@ -295,15 +306,18 @@ class BusExchange:
             for member in self._members:
                 member.listener.request_sent(now)
 
-    def _notice_lost_time(self, now: float) -> None:
+    def _notice_lost_time(self, now: float) -> bool:
+        """Re-arm everything after a second that was lost; False: none was."""
         gap = now - self._last_pass
         self._last_pass = now
         if gap < LOST_TIME or not self.active:
-            return
+            return False
+        self._meant_at = now
         for member in self._members:
-            member.listener.discard_commands()
+            member.listener.discard_commands(f'the bridge stood still for {gap:.2f} s')
             member.session.time_lost(now)
             self._pump(member)
+        return True
 
     # -- the reader thread (LinkListener) ---------------------------------------------------------
 

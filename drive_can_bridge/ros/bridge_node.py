@@ -35,9 +35,11 @@ from drive_can_bridge.process.scheduling import raise_priority
 from drive_can_bridge.protocols.families import FAMILIES, make_sessions
 from drive_can_bridge.ros.diagnostics import Diagnostics
 from drive_can_bridge.ros.drive_node import DriveNode
+from drive_can_bridge.ros.log import Log
 from drive_can_bridge.ros.mailbox import Mailbox
 from drive_can_bridge.ros.node_parameters import NodeParameters
 from drive_can_bridge.ros.periodic_thread import PeriodicThread
+from drive_can_bridge.ros.service_thread import ServiceThread
 from drive_can_bridge.ros.transition_guard import guard_transitions
 from drive_can_bridge.transport import adapters
 from drive_can_bridge.transport.link import steady_now
@@ -63,6 +65,7 @@ class BridgeNode(LifecycleNode):
                  context: Context | None = None, files: Sequence[str] = (),
                  **options: Any) -> None:
         super().__init__(NODE_NAME, context=context, enable_logger_service=True, **options)
+        self.log = Log(self.get_logger())
         self._spinner = executor
         self._fatal = fatal
         # now: later on, somebody may have edited or removed them
@@ -70,6 +73,8 @@ class BridgeNode(LifecycleNode):
             Path(file), self.get_fully_qualified_name())]
         self._transition_lock = threading.RLock()
         self._mailbox = Mailbox(self)
+        self._control_thread = ServiceThread('control', self.context, self.log.error,
+                                             raise_priority)
         self._diagnostics: Diagnostics | None = None
         self._diagnostics_thread: PeriodicThread | None = None
         self._configuring = False
@@ -81,7 +86,7 @@ class BridgeNode(LifecycleNode):
         self.exchanges: dict[str, BusExchange] = {}
         self.drives: dict[str, DriveNode] = {}
         self._node_parameters = NodeParameters(self, self._parameter_changed)
-        guard_transitions(self, self._transition_lock,
+        guard_transitions(self, self.log.warning, self._transition_lock,
                           lambda: 'the bridge is being stopped' if self._ending else '')
         executor.add_node(self)
 
@@ -150,10 +155,10 @@ class BridgeNode(LifecycleNode):
             action()
         except ConfigurationError as error:
             for problem in error.problems:
-                self.get_logger().error(problem)
+                self.log.error(problem)
             return FAILURE
         except Exception as error:  # noqa: BLE001  see above
-            self.get_logger().error(f'{name} failed: {type(error).__name__}: {error}')
+            self.log.error(f'{name} failed: {type(error).__name__}: {error}')
             return TransitionCallbackReturn.ERROR
         return SUCCESS
 
@@ -179,7 +184,7 @@ class BridgeNode(LifecycleNode):
             raise ConfigurationError([f'drives.{self.get_name()}: the name of the bridge itself '
                                       f'(remapped), allowed is another one'])
         for warning in configuration.warnings:
-            self.get_logger().warning(warning)
+            self.log.warning(warning)
         self._node_parameters.declare(configuration)
         self.configuration = configuration
         self._misconfigured = []
@@ -205,7 +210,8 @@ class BridgeNode(LifecycleNode):
             self.exchanges[bus.name] = exchange
             for drive, session, family in zip(drives, sessions, families):
                 node = DriveNode(
-                    self, drive, session, family, exchange, self._mailbox, self._spinner,
+                    self, drive, session, family, exchange, self._mailbox, self._spinner, self.log,
+                    self._control_thread,
                     partial(self._node_parameters.announce, identity_name(drive.name)))
                 self.drives[drive.name] = node
                 exchange.attach(session, node)
@@ -218,18 +224,18 @@ class BridgeNode(LifecycleNode):
             exchange.link.wait_first_attempt(max(0.0, deadline - steady_now()))
         if self._misconfigured:
             raise ConfigurationError(self._misconfigured)
-        self.get_logger().info(self._priority)
+        self.log.info(self._priority)
         self._diagnostics = Diagnostics(self, list(self.exchanges.values()),
                                         list(self.drives.values()))
         self._diagnostics_thread = PeriodicThread(
             'diagnostics', configuration.diagnostics_period, self._diagnostics.publish,
-            lambda text: self.get_logger().error(f'diagnostics: {text}'))
+            lambda text: self.log.error(f'diagnostics: {text}'))
         self._diagnostics_thread.start()
 
     def _activate(self) -> None:
         for exchange in self.exchanges.values():
             exchange.activate()
-        self.get_logger().info(
+        self.log.info(
             f'active: {_count(len(self.drives), "drive", "drives")} on '
             f'{_count(len(self.exchanges), "bus", "buses")}')
 
@@ -250,7 +256,7 @@ class BridgeNode(LifecycleNode):
                 return
         except Exception as error:  # noqa: BLE001  outermost call of a thread: nothing is silent
             reason = f'{type(error).__name__}: {error}'
-        self.get_logger().error(f'bus {exchange.bus.name}: the stop frames could not all be '
+        self.log.error(f'bus {exchange.bus.name}: the stop frames could not all be '
                                 f'sent: {reason}')
 
     def _clean_up(self) -> None:
@@ -308,6 +314,12 @@ class BridgeNode(LifecycleNode):
         self._clean_up()
         while self._leaving:
             self._leaving.pop().destroy()
+        self._control_thread.stop()
+
+    def destroy_node(self) -> None:
+        """Take the node out of the graph, when everything is written that it had to say."""
+        self.log.close()
+        super().destroy_node()
 
     @property
     def is_active(self) -> bool:
@@ -329,13 +341,13 @@ class BridgeNode(LifecycleNode):
 
     def bus_opened(self, bus: str) -> None:
         """Log it."""
-        self.get_logger().info(f'bus {bus}: open')
+        self.log.info(f'bus {bus}: open')
 
     def bus_lost(self, bus: str, reason: str) -> None:
         """Log it."""
         exchange = self.exchanges.get(bus)
         if exchange is not None:  # else it was given up while it was still being opened
-            self.get_logger().error(f'bus {bus}: {reason}; tried again every '
+            self.log.error(f'bus {bus}: {reason}; tried again every '
                                     f'{exchange.bus.reconnect_period:g} s')
 
     def fatal(self, bus: str, reason: str, *, misconfigured: bool) -> None:
@@ -344,7 +356,7 @@ class BridgeNode(LifecycleNode):
         if misconfigured and self._configuring:
             self._misconfigured.append(text)
         else:
-            self.get_logger().fatal(text)
+            self.log.fatal(text)
             self._fatal(text)
 
 

@@ -5,10 +5,10 @@ Setpoint commands: taken by the exchange at its tick, not by callbacks.
 A callback per message makes an executor pay for its whole wait set each time, and a flood of
 commands would starve the services. Here the exchange's timer thread takes what is waiting just
 before a cycle: the newest command goes out in the very next frame, and a flood costs nothing but
-the take. The subscriptions stand in a callback group that no executor ever runs. Nor does it wait
-for their events, such as a publisher of incompatible quality: with Fast DDS that wait ends with
-every message, which at 3,000 commands/s costs more than everything else. They are looked at once
-in a while instead.
+the take of as many as can wait (:mod:`.command_topic`). The subscriptions stand in a callback
+group that no executor ever runs. Nor does it wait for their events, such as a publisher of other
+quality: with Fast DDS that wait ends with every message, which at 3,000 commands/s costs more than
+everything else. They are looked at once in a while instead.
 
 Even a look into an empty queue costs 2 µs, with four setpoints a tenth of the whole exchange. So
 only the topics that somebody publishes are looked at in each cycle; who does is looked up every
@@ -20,7 +20,6 @@ from collections.abc import Callable
 import math
 from typing import Any, Protocol
 
-from rclpy.callback_groups import CallbackGroup
 from rclpy.event_handler import QoSSubscriptionEventType, SubscriptionEventCallbacks
 from rclpy.exceptions import InvalidHandle
 from rclpy.impl.implementation_singleton import rclpy_implementation
@@ -34,6 +33,9 @@ from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import Value, ValueKind
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.setpoints import CommandOutcome
+from drive_can_bridge.core.text import printable
+from drive_can_bridge.ros.command_topic import CommandTopic
+from drive_can_bridge.ros.polled_group import PolledGroup
 from drive_can_bridge.ros.quality import command_quality, overriding
 from drive_can_bridge.ros.values import TOPIC_TYPES, value_text
 
@@ -45,28 +47,11 @@ COUNT_PERIOD = 0.05
 EVENT_PERIOD = 1.0
 
 
-class PolledGroup(CallbackGroup):
-    """Subscriptions of this group are taken by hand; an executor never waits for them."""
-
-    def can_execute(self, entity: Any) -> bool:
-        return False
-
-    def beginning_execution(self, entity: Any) -> bool:
-        return False
-
-    def ending_execution(self, entity: Any) -> None:
-        pass
-
-
 class Warn(Protocol):
     """Takes the topic of a warning, and its text; ``once``: no need to repeat it."""
 
     def __call__(self, topic: str, text: str, *, once: bool = False) -> None:
         """Log it, or not."""
-
-
-#: handle of a subscription, type of its messages, what takes them
-_Taker = tuple[Any, type, Callable[[Any, float], None]]
 
 
 class PolledEvent:
@@ -98,16 +83,19 @@ class CommandIntake:
     The command subscriptions of one drive.
 
     :param warn: takes (topic of the warning, text); throttling is its business.
+    :param inform: takes what nobody has to do anything about.
     """
 
     def __init__(self, node: Node, drive: DriveConfiguration, session: Session,
-                 warn: Warn) -> None:
+                 warn: Warn, inform: Callable[[str], None]) -> None:
         self._session = session
         self._warn = warn
+        self._inform = inform
+        self._told: set[str] = set()
         self._drive = drive
         self._group = PolledGroup()
-        self._takers: list[_Taker] = []
-        self._published: list[_Taker] = []  # by somebody, as far as known
+        self._topics: list[CommandTopic] = []
+        self._published: list[CommandTopic] = []  # by somebody, as far as known
         self._count_at = -math.inf
         self._events: list[PolledEvent] = []
         self._look_at = -math.inf
@@ -126,36 +114,39 @@ class CommandIntake:
 
     def take(self, now: float) -> None:
         """Hand all waiting commands to the session, oldest first."""
-        takers = self._published
-        if now >= self._count_at:
+        try:
+            if now < self._count_at:
+                for topic in self._published:
+                    topic.take(now)
+                return
             self._count_at = now + COUNT_PERIOD
-            takers = self._takers  # some may have come from a publisher that is gone by now
-            try:
-                self._published = [
-                    taker for taker in takers if taker[0].get_publisher_count()]
-                if now >= self._look_at:
-                    self._look_at = now + EVENT_PERIOD
-                    for event in self._events:
-                        event.look()
-            except (InvalidHandle, RCLError):  # the node is being destroyed
-                return
-        for handle, message_type, take in takers:
-            try:
-                taken = handle.take_message(message_type, False)
-                while taken is not None:
-                    take(taken[0], now)
-                    taken = handle.take_message(message_type, False)
-            except InvalidHandle:  # the node is being destroyed
-                return
+            for topic in self._topics:  # some may have come from a publisher that is gone by now
+                topic.take(now)
+            self._published = [topic for topic in self._topics
+                               if topic.handle.get_publisher_count()]
+            for topic in self._topics:
+                if topic not in self._published:
+                    topic.forget()
+            if now >= self._look_at:
+                self._look_at = now + EVENT_PERIOD
+                for event in self._events:
+                    event.look()
+        except (InvalidHandle, RCLError):  # the node is being destroyed
+            pass
 
-    def discard(self) -> None:
-        """Throw away what is waiting."""
-        for handle, message_type, _ in self._takers:
-            try:
-                while handle.take_message(message_type, False) is not None:
-                    pass
-            except InvalidHandle:
-                return
+    def discard(self, why: str) -> None:
+        """
+        Throw away what is waiting.
+
+        :param why: in words; '': nobody has to be told.
+        """
+        try:
+            count = sum(topic.discard() for topic in self._topics)
+        except (InvalidHandle, RCLError):  # the node is being destroyed
+            return
+        if count and why:
+            self._session.statistics.commands_refused += count
+            self._warn('discarded', f'{count} commands thrown away: {why}')
 
     def destroy(self) -> None:
         """Let go of the subscriptions. Before the node is destroyed, which has them otherwise."""
@@ -181,10 +172,19 @@ class CommandIntake:
             subscription, QoSSubscriptionEventType.RCL_SUBSCRIPTION_REQUESTED_INCOMPATIBLE_QOS,
             incompatible))
         self._subscriptions.append(subscription)
-        self._takers.append((subscription.handle, message_type, take))
+
+        def late(seconds: float) -> None:
+            self._refuse(f'late {name}', f'command on {name} thrown away: it came {seconds:.2f} s '
+                         f'later than others have')
+
+        def unreadable(reason: str) -> None:
+            self._refuse(f'unreadable {name}',
+                         f'command on {name} cannot be read: {printable(reason)}')
+        self._topics.append(CommandTopic(subscription, use=take, late=late,
+                                         unreadable=unreadable))
 
     def _taker(self, index: int) -> Callable[[Any, float], None]:
-        return lambda message, now: self._command(index, message.data, now)
+        return lambda value, now: self._command(index, value, now)
 
     def _command(self, index: int, value: Value, now: float) -> None:
         session = self._session
@@ -224,13 +224,14 @@ class CommandIntake:
             if not len(values):
                 continue
             if target is None:
-                self._refuse(f'joint {quantity}',
-                             f'joint_command has a {quantity}, but joint.{quantity}_command '
-                             f'is not configured')
+                if quantity not in self._told:
+                    self._told.add(quantity)
+                    self._inform(f'joint_command has a {quantity}, which is ignored: '
+                                 f'joint.{quantity}_command is not configured')
             elif entry >= len(values):
                 self._refuse(f'joint {quantity}',
                              f'joint_command has fewer {quantity} values than names')
-            else:
+            elif not math.isnan(values[entry]):
                 self._command_joint(target, values[entry], now)
 
     def _command_joint(self, name: str, value: float, now: float) -> None:

@@ -1,40 +1,78 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """``~/enable``, ``~/reset_fault``, ``~/quick_stop`` of a drive whose profile has ``control``."""
 
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
+import threading
 from typing import Any
 
-from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
 from rclpy.qos import qos_profile_parameters
+from rclpy.service import Service
 from std_srvs.srv import SetBool, Trigger
 
-from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlTicket
+from drive_can_bridge.core.requests import BRIDGE_INACTIVE
+from drive_can_bridge.ros.polled_group import PolledGroup
+from drive_can_bridge.ros.service_thread import Answer, ServiceThread
 
-#: asks for an action; awaitable of (success, message)
-Ask = Callable[[ControlAction], Awaitable[tuple[bool, str]]]
+#: hands an action to the session, and its ticket to whoever is to be told; '' or why not
+Ask = Callable[[ControlAction, Callable[[ControlTicket], None]], str]
 
 
 class ControlServices:
-    """The control services of one drive."""
+    """
+    The control services of one drive, served by a thread that they share with other drives only.
 
-    def __init__(self, node: Node, ask: Ask) -> None:
+    :param thread: serves them.
+    """
+
+    def __init__(self, node: Node, thread: ServiceThread, ask: Ask) -> None:
+        self._thread = thread
         self._ask = ask
-        group = ReentrantCallbackGroup()
-        node.create_service(SetBool, '~/enable', self._enable,
-                            qos_profile=qos_profile_parameters, callback_group=group)
-        node.create_service(Trigger, '~/reset_fault', self._trigger(ControlAction.RESET_FAULT),
-                            qos_profile=qos_profile_parameters, callback_group=group)
-        node.create_service(Trigger, '~/quick_stop', self._trigger(ControlAction.QUICK_STOP),
-                            qos_profile=qos_profile_parameters, callback_group=group)
+        self._tickets: dict[ControlTicket, Callable[[bool, str], None]] = {}
+        self._calls = 0     # that wait for their answer
+        self._lock = threading.Lock()
+        self._services: list[Service] = []
+        for kind, name, action in (
+                (SetBool, 'enable', None), (Trigger, 'reset_fault', ControlAction.RESET_FAULT),
+                (Trigger, 'quick_stop', ControlAction.QUICK_STOP)):
+            service = node.create_service(kind, f'~/{name}', _never, callback_group=PolledGroup(),
+                                          qos_profile=qos_profile_parameters)
+            self._services.append(service)
+            thread.serve(service, self._callback(kind, action), lambda: self._count(-1))
 
-    async def _enable(self, request: Any, response: Any) -> Any:
-        action = ControlAction.ENABLE if request.data else ControlAction.DISABLE
-        response.success, response.message = await self._ask(action)
-        return response
+    def completed(self, outcome: ControlCompleted) -> None:
+        """Answer whoever asked for an action. From any thread."""
+        answer = self._tickets.pop(outcome.ticket, None)
+        if answer is not None:
+            answer(outcome.success, outcome.message)
 
-    def _trigger(self, action: ControlAction) -> Callable[[Any, Any], Awaitable[Any]]:
-        async def callback(_: Any, response: Any) -> Any:
-            response.success, response.message = await self._ask(action)
-            return response
+    def answer_all(self) -> bool:
+        """Tell whoever still waits that nothing will come of it; True: all have their answer."""
+        while self._tickets:
+            self._tickets.popitem()[1](False, BRIDGE_INACTIVE)
+        return not self._calls
+
+    def destroy(self) -> None:
+        """Let go of the services. Before the node is destroyed."""
+        self._thread.forget(self._services)
+
+    def _callback(self, kind: Any, action: ControlAction | None) -> Callable[[Any, Answer], None]:
+        def callback(request: Any, answer: Answer) -> None:
+            wanted = action or (ControlAction.ENABLE if request.data else ControlAction.DISABLE)
+
+            def say(success: bool, message: str) -> None:
+                answer(kind.Response(success=success, message=message))
+            self._count(1)
+            refusal = self._ask(wanted, lambda ticket: self._tickets.update({ticket: say}))
+            if refusal:
+                say(False, refusal)
         return callback
+
+    def _count(self, change: int) -> None:
+        with self._lock:
+            self._calls += change
+
+
+def _never(_: Any, response: Any) -> Any:
+    raise RuntimeError('control services are taken by a thread of their own')

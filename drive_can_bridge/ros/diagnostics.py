@@ -11,6 +11,7 @@ from rclpy.qos import QoSProfile
 
 from drive_can_bridge.core.session import DriveState
 from drive_can_bridge.core.statistics import Statistic
+from drive_can_bridge.core.text import printable
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.ros.drive_node import DriveNode
 from drive_can_bridge.ros.quality import overriding
@@ -248,12 +249,12 @@ class StatusMessage:
     def fill(self, report: Report) -> DiagnosticStatus:
         """Return the message with what the report says."""
         status, entries = self.status, self._entries
-        status.level, status.message = report.level, report.message
+        status.level, status.message = report.level, printable(report.message, None)
         if entries.keys() != report.facts.keys():
             self._entries = entries = {key: KeyValue(key=key) for key in report.facts}
             status.values = list(entries.values())
         for key, value in report.facts.items():
-            entries[key].value = value
+            entries[key].value = printable(value, None)
         return status
 
 

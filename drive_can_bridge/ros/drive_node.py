@@ -2,8 +2,8 @@
 """
 The node of one drive: what its session says becomes topics, what users want goes to the session.
 
-Samples are published in the thread that received the frame; service calls are served in the
-executor thread and get their answers through the mailbox.
+Samples are published in the thread that received the frame; parameter services are served in the
+executor thread and get their answers through the mailbox, control services in a thread of theirs.
 """
 
 from collections.abc import Callable
@@ -18,7 +18,7 @@ from rclpy.task import Future
 from std_msgs.msg import Bool
 
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlTicket
+from drive_can_bridge.core.control import ControlCompleted
 from drive_can_bridge.core.directory import ParameterDirectory
 from drive_can_bridge.core.events import (
     Event, ForeignMasterSeen, FrameRejected, MappingDiffered, MappingWritten, Noted,
@@ -29,16 +29,19 @@ from drive_can_bridge.core.requests import (
     BRIDGE_INACTIVE, Failure, Outcome, ReadRequest, Request,
 )
 from drive_can_bridge.core.session import Session
+from drive_can_bridge.core.text import printable
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.protocols.family import Family
 from drive_can_bridge.ros.commands import CommandIntake
 from drive_can_bridge.ros.control_services import ControlServices
 from drive_can_bridge.ros.event_topic import RequestTopic
 from drive_can_bridge.ros.identity import IdentityReader
+from drive_can_bridge.ros.log import Log
 from drive_can_bridge.ros.mailbox import Mailbox
 from drive_can_bridge.ros.parameter_services import ParameterServices
 from drive_can_bridge.ros.quality import latched_quality, overriding, quality_overrides
 from drive_can_bridge.ros.samples import SamplePublisher
+from drive_can_bridge.ros.service_thread import ServiceThread
 from drive_can_bridge.ros.stamps import Stamps
 from drive_can_bridge.ros.throttle import Throttle
 
@@ -50,21 +53,23 @@ class DriveNode:
     One drive in the ROS graph (a ``DriveListener`` of its exchange).
 
     :param bridge: the bridge's node; the drive lives in its namespace.
+    :param log: of the bridge.
+    :param control_thread: serves ``~/enable`` and its like.
     :param identified: takes the drive's identity in words whenever it changes.
     """
 
     def __init__(self, bridge: Node, drive: DriveConfiguration, session: Session, family: Family,
-                 exchange: BusExchange, mailbox: Mailbox, executor: Executor,
-                 identified: Callable[[str], None]) -> None:
+                 exchange: BusExchange, mailbox: Mailbox, executor: Executor, log: Log,
+                 control_thread: ServiceThread, identified: Callable[[str], None]) -> None:
         self.drive = drive
         self.session = session
         self.exchange = exchange
         self._mailbox = mailbox
         self._executor = executor
-        self._logger = bridge.get_logger()
+        self._log = log
         self._throttle = Throttle(self._warn_now)
         self._requests: dict[int, tuple[Request, Future]] = {}
-        self._tickets: dict[ControlTicket, Future] = {}
+        self._control: ControlServices | None = None
         self._calls = 0  # service calls that wait for their answer
         self.requests_refused = 0
         self._identity = IdentityReader(drive.profile, self._submit_quietly, identified,
@@ -81,9 +86,9 @@ class DriveNode:
                                  NodeParameter('use_sim_time', value=False),
                                  *quality_overrides(bridge)])
         try:
-            self.commands = CommandIntake(self.node, drive, session, self.warn)
+            self.commands = CommandIntake(self.node, drive, session, self.warn, self._inform)
             try:
-                self._populate(bridge.get_clock(), family)
+                self._populate(bridge.get_clock(), family, control_thread)
             except BaseException:
                 self.commands.destroy()
                 raise
@@ -92,7 +97,7 @@ class DriveNode:
             raise
         executor.add_node(self.node)
 
-    def _populate(self, clock: Clock, family: Family) -> None:
+    def _populate(self, clock: Clock, family: Family, control_thread: ServiceThread) -> None:
         """Make the topics and services."""
         drive, session = self.drive, self.session
         stamps = Stamps(clock)
@@ -108,7 +113,9 @@ class DriveNode:
                           write_refusal=session.write_refusal, role=session.role,
                           active=lambda: session.active, failed=self._parameter_failed)
         if session.control is not None:
-            ControlServices(self.node, self._ask)
+            self._control = ControlServices(
+                self.node, control_thread, lambda action, register: self.exchange.request_control(
+                    session, action, register))
 
     @property
     def name(self) -> str:
@@ -128,14 +135,15 @@ class DriveNode:
         while self._requests:
             request, future = self._requests.popitem()[1]
             self._mailbox.complete(future, (Failure(BRIDGE_INACTIVE),) * len(request))
-        while self._tickets:
-            self._mailbox.complete(self._tickets.popitem()[1], (False, BRIDGE_INACTIVE))
-        return not self._calls
+        answered = self._control is None or self._control.answer_all()
+        return answered and not self._calls
 
     def destroy(self) -> None:
         """Take the drive out of the graph. The exchange must be closed."""
         self._executor.remove_node(self.node)
         self.commands.destroy()
+        if self._control is not None:
+            self._control.destroy()
         self.node.destroy_node()
 
     # -- log --------------------------------------------------------------------------------------
@@ -148,8 +156,11 @@ class DriveNode:
         """
         self._throttle(topic, text, once=once)
 
+    def _inform(self, text: str) -> None:
+        self._log.info(f'{self.name}: {text}')
+
     def _warn_now(self, text: str) -> None:
-        self._logger.warning(f'{self.name}: {text}')
+        self._log.warning(f'{self.name}: {text}')
 
     # -- from the exchange (DriveListener): the bus lock is held ----------------------------------
 
@@ -157,9 +168,9 @@ class DriveNode:
         """Hand the newest commands to the session."""
         self.commands.take(now)
 
-    def discard_commands(self) -> None:
+    def discard_commands(self, why: str) -> None:
         """Throw waiting commands away."""
-        self.commands.discard()
+        self.commands.discard(why)
 
     def process_data(self, event: ProcessDataReceived) -> None:
         """Publish a sample."""
@@ -189,24 +200,24 @@ class DriveNode:
         elif isinstance(event, StationFound):
             self._online.publish(Bool(data=True))
             self._throttle.reset()
-            self._logger.info(f'{self.name}: online')
+            self._inform('online')
             self._mailbox.post(self._identity.read)
         elif isinstance(event, StationLost):
             self._online.publish(Bool(data=False))
             self.samples.forget()
             if self.session.active:
-                self._logger.warning(f'{self.name}: offline: {event.reason}')
+                self._log.warning(f'{self.name}: offline: {event.reason}')
             else:
-                self._logger.info(f'{self.name}: stopped')
+                self._inform('stopped')
         elif isinstance(event, SetpointsExpired):
             self.warn('command timeout',
                       f'no command for {self.session.drive.command_timeout:g} s: '
                       f'{", ".join(event.names)} neutral until armed again')
         elif isinstance(event, MappingDiffered):
-            self._logger.error(f'{self.name}: mapping differs, no cyclic frame is sent: '
+            self._log.error(f'{self.name}: mapping differs, no cyclic frame is sent: '
                                f'{event.text}')
         elif isinstance(event, MappingWritten):
-            self._logger.warning(f'{self.name}: maps of the drive rewritten: {event.text}')
+            self._log.warning(f'{self.name}: maps of the drive rewritten: {event.text}')
         elif isinstance(event, FrameRejected):
             self.rejected_text = event.text
             self.warn('rejected', f'frame rejected: {event.text}')
@@ -217,12 +228,12 @@ class DriveNode:
             if event.warning:
                 self._warn_now(event.text)
             else:
-                self._logger.info(f'{self.name}: {event.text}')
+                self._inform(event.text)
 
     def control_completed(self, outcome: ControlCompleted) -> None:
         """Answer a control request."""
-        future = self._tickets.pop(outcome.ticket)
-        self._mailbox.complete(future, (outcome.success, outcome.message))
+        if self._control is not None:
+            self._control.completed(outcome)
 
     def _cannot_publish(self, error: Exception) -> None:
         if self.node.context.ok():
@@ -249,21 +260,8 @@ class DriveNode:
         self._requests[id(request)] = (request, future)
         self.exchange.submit(self.session, request)
 
-    async def _ask(self, action: ControlAction) -> tuple[bool, str]:
-        future = Future(executor=self._executor)
-        refusal = self.exchange.request_control(
-            self.session, action, lambda ticket: self._tickets.update({ticket: future}))
-        if refusal:
-            return False, refusal
-        self._calls += 1
-        try:
-            answer: tuple[bool, str] = await future
-        finally:
-            self._calls -= 1
-        return answer
-
     def _parameter_failed(self, what: str, reason: str, uncounted: int) -> None:
-        text = f'{what}: {reason}'
+        text = printable(f'{what}: {reason}')
         self.requests_refused += uncounted
         self.session.statistics.last_request_error = text
         self.warn(f'parameter {text}', text)

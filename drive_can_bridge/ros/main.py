@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 
 from drive_can_bridge.process.scheduling import be_punctual
 from drive_can_bridge.process.signals import leave, SignalWatcher
+from drive_can_bridge.process.standard_error import StandardError
 
 if TYPE_CHECKING:
     from drive_can_bridge.ros.bridge_node import BridgeNode
@@ -34,9 +35,13 @@ def main(args: Sequence[str] | None = None) -> int:
     arguments = list(sys.argv if args is None else args)
     be_punctual()
     # in a process of our own, signals are looked after to the very end
-    with SignalWatcher(keep=args is None) as watcher:
+    with SignalWatcher(keep=args is None) as watcher, StandardError() as standard_error:
+        if standard_error.is_terminal:  # rcutils sees a pipe
+            os.environ.setdefault('RCUTILS_COLORIZED_OUTPUT', '1')
         code = watcher.exit_code(_main(watcher, arguments))
         if args is None:
+            sys.stderr.flush()
+            standard_error.flush()
             leave(code)
         return code
 
@@ -85,7 +90,7 @@ def _run(watcher: SignalWatcher, arguments: Sequence[str]) -> int:
     from drive_can_bridge.ros.executor_thread import ExecutorThread
     from drive_can_bridge.transport.failures import in_words
 
-    spinner = ExecutorThread('services', lambda text: bridge.get_logger().error(text),
+    spinner = ExecutorThread('services', lambda text: bridge.log.error(text),
                              rclpy.get_default_context())
     try:
         bridge = BridgeNode(spinner.executor, watcher.fatal, files=_parameter_files(arguments))
@@ -93,7 +98,7 @@ def _run(watcher: SignalWatcher, arguments: Sequence[str]) -> int:
         print(f'drive_can_bridge: {in_words(error)}', file=sys.stderr)
         return 1
     if bridge.is_empty:
-        bridge.get_logger().fatal(_nothing_configured(bridge, arguments))
+        bridge.log.fatal(_nothing_configured(bridge, arguments))
         bridge.destroy_node()
         return 1
     spinner.start()

@@ -7,7 +7,7 @@ writing goes over acyclic frames: the callbacks are coroutines that wait for the
 without holding up the executor.
 """
 
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 from typing import Any
 
 from rcl_interfaces.msg import (
@@ -23,7 +23,7 @@ from rclpy.clock import Clock
 from rclpy.node import Node
 from rclpy.qos import qos_profile_parameter_events, qos_profile_parameters
 
-from drive_can_bridge.core.directory import ParameterDirectory
+from drive_can_bridge.core.directory import NAME_SHOWN, ParameterDirectory
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.requests import (
@@ -31,12 +31,17 @@ from drive_can_bridge.core.requests import (
     Request, WriteRequest, Written,
 )
 from drive_can_bridge.core.roles import Role
+from drive_can_bridge.core.text import printable, TEXT_MAX
 from drive_can_bridge.ros.values import (
     descriptor, PARAMETER_TYPES, parameter_value, value_of,
 )
 
 #: why a read may fail that says nothing about the parameter
 _NOT_ITS_FAULT = frozenset([BRIDGE_INACTIVE, BUS_DOWN, BUSY, NO_ANSWER_OFFLINE])
+#: names in one call
+NAMES_MAX = 1000
+#: names of one call that are logged, and looked at for what else might be meant, one by one
+TOLD_MAX = 16
 #: separates the levels of a parameter name (rcl_interfaces/srv/ListParameters)
 SEPARATOR = '.'
 
@@ -83,13 +88,34 @@ class ParameterServices:
         self._events = node.create_publisher(ParameterEvent, '/parameter_events',
                                              qos_profile_parameter_events)
 
+    def _excess(self, names: Sequence[str], what: str) -> str:
+        """
+        Say why a call asks for too much to be looked at; '' if it does not.
+
+        Whoever waits behind it should not notice it: neither its names are looked up, nor is each
+        of them logged.
+        """
+        if len(names) > NAMES_MAX:
+            reason = f'{len(names)} names in one call, at most {NAMES_MAX} are allowed'
+        elif any(len(name) > TEXT_MAX for name in names):
+            reason = f'a name longer than {TEXT_MAX} characters'
+        else:
+            return ''
+        self._failed(what, reason, len(names))
+        return reason
+
     # -- reading ----------------------------------------------------------------------------------
 
     async def _get(self, request: Any, response: Any) -> Any:
+        excess = self._excess(request.names, 'read parameters')
+        if excess:
+            response.values = [ParameterValue() for _ in request.names]
+            return response
         found = [self._directory.find(name) for name in request.names]
-        for name, parameter in zip(request.names, found):
-            if parameter is None:
-                self._failed(f'read {name}', self._directory.unknown(name), 1)
+        self._tell('read', [
+            (name, self._directory.unknown(name, hint=place < TOLD_MAX))
+            for place, (name, parameter) in enumerate(zip(request.names, found))
+            if parameter is None])
         values: dict[int, ParameterValue] = {}
         if self._active():
             wanted = [(place, parameter) for place, parameter in enumerate(found)
@@ -113,11 +139,17 @@ class ParameterServices:
         return response
 
     def _list(self, request: Any, response: Any) -> Any:
+        if self._excess(request.prefixes, 'list parameters'):
+            return response
         response.result = list_parameters(list(self._directory.listed), list(request.prefixes),
                                           request.depth)
         return response
 
     def _describe(self, request: Any, response: Any) -> Any:
+        if self._excess(request.names, 'describe parameters'):
+            response.descriptors = [ParameterDescriptor(name=printable(name))
+                                    for name in request.names]
+            return response
         # rcl_interfaces/srv/DescribeParameters: as many descriptors as names, in the same order
         found = [(name, self._directory.find(name)) for name in request.names]
         response.descriptors = [
@@ -128,6 +160,9 @@ class ParameterServices:
         return response
 
     def _types(self, request: Any, response: Any) -> Any:
+        if self._excess(request.names, 'types of parameters'):
+            response.types = [ParameterType.PARAMETER_NOT_SET] * len(request.names)
+            return response
         found = [self._directory.find(name) for name in request.names]
         response.types = [
             ParameterType.PARAMETER_NOT_SET if parameter is None
@@ -137,14 +172,22 @@ class ParameterServices:
     # -- writing ----------------------------------------------------------------------------------
 
     async def _set(self, request: Any, response: Any) -> Any:
+        excess = self._excess([message.name for message in request.parameters],
+                              'set parameters')
+        if excess:
+            response.results = [SetParametersResult(reason=excess) for _ in request.parameters]
+            return response
         results: list[SetParametersResult] = [
             SetParametersResult() for _ in request.parameters]
         items: list[tuple[int, Parameter, int]] = []
+        refused = []
         for place, message in enumerate(request.parameters):
             try:
-                items.append((place, *self._checked(message)))
+                items.append((place, *self._checked(message, hint=place < TOLD_MAX)))
             except ValueRefused as error:
-                results[place] = self._refused(message.name, str(error))
+                results[place] = SetParametersResult(reason=str(error))
+                refused.append((message.name, str(error)))
+        self._tell('set', refused)
         if items:
             outcomes = await self._submit(
                 WriteRequest(tuple((parameter, raw) for _, parameter, raw in items)))
@@ -159,13 +202,20 @@ class ParameterServices:
         return response
 
     async def _set_atomically(self, request: Any, response: Any) -> Any:
+        excess = self._excess([message.name for message in request.parameters],
+                              'set parameters')
+        if excess:
+            response.result = SetParametersResult(reason=f'{excess}; nothing was written')
+            return response
         items: list[tuple[Parameter, int]] = []
         for message in request.parameters:
             try:
                 items.append(self._checked(message))
             except ValueRefused as error:
-                reason = f'{message.name}: {error}; nothing was written'
-                response.result = self._refused(message.name, reason)
+                name = printable(message.name, NAME_SHOWN)
+                reason = f'{name}: {error}; nothing was written'
+                self._failed(f'set {name}', reason, 1)
+                response.result = SetParametersResult(reason=reason)
                 return response
         if not items:
             response.result = SetParametersResult(successful=True)
@@ -185,15 +235,16 @@ class ParameterServices:
             successful=all(result.successful for result in results), reason=text)
         return response
 
-    def _checked(self, message: ParameterMessage) -> tuple[Parameter, int]:
+    def _checked(self, message: ParameterMessage, *, hint: bool = True) -> tuple[Parameter, int]:
         """
         Find the parameter that is to be set, and the raw integer.
 
+        :param hint: for a name that nobody knows, look for the nearest that somebody does.
         :raises ValueRefused: in words.
         """
         parameter = self._directory.find(message.name)
         if parameter is None:
-            raise ValueRefused(self._directory.unknown(message.name))
+            raise ValueRefused(self._directory.unknown(message.name, hint=hint))
         if not self._active():
             raise ValueRefused(BRIDGE_INACTIVE)
         refusal = self._write_refusal(parameter)
@@ -201,9 +252,13 @@ class ParameterServices:
             raise ValueRefused(refusal)
         return parameter, self._directory.raw_from_user(parameter, value_of(message.value))
 
-    def _refused(self, name: str, reason: str) -> SetParametersResult:
-        self._failed(f'set {name}', reason, 1)
-        return SetParametersResult(successful=False, reason=reason)
+    def _tell(self, what: str, failures: Sequence[tuple[str, str]]) -> None:
+        """Log what failed before anything was sent, name and reason; the first ones by name."""
+        for name, reason in failures[:TOLD_MAX]:
+            self._failed(f'{what} {printable(name, NAME_SHOWN)}', reason, 1)
+        more = len(failures) - TOLD_MAX
+        if more > 0:
+            self._failed(f'{what} parameters', f'{more} more names of the same call failed', more)
 
     def _result(self, parameter: Parameter, name: str, outcome: Outcome) -> SetParametersResult:
         if isinstance(outcome, Written):

@@ -24,12 +24,13 @@ def latched_quality() -> QoSProfile:
 
 def command_quality() -> QoSProfile:
     """
-    Setpoints: the newest wins.
+    Setpoints: the newest wins, and what was lost is outdated.
 
-    A few messages of history all the same: a refused value must not push a good one, sent just
-    before it, out of the queue between two cycles.
+    Best effort: after a pause of this process, reliable middleware delivers again what was sent
+    meanwhile, seconds late. A few messages of history all the same: a refused value must not push
+    a good one, sent just before it, out of the queue between two cycles.
     """
-    return QoSProfile(depth=8, reliability=ReliabilityPolicy.RELIABLE)
+    return QoSProfile(depth=8, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
 def overriding(node: Node, topic: str) -> QoSOverridingOptions | None:

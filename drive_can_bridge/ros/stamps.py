@@ -5,6 +5,7 @@ import time
 
 from rclpy.clock import Clock, ROSClock
 
+from drive_can_bridge.transport.clock import steady_now
 
 #: seconds and nanoseconds, as ``builtin_interfaces/Time`` has them
 Stamp = tuple[int, int]
@@ -21,5 +22,5 @@ class Stamps:
         if isinstance(self._clock, ROSClock) and self._clock.ros_time_is_active:
             nanoseconds = self._clock.now().nanoseconds
         else:
-            nanoseconds = time.time_ns() - int((time.monotonic() - received_at) * 1e9)
+            nanoseconds = time.time_ns() - int((steady_now() - received_at) * 1e9)
         return divmod(nanoseconds, 1_000_000_000)

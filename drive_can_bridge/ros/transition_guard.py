@@ -13,13 +13,17 @@ from typing import Any
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.lifecycle import LifecycleNode
 
+from drive_can_bridge.core.text import printable
+
 RCLError = rclpy_implementation.RCLError
 
 
-def guard_transitions(node: LifecycleNode, lock: RLock, refusal: Callable[[], str]) -> None:
+def guard_transitions(node: LifecycleNode, warn: Callable[[str], None], lock: RLock,
+                      refusal: Callable[[], str]) -> None:
     """
     Guard the transition service of a node.
 
+    :param warn: takes what is wrong with a transition.
     :param lock: is held during a transition.
     :param refusal: why none is possible any more; '' otherwise.
     """
@@ -35,11 +39,10 @@ def guard_transitions(node: LifecycleNode, lock: RLock, refusal: Callable[[], st
                     node._state_machine.get_transition_by_label(request.transition.label)
                 return change_state(request, response)
             except (RCLError, RuntimeError) as error:
-                label = request.transition.label or f'number {request.transition.id}'
+                label = printable(request.transition.label or f'number {request.transition.id}')
                 state = node._state_machine.current_state[1]
-                node.get_logger().warning(
-                    f'transition {label} is not possible in state {state}'
-                    f' ({" ".join(str(error).split())})')
+                warn(f'transition {label} is not possible in state {state}'
+                     f' ({printable(" ".join(str(error).split()))})')
                 response.success = False
                 return response
 

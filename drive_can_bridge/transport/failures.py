@@ -8,10 +8,12 @@ children, whatever a vendor's library throws.
 
 import errno
 
+from drive_can_bridge.core.text import printable
+
 
 def in_words(error: BaseException) -> str:
     """Return one readable line for any exception."""
-    text = ' '.join(str(error).split())
+    text = printable(' '.join(str(error).split()))
     return text or type(error).__name__
 
 

@@ -18,12 +18,12 @@ counts as open only after its first read.
 
 from collections.abc import Callable, Sequence
 import threading
-import time
 from typing import Protocol
 
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, TransportError
 from drive_can_bridge.core.frame import Frame, Route
+from drive_can_bridge.transport.clock import steady_now as steady_now
 from drive_can_bridge.transport.end_point import EndPoint
 from drive_can_bridge.transport.error_frames import ADVICE_ALONE, BUS_OFF, BusError
 from drive_can_bridge.transport.failures import in_words
@@ -284,8 +284,3 @@ class Link:
             # a controller that is being tried again is in no other state that anybody knows
             self._closed_controller = BUS_OFF if port.controller == BUS_OFF else ''
             port.close()
-
-
-def steady_now() -> float:
-    """Return the steady clock in s: the ``now`` of all sessions."""
-    return time.monotonic()

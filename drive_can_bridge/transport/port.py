@@ -20,6 +20,7 @@ from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, Trans
 from drive_can_bridge.core.frame import (
     EXTENDED_IDENTIFIER_MAX, Frame, Route, STANDARD_IDENTIFIER_MAX,
 )
+from drive_can_bridge.transport.clock import steady_now
 from drive_can_bridge.transport.end_point import EndPoint
 from drive_can_bridge.transport.error_frames import (
     ADVICE_DISTURBED, BUS_OFF, BusError, decode_error_frame,
@@ -30,8 +31,9 @@ from drive_can_bridge.transport.failures import (
 from drive_can_bridge.transport.raw_socket import RawSocket
 from drive_can_bridge.transport.serial_writer import SerialWriter, watched
 
-# A frame's own time stamp is believed only if it is that much older than now at most: adapters
-# that count from power-up, and clocks that were set, fall out.
+# A frame's own time stamp is believed if it is that much older than now at most, or if the frame
+# may have waited for so long: adapters that count from power-up, and clocks that were set, fall
+# out.
 _STAMP_AGE_MAX = 0.1
 # Data bytes of a classical CAN frame.
 _LENGTH_MAX = 8
@@ -69,6 +71,7 @@ class Port(EndPoint):
         self._socket = RawSocket.below(bus)
         self._lost = False
         self._malformed_in_row = 0
+        self._earliest = steady_now()   # the next frame cannot have come before
 
     def receive(self, timeout: float) -> Frame | None:
         """Wait for a frame. See the base class."""
@@ -81,6 +84,7 @@ class Port(EndPoint):
             self._lost = True
             raise BusUnavailable(f'receive: {with_cause(error)}') from error
         if message is None:
+            self._earliest = steady_now()
             self._limit_line()
             return None
         if message.is_error_frame:
@@ -99,8 +103,10 @@ class Port(EndPoint):
             self._malformed()
             return None
         self._malformed_in_row = 0
+        now = steady_now()
         age = time.time() - message.timestamp
-        self.age = age if 0.0 < age < _STAMP_AGE_MAX else 0.0
+        self.age = age if 0.0 < age < max(_STAMP_AGE_MAX, now - self._earliest) else 0.0
+        self._earliest = now - self.age     # they come in order
         return Frame(message.arbitration_id, data, message.is_extended_id)
 
     def send(self, frame: Frame, timeout: float) -> None:

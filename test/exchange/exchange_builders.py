@@ -64,7 +64,7 @@ class DriveNotes:
     def request_sent(self, now: float) -> None:
         self.told.append(now)
 
-    def discard_commands(self) -> None:
+    def discard_commands(self, why: str) -> None:
         self.discarded += 1
         self.commands.clear()
 

@@ -447,6 +447,24 @@ def test_close_without_open() -> None:
     assert bench.link.stopped
 
 
+@pytest.mark.parametrize('late, sent', [
+    (0.24, '03E8'),     # it is fresh enough
+    (0.26, '0000'),     # neutral armed, but what came since has waited too long
+    (0.9, '0000')])
+def test_what_waits_when_the_exchange_is_late_is_not_believed(late: float, sent: str) -> None:
+    bench = Bench(drive(rearm_immediate=False, command_timeout=5.0))
+    bench.online()
+    [notes] = bench.notes
+    notes.commands.append((0, 0.0))
+    bench.at(10.02)
+    bench.hears(ANSWER, 10.021)
+    before = notes.discarded
+    notes.commands.append((0, 100.0))
+    assert bench.at(10.04 + late) == [f'003FFFF0#{sent}000000000000']
+    assert (notes.discarded > before) == (sent == '0000')
+    assert not notes.session.setpoints.waiting[:-1], 'nothing is armed anew for that'
+
+
 # -- what was last sent ---------------------------------------------------------------------------
 
 

@@ -307,7 +307,7 @@ class Bridge:
     def request_sent(self, now: float) -> None:
         """Nobody asks."""
 
-    def discard_commands(self) -> None:
+    def discard_commands(self, why: str) -> None:
         """Nothing to throw away."""
 
     def process_data(self, event: ProcessDataReceived) -> None:

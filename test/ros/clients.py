@@ -4,6 +4,7 @@
 from collections.abc import Callable
 import itertools
 import os
+import re
 import threading
 import time
 from typing import Any
@@ -168,6 +169,9 @@ class Client:
             self._publishers[name] = self.node.create_publisher(message_type, name, quality)
             wait_until(self._publishers[name].get_subscription_count,
                        what=f'a subscriber of {name}')
+            host = re.split('/command/|/joint_command', name)[0]
+            if host != name:    # nothing is sent again to a subscriber that finds out later
+                self._acquaint(name, host)
         return self._publishers[name]
 
     def publish(self, name: str, message: Any) -> None:

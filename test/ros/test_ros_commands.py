@@ -196,17 +196,27 @@ def test_joint_command(bridge: StartBridge, client: Client) -> None:
         client.publish(topic, JointState(name=['other', 'belt'], velocity=[1.0]))
         wait_until(lambda: refused(one) == 4)
         client.wait_logged('conveyor: joint_command has fewer velocity values than names')
-        client.publish(topic, JointState(name=['belt'], position=[1.0]))
+        for _ in range(3):
+            client.publish(topic, JointState(name=['belt'], position=[1.0]))
+        client.wait_logged('joint_command has a position, which is ignored')
+        client.publish(topic, JointState(name=['belt'], velocity=[math.inf]))
+        client.wait_logged('command speed_setpoint refused: inf')
         wait_until(lambda: refused(one) == 5)
-        client.wait_logged('joint_command has a position, but joint.position_command is not')
-        client.publish(topic, JointState(name=['belt'], velocity=[math.nan]))
-        client.wait_logged('command speed_setpoint refused: nan')
+        told = [text for text in client.logged(0) if 'which is ignored' in text]
+        assert told == ['conveyor: joint_command has a position, which is ignored: '
+                        'joint.position_command is not configured']
+        assert not [text for text in client.logged() if text in told]
         warnings = [text for text in client.logged() if 'without an entry' in text]
         assert warnings == ['conveyor: joint_command without an entry named belt']
         client.publish(topic, JointState(name=['belt']))
         client.publish(topic, JointState(name=['belt'], velocity=[30 * one_rpm]))
         wait_until(lambda: recorder.words()[:2] == (300, 250))
-        assert refused(one) == 6
+        # NaN leaves it alone, and refreshes no age
+        before = one.node.drives['conveyor'].session.setpoints.items[0].commanded_at
+        client.publish(topic, JointState(name=['belt'], velocity=[math.nan], effort=[30.0]))
+        wait_until(lambda: recorder.words()[:2] == (300, 300))
+        assert one.node.drives['conveyor'].session.setpoints.items[0].commanded_at == before
+        assert refused(one) == 5
 
 
 def test_commands_while_offline_have_no_effect_later(bridge: StartBridge,
@@ -246,8 +256,20 @@ def test_reconnection_wants_arming_again(bridge: StartBridge, client: Client) ->
         arm(client, recorder, 50.0)
 
 
-def test_incompatible_publishers_are_told_about(bridge: StartBridge, client: Client) -> None:
+@pytest.mark.parametrize('reliability', list(ReliabilityPolicy)[1:3])
+def test_any_publisher_will_do(bridge: StartBridge, client: Client,
+                               reliability: ReliabilityPolicy) -> None:
     one = bridge()
+    one.online()
+    with one.record() as recorder:
+        client.publisher(SPEED, Float64, QoSProfile(depth=1, reliability=reliability))
+        arm(client, recorder)
+
+
+def test_incompatible_publishers_are_told_about(bridge: StartBridge, client: Client) -> None:
+    content = parameters()
+    content['qos_overrides'] = {SPEED: {'subscription': {'reliability': 'reliable'}}}
+    one = bridge(content)
     one.online()
     client.node.create_publisher(Float64, SPEED, QoSProfile(
         depth=1, reliability=ReliabilityPolicy.BEST_EFFORT))

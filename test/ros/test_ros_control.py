@@ -1,6 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """``~/enable``, ``~/reset_fault`` and ``~/quick_stop``."""
 
+import threading
 from typing import Any
 
 from bridges import HASTY, LIFT, parameters, StartBridge
@@ -164,3 +165,26 @@ def test_inactive_refuses(bridge: StartBridge, client: Client) -> None:
     wait_until(future.done)
     assert (future.result().success, future.result().message) == (False, 'bridge inactive')
     assert enable(client) == (False, 'bridge inactive')
+
+
+def test_a_stop_waits_for_no_other_service(bridge: StartBridge, client: Client) -> None:
+    one = bridge(parameters(lift=LIFT))
+    one.online()
+    client.service('/lift/quick_stop', Trigger)
+    assert enable(client)[0]
+    reached, go_on = threading.Event(), threading.Event()
+
+    def be_busy() -> None:
+        reached.set()
+        go_on.wait(60.0)
+    one.spinner.executor.create_task(be_busy)
+    assert reached.wait(60.0)
+    try:
+        with one.record() as recorder:
+            answer = client.ask('/lift/quick_stop', Trigger)
+            wait_until(lambda: 2 in [words[0] for words in recorder.cycles(2)],
+                       what='a quick stop on the bus')
+        wait_until(answer.done, what='the answer')
+        assert answer.result().success
+    finally:
+        go_on.set()

@@ -39,16 +39,22 @@ def environment() -> dict[str, str]:
 
 
 class Process:
-    """A process with its standard output and standard error in files."""
+    """
+    A process with its standard output and standard error in files.
 
-    def __init__(self, command: Sequence[str], directory: Path, name: str) -> None:
+    :param standard_error: a descriptor that it gets as its standard error instead.
+    """
+
+    def __init__(self, command: Sequence[str], directory: Path, name: str, *,
+                 standard_error: int | None = None) -> None:
         self.name = name
         self.command = list(command)
         self.out = directory / f'{name}.out'
         self.err = directory / f'{name}.err'
         with self.out.open('wb') as out, self.err.open('wb') as err:
             self.process = subprocess.Popen(self.command, stdin=subprocess.PIPE, stdout=out,
-                                            stderr=err, env=environment())
+                                            stderr=(err if standard_error is None
+                                                    else standard_error), env=environment())
 
     @property
     def pid(self) -> int:
@@ -141,10 +147,12 @@ class Processes:
         #: shown and looked at like the others, but not ended with them
         self.guests: list[Process] = []
 
-    def start(self, command: Sequence[str], name: str) -> Process:
+    def start(self, command: Sequence[str], name: str, *,
+              standard_error: int | None = None) -> Process:
         """Start anything."""
         number = sum(process.name.rstrip('0123456789') == name for process in self.started)
-        process = Process(command, self.directory, name + (str(number + 1) if number else ''))
+        process = Process(command, self.directory, name + (str(number + 1) if number else ''),
+                          standard_error=standard_error)
         self.started.append(process)
         return process
 
@@ -163,13 +171,14 @@ class Processes:
         process.line('^drive ')
         return process
 
-    def bridge(self, file: Path | None, namespace: str = '', *arguments: str) -> Process:
+    def bridge(self, file: Path | None, namespace: str = '', *arguments: str,
+               standard_error: int | None = None) -> Process:
         """Start the bridge."""
         options = ['--params-file', str(file)] if file else []
         if namespace:
             options += ['-r', f'__ns:=/{namespace}']
         return self.start([*command_line('drive_can_bridge'), '--ros-args', *options,
-                           *arguments], 'bridge')
+                           *arguments], 'bridge', standard_error=standard_error)
 
     def end(self) -> None:
         """End what is still running."""

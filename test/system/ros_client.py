@@ -17,7 +17,7 @@ import time
 from acquaintance import acquaint
 from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.srv import ChangeState
-from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.msg import Log, Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import GetParameters, SetParameters, SetParametersAtomically
 import rclpy
 from rclpy.executors import ExternalShutdownException
@@ -121,6 +121,14 @@ class Client:
         self.statuses.clear()
         self.until(look, timeout, f'diagnostics of {name} with {conditions}')
         return found
+
+    def listen_to_log(self, timeout):
+        self.log = []
+        self.node.create_subscription(Log, '/rosout', lambda message: self.log.append(message.msg),
+                                      QoSProfile(depth=1000))
+
+    def logged(self, text, timeout):
+        self.until(lambda: any(text in line for line in self.log), timeout, f'{text} in the log')
 
     # -- services ---------------------------------------------------------------------------------
 

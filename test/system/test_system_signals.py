@@ -168,6 +168,33 @@ def test_process_that_stood_still(processes: Processes, client: Client, namespac
     assert bridge.end() == 0
 
 
+def test_what_was_sent_while_it_stood_still_is_thrown_away(
+        processes: Processes, client: Client, namespace: str, tmp_path: Path) -> None:
+    # neither a command time-out nor a lost second: only the age of the commands tells
+    file = bridge_file(tmp_path, drives={'conveyor': {**CONVEYOR, 'command_timeout': 60.0}})
+    simulator = processes.simulator(file)
+    bridge = processes.bridge(file, namespace)
+    topic = f'/{namespace}/conveyor/command/speed_setpoint'
+    start_moving(client, f'/{namespace}/conveyor')
+    bridge.send(signal.SIGSTOP)
+    client.publish(topic, 200.0, rate=100.0)
+    client.ask('rest', seconds=0.1)
+    client.silence(topic)       # whoever said 200 has changed his mind long before it goes on
+    client.ask('rest', seconds=0.5)
+    count = len(simulator.frames())
+    bridge.send(signal.SIGCONT)
+    requests = simulator.frame('^003FFFF0.* R$', since=count, count=50)
+    assert not [frame for frame in requests if frame.startswith('003FFFF0#07D0')]
+    bridge.error('commands? .*thrown away|offline: the bridge stood still')
+    # what is said now counts
+    client.publish(topic, 0.0)
+    simulator.frame(NEUTRAL, since=count)
+    client.publish(topic, 250.0)
+    simulator.frame('^003FFFF0#09C4', since=count)
+    assert not simulator.frames('^003FFFF0#07D0')
+    assert bridge.end() == 0
+
+
 def test_killed(processes: Processes, client: Client, namespace: str, tmp_path: Path) -> None:
     file = bridge_file(tmp_path)
     simulator = processes.simulator(file)

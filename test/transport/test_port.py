@@ -114,6 +114,30 @@ def test_age(bus: FakeBus, monkeypatch: pytest.MonkeyPatch, stamp: float, age: f
     assert port.age == pytest.approx(age)
 
 
+def test_age_of_frames_that_waited(bus: FakeBus, monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [50.0]
+    monkeypatch.setattr(time, 'time', lambda: 950.0 + now[0])
+    monkeypatch.setattr('drive_can_bridge.transport.port.steady_now', lambda: now[0])
+    port = Port(bus)
+
+    def comes(stamped: float) -> float:
+        bus.coming.append(can.Message(arbitration_id=1, timestamp=stamped))
+        assert port.receive(0.02) is not None
+        return port.age
+    assert port.receive(0.02) is None       # nothing is there at 50.0
+    now[0] = 50.5                           # and nobody looks for half a second
+    assert comes(1000.1) == pytest.approx(0.4)
+    assert comes(1000.3) == pytest.approx(0.2)
+    now[0] = 51.2
+    assert comes(1000.9) == pytest.approx(0.3)
+    assert port.receive(0.02) is None
+    # the queue was empty just now: a stamp that is older is one of a clock that was set
+    assert comes(1001.0) == 0.0
+    now[0] = 55.0
+    assert comes(1000.0) == 0.0, 'before the one before it'
+    assert comes(0.0) == 0.0
+
+
 def test_error_frames_change_the_state(bus: FakeBus) -> None:
     port = Port(bus, kernel_errors=True)
     bus.coming += [error_frame(0x004, '0008'), error_frame(0x004, '0020'), error_frame(0x020),

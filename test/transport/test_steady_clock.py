@@ -3,6 +3,10 @@
 
 import ast
 from pathlib import Path
+import subprocess
+import sys
+
+import pytest
 
 PACKAGE = Path(__file__).resolve().parents[2] / 'drive_can_bridge'
 
@@ -10,6 +14,8 @@ PACKAGE = Path(__file__).resolve().parents[2] / 'drive_can_bridge'
 ALLOWED = {
     # the age of a frame, believed below a tenth of a second only
     'transport/port.py': 1,
+    # how old a command is, where the middleware does not say when it came
+    'ros/command_topic.py': 1,
     # stamps of messages
     'ros/stamps.py': 1,
     # times shown to people
@@ -40,3 +46,25 @@ def looks(path: Path) -> int:
 def test_who_looks_at_the_system_clock() -> None:
     found = {path.relative_to(PACKAGE).as_posix(): looks(path) for path in PACKAGE.rglob('*.py')}
     assert {path: count for path, count in found.items() if count} == ALLOWED
+
+
+OFFSET = """
+import time
+from drive_can_bridge.transport.clock import steady_now
+print(steady_now() - time.monotonic())
+"""
+
+
+def test_suspend_counts() -> None:
+    # a machine that was suspended for 5,000 s differs from one that was not by that offset
+    command = ['unshare', '--time', '--boottime', '5000', sys.executable, '-c', OFFSET]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    except FileNotFoundError:
+        pytest.skip('unshare is not installed')
+    if done.returncode and 'unshare' in done.stderr:
+        pytest.skip(f'no time namespace: {done.stderr.strip()}')
+    assert not done.returncode, done.stderr
+    plain = subprocess.run([sys.executable, '-c', OFFSET], capture_output=True, text=True,
+                           check=True, timeout=60)
+    assert float(done.stdout) - float(plain.stdout) == pytest.approx(5000.0, abs=1.0)

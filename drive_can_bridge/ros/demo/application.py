@@ -142,7 +142,7 @@ def _simulation(configuration: BridgeConfiguration,
 def _start_bridge(stack: ExitStack, configuration: BridgeConfiguration, watcher: SignalWatcher,
                   options: Options) -> tuple[BridgeNode | None, Observer]:
     """Start the bridge, and the commander; None instead of a bridge that refuses (logged)."""
-    spinner = ExecutorThread('services', lambda text: bridge.get_logger().error(text),
+    spinner = ExecutorThread('services', lambda text: bridge.log.error(text),
                              rclpy.get_default_context())
     # every parameter is given: no file on ROS's own command line, whose buses would mix with ours
     bridge = BridgeNode(spinner.executor, watcher.fatal, parameter_overrides=[

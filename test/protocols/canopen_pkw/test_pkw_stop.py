@@ -449,7 +449,8 @@ def test_emergencies_in_a_flood() -> None:
         for text in talk.at(due):
             while text:
                 text, *_ = talk.hears(_answer(text), due + 0.0001) or ['']
-    text = 'emergency 2310h (current, output side), error register 02h, manufacturer 0A 00 00 00 00'
+    text = ('emergency 2310h (current, output side), error register 02h, '
+            'manufacturer 0A 00 00 00 00')
     assert talk.events(Noted) == [
         Noted(f'{text} (499 more)', warning=True),
         Noted('emergency over: the node reports no error any more (499 more)')]

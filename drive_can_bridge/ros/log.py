@@ -1,0 +1,109 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The log of the bridge, written by a thread of its own.
+
+A line costs tens of microseconds at best, and whatever the file of the log and its subscribers
+take at worst. Most of what there is to say is found out with a bus lock held. So whoever has a
+line puts it into a bounded queue and goes on; what does not fit is counted and said later.
+"""
+
+from enum import Enum
+import queue
+import threading
+from typing import Any
+
+from drive_can_bridge.core.text import printable
+
+#: lines that may wait
+LINES_MAX = 1000
+#: s that the end waits for lines that have not been written yet
+CLOSE_TIMEOUT = 0.3
+
+
+class Level(Enum):
+    """How much a line matters."""
+
+    INFO = 'info'
+    WARNING = 'warning'
+    ERROR = 'error'
+    FATAL = 'fatal'
+
+
+class Log:
+    """
+    Passes lines on to a logger of rclpy. From any thread; never waits.
+
+    Whatever a line contains is printable when it arrives there.
+    """
+
+    def __init__(self, logger: Any) -> None:
+        self._logger = logger
+        self._lines: queue.Queue[tuple[Level, str] | None] = queue.Queue(LINES_MAX)
+        self._dropped = 0
+        self._closed = False
+        self._thread = threading.Thread(target=self._run, name='log', daemon=True)
+        self._thread.start()
+
+    def info(self, text: str) -> None:
+        """Log what is as it should be."""
+        self._put(Level.INFO, text)
+
+    def warning(self, text: str) -> None:
+        """Log what somebody should look at."""
+        self._put(Level.WARNING, text)
+
+    def error(self, text: str) -> None:
+        """Log what does not work."""
+        self._put(Level.ERROR, text)
+
+    def fatal(self, text: str) -> None:
+        """Log why the bridge ends."""
+        self._put(Level.FATAL, text)
+
+    def close(self) -> None:
+        """Write what waits, for a while at most; what comes later is written at once."""
+        if self._closed:
+            return
+        self._closed = True
+        try:
+            self._lines.put(None, timeout=CLOSE_TIMEOUT)
+        except queue.Full:
+            return
+        if self._thread is not threading.current_thread():
+            self._thread.join(CLOSE_TIMEOUT)
+
+    def _put(self, level: Level, text: str) -> None:
+        if self._closed:
+            self._write(level, text)
+            return
+        try:
+            self._lines.put_nowait((level, text))
+        except queue.Full:
+            self._dropped += 1
+
+    def _run(self) -> None:
+        while True:
+            line = self._lines.get()
+            if line is None:
+                return
+            self._write(*line)
+            if self._dropped and self._lines.empty():
+                dropped, self._dropped = self._dropped, 0
+                self._write(Level.WARNING, f'{dropped} lines of the log left out: they came '
+                                           f'faster than they could be written')
+
+    def _write(self, level: Level, text: str) -> None:
+        text = printable(text, None)
+        logger = self._logger
+        try:
+            # a line each: rclpy wants the level of a place in the source not to change
+            if level is Level.INFO:
+                logger.info(text)
+            elif level is Level.WARNING:
+                logger.warning(text)
+            elif level is Level.ERROR:
+                logger.error(text)
+            else:
+                logger.fatal(text)
+        except Exception:  # noqa: BLE001  the context is gone: nobody is left to be told
+            pass

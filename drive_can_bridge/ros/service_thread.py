@@ -1,0 +1,169 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+Services that wait for nobody.
+
+An executor serves one callback after the other, and looks at everything else that it has in
+between: whoever asks a drive for a thousand parameters is served before the one who wants it to
+stop. So services that stop machines are taken by a thread that has nothing else to do, straight
+from a wait set of their own. Answers are sent by another one: where a caller has been discovered
+only halfway, sending takes the middleware a tenth of a second.
+"""
+
+from collections.abc import Callable
+from contextlib import ExitStack
+import queue
+import threading
+from typing import Any, NamedTuple
+
+from rclpy.context import Context
+from rclpy.exceptions import InvalidHandle
+from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.service import Service
+
+RCLError = rclpy_implementation.RCLError
+
+#: s between two failures: one that comes at once again must not take the machine
+ERROR_PAUSE = 0.05
+
+#: takes the response; to be called once, from any thread
+Answer = Callable[[Any], None]
+#: takes a request, and whatever is to be called with the response
+Callback = Callable[[Any, Answer], None]
+
+
+class _Response(NamedTuple):
+    """A response on its way."""
+
+    service: Service
+    header: Any
+    message: Any
+    sent: Callable[[], None]
+
+
+class ServiceThread:
+    """
+    Serves services whose callback group keeps them from executors.
+
+    Starts with the first service. Answers are awaited by nobody: a callback has to be short.
+
+    :param report: takes one line about an exception that a callback let escape.
+    :param prepare_thread: called first in the thread that takes requests.
+    """
+
+    def __init__(self, name: str, context: Context, report: Callable[[str], None],
+                 prepare_thread: Callable[[], object] = lambda: None) -> None:
+        self._name = name
+        self._context = context
+        self._report = report
+        self._prepare_thread = prepare_thread
+        self._served: dict[Service, tuple[Callback, Callable[[], None]]] = {}
+        self._responses: queue.SimpleQueue[_Response | None] = queue.SimpleQueue()
+        self._guard = rclpy_implementation.GuardCondition(context.handle)
+        self._ending = threading.Event()
+        self._threads: list[threading.Thread] = []
+
+    def serve(self, service: Service, callback: Callback,
+              answered: Callable[[], None] = lambda: None) -> None:
+        """
+        Begin to serve a service.
+
+        :param answered: called after each response was sent.
+        """
+        self._served[service] = callback, answered
+        if not self._threads:
+            self._threads = [
+                threading.Thread(target=self._take_all, name=self._name, daemon=True),
+                threading.Thread(target=self._answer_all, name=f'{self._name}, answering',
+                                 daemon=True)]
+            for thread in self._threads:
+                thread.start()
+        self._wake()
+
+    def forget(self, services: list[Service]) -> None:
+        """Stop to serve them; they may be destroyed then."""
+        for service in services:
+            self._served.pop(service, None)
+        self._wake()
+
+    def stop(self) -> None:
+        """End, when the answers that there are have been sent."""
+        self._ending.set()
+        self._wake()
+        self._responses.put(None)
+        for thread in self._threads:
+            thread.join(timeout=5.0)
+        self._threads.clear()
+        self._guard.destroy_when_not_in_use()
+
+    def _wake(self) -> None:
+        try:
+            with self._guard:
+                self._guard.trigger_guard_condition()
+        except (InvalidHandle, RCLError):  # stopped
+            pass
+
+    # -- the thread that takes --------------------------------------------------------------------
+
+    def _take_all(self) -> None:
+        self._prepare_thread()
+        while not self._ending.is_set() and self._context.ok():
+            try:
+                for service in self._wait():
+                    self._take(service)
+            except Exception as error:  # noqa: BLE001  outermost loop: no failure is silent
+                if self._ending.is_set():
+                    return
+                self._report(f'internal error in a callback: {type(error).__name__}: {error}')
+                self._ending.wait(ERROR_PAUSE)
+
+    def _wait(self) -> list[Service]:
+        """Wait until something is to be served, or has changed."""
+        context_handle: Any = self._context.handle
+        with ExitStack() as held:
+            present = []
+            for service in list(self._served):
+                try:
+                    held.enter_context(service.handle)
+                except InvalidHandle:   # destroyed meanwhile
+                    continue
+                present.append(service)
+            held.enter_context(self._guard)
+            held.enter_context(context_handle)
+            waiting = rclpy_implementation.WaitSet(0, 1, 0, 0, len(present), 0, context_handle)
+            waiting.clear_entities()
+            waiting.add_guard_condition(self._guard)
+            for service in present:
+                waiting.add_service(service.handle)
+            waiting.wait(-1)
+            ready = set(waiting.get_ready_entities('service'))
+            return [service for service in present if service.handle.pointer in ready]
+
+    def _take(self, service: Service) -> None:
+        served = self._served.get(service)
+        if served is None:
+            return
+        callback, answered = served
+        kind: Any = service.srv_type
+        try:
+            with service.handle:
+                request, header = service.handle.service_take_request(kind.Request)
+        except InvalidHandle:
+            return
+        if header is not None:
+            callback(request, lambda message: self._responses.put(
+                _Response(service, header, message, answered)))
+
+    # -- the thread that answers ------------------------------------------------------------------
+
+    def _answer_all(self) -> None:
+        while True:
+            response = self._responses.get()
+            if response is None:
+                return
+            try:
+                response.service.send_response(response.message, response.header)
+            except (InvalidHandle, RCLError):   # service or context are gone
+                pass
+            except Exception as error:  # noqa: BLE001  outermost loop: no failure is silent
+                self._report(f'internal error in an answer: {type(error).__name__}: {error}')
+            response.sent()

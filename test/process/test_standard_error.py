@@ -1,0 +1,105 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""A standard error that keeps nobody waiting, in a process of its own."""
+
+import os
+import subprocess
+import sys
+import textwrap
+
+import pytest
+
+HEAD = """
+import ctypes, os, sys, threading, time
+from drive_can_bridge.process import standard_error
+from drive_can_bridge.process.standard_error import StandardError
+libc = ctypes.PyDLL(None)      # holds the interpreter while it writes, as rcutils does
+"""
+
+
+def run(program: str, **options: object) -> 'subprocess.CompletedProcess[bytes]':
+    return subprocess.run([sys.executable, '-c', HEAD + textwrap.dedent(program)], timeout=60,
+                          stdout=subprocess.PIPE, check=False, **options)  # type: ignore[call-overload,no-any-return]
+
+
+def start(program: str, standard_error: int) -> 'subprocess.Popen[bytes]':
+    return subprocess.Popen([sys.executable, '-c', HEAD + textwrap.dedent(program)],
+                            stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                            stderr=standard_error)
+
+
+def test_everything_arrives_whoever_writes_it() -> None:
+    done = run("""
+        with StandardError() as output:
+            assert not output.is_terminal
+            print('python', file=sys.stderr)
+            os.write(2, b'descriptor\\n')
+            libc.write(2, b'library\\n', 8)
+            for number in range(20_000):
+                libc.write(2, b'x' * 99 + b'\\n', 100)
+                if number % 100 == 0:
+                    time.sleep(0)
+        os.write(2, b'afterwards\\n')
+        """, stderr=subprocess.PIPE)
+    lines = done.stderr.decode().splitlines()
+    assert (done.returncode, lines[:3], lines[-1]) == (
+        0, ['python', 'descriptor', 'library'], 'afterwards')
+    assert lines[3:-1] == ['x' * 99] * 20_000
+
+
+def test_nobody_reads() -> None:
+    read, write = os.pipe()
+    process = start("""
+        output = StandardError().__enter__()
+        ticks = []
+        threading.Thread(target=lambda: [ticks.append(time.monotonic()) or time.sleep(0.001)
+                                         for _ in range(500)], daemon=True).start()
+        for number in range(40_000):    # 4 MB
+            libc.write(2, b'x' * 99 + b'\\n', 100)
+            if number % 100 == 0:
+                time.sleep(0.0001)
+        while len(ticks) < 500:
+            time.sleep(0.01)
+        assert not output.flush(0.05)
+        print('on its way', flush=True)
+        sys.stdin.read()
+        """, write)
+    os.close(write)
+    assert process.stdin is not None and process.stdout is not None
+    # it got that far without a reader
+    assert process.stdout.readline() == b'on its way\n'
+    text = b''
+    while b'left out here' not in text:
+        text += os.read(read, 65536)
+    lines = text.decode().splitlines()
+    told = next(line for line in lines if 'left out here' in line)
+    kept = sum(line == 'x' * 99 for line in lines)
+    # what a full pipe refused is nobody's; here the emptying thread has its turns
+    assert kept + int(told.split()[1]) == pytest.approx(40_000, abs=100)
+    assert 5_000 < kept < 15_000
+    process.kill()
+    process.wait()
+    process.stdin.close()
+    process.stdout.close()
+    os.close(read)
+
+
+@pytest.mark.parametrize('end', ['closed', 'gone'])
+def test_nobody_is_there(end: str) -> None:
+    program = """
+        with StandardError() as output:
+            for _ in range(1000):
+                os.write(2, b'x' * 1000) if end == 'gone' else None
+                time.sleep(0)
+            assert output.flush(5.0)
+        print('through')
+        """
+    if end == 'closed':
+        command = [sys.executable, '-c', f'{HEAD}\nend = "closed"\n{textwrap.dedent(program)}']
+        done = subprocess.run(['sh', '-c', 'exec "$@" 2>&-', 'sh', *command], timeout=60,
+                              stdout=subprocess.PIPE, check=False)
+    else:
+        read, write = os.pipe()
+        os.close(read)
+        done = run('\nend = "gone"\n' + textwrap.dedent(program), stderr=write)
+        os.close(write)
+    assert (done.returncode, done.stdout) == (0, b'through\n')

@@ -1,0 +1,133 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""What is taken from a command subscription: the bytes of any publisher, and how old they are."""
+
+from collections import deque
+import math
+from typing import Any
+
+import pytest
+from rclpy.qos import QoSProfile
+from rclpy.serialization import serialize_message
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Bool, Float64, Int64
+
+from drive_can_bridge.ros.command_topic import CommandTopic
+
+MS = 1_000_000
+
+
+class Subscription:
+    """Stands for what rclpy gives: a queue of bytes with their time stamps."""
+
+    def __init__(self, kind: Any, depth: int = 8) -> None:
+        self.msg_type = kind
+        self.qos_profile = QoSProfile(depth=depth)
+        self.handle = self
+        self.waiting: deque[tuple[bytes, dict[str, Any]]] = deque()
+        self.endless = False
+
+    def put(self, data: bytes, source: int = 0, received: int = 0) -> None:
+        self.waiting.append((data, {'source_timestamp': source, 'received_timestamp': received}))
+
+    def take_message(self, kind: Any, raw: bool) -> Any:
+        assert raw
+        if self.endless:
+            self.put(serialize_message(self.msg_type()))
+        return self.waiting.popleft() if self.waiting else None
+
+
+class Taken:
+    """A topic and what became of its messages."""
+
+    def __init__(self, kind: Any, depth: int = 8) -> None:
+        self.subscription = Subscription(kind, depth)
+        self.used: list[Any] = []
+        self.late: list[float] = []
+        self.unreadable: list[str] = []
+        self.topic = CommandTopic(
+            self.subscription, use=lambda message, _: self.used.append(message),  # type: ignore
+            late=self.late.append, unreadable=self.unreadable.append)
+
+
+@pytest.mark.parametrize('message', [
+    Float64(data=-12.5), Float64(data=math.inf), Int64(data=-7), Int64(data=2 ** 62),
+    Bool(data=True), Bool(data=False)], ids=str)
+def test_as_the_middleware_writes_it(message: Any) -> None:
+    taken = Taken(type(message))
+    taken.subscription.put(serialize_message(message))
+    taken.topic.take(1.0)
+    assert taken.used == [message.data] and type(taken.used[0]) is type(message.data)
+
+
+@pytest.mark.parametrize('kind, data, value', [
+    # OMG DDS-XTypes 1.3, 7.6.3.1.2: CDR_BE 0000h, CDR_LE 0001h, CDR2_BE 0006h, CDR2_LE 0007h; two
+    # octets of options, of which the last says how many bytes are padding
+    (Float64, '00000000C029000000000000', -12.5), (Float64, '0001000000000000000029C0', -12.5),
+    (Int64, '00060000FFFFFFFFFFFFFFF9', -7), (Int64, '00070000F9FFFFFFFFFFFFFF', -7),
+    (Bool, '0000000001', True), (Bool, '0001000301000000', True), (Bool, '0001000000', False)])
+def test_as_others_write_it(kind: Any, data: str, value: Any) -> None:
+    taken = Taken(kind)
+    taken.subscription.put(bytes.fromhex(data))
+    taken.topic.take(1.0)
+    assert taken.used == [value] and not taken.unreadable
+
+
+@pytest.mark.parametrize('kind', [Float64, Int64, Bool, JointState])
+@pytest.mark.parametrize('data', [b'', b'\x00', b'\x00\x01\x00\x00', b'\xff' * 40,
+                                  b'\x00\x01\x00\x00' + b'\xff' * 200, b'\x00\x01' + bytes(70000)])
+def test_rubbish_is_no_exception(kind: Any, data: bytes) -> None:
+    taken = Taken(kind)
+    taken.subscription.put(data)
+    taken.subscription.put(serialize_message(kind()))
+    taken.topic.take(1.0)
+    assert len(taken.used) + len(taken.unreadable) == 2
+    assert taken.used
+
+
+def test_a_joint_state_is_an_object() -> None:
+    taken = Taken(JointState)
+    message = JointState(name=['belt'], velocity=[1.0])
+    taken.subscription.put(serialize_message(message))
+    taken.topic.take(1.0)
+    assert taken.used == [message]
+
+
+@pytest.mark.parametrize('skew', [0, 3_600_000 * MS, -3_600_000 * MS],
+                         ids=['one clock', 'publisher behind', 'publisher ahead'])
+def test_age(skew: int) -> None:
+    taken = Taken(Bool)
+    data = serialize_message(Bool(data=True))
+
+    def came(age: int) -> tuple[int, list[float]]:
+        taken.used.clear()
+        taken.late.clear()
+        taken.subscription.put(data, 10_000_000 * MS, 10_000_000 * MS + skew + age * MS)
+        taken.topic.take(1.0)
+        return len(taken.used), taken.late
+    assert came(50) == (1, [])
+    assert came(300) == (1, [])
+    assert came(301) == (0, [pytest.approx(0.251)])
+    assert came(2) == (1, [])           # the quickest so far
+    assert came(252) == (1, [])
+    assert came(253) == (0, [pytest.approx(0.251)])
+    assert came(5000) == (0, [pytest.approx(4.998)])
+    taken.topic.forget()                # another publisher, another clock
+    assert came(5000) == (1, [])
+
+
+def test_a_middleware_without_time_stamps() -> None:
+    taken = Taken(Bool)
+    for _ in range(3):
+        taken.subscription.put(serialize_message(Bool(data=True)), 0, 0)
+    taken.topic.take(1.0)
+    assert taken.used == [True] * 3
+
+
+def test_a_flood_is_taken_in_bounds() -> None:
+    taken = Taken(Float64, depth=5)
+    taken.subscription.endless = True
+    taken.topic.take(1.0)
+    assert len(taken.used) == 5
+    assert taken.topic.discard() == 5
+    taken.subscription.endless = False
+    assert taken.topic.discard() == 0

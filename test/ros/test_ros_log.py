@@ -1,0 +1,65 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""The log's own thread: nobody waits for it, and nothing is left out in silence."""
+
+import threading
+from typing import Any
+
+from waiting import wait_for
+
+from drive_can_bridge.ros.log import LINES_MAX, Log
+
+
+class Logger:
+    """Keeps lines, or holds up whoever writes one."""
+
+    def __init__(self) -> None:
+        self.lines: list[tuple[str, str]] = []
+        self.open = threading.Event()
+        self.open.set()
+
+    def __getattr__(self, level: str) -> Any:
+        def write(text: str) -> None:
+            self.open.wait()
+            self.lines.append((level, text))
+        return write
+
+
+def test_lines_in_order_and_printable() -> None:
+    logger = Logger()
+    log = Log(logger)
+    log.info('first')
+    log.warning('line\nfeed \x1b[2J')
+    log.error('third')
+    log.fatal('fourth')
+    log.close()
+    assert logger.lines == [('info', 'first'), ('warning', r'line\nfeed \x1b[2J'),
+                            ('error', 'third'), ('fatal', 'fourth')]
+    log.error('too late')
+    assert logger.lines[-1] == ('error', 'too late')
+
+
+def test_nobody_waits_for_a_logger_that_does_not_come_back() -> None:
+    logger = Logger()
+    logger.open.clear()
+    log = Log(logger)
+    for number in range(LINES_MAX + 500):
+        log.info(str(number))
+    logger.open.set()
+    wait_for(lambda: logger.lines[-1:] and logger.lines[-1][0] == 'warning')
+    told = logger.lines[-1][1]
+    dropped = int(told.split()[0])
+    assert told == (f'{dropped} lines of the log left out: they came faster than they could be '
+                    f'written')
+    assert dropped + len(logger.lines) - 1 == LINES_MAX + 500
+    assert logger.lines[:3] == [('info', '0'), ('info', '1'), ('info', '2')]
+    log.close()
+
+
+def test_the_end_does_not_wait_for_ever() -> None:
+    logger = Logger()
+    logger.open.clear()
+    log = Log(logger)
+    for number in range(LINES_MAX + 2):
+        log.info(str(number))
+    log.close()
+    logger.open.set()

@@ -1,0 +1,87 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Nobody reads standard error any more: the drives must not notice, nor the way out."""
+
+from collections.abc import Iterator
+import os
+from pathlib import Path
+import signal
+import tty
+
+from parameter_files import bridge_file, CONVEYOR, NEIGHBOUR
+from processes import Client, Processes
+import pytest
+from stuck_output import StuckOutput
+from test_system_reconnection import start_moving
+from waiting import wait_for
+
+NEIGHBOURS_REQUEST, REQUEST = '005FFFF0', '003FFFF0'
+
+
+@pytest.fixture
+def output() -> Iterator[StuckOutput]:
+    """Return a pipe that takes nothing."""
+    with StuckOutput() as stuck:
+        assert stuck.full
+        yield stuck
+
+
+def test_a_drive_falls_silent_and_the_bridge_is_stopped(
+        processes: Processes, client: Client, namespace: str, tmp_path: Path,
+        output: StuckOutput) -> None:
+    file = bridge_file(tmp_path, drives={'conveyor': CONVEYOR, 'neighbour': NEIGHBOUR})
+    simulator = processes.simulator(file)
+    bridge = processes.bridge(file, namespace, standard_error=output.write)
+    start_moving(client, f'/{namespace}/conveyor')
+    client.online(f'/{namespace}/neighbour')
+    client.ask('listen_to_log')
+    simulator.write('neighbour silent')
+    client.online(f'/{namespace}/neighbour', wanted=False)
+    # whoever listens to the log gets it all the same
+    client.ask('logged', text='neighbour: offline: no cyclic response for 25 cycles')
+    # the other one is asked as if nothing had happened, with what it is told to do
+    count = len(simulator.frames())
+    requests = simulator.frame(f'^{REQUEST}.* R$', since=count, count=100)
+    assert set(requests) == {f'{REQUEST}#05DC000000000000 R'}
+    assert client.get(f'/{namespace}/conveyor', 'ramp_time') == [1.0]
+    assert output.full
+    assert bridge.end(signal.SIGTERM, timeout=10.0) == 0
+    requests = [frame for frame in simulator.frames(' R$') if frame.startswith(REQUEST)]
+    assert requests[-3:] == [f'{REQUEST}#0000000000000000 R'] * 3
+
+
+def test_what_was_not_read_is_told_later(processes: Processes, client: Client, namespace: str,
+                                         tmp_path: Path, output: StuckOutput) -> None:
+    file = bridge_file(tmp_path)
+    processes.simulator(file)
+    bridge = processes.bridge(file, namespace, standard_error=output.write)
+    client.online(f'/{namespace}/conveyor')
+    text = ''
+
+    def read() -> bool:
+        nonlocal text
+        text += output.read()
+        return 'conveyor: online' in text
+    wait_for(read, 'the lines of the time before')
+    assert 'active: 1 drive on 1 bus' in text
+    assert bridge.end() == 0
+    read()
+    assert 'conveyor: stopped' in text
+
+
+def test_second_signal(processes: Processes, client: Client, namespace: str, tmp_path: Path,
+                       output: StuckOutput) -> None:
+    master, slave = os.openpty()
+    tty.setraw(slave)
+    try:
+        # its reader hangs in an open that never ends, so that the first signal takes its time
+        bridge = processes.bridge(
+            bridge_file(tmp_path, channel=os.ttyname(slave), bus={'sleep_after_open': 600.0}),
+            namespace, standard_error=output.write)
+        client.diagnostics(f'{namespace}/drive_can_bridge: bus main', state='opening')
+        bridge.send(signal.SIGINT)
+        bridge.send(signal.SIGTERM)
+        assert bridge.wait(timeout=10.0) in (128 + signal.SIGINT, 128 + signal.SIGTERM)
+        assert output.full
+    finally:
+        os.close(master)
+        os.close(slave)
