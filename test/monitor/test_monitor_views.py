@@ -1,11 +1,8 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Pages of fixed times and values: golden ones, and that they fit everywhere."""
 
-import pytest
-
-pytest.importorskip('rich')
-
 from monitor_builders import drive_status, many_drives, model_of, seen, three_drives
+import pytest
 from views import golden_file, plain, shown, SIZES, VIEWS
 
 from drive_can_bridge.monitor.model import Model
