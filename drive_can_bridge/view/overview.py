@@ -73,8 +73,10 @@ class _FullTable:
         if self._setpoints.width:
             need += self._setpoints.width + _GAP
         self._too_wide = need > width
-        self._exchange = need + _GAP + _EXCHANGE_WIDTH <= width
-        left = width - need - (_GAP + _EXCHANGE_WIDTH) * self._exchange - _GAP
+        left = width - need - _GAP
+        # where there is room for one of them only, a trend tells more
+        self._exchange = left >= _TREND_MIN + _GAP + _EXCHANGE_WIDTH
+        left -= (_GAP + _EXCHANGE_WIDTH) * self._exchange
         self._trend = min(left, _TREND_MAX) if left >= _TREND_MIN else 0
         self.height = 1 + sum(self._lines(drive) for drive in drives) + max(0, len(drives) - 1)
 
