@@ -20,25 +20,28 @@ import time
 os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
 os.environ.setdefault('ROS_DOMAIN_ID', '96')
 
-from drive_can_bridge.monitor.model import Model
-from drive_can_bridge.ros.monitor.client import MonitorClient
-from drive_can_bridge.view.keys import Choice
-from drive_can_bridge.view.page import page, Setting
-from drive_can_bridge.view.parts import TREND_SPAN
 from rich import box
 from rich.console import Console, Group, RenderableType
 from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
+from drive_can_bridge.monitor.model import Model
+from drive_can_bridge.ros.monitor.client import MonitorClient
+from drive_can_bridge.view.keys import Choice
+from drive_can_bridge.view.page import page, Setting
+from drive_can_bridge.view.parts import TREND_SPAN
+
 HERE = Path(__file__).resolve().parent
 #: columns and lines of the live view
 SIZE = (138, 33)
+#: lines of the architecture's boxes
+_HEIGHT = 20
 #: s that the demo may take to come up
 _START_TIMEOUT = 120.0
 _FRAME_PERIOD = 0.25
 #: rich's SVG wants a font from a server; a picture is complete in itself
-_FONT_FACE = re.compile(r'@font-face \{.*?\}\s*', re.DOTALL)
+_SUPERFLUOUS = re.compile(r'@font-face \{.*?\}\s*|<!--.*?-->\s*', re.DOTALL)
 _FONTS = 'Fira Code, DejaVu Sans Mono, Menlo, Consolas, monospace'
 
 
@@ -99,10 +102,10 @@ def architecture(path: Path) -> None:
         _titled('exchange/', exchange, 30), _arrows({3: '→', 6: '←'}),
         _titled('transport/', transport, 22)])
     bridge = Panel(inside, title='one process: drive_can_bridge', title_align='left',
-                   border_style='bright_black', box=box.ROUNDED, width=82)
+                   border_style='bright_black', box=box.ROUNDED, width=82, height=_HEIGHT)
     picture = _row([
-        _titled('ROS graph', graph, 19, 'green'), _arrows({2: '→', 5: '←', 10: '⇄', 13: '←'}),
-        bridge, _arrows({4: '→', 7: '←'}), _titled('CAN', can, 22, 'yellow')])
+        _titled('ROS graph', graph, 19, 'green', _HEIGHT), _arrows({2: '→', 5: '←', 10: '⇄', 13: '←'}),
+        bridge, _arrows({4: '→', 7: '←'}), _titled('CAN', can, 22, 'yellow', _HEIGHT)])
     clients = Panel(_lines(['drive_can monitor, read, write, backup … and your own nodes: '
                             'processes of their own, clients of the graph like any other']),
                     border_style='green', box=box.ROUNDED, width=127)
@@ -113,9 +116,10 @@ def _lines(lines: Sequence[str], justify: str = 'left', style: str = '') -> Text
     return Text('\n'.join(lines), justify=justify, style=style)  # type: ignore[arg-type]
 
 
-def _titled(title: str, body: RenderableType, width: int, style: str = 'white') -> Panel:
-    return Panel(body, title=Text(title, style='bold'), width=width, height=18, border_style=style,
-                 box=box.ROUNDED)
+def _titled(title: str, body: RenderableType, width: int, style: str = 'white',
+            height: int = _HEIGHT - 2) -> Panel:
+    return Panel(body, title=Text(title, style='bold'), width=width, height=height,
+                 border_style=style, box=box.ROUNDED)
 
 
 def _arrows(rows: dict[int, str]) -> Text:
@@ -139,7 +143,7 @@ def _save(body: RenderableType, path: Path, title: str, width: int, height: int)
                           color_system='truecolor', file=nowhere)
         console.print(body, height=height)
         svg = console.export_svg(title=title, unique_id=path.stem)
-    svg = _FONT_FACE.sub('', svg).replace('font-family: Fira Code, monospace',
+    svg = _SUPERFLUOUS.sub('', svg).replace('font-family: Fira Code, monospace',
                                           f'font-family: {_FONTS}')
     path.write_text('\n'.join(line.rstrip() for line in svg.splitlines()) + '\n',
                     encoding='utf-8')

@@ -45,12 +45,15 @@ _SEQUENCES = {
 _LONGEST = max(map(len, _SEQUENCES))
 
 #: the last line: what may be pressed here
-HINTS = {
-    Page.DRIVES: '↑↓ drive  ⏎ in detail  p parameters  l log  ? help  q quit',
-    Page.DRIVE: '↑↓ drive  p parameters  l log  esc back  ? help  q quit',
-    Page.PARAMETERS: 'space b page  r read again  ↑↓ drive  esc back  q quit',
-    Page.LOG: 'space b page  esc back  ? help  q quit',
-    Page.HELP: '↑↓ drive  esc back  q quit',
+HINTS: dict[Page, tuple[tuple[str, str], ...]] = {
+    Page.DRIVES: (('↑↓', 'drive'), ('⏎', 'in detail'), ('p', 'parameters'), ('l', 'log'),
+                  ('?', 'help'), ('q', 'quit')),
+    Page.DRIVE: (('↑↓', 'drive'), ('p', 'parameters'), ('l', 'log'), ('esc', 'back'),
+                 ('?', 'help'), ('q', 'quit')),
+    Page.PARAMETERS: (('space', 'next'), ('b', 'previous'), ('r', 'read again'), ('↑↓', 'drive'),
+                      ('esc', 'back'), ('q', 'quit')),
+    Page.LOG: (('space', 'older'), ('b', 'newer'), ('esc', 'back'), ('?', 'help'), ('q', 'quit')),
+    Page.HELP: (('↑↓', 'drive'), ('esc', 'back'), ('q', 'quit')),
 }
 
 

@@ -154,15 +154,12 @@ def _header(snapshot: Snapshot, setting: Setting, width: int) -> Text:
 
 
 def _keys(shown: Page, width: int) -> Text:
-    """Return the last line; what does not fit is left out from its middle: q stays."""
-    words = HINTS[shown].split('  ')
-    while len('  '.join(words)) > width and len(words) > 1:
-        words.pop(-2)
-    line = Text(no_wrap=True)
-    for word in words:
-        key, _, meaning = word.rpartition(' ')
-        line.append('  ' if line.plain else '').append(key or word, style='bold')
-        line.append(f' {meaning}' if key else '', style=DIM)
+    """Return the last line; what does not fit is left out before its end: q stays."""
+    hints = [Text(key, style='bold').append(f' {meaning}', style=f'not bold {DIM}')
+             for key, meaning in HINTS[shown]]
+    while sum(hint.cell_len + 2 for hint in hints) - 2 > width and len(hints) > 1:
+        hints.pop(-2)
+    line = Text('  ', no_wrap=True).join(hints)
     line.truncate(width)
     return line
 
@@ -264,7 +261,7 @@ def _log(frame: _Frame, snapshot: Snapshot, choice: Choice) -> None:
         screen = min(choice.screen, max(0, len(everything) - 1) // lines)
         end = len(everything) - screen * lines
         return everything[max(0, end - lines):end]
-    frame.fill('log, the newest below; space: further back', body)
+    frame.fill('log, the newest below', body)
 
 
 def _help(frame: _Frame, drive: DriveSnapshot | None, setting: Setting) -> None:

@@ -34,9 +34,9 @@ def test_it_fits_everywhere(width: int, page: Page) -> None:
 
 
 def test_the_last_line_names_the_keys() -> None:
-    for page, words in HINTS.items():
+    for page, hints in HINTS.items():
         last = plain(seen(three_drives()), Choice(page), 80, 24).rstrip('\n').split('\n')[-1]
-        assert last.rstrip() == words
+        assert last.rstrip() == '  '.join(' '.join(hint) for hint in hints)
     narrow = plain(seen(three_drives()), Choice(), 30, 10).rstrip('\n').split('\n')[-1]
     assert narrow.rstrip().endswith('q quit')
 
