@@ -7,15 +7,16 @@ BIN := $(VENV)/bin
 # Nothing that runs from here leaves this machine, unless you say otherwise.
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 
-.PHONY: help demo test setup bench lint clean
+.PHONY: help demo test setup bench pictures lint clean
 .NOTPARALLEL:
 .DEFAULT_GOAL := help
 
 help:
-	@echo 'make demo    simulated drives and the bridge in one process; ARGS="..." goes to drive_can demo'
+	@echo 'make demo    simulated drives, a bridge and the live view; ARGS="..." goes to drive_can demo'
 	@echo 'make test    types and all tests; ARGS="..." goes to pytest (-n 0: one after the other)'
 	@echo '             DRIVE_CAN_TEST_PROFILE=long: what is random looks longer, as in CI'
 	@echo 'make bench   measurements; ARGS="..." goes to bench/run.py'
+	@echo 'make pictures  those of README and docs, from a demo that runs; ARGS="..." goes to docs/pictures.py'
 	@echo 'make lint    style'
 	@echo 'make setup   only the virtual environment that all of them use, in $(VENV)'
 	@echo 'make clean   removes it and everything else that was built'
@@ -35,6 +36,9 @@ test: setup
 
 bench: setup
 	@exec $(BIN)/python .ci/foreground $(BIN)/python bench/run.py $(ARGS)
+
+pictures: setup
+	@exec $(BIN)/python docs/pictures.py $(ARGS)
 
 lint: setup
 	@.ci/lint '$(VENV)'

@@ -104,8 +104,7 @@ def main() -> None:
             raise SystemExit('the drives did not come online')
         time.sleep(0.005)
     serve({'clear': measured.clear, 'result': measured.result},
-          ready=time.monotonic() - begun)
-    measured.close()
+          ready=time.monotonic() - begun, close=measured.close)
 
 
 if __name__ == '__main__':

@@ -13,7 +13,9 @@ from pathlib import Path
 import subprocess
 import sys
 import time
-from typing import Any
+from typing import Any, NoReturn
+
+from drive_can_bridge.process.signals import leave
 
 HERE = Path(__file__).resolve().parent
 ANSWER_TIMEOUT = 120.0
@@ -38,12 +40,7 @@ class Child:
 
     def cpu(self) -> float:
         """Return the CPU time of the whole process in s."""
-        fields = Path(f'/proc/{self.process.pid}/schedstat').read_text().split()
-        total = int(fields[0])
-        for task in Path(f'/proc/{self.process.pid}/task').iterdir():
-            if task.name != str(self.process.pid):
-                total += int((task / 'schedstat').read_text().split()[0])
-        return total * 1e-9
+        return cpu_of(self.process.pid)
 
     def resident_mb(self) -> float:
         """Return the resident memory in MB."""
@@ -68,6 +65,12 @@ class Child:
         return json.loads(line)
 
 
+def cpu_of(process: int) -> float:
+    """Return the CPU time of all threads of a process in s."""
+    return 1e-9 * sum(int((task / 'schedstat').read_text().split()[0])
+                      for task in Path(f'/proc/{process}/task').iterdir())
+
+
 @contextmanager
 def child(script: str, *arguments: object) -> Iterator[Child]:
     """Run a process for as long as needed."""
@@ -78,12 +81,19 @@ def child(script: str, *arguments: object) -> Iterator[Child]:
         process.close()
 
 
-def serve(commands: dict[str, Callable[..., Any]], ready: Any = True) -> None:
-    """Be the far end: obey until the standard input ends."""
+def serve(commands: dict[str, Callable[..., Any]], ready: Any = True, *,
+          close: Callable[[], Any] = lambda: None) -> NoReturn:
+    """
+    Be the far end: obey until the standard input ends, and then end the process.
+
+    It does not take Python's way out, on which the middleware finds its threads still running.
+    """
     print(json.dumps(ready), flush=True)
     for line in sys.stdin:
         name, *arguments = line.split()
         print(json.dumps(commands[name](*map(float, arguments))), flush=True)
+    close()
+    leave(0)
 
 
 def sleep_until(deadline: float) -> None:

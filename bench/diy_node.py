@@ -85,6 +85,11 @@ class DoItYourself(Node):
         self.notifier = can.Notifier(self.bus, [self.reader])
         self.timer = self.create_timer(period, self.tick)
 
+    def close(self):
+        """End well."""
+        self.notifier.stop()
+        self.bus.shutdown()
+
     def tick(self):
         """Exchange with every drive."""
         message = self.reader.get_message(timeout=0.0)
@@ -107,7 +112,7 @@ def main() -> None:
     for drive in node.drives.values():
         executor.add_node(drive)
     threading.Thread(target=executor.spin, daemon=True).start()
-    serve({})
+    serve({}, close=node.close)
 
 
 if __name__ == '__main__':

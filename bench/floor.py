@@ -67,6 +67,10 @@ class Floor:
             deadline += period
         found['cpu'] = time.thread_time() - cpu
 
+    def close(self) -> None:
+        """End well."""
+        self._bus.shutdown()
+
 
 def main() -> None:
     """Obey."""
@@ -74,7 +78,7 @@ def main() -> None:
     rclpy.init(args=[])
     floor = Floor(Node('bench_floor', enable_rosout=False), sys.argv[1], int(sys.argv[2]),
                   float(sys.argv[3]))
-    serve({'run': floor.run})
+    serve({'run': floor.run}, close=floor.close)
 
 
 if __name__ == '__main__':

@@ -93,6 +93,23 @@ def flood_figures(found: dict[str, Any]) -> list[Figure]:
                    f'{1e3 * sleeping[0]:.3f} ms', flood / quiet, 1.2)]
 
 
+def monitor_figures(found: dict[str, Any]) -> list[Figure]:
+    """What a bridge notices of a monitor, and what the monitor takes."""
+    before, beside = found['without'], found['with']
+    periods = [p99(each['period_errors']) for each in (before, beside)]
+    shares = [each['cpu'] / each['elapsed'] for each in (before, beside)]
+    return [
+        Figure('period error p99 with a monitor', f'{1e3 * periods[1]:.3f} ms',
+               f'without {1e3 * periods[0]:.3f} ms', periods[1] / periods[0], 1.1),
+        Figure('exchanges missed with a monitor', str(beside['missed']),
+               f'without {before["missed"]}', beside['missed'], 0.0),
+        Figure('CPU of the bridge with a monitor', f'{100 * shares[1]:.1f} %',
+               f'without {100 * shares[0]:.1f} %', shares[1] / shares[0], 1.25),
+        Figure('CPU of the monitor, of one core', f'{100 * median(found["monitor"]):.1f} %', '',
+               median(found['monitor']), 0.1),
+    ]
+
+
 def drives_figures(found: dict[str, dict[str, Any]]) -> list[Figure]:
     """Cost by number of drives."""
     costs = {int(number): sum(each['bridge']['cpu'][name] for name in ('timer', 'reader'))
@@ -129,7 +146,7 @@ FIGURES: dict[str, Callable[[Any], list[Figure]]] = {
     'unsubscribed': lambda found: exchange_figures(found, 'nobody subscribed', 1.0),
     'ordinary': lambda found: exchange_figures(found, 'all of it at ordinary priority', 1.5),
     'diy': diy_figures, 'latency': latency_figures, 'service': service_figures,
-    'flood': flood_figures, 'drives': drives_figures, 'start': start_figures,
+    'flood': flood_figures, 'monitor': monitor_figures, 'drives': drives_figures, 'start': start_figures,
 }
 
 

@@ -33,6 +33,7 @@ def plan(options: argparse.Namespace) -> dict[str, Callable[[], Any]]:
         'diy': lambda: scenarios.do_it_yourself(Load(8, 0.01, commands=100.0), duration),
         'service': lambda: scenarios.service(Load(1, 0.02, subscribed=False), 300),
         'flood': lambda: scenarios.flood(Load(8, 0.01, subscribed=False), duration, 10000.0),
+        'monitor': lambda: scenarios.monitor(Load(drives, period, subscribed=False), duration),
         'drives': lambda: {number: scenarios.exchange(
             Load(number, period, subscribed=False), duration, floor=False)
             for number in sorted({1, 4, 8, drives})},

@@ -16,6 +16,7 @@ from typing import Any
 
 from child import Child, child, HERE
 from unix_bus import INTERFACE
+from viewer import viewer
 
 #: s until discovery and the first publishes are over
 SETTLE = 2.0
@@ -152,6 +153,33 @@ def flood(load: Load, duration: float, commands: float) -> dict[str, Any]:
                                'missed': result['missed'], 'exchanges': result['exchanges'],
                                'sleeper': sleeper.ask('errors')}
             found['calls'] = caller.ask('calm')
+    return found
+
+
+def monitor(load: Load, duration: float, rounds: int = 4) -> dict[str, Any]:
+    """Measure the period of one bridge with and without a monitor, in turn, and the monitor."""
+    found: dict[str, Any] = {name: {'period_errors': [], 'missed': 0, 'cpu': 0.0, 'elapsed': 0.0}
+                             for name in ('without', 'with')}
+    found['monitor'] = []
+    with ExitStack() as outer:
+        bus = Bus(outer, load)
+        subscribers(outer, load)
+        with bridge_under(load, bus) as bridge:
+            for number in range(2 * rounds):
+                with ExitStack() as stack:
+                    name = 'with' if number % 2 else 'without'
+                    watcher = stack.enter_context(viewer()) if number % 2 else None
+                    time.sleep(2 * SETTLE)
+                    bridge.ask('clear')
+                    begun = watcher.cpu() if watcher else 0.0
+                    time.sleep(duration)
+                    result = bridge.ask('result')
+                    if watcher:
+                        found['monitor'].append((watcher.cpu() - begun) / result['elapsed'])
+                    found[name]['period_errors'] += result['period_errors']
+                    for key in ('missed', 'elapsed'):
+                        found[name][key] += result[key]
+                    found[name]['cpu'] += result['process_cpu']
     return found
 
 

@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Start the bridge with simulated drives, in one process and on buses inside it.
+Start simulated drives, a bridge for them and a monitor of both, on pseudo-terminals.
 
 .. code-block:: console
 

@@ -72,7 +72,8 @@ os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
 HERE = Path(__file__).parent
 #: directories and modules whose tests wait for processes of their own: each test by itself
-SPREAD = ('test/system/', 'test/demo/', 'test/simulation/test_simulate_command', 'test/process/')
+SPREAD = ('test/system/', 'test/demo/', 'test/monitor/test_monitor_attach',
+          'test/simulation/test_simulate_command', 'test/process/')
 #: what comes first, because it takes longest
 FIRST = ('test/system/test_soak', 'test/system/', 'test/demo/', 'test/ros/', 'test/')
 #: processes for each core: most of the time they wait

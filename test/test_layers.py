@@ -19,7 +19,7 @@ CHECKOUT = Path(__file__).resolve().parent.parent
 PACKAGE = CHECKOUT / 'drive_can_bridge'
 
 #: Layer: the layers that it may import, besides itself. '' is the package's own __init__.
-#: ``ros.demo`` is one above ros, because it joins both ends of the bus in one process.
+#: ``ros.monitor`` is a client of bridges, no part of one: it knows none of them.
 INTERNAL: dict[str, set[str]] = {
     '': set(),
     'resources': {''},
@@ -33,12 +33,14 @@ INTERNAL: dict[str, set[str]] = {
     'simulation': {'', 'core', 'configuration', 'protocols', 'resources', 'transport'},
     'ros': {
         '', 'core', 'configuration', 'protocols', 'resources', 'transport', 'exchange', 'process'},
-    'ros.demo': {
-        '', 'core', 'configuration', 'protocols', 'resources', 'transport',
-        'exchange', 'process', 'simulation', 'ros'},
+    'monitor': {'', 'core'},
+    'view': {'', 'core', 'monitor'},
+    'ros.monitor': {'', 'core', 'monitor'},
+    'ros.demo': {'', 'core', 'configuration', 'simulation', 'monitor', 'ros', 'ros.monitor'},
+    'demo': {'', 'core', 'configuration', 'process'},
     'cli': {
-        '', 'core', 'configuration', 'protocols', 'resources', 'transport',
-        'exchange', 'process', 'profiles', 'simulation', 'ros', 'ros.demo'},
+        '', 'core', 'configuration', 'protocols', 'resources', 'transport', 'exchange', 'process',
+        'profiles', 'simulation', 'monitor', 'view', 'demo', 'ros', 'ros.monitor', 'ros.demo'},
 }
 
 ROS_PACKAGES = {
@@ -55,16 +57,20 @@ EXTERNAL: dict[str, set[str]] = {
     'transport': {'can', 'serial'},
     # yaml: only to tell which nodes a parameter file names when none of them is ours
     'ros': {*ROS_PACKAGES, 'yaml'},
-    'ros.demo': {*ROS_PACKAGES, 'rich'},
+    'ros.monitor': ROS_PACKAGES,
+    'ros.demo': ROS_PACKAGES,
+    'view': {'rich'},
+    'demo': {'yaml'},
     'cli': {'rich'},
 }
 
 #: Layer: edges that may be used inside functions only, so that importing the layer stays cheap and
 #: works where the other side is missing.
-LAZY = {('cli', 'ros'), ('cli', 'ros.demo')}
+LAZY = {('cli', 'ros'), ('cli', 'ros.monitor'), ('cli', 'ros.demo'), ('cli', 'view'),
+        ('cli', 'demo')}
 
 #: No clock, no thread, no log, no input or output in here: time and frames are arguments.
-SANS_IO = {'core', 'protocols'}
+SANS_IO = {'core', 'protocols', 'monitor'}
 IMPURE = {
     'asyncio', 'concurrent', 'datetime', 'logging', 'multiprocessing', 'os', 'pathlib', 'queue',
     'random', 'select', 'selectors', 'signal', 'socket', 'subprocess', 'threading', 'time',

@@ -28,12 +28,14 @@ SUBCOMMANDS: dict[str, tuple[str, str]] = {
     'simulate': ('drive_can_bridge.cli.simulate',
                  'play every drive of a parameter file on its bus'),
     'demo': ('drive_can_bridge.cli.demo',
-             'run a bridge and simulated drives in one process'),
+             'run a bridge, simulated drives and the live view of them'),
+    'monitor': ('drive_can_bridge.cli.monitor',
+                'show all bridges and their drives, live'),
     'profile': ('drive_can_bridge.cli.profile',
                 'list, show, check and import parameter tables'),
 }
 #: what runs until a signal comes: that is no failure
-ENDLESS = ('simulate', 'demo')
+ENDLESS = ('simulate', 'demo', 'monitor')
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -21,12 +21,12 @@ from typing import Any, TextIO, TypeVar
 
 from drive_can_bridge.core.configuration import BridgeConfiguration, BusConfiguration
 from drive_can_bridge.core.errors import ConfigurationError, TransportError, ValueRefused
-from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.simulation.console import (
     Console, describe, help_lines, LineReader, wear_lines,
 )
 from drive_can_bridge.simulation.faults import Fault, parse_fault
 from drive_can_bridge.simulation.plant import Mechanics
+from drive_can_bridge.simulation.player import ShowFrame
 from drive_can_bridge.simulation.simulation import Simulation
 from drive_can_bridge.simulation.terminal import SlcanTerminal
 
@@ -65,8 +65,9 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument('--axis', metavar='DRIVE:KEY=VALUE,…', action='append', default=[],
                         help='what the motor of a drive carries, for example '
                              'lift:load=0.3,noise=1,brake=0; repeatable')
-    parser.add_argument('--log-frames', action='store_true',
-                        help='print every frame: (seconds) BUS ID#DATA R|T')
+    parser.add_argument('--log-frames', metavar='FILE', type=Path, nargs='?', const=Path('-'),
+                        help='print every frame: (seconds) BUS ID#DATA R|T; or write it to FILE, '
+                             'as candump -L does')
     parser.set_defaults(run=run)
 
 
@@ -99,21 +100,18 @@ def run(args: argparse.Namespace) -> int:
 
 def _simulate(stack: ExitStack, configuration: BridgeConfiguration,
               faults: list[tuple[str, Fault]], mechanics: dict[str, Mechanics], *, pty: bool,
-              link: Path | None, log_frames: bool) -> int:
+              link: Path | None, log_frames: Path | None) -> int:
     # before anything is announced: whoever reads the first line may send the signal at once
     wake = stack.enter_context(_signals_as_descriptor())
     output = _Output(sys.stdout)
     terminals: dict[str, SlcanTerminal] = {}
-
-    def show_frame(bus: str, frame: Frame, sent: bool) -> None:
-        output.say(f'({time.time():.6f}) {bus} {frame} {"T" if sent else "R"}')
 
     def open_terminal(bus: BusConfiguration) -> SlcanTerminal:
         return terminals[bus.name]
 
     simulation = Simulation(
         configuration, open_bus=open_terminal if pty else None, say=output.say,
-        complain=_complain, show_frame=show_frame if log_frames else None, mechanics=mechanics)
+        complain=_complain, show_frame=_frame_log(stack, output, log_frames), mechanics=mechanics)
     for name, fault in faults:
         try:
             simulation.drives[name].fault(fault)
@@ -139,6 +137,21 @@ def _simulate(stack: ExitStack, configuration: BridgeConfiguration,
         for rule, count in drive.violations.items():
             output.say(f'{drive.name}: violation: {rule}: {count} times')
     return status
+
+
+def _frame_log(stack: ExitStack, output: '_Output', path: Path | None) -> ShowFrame | None:
+    """
+    Return what takes the frames: standard output (``-``), a file as candump -L writes it, or None.
+
+    :raises OSError: the file cannot be written.
+    """
+    if path is None:
+        return None
+    if path == Path('-'):
+        return lambda bus, frame, sent: output.say(
+            f'({time.time():.6f}) {bus} {frame} {"T" if sent else "R"}')
+    file = _Output(stack.enter_context(path.open('w', encoding='ascii')), path)
+    return lambda bus, frame, _: file.say(f'({time.time():.6f}) {bus} {frame}')
 
 
 def _wait(simulation: Simulation, wake: int, console: Console) -> int:
@@ -195,10 +208,11 @@ def _of_drive(option: str, text: str, configuration: BridgeConfiguration,
 
 
 class _Output:
-    """Standard output for several threads; a reader who left is no reason to end."""
+    """Standard output, or a file, for several threads; that it ends is no reason to end."""
 
-    def __init__(self, stream: TextIO | None) -> None:
+    def __init__(self, stream: TextIO | None, path: Path | None = None) -> None:
         self._stream = stream
+        self._path = path
         self._lock = threading.Lock()
 
     def say(self, line: str) -> None:
@@ -207,10 +221,13 @@ class _Output:
                 return
             try:
                 print(line, file=self._stream, flush=True)
-            except OSError:
+            except OSError as error:
                 self._stream = None
-                # Python flushes once more at exit, and would complain
-                os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+                if self._path is not None:
+                    _complain(f'{self._path}: incomplete: {error.strerror}')
+                else:
+                    # Python flushes once more at exit, and would complain
+                    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _complain(line: str) -> None:

@@ -1,114 +1,105 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""``drive_can demo`` in a terminal: a pseudo-terminal, and what arrives at its other end."""
+"""``drive_can demo`` in a terminal: what arrives at its other end, and which process may die."""
 
-from collections.abc import Iterator
-import fcntl
+from collections.abc import Callable
 import os
 from pathlib import Path
-import pty
-import select
 import signal
-import struct
-import termios
-from typing import Any
 
-from demo_builders import Demo
 import pytest
+from running import Running, Terminal
 from waiting import wait_for
 
 pytest.importorskip('rclpy')
 pytest.importorskip('rich')
 
-ENTERED, LEFT = b'\x1b[?1049h', b'\x1b[?1049l'
-
-
-class Terminal:
-    """The other end of a pseudo-terminal."""
-
-    def __init__(self) -> None:
-        self.near, self.far = pty.openpty()
-        self.written = b''
-
-    def resize(self, columns: int, lines: int) -> None:
-        fcntl.ioctl(self.far, termios.TIOCSWINSZ, struct.pack('HHHH', lines, columns, 0, 0))
-
-    def read(self) -> bytes:
-        """Take what has come; return all of it."""
-        while select.select([self.near], [], [], 0)[0]:
-            try:
-                self.written += os.read(self.near, 65536)
-            except OSError:  # nobody has the terminal open any more
-                break
-        return self.written
-
-    @property
-    def echoes(self) -> bool:
-        """What is typed appears."""
-        flags: list[Any] = termios.tcgetattr(self.far)
-        return bool(flags[3] & termios.ECHO)
-
-    def close(self) -> None:
-        os.close(self.near)
-        os.close(self.far)
+ENTERED, LEFT = '\x1b[?1049h', '\x1b[?1049l'
+Start = Callable[..., Running]
 
 
 @pytest.fixture
-def terminal() -> Iterator[Terminal]:
-    opened = Terminal()
-    opened.resize(120, 40)
-    yield opened
-    opened.close()
+def demo(start: Start, terminal: Terminal) -> Running:
+    """Return a demo whose view is up."""
+    running = start(**terminal.options)
+    terminal.shows('not armed.*online')
+    return running
 
 
-def start(terminal: Terminal, directory: Path, *arguments: str, **variables: str) -> Demo:
-    return Demo(directory, *arguments, stdin=terminal.far, stdout=terminal.far,
-                stderr=terminal.far, environment={
-                    'TERM': 'xterm-256color', 'PYTHONIOENCODING': 'utf-8', **variables})
+def all_gone(children: dict[str, int]) -> bool:
+    """Tell whether none of the processes exists any more."""
+    return not any(Path(f'/proc/{number}').exists() for number in children.values())
 
 
-@pytest.fixture
-def demos() -> Iterator[list[Demo]]:
-    started: list[Demo] = []
-    yield started
-    for demo in started:
-        demo.close()
-
-
-def test_the_view_comes_and_goes(terminal: Terminal, tmp_path: Path, demos: list[Demo]) -> None:
-    demo = start(terminal, tmp_path)
-    demos.append(demo)
-    wait_for(lambda: b'not armed' in terminal.read() and b'online' in terminal.read(), 'view')
-    assert ENTERED in terminal.written
-    assert LEFT not in terminal.written
+def test_the_view_comes_and_goes(demo: Running, terminal: Terminal) -> None:
+    assert ENTERED in terminal.read()
+    assert LEFT not in terminal.read()
     assert not terminal.echoes
     # the log is inside the view, and never written across it
-    assert b'[INFO]' not in terminal.written
+    assert '[INFO]' not in terminal.read()
 
-    before = len(terminal.written)
+    before = len(terminal.read())
     terminal.resize(80, 24)
-    wait_for(lambda: b'\x1b[2J' in terminal.read()[before:]
-             and b'conveyor' in terminal.written[before:], 'page of another size')
+    terminal.shows('── bus ──.*quit', since=before)
 
-    assert demo.end(signal.SIGINT) == 0
+    children = demo.children()
+    assert set(children) == {'monitor', 'simulate', 'drive_can_bridge'}
+    terminal.type('\x03')
+    assert demo.process.wait(20.0) == 0
     view, _, rest = terminal.read().rpartition(LEFT)
-    assert view.endswith(b'\x1b[?25h')
-    assert b' missed, period error ' in rest
-    assert b'Traceback' not in terminal.written
+    assert 'conveyor' in view
+    assert ' missed, period error ' in rest
+    assert 'Traceback' not in terminal.read()
     assert terminal.echoes
+    assert all_gone(children)
 
 
-def test_a_dumb_terminal_gets_lines(terminal: Terminal, tmp_path: Path,
-                                    demos: list[Demo]) -> None:
-    demo = start(terminal, tmp_path, TERM='dumb')
-    demos.append(demo)
-    wait_for(lambda: b'conveyor online actual_speed=' in terminal.read(), 'lines')
+def test_whoever_has_seen_enough_ends_everything(demo: Running, terminal: Terminal) -> None:
+    children = demo.children()
+    terminal.type('q')
+    assert demo.process.wait(20.0) == 0
+    assert 'has ended' not in terminal.read()
+    assert all_gone(children)
+
+
+def test_without_its_view_the_bridge_runs_on_and_it_is_said(demo: Running,
+                                                            terminal: Terminal) -> None:
+    children = demo.children()
+    os.kill(children['monitor'], signal.SIGKILL)
+    terminal.shows(r'the view has ended \(killed by signal 9\); bridge and drives run on')
+    assert demo.process.poll() is None
+    assert set(demo.children()) == {'simulate', 'drive_can_bridge'}
+    assert LEFT in terminal.read()
     assert demo.end(signal.SIGTERM) == 0
-    assert b'\x1b[?' not in terminal.read()
+    assert terminal.echoes
+    assert all_gone(children)
 
 
-def test_a_mistake_is_seen(terminal: Terminal, tmp_path: Path, demos: list[Demo]) -> None:
-    demo = start(terminal, tmp_path, '--fault', 'lift:stuck=nothing')
-    demos.append(demo)
-    assert demo.process.wait(30.0) == 2
-    assert b'drive_can demo: --fault' in terminal.read()
-    assert ENTERED not in terminal.written
+def test_without_its_bridge_every_drive_is_offline_in_words(demo: Running,
+                                                            terminal: Terminal) -> None:
+    children = demo.children()
+    os.kill(children['drive_can_bridge'], signal.SIGKILL)
+    terminal.shows('conveyor, lift, turntable: offline: its bridge /drive_can_bridge has been '
+                   'silent')
+    assert demo.end(signal.SIGINT) == 0
+    assert all_gone(children)
+
+
+def test_what_the_demo_dies_of_its_processes_end(demo: Running) -> None:
+    children = demo.children()
+    demo.end(signal.SIGKILL)
+    wait_for(lambda: all_gone(children), 'the end of all processes')
+
+
+def test_a_dumb_terminal_gets_lines(start: Start, terminal: Terminal) -> None:
+    options = {**terminal.options, 'environment': {'TERM': 'dumb'}}
+    demo = start(**options)
+    terminal.shows('conveyor online actual_speed=')
+    assert demo.end(signal.SIGTERM) == 0
+    assert '\x1b[?' not in terminal.read()
+
+
+def test_a_mistake_is_seen(start: Start, terminal: Terminal) -> None:
+    demo = start('--fault', 'lift:stuck=nothing', **terminal.options)
+    assert demo.process.wait(60.0) == 2
+    assert 'drive_can demo: --fault' in terminal.read()
+    assert ENTERED not in terminal.read()

@@ -1,5 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""The commands of the README, with the real ``ros2`` wherever it is installed."""
+"""The commands of docs/first_steps.md, with the real ``ros2`` wherever it is installed."""
 
 from collections.abc import Callable
 import importlib.util

@@ -2,33 +2,31 @@
 """
 Somebody who commands the drives, as any other ROS node would: ``drive_can demo --drive``.
 
-Neutral until every setpoint is armed, then ``~/enable`` where there is control, then a slow sine.
+``~/enable`` where there is control, neutral until every setpoint is armed, then a slow sine.
 Setpoints without a negative side (limits) get a steady value.
 """
 
 import math
-import threading
+import sys
 import time
 from typing import Any
 
-from rclpy.exceptions import InvalidHandle
-from rclpy.executors import Executor
-from rclpy.impl.implementation_singleton import rclpy_implementation
-from rclpy.logging import get_logger
+from diagnostic_msgs.msg import DiagnosticArray
+import rclpy
+from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.publisher import Publisher
+from rclpy.qos import QoSProfile
 from std_srvs.srv import SetBool
 
+from drive_can_bridge.configuration.load import configuration_from_file
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter, Value, ValueKind
-from drive_can_bridge.core.session import Session
-from drive_can_bridge.ros.bridge_node import BridgeNode
-from drive_can_bridge.ros.drive_node import DriveNode
+from drive_can_bridge.monitor.reports import read_status, Report
+from drive_can_bridge.ros.monitor.messages import statuses
 from drive_can_bridge.ros.values import TOPIC_TYPES
 from drive_can_bridge.simulation.names import quantity_of
 
-RCLError = rclpy_implementation.RCLError
-
-#: of a process only the bridge and its drives have names without underscore
 NODE_NAME = '_demo_commander'
 #: s between two commands to a drive
 COMMAND_PERIOD = 0.05
@@ -36,117 +34,81 @@ COMMAND_PERIOD = 0.05
 SINE_PERIOD = 20.0
 #: share of the permitted range that the sine, or a steady value, goes up to
 AMPLITUDE = 0.3
-#: s until ~/enable is tried again after it was refused
-_ENABLE_AGAIN = 5.0
-#: s more to wait for an answer that does not come
-_ANSWER_TIMEOUT = 4.0
+#: s until ~/enable is tried again
+_ENABLE_AGAIN = 4.0
+#: control states in which setpoints count
+_ENABLED = ('enabled', 'operation enabled')
 
 
 class _DriveCommander:
-    """Commands one drive."""
+    """Commands one drive by what diagnostics say of it."""
 
-    def __init__(self, node: Node, drive: DriveNode, delay: float) -> None:
+    def __init__(self, node: Node, drive: DriveConfiguration, delay: float) -> None:
+        self._logger = node.get_logger()
         self._name = drive.name
         self._delay = delay
-        name = drive.node.get_fully_qualified_name()
+        table = drive.profile.control
         self._setpoints: list[tuple[Parameter, Publisher, Any]] = []
-        for item in drive.session.setpoints.items:
-            parameter = item.parameter
-            message_type = TOPIC_TYPES[parameter.kind]
-            publisher = node.create_publisher(message_type, f'{name}/command/{parameter.name}', 8)
-            self._setpoints.append((parameter, publisher, message_type()))
-        self._client = (node.create_client(SetBool, f'{name}/enable')
-                        if drive.session.control is not None else None)
+        for parameter in drive.cyclic_request:
+            if table is None or parameter.name != table.parameter:
+                message_type = TOPIC_TYPES[parameter.kind]
+                self._setpoints.append((parameter, node.create_publisher(
+                    message_type, f'/{drive.name}/command/{parameter.name}', 8), message_type()))
+        self._client = node.create_client(SetBool, f'/{drive.name}/enable')
         self._ask_at = 0.0
-        self._asking = False
-        self._rest()
-
-    def _rest(self) -> None:
         self._begun_at: float | None = None
-        self._enabled = self._client is None
 
-    def command(self, session: Session | None, now: float) -> None:
-        """Publish what is due, once."""
-        if session is None or not session.online or session.setpoints.waiting:
+    def reported(self, report: Report, now: float) -> None:
+        """Take what the bridge says of the drive."""
+        control = report.facts.get('control_state')
+        there = report.state not in ('offline', 'mapping differs', 'fault')
+        ready = there and (control is None or control in _ENABLED)
+        if not (ready and report.state == 'online'):
             # gone, back again, or the process stood still: whatever it was, begin anew
-            self._rest()
-        elif not self._enabled:
-            self._ask(now)
+            self._begun_at = None
         elif self._begun_at is None:
             self._begun_at = now + self._delay
+        if there and not ready and now >= self._ask_at and self._client.service_is_ready():
+            self._ask_at = now + _ENABLE_AGAIN
+            self._client.call_async(SetBool.Request(data=True)).add_done_callback(self._answered)
+
+    def command(self, now: float) -> None:
+        """Publish what is due, once."""
         elapsed = 0.0 if self._begun_at is None else max(0.0, now - self._begun_at)
         for parameter, publisher, message in self._setpoints:
-            message.data = (neutral(parameter) if elapsed <= 0.0
-                            else commanded(parameter, elapsed))
+            message.data = neutral(parameter) if elapsed <= 0.0 else commanded(parameter, elapsed)
             publisher.publish(message)
 
-    def _ask(self, now: float) -> None:
-        client = self._client
-        # an answer may get lost on its way: a service may answer before it knows where to
-        if (client is None or now < self._ask_at + (_ANSWER_TIMEOUT if self._asking else 0.0)
-                or not client.service_is_ready()):
-            return
-        self._asking = True
-        self._ask_at = now + _ENABLE_AGAIN
-        client.call_async(SetBool.Request(data=True)).add_done_callback(self._take_answer)
-
-    def _take_answer(self, future: Any) -> None:
-        self._asking = False
+    def _answered(self, future: Any) -> None:
         answer = None if future.cancelled() or future.exception() else future.result()
-        if answer is not None and answer.success:
-            self._enabled = True
-        elif answer is not None:
-            get_logger('demo').warning(f'{self._name}: ~/enable: {answer.message}')
+        if answer is not None and not answer.success:
+            self._logger.warning(f'{self._name}: ~/enable: {answer.message}')
 
 
-class Commander:
-    """
-    Commands all drives of a bridge, from a thread of its own.
+def main() -> int:
+    """Command all drives of a parameter file, until the process is ended."""
+    configuration = configuration_from_file(sys.argv[1])
+    rclpy.init(args=[])
+    node = Node(NODE_NAME, start_parameter_services=False, enable_rosout=False)
+    drives = {name: _DriveCommander(node, drive, delay=index * SINE_PERIOD / 8)
+              for index, (name, drive) in enumerate(configuration.drives.items())}
 
-    :param executor: takes the answers of the services.
-    """
+    def take(message: DiagnosticArray) -> None:
+        for status in statuses(message):
+            report = read_status(status)
+            if report is not None and report.is_drive and report.name in drives:
+                drives[report.name].reported(report, time.monotonic())
 
-    def __init__(self, bridge: BridgeNode, executor: Executor) -> None:
-        self._bridge = bridge
-        self._executor = executor
-        self.node = Node(NODE_NAME, namespace=bridge.get_namespace(), context=bridge.context,
-                         use_global_arguments=False, start_parameter_services=False,
-                         enable_rosout=False)
-        drives = list(bridge.drives.values())
-        self._drives = {
-            drive.name: _DriveCommander(self.node, drive, delay=index * SINE_PERIOD / 8)
-            for index, drive in enumerate(drives)}
-        self._stopping = threading.Event()
-        self._thread = threading.Thread(target=self._run, name='commander', daemon=True)
-        executor.add_node(self.node)
-
-    def start(self) -> None:
-        """Begin to command."""
-        self._thread.start()
-
-    def stop(self) -> None:
-        """Command nothing any more."""
-        self._stopping.set()
-        if self._thread.is_alive():
-            self._thread.join(timeout=1.0)
-
-    def destroy(self) -> None:
-        """Take the node out of the graph. The executor must have stopped."""
-        self._executor.remove_node(self.node)
-        self.node.destroy_node()
-
-    def _run(self) -> None:
-        due = time.monotonic()
-        try:
-            while not self._stopping.wait(max(0.0, due - time.monotonic())):
-                now = time.monotonic()
-                due = max(due + COMMAND_PERIOD, now)
-                for name, commander in self._drives.items():
-                    drive = self._bridge.drives.get(name)
-                    commander.command(drive.session if drive is not None else None, now)
-        except (InvalidHandle, RCLError) as error:
-            if self._bridge.context.ok():
-                get_logger('demo').error(f'no more commands: {error}')
+    def command() -> None:
+        for drive in drives.values():
+            drive.command(time.monotonic())
+    node.create_subscription(DiagnosticArray, '/diagnostics', take, QoSProfile(depth=10))
+    node.create_timer(COMMAND_PERIOD, command)
+    try:
+        rclpy.spin(node)
+    except ExternalShutdownException:  # SIGTERM
+        pass
+    return 0
 
 
 def neutral(parameter: Parameter) -> Value:

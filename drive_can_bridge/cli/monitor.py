@@ -1,0 +1,115 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+``drive_can monitor``: the live view of whatever bridges run.
+
+A ROS client and nothing else: it sees what any node could see, attaches to all bridges there are,
+on this host or others, and detaches again without any of them noticing.
+"""
+
+import argparse
+import os
+import sys
+import time
+from typing import Any
+
+from drive_can_bridge.cli.without_ros import what_is_missing
+from drive_can_bridge.core.errors import DriveCanError
+from drive_can_bridge.monitor.lines import balance, line
+from drive_can_bridge.monitor.model import Model
+from drive_can_bridge.monitor.source import Source
+from drive_can_bridge.monitor.text import is_ros_name
+from drive_can_bridge.process import environment
+from drive_can_bridge.process.signals import leave, SignalWatcher
+
+#: s between two lines of a drive, and between two looks at what arrives
+LINE_PERIOD = 1.0
+_POLL_PERIOD = 0.1
+#: s that a drive which came online may take until its first sample is here
+_FIRST_SAMPLE = 2.0
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add the subcommand to the parser of ``drive_can``."""
+    parser = subparsers.add_parser(
+        'monitor', help='show all bridges and their drives, live',
+        description='Show all bridges and their drives, live, until SIGINT or SIGTERM. Needs ROS, '
+                    'and nothing of a bridge but its topics and services. In a terminal its last '
+                    'line names the keys; elsewhere one line per drive and second.')
+    parser.add_argument('--namespace', metavar='NS', default='', type=_namespace,
+                        help='only bridges in this namespace, or below it')
+    # how drive_can demo runs it
+    parser.add_argument('--title', default='drive_can monitor', help=argparse.SUPPRESS)
+    parser.add_argument('--quit-code', type=int, default=0, help=argparse.SUPPRESS)
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """
+    Show what there is.
+
+    :return: 0 after SIGINT or SIGTERM.
+    :raises DriveCanError: no ROS.
+    """
+    # a second signal ends the process at once
+    with SignalWatcher(keep=True) as watcher:
+        try:
+            from drive_can_bridge.ros.monitor.client import MonitorClient
+        except ImportError as error:
+            raise DriveCanError(what_is_missing('drive_can monitor', error)) from error
+        model = Model(args.namespace)
+        source = MonitorClient(model)
+        try:
+            code = _show(source, model, watcher, args)
+        finally:
+            source.close()
+        leave(watcher.exit_code(code))
+
+
+def _show(source: Source, model: Model, watcher: SignalWatcher, args: argparse.Namespace) -> int:
+    place = environment.in_words()
+    if sys.stdout.isatty() and os.environ.get('TERM', 'dumb') not in ('dumb', 'unknown'):
+        try:
+            from drive_can_bridge.view.live import show
+            from drive_can_bridge.view.page import Setting
+        except ImportError as error:
+            print(f'{args.title}: no live view without the Python module {error.name}',
+                  file=sys.stderr)
+        else:
+            setting = Setting(args.title, place, args.namespace, environment.export_command())
+            code = show(source, model, setting, ended=lambda: watcher.signalled,
+                        quit_code=args.quit_code)
+            for text in balance(model.look(time.monotonic(), time.time())):
+                print(text)
+            return code
+    print(f'{args.title}: {place}', file=sys.stderr, flush=True)
+    return _print_lines(source, model, watcher)
+
+
+def _print_lines(source: Source, model: Model, watcher: SignalWatcher) -> int:
+    """Print one line per drive and second, until a signal."""
+    online_since: dict[str, float] = {}
+    due = time.monotonic() + LINE_PERIOD
+    while watcher.wait(_POLL_PERIOD) is None:
+        now = time.monotonic()
+        source.poll(now)
+        if now < due:
+            continue
+        due = max(due + LINE_PERIOD, now)
+        lines = []
+        for drive in model.look(now, time.time()).drives:
+            if not drive.online:
+                online_since.pop(drive.name, None)
+            # its values belong to it: they are a moment behind
+            since = online_since.setdefault(drive.name, now) if drive.online else now
+            known = bool(drive.values and drive.parameters) or now - since > _FIRST_SAMPLE
+            lines.append(line(drive) if known or not drive.online else f'{drive.label} offline')
+        if lines:
+            print('\n'.join(lines), flush=True)
+    return 0
+
+
+def _namespace(text: str) -> str:
+    name = f'/{text.strip("/")}'
+    if name != '/' and not is_ros_name(name):
+        raise argparse.ArgumentTypeError(f'{text!r} is no namespace, write /cell1')
+    return name if name != '/' else ''

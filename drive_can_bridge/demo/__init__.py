@@ -1,0 +1,7 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+``drive_can demo``: simulated drives, bridge and live view, each a process of its own.
+
+They are the ones that a user starts by hand, and meet as those do: bridge and drives on
+pseudo-terminals, the view and whoever commands in the ROS graph.
+"""

@@ -1,0 +1,107 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+A process of the demo, from both sides: started and ended by one, run in the other.
+
+It ends with the demo, whatever that one dies of: the kernel sends it SIGTERM then.
+"""
+
+import ctypes
+import importlib
+import os
+from pathlib import Path
+import signal
+import subprocess
+import sys
+import time
+from typing import IO
+
+#: what can be run: module with ``main()``
+PROGRAMS = {
+    'drive_can_bridge': 'drive_can_bridge.ros.main',
+    'drive_can': 'drive_can_bridge.cli.main',
+    'commander': 'drive_can_bridge.ros.demo.commander',
+}
+_PR_SET_PDEATHSIG = 1
+_MOMENT = 0.01
+
+
+class Child:
+    """
+    A process of the demo.
+
+    :param what: what it is to a user, ``the bridge``.
+    :param shared: stays in the terminal's foreground, and gets its signals; others have a session
+        of their own, so that nothing but the demo ends them.
+    :param log: takes its standard error; None: it is the demo's.
+    """
+
+    def __init__(self, what: str, program: str, *arguments: str, shared: bool = False,
+                 log: Path | None = None, output: IO[bytes] | int | None = None) -> None:
+        self.what = what
+        self.log = log
+        self.told = False
+        command = [sys.executable, '-m', __name__, program, *arguments]
+        keyboard = None if shared else subprocess.DEVNULL
+        if log is None:
+            self.process = subprocess.Popen(command, stdin=keyboard, stdout=output,
+                                            start_new_session=not shared)
+            return
+        with log.open('wb') as errors:
+            self.process = subprocess.Popen(command, stdin=keyboard, stdout=output,
+                                            stderr=errors, start_new_session=not shared)
+
+    @property
+    def code(self) -> int | None:
+        """Exit code; negative: killed by that signal; None: it runs."""
+        return self.process.poll()
+
+    @property
+    def end(self) -> str:
+        """How it ended, in words."""
+        code = self.process.returncode
+        return f'killed by signal {-code}' if code < 0 else f'exit code {code}'
+
+    def ask_to_end(self, signum: int = signal.SIGTERM) -> None:
+        """Send a signal, if there is somebody to get it."""
+        if self.code is None:
+            # stopped processes have to go on in order to end
+            for number in (signum, signal.SIGCONT):
+                self.process.send_signal(number)
+
+    def wait_until_stopped(self, timeout: float) -> None:
+        """Wait until it has obeyed Ctrl-Z, or has ended."""
+        deadline = time.monotonic() + timeout
+        while self.code is None and time.monotonic() < deadline:
+            if os.waitid(os.P_PID, self.process.pid, os.WSTOPPED | os.WNOHANG | os.WNOWAIT):
+                return
+            time.sleep(_MOMENT)
+
+    def wait(self, timeout: float) -> bool:
+        """Wait for its end, and then end it; return whether it ended by itself."""
+        try:
+            self.process.wait(timeout)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+            return False
+        return True
+
+    def errors(self) -> str:
+        """Return what it wrote to standard error and nobody has seen."""
+        return self.log.read_text(encoding='utf-8', errors='replace') if self.log else ''
+
+
+def main() -> int:
+    """Run a program in this process."""
+    parent = os.getppid()
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, int(signal.SIGTERM))
+    if os.getppid() != parent:  # it has gone already
+        return 1
+    program, *arguments = sys.argv[1:]
+    sys.argv = [program, *arguments]
+    code: int = importlib.import_module(PROGRAMS[program]).main()
+    return code
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,242 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The demo itself: which processes start in which order, and end in the opposite one.
+
+First the drives, so that the bridge finds its buses; the view at once, since it takes a while. At
+the end the bridge stops the drives, neutral frames first, and only then do they lose their bus.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager, ExitStack
+from dataclasses import dataclass
+import os
+from pathlib import Path
+import signal
+import subprocess
+import sys
+import tempfile
+import termios
+import time
+
+from drive_can_bridge.core.configuration import BridgeConfiguration
+from drive_can_bridge.core.errors import DriveCanError
+from drive_can_bridge.demo.child import Child
+from drive_can_bridge.demo.parameter_file import on_terminals, write
+from drive_can_bridge.process.signals import SignalWatcher
+
+TITLE = 'drive_can demo'
+#: with which the view ends when the user has enough, and not somebody else of the view
+ENOUGH = 64
+#: s between two looks at the processes
+_LOOK_PERIOD = 0.1
+#: s that the simulated drives may take to appear
+_DRIVES_TIMEOUT = 60.0
+#: s that each process gets for its end. A bridge that has lost its drives tries for a while.
+_BRIDGE_PATIENCE = 10.0
+_PATIENCE = 1.0
+#: leaves the view's screen, shows the cursor
+_RESTORE = '\x1b[?1049l\x1b[?25h'
+
+
+@dataclass(frozen=True)
+class Options:
+    """
+    What is to run.
+
+    :param configuration: its buses are replaced by pseudo-terminals.
+    :param faults: to begin with, ``DRIVE:FAULT``.
+    :param commanded: somebody moves the drives.
+    :param frame_log: file for all frames.
+    :param duration: s; None: until a signal.
+    """
+
+    configuration: BridgeConfiguration
+    faults: tuple[str, ...] = ()
+    commanded: bool = False
+    frame_log: Path | None = None
+    duration: float | None = None
+
+
+class Demo:
+    """
+    The processes of a demo.
+
+    :param directory: a place of its own.
+    :param live: there is a terminal that the view takes.
+    """
+
+    def __init__(self, options: Options, directory: Path, *, live: bool) -> None:
+        self._options = options
+        self._directory = directory
+        # the view has the terminal: others tell what they have to tell afterwards
+        self._quiet = live and os.isatty(2)
+        self._live = live
+        self._children: list[Child] = []
+        self._view: Child | None = None
+        self._bridge: Child | None = None
+        self._drives: Child | None = None
+        self._suspend_asked = False
+
+    def start(self, watcher: SignalWatcher) -> bool:
+        """
+        Start everything.
+
+        :return: False: a signal came first.
+        :raises DriveCanError: the drives do not start.
+        """
+        options, directory = self._options, self._directory
+        signal.signal(signal.SIGTSTP, self._ask_to_suspend)
+        self._view = self._start('the view', 'drive_can', 'monitor', '--title', TITLE,
+                                 '--quit-code', str(ENOUGH), view=True)
+        configuration = on_terminals(options.configuration, directory)
+        file = directory / 'demo.yaml'
+        write(configuration, file)
+        arguments = ['--params-file', str(file), '--pty-link', str(directory)]
+        for fault in options.faults:
+            arguments += ['--fault', fault]
+        if options.frame_log is not None:
+            arguments += ['--log-frames', str(options.frame_log)]
+        self._drives = self._start('the simulation', 'drive_can', 'simulate', *arguments)
+        deadline = time.monotonic() + _DRIVES_TIMEOUT
+        while not all((directory / name).is_symlink() for name in configuration.buses):
+            if watcher.wait(_LOOK_PERIOD / 4) is not None:
+                return False
+            if self._drives.code is not None or time.monotonic() > deadline:
+                raise DriveCanError(f'{TITLE}: the simulated drives did not start')
+        self._bridge = self._start('the bridge', 'drive_can_bridge', '--ros-args',
+                                   '--params-file', str(file))
+        if options.commanded:
+            self._start('the commander', 'commander', str(file))
+        return True
+
+    def watch(self, watcher: SignalWatcher) -> int:
+        """
+        Wait for the end.
+
+        :return: exit code: 0 after a signal, the duration, or when the user has enough.
+        """
+        begun, duration = time.monotonic(), self._options.duration
+        while True:
+            left = _LOOK_PERIOD if duration is None else min(
+                _LOOK_PERIOD, max(0.0, begun + duration - time.monotonic()))
+            if watcher.wait(left) is not None:
+                return 0
+            if self._suspend_asked:
+                self._suspend()
+            for child in self._children:
+                if child.code is None or child.told:
+                    continue
+                if watcher.signalled or child is self._view and child.code == ENOUGH:
+                    return 0
+                if child.code > 0:  # of its own accord: it has said why, or will
+                    return 1
+                child.told = True
+                self._tell(child)
+            if duration is not None and time.monotonic() >= begun + duration:
+                return 0
+
+    def stop(self) -> None:
+        """End everything, the drives last."""
+        bridge, drives = self._bridge, self._drives
+        for child in self._children:
+            if child is not bridge and child is not drives:
+                child.ask_to_end()
+        for process, signum, patience in ((bridge, signal.SIGINT, _BRIDGE_PATIENCE),
+                                          (drives, signal.SIGTERM, _PATIENCE)):
+            if process is not None:
+                process.ask_to_end(signum)
+                if not process.wait(patience):
+                    self._say(f'{process.what} did not end in {patience:g} s and was killed')
+        for child in self._children:
+            child.wait(_PATIENCE)
+
+    def conclude(self, code: int) -> None:
+        """Say what is left to say, now that the terminal is free."""
+        for child in self._children:
+            if code and child.errors():
+                sys.stderr.write(child.errors())
+        frame_log = self._options.frame_log
+        if self._live and frame_log is not None:
+            with frame_log.open('rb') as file:
+                count = sum(1 for _ in file)
+            print(f'{count} frames in {frame_log}')
+
+    # -- inside -----------------------------------------------------------------------------------
+
+    def _start(self, what: str, program: str, *arguments: str, view: bool = False) -> Child:
+        log = self._directory / f'{len(self._children)}.log' if self._quiet and not view else None
+        child = Child(what, program, *arguments, shared=view, log=log,
+                      output=None if view else subprocess.DEVNULL)
+        self._children.append(child)
+        return child
+
+    def _ask_to_suspend(self, *_: object) -> None:
+        self._suspend_asked = True
+
+    def _suspend(self) -> None:
+        """
+        Let the shell have the terminal, once the view has given it back (Ctrl-Z).
+
+        Bridge and drives run on: they are no part of the terminal's job.
+        """
+        self._suspend_asked = False
+        if self._view is not None:
+            self._view.wait_until_stopped(_PATIENCE)
+        signal.signal(signal.SIGTSTP, signal.SIG_DFL)
+        os.kill(os.getpid(), signal.SIGTSTP)
+        # continued
+        signal.signal(signal.SIGTSTP, self._ask_to_suspend)
+
+    def _tell(self, child: Child) -> None:
+        """Say that a process has ended, and that the others go on."""
+        if child is self._view:
+            if self._live:
+                sys.stdout.write(_RESTORE)
+                sys.stdout.flush()
+            self._say(f'the view has ended ({child.end}); bridge and drives run on until Ctrl-C, '
+                      f'and drive_can monitor shows them')
+        elif not (self._live and self._view is not None and self._view.code is None):
+            self._say(f'{child.what} has ended ({child.end}); the others run on until Ctrl-C')
+
+    def _say(self, text: str) -> None:
+        print(f'{TITLE}: {text}', file=sys.stderr, flush=True)
+
+
+def run(options: Options, watcher: SignalWatcher) -> int:
+    """
+    Run until a signal, or as long as the options say.
+
+    :return: 0, or 1 when a process could not start or go on.
+    :raises DriveCanError: the drives do not start.
+    :raises OSError: a file cannot be written.
+    """
+    if options.frame_log is not None:
+        options.frame_log.write_bytes(b'')  # whether it can be written is known now
+    live = sys.stdout.isatty() and os.environ.get('TERM', 'dumb') not in ('dumb', 'unknown')
+    code = 1
+    with ExitStack() as stack:
+        directory = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix='drive_can_')))
+        stack.enter_context(_terminal_restored())
+        demo = Demo(options, directory, live=live)
+        try:
+            try:
+                code = demo.watch(watcher) if demo.start(watcher) else 0
+            finally:
+                demo.stop()
+        finally:
+            demo.conclude(code)
+    return code
+
+
+@contextmanager
+def _terminal_restored() -> Iterator[None]:
+    """Leave the keyboard as it was, whatever the view died of."""
+    try:
+        settings = termios.tcgetattr(0)
+    except termios.error:
+        yield
+        return
+    try:
+        yield
+    finally:
+        termios.tcsetattr(0, termios.TCSANOW, settings)

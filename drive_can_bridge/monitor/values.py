@@ -1,0 +1,122 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Parameters as their descriptors tell of them, and values the way people read them."""
+
+from dataclasses import dataclass, field
+import math
+import re
+
+from drive_can_bridge.core.parameters import ParameterType, Value, ValueKind
+
+_DECIMALS_MAX = 6
+#: columns for a value of which nothing is known
+_WIDTH = 8
+#: what a drive says about its states is read in hexadecimal
+_WORD_SUFFIX = 'word'
+_PAIR = re.compile(r'(\w+)=(?:"([^"]*)"|(\S+))')
+
+
+def facts_from_constraints(text: str) -> dict[str, str]:
+    """Read ``additional_constraints``: ``unit="N m" number=209 type=int16``."""
+    return {match[1]: match[3] if match[2] is None else match[2]
+            for match in _PAIR.finditer(text)}
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterInfo:
+    """
+    A parameter of a drive, by its descriptor.
+
+    :param minimum: smallest allowed value; None: not told.
+    :param facts: of ``additional_constraints``: unit, number, type, scale, access, storage, role …
+    """
+
+    name: str
+    kind: ValueKind = ValueKind.DOUBLE
+    read_only: bool = False
+    description: str = ''
+    minimum: float | None = None
+    maximum: float | None = None
+    facts: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def unit(self) -> str:
+        """Unit of the value, or ''."""
+        return self.facts.get('unit', '')
+
+    @property
+    def readable(self) -> bool:
+        """Can be read by a service."""
+        return self.facts.get('access') != 'wo'
+
+    @property
+    def address(self) -> str:
+        """Name the parameter as the drive's manual does: ``P30``, ``P613.5``, ``2004h.06h``."""
+        number, index = self.facts.get('number'), self.facts.get('index', '')
+        subindex = self.facts.get('subindex')
+        if number:
+            return f'P{number}.{subindex}' if subindex and not index else f'P{number}'
+        if index:
+            return (f'{index.removeprefix("0x")}h.'
+                    f'{(subindex or "00").removeprefix("0x")}h')
+        return ''
+
+    @property
+    def range_text(self) -> str:
+        """What is allowed, ``-3000 … 3000``; '' where nothing is told."""
+        if self.minimum is None or self.maximum is None:
+            return ''
+        return f'{self.minimum:.10g} … {self.maximum:.10g}'
+
+    @property
+    def width(self) -> int:
+        """Characters that the longest possible value takes: columns must not move."""
+        if self.kind is ValueKind.BOOL:
+            return len('false')
+        kind = next((kind for kind in ParameterType if kind.value == self.facts.get('type')), None)
+        if kind is None:
+            return _WIDTH
+        if self.kind is ValueKind.INTEGER:
+            return max(len(self.text(end)) for end in kind.raw_range)
+        scale, offset = self._number('scale', 1.0), self._number('offset', 0.0)
+        return max(len(self.text(end * scale + offset)) for end in kind.raw_range)
+
+    def text(self, value: Value) -> str:
+        """Write a value: as many decimals as it has, words in hexadecimal."""
+        if isinstance(value, bool):
+            return 'true' if value else 'false'
+        if isinstance(value, int):
+            if self.name.endswith(_WORD_SUFFIX) and value >= 0:
+                return f'0x{value:0{8 if "32" in self.facts.get("type", "") else 4}X}'
+            return str(value)
+        if not math.isfinite(value):
+            return str(value)
+        decimals = self._decimals
+        text = f'{value:.3f}' if decimals is None else f'{value:.{decimals}f}'
+        # what is rounded to nothing has no sign
+        return text.removeprefix('-') if not float(text) else text
+
+    def assignment(self, value: Value) -> str:
+        """Write ``actual_speed=12.3 rpm``; integers as they are, for programs to read."""
+        text = (str(value) if isinstance(value, int) and not isinstance(value, bool)
+                else self.text(value))
+        return f'{self.name}={text}{f" {self.unit}" if self.unit else ""}'
+
+    def _number(self, fact: str, default: float) -> float:
+        try:
+            number = float(self.facts.get(fact, default))
+        except ValueError:
+            return default
+        return number if math.isfinite(number) else default
+
+    @property
+    def _decimals(self) -> int | None:
+        """Digits behind the point that one raw step needs; None while the step is not known."""
+        step = abs(self._number('scale', 0.0))
+        if not step:
+            return None
+        for decimals in range(_DECIMALS_MAX):
+            scaled = step * 10 ** decimals
+            if scaled >= 0.5 and math.isclose(scaled, round(scaled), rel_tol=1e-6):
+                return decimals
+        # no round number: three significant digits of a step
+        return min(max(0, 2 - math.floor(math.log10(step))), _DECIMALS_MAX)

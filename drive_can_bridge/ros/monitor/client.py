@@ -1,0 +1,247 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+A hidden node that attaches to whatever bridges there are, and fills the model.
+
+It subscribes and asks, and that is all: no topic, no service, no parameter of its own. Everything
+happens in :meth:`MonitorClient.poll`, in the thread that calls it.
+"""
+
+from collections.abc import Callable, Iterable
+import math
+import os
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rcl_interfaces.msg import Log, ParameterEvent
+from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters
+import rclpy
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.signals import SignalHandlerOptions
+from std_msgs.msg import Bool
+
+from drive_can_bridge.core.errors import DriveCanError
+from drive_can_bridge.monitor.model import Model
+from drive_can_bridge.monitor.plan import SamplingPlan
+from drive_can_bridge.monitor.snapshot import Place
+from drive_can_bridge.monitor.text import is_ros_name, printable
+from drive_can_bridge.monitor.values import ParameterInfo
+from drive_can_bridge.ros.monitor.inbox import (
+    Call, Inbox, latched_quality, log_quality, newest_quality,
+)
+from drive_can_bridge.ros.monitor.messages import (
+    drive_value, log_level, parameter_info, plain_value, stamp_of, statuses, values,
+)
+
+#: a leading underscore hides a node from ``ros2 node list``
+NODE_NAME = '_drive_can_monitor_{}'
+#: s between two looks at the graph, which are not cheap
+_GRAPH_PERIOD = 2.0
+#: descriptors asked for at once
+_BATCH = 200
+_BITS_MAX = 256
+_PLACE = ('bus', 'station', 'protocol', 'period')
+
+
+class MonitorClient:
+    """
+    Fills a model.
+
+    :raises DriveCanError: ROS does not start.
+    """
+
+    def __init__(self, model: Model) -> None:
+        self._model = model
+        self._context = Context()
+        try:
+            rclpy.init(args=[], context=self._context,
+                       signal_handler_options=SignalHandlerOptions.NO)
+            self._node = Node(NODE_NAME.format(os.getpid()), context=self._context,
+                              use_global_arguments=False, enable_rosout=False,
+                              start_parameter_services=False)
+        except Exception as error:  # rcl fails in several types
+            reason = str(error).partition(', at ')[0]
+            raise DriveCanError(f'drive_can monitor: ROS does not start: {reason}') from error
+        self._now = 0.0
+        self._plan = SamplingPlan()
+        self._inboxes = [
+            Inbox(self._node, DiagnosticArray, '/diagnostics', QoSProfile(depth=50),
+                  self._take_diagnostics),
+            Inbox(self._node, Log, '/rosout', log_quality(), self._take_log)]
+        self._online: dict[str, Inbox] = {}
+        self._samples: dict[str, tuple[Inbox, Inbox]] = {}
+        self._bits: dict[str, Inbox] = {}
+        self._focus: str | None = None
+        self._graph_at = 0.0
+        self._calls: dict[tuple[str, str], Call] = {}
+        self._asked: set[str] = set()
+
+    # -- for the view -----------------------------------------------------------------------------
+
+    def focus(self, drive: str | None) -> None:
+        """Look at one drive closely: all of its samples, and its bits."""
+        if drive != self._focus:
+            self._focus = drive
+            self._graph_at = 0.0
+            for inbox in self._bits.values():
+                inbox.close()
+            self._bits = {}
+
+    def read(self, drive: str, names: list[str]) -> None:
+        """Read parameters of a drive over its bus. The last wish counts."""
+        def take(response: GetParameters.Response | None) -> None:
+            found = [] if response is None else response.values
+            answers = [drive_value(value) for value in found]
+            answers += [None] * (len(names) - len(answers))
+            self._model.read(drive, zip(names, answers), self._now)
+        self._call(drive, GetParameters, 'get_parameters', GetParameters.Request(names=names),
+                   take)
+
+    def poll(self, now: float) -> None:
+        """Take what has arrived, and ask for what is missing."""
+        self._now = now
+        for inbox in (*self._inboxes, *self._online.values(), *self._bits.values()):
+            inbox.look()
+        for pair in self._samples.values():
+            for inbox in pair:
+                inbox.look()
+        for key, call in list(self._calls.items()):
+            # what is done may ask again, under the same key
+            if call.look(now) and self._calls.get(key) is call:
+                del self._calls[key]
+        self._follow()
+
+    def close(self) -> None:
+        """Leave the graph."""
+        self._node.destroy_node()
+        self._context.try_shutdown()
+
+    # -- what arrives -----------------------------------------------------------------------------
+
+    def _take_diagnostics(self, message: DiagnosticArray) -> None:
+        self._model.diagnosed(statuses(message), stamp_of(message.header.stamp), self._now)
+
+    def _take_log(self, message: Log) -> None:
+        self._model.logged(stamp_of(message.stamp), log_level(message), message.name, message.msg)
+
+    # -- what is asked for ------------------------------------------------------------------------
+
+    def _follow(self) -> None:
+        """Subscribe to what there is to be seen now, and to nothing else."""
+        model, now = self._model, self._now
+        _keep(self._online, model.drives, self._subscribe_online, Inbox.close)
+        wanted = self._plan.choose(model.rates(), self._focus, now)
+        model.sampled(wanted, now)
+        _keep(self._samples, wanted, self._subscribe_samples, _close_all)
+        self._asked &= {*model.drives, *model.bridges} - set(model.silent(now))
+        for bridge in model.bridges:
+            if bridge not in self._asked:
+                self._ask_places(bridge)
+        for drive in model.drives:
+            if drive not in self._asked:
+                self._ask_names(drive)
+        if self._focus is not None and now >= self._graph_at:
+            self._graph_at = now + _GRAPH_PERIOD
+            self._find_bits(self._focus)
+
+    def _subscribe_online(self, drive: str) -> Inbox:
+        def take(message: Bool) -> None:
+            self._model.went_online(drive, message.data, self._now)
+        return Inbox(self._node, Bool, f'{drive}/online', latched_quality(), take)
+
+    def _subscribe_samples(self, drive: str) -> tuple[Inbox, Inbox]:
+        def take_response(message: ParameterEvent) -> None:
+            self._model.responded(drive, values(message), self._now)
+
+        def take_request(message: ParameterEvent) -> None:
+            self._model.requested(drive, values(message), self._now)
+        return (Inbox(self._node, ParameterEvent, f'{drive}/response', newest_quality(),
+                      take_response),
+                Inbox(self._node, ParameterEvent, f'{drive}/request', newest_quality(),
+                      take_request))
+
+    def _find_bits(self, drive: str) -> None:
+        """Subscribe to the bits of a drive: ``~/<parameter>/<bit>``."""
+        for topic, types in self._node.get_topic_names_and_types():
+            below = topic.removeprefix(f'{drive}/').split('/')
+            if (topic.startswith(f'{drive}/') and len(below) == 2 and below[0] != 'command'
+                    and types == ['std_msgs/msg/Bool'] and topic not in self._bits
+                    and len(self._bits) < _BITS_MAX):
+                self._bits[topic] = self._subscribe_bit(drive, *below)
+
+    def _subscribe_bit(self, drive: str, parameter: str, bit: str) -> Inbox:
+        def take(message: Bool) -> None:
+            self._model.bit(drive, parameter, bit, message.data)
+        return Inbox(self._node, Bool, f'{drive}/{parameter}/{bit}', latched_quality(), take)
+
+    def _ask_places(self, bridge: str) -> None:
+        """Ask a bridge where its drives are."""
+        self._asked.add(bridge)
+        drives = self._model.drives_of(bridge)
+        names = [f'drives.{drive.rpartition("/")[2]}.{key}' for drive in drives for key in _PLACE]
+
+        def take(response: GetParameters.Response | None) -> None:
+            found = iter([] if response is None else response.values)
+            for drive, (bus, station, protocol, period) in zip(drives, zip(*[found] * 4)):
+                self._model.placed(drive, Place(
+                    _text(bus), _text(station), _text(protocol), _number(period)))
+        self._call(bridge, GetParameters, 'get_parameters', GetParameters.Request(names=names),
+                   take)
+
+    def _ask_names(self, drive: str) -> None:
+        """Ask a drive what parameters it has, and then what they are."""
+        self._asked.add(drive)
+
+        def take(response: ListParameters.Response | None) -> None:
+            if response is None:
+                self._asked.discard(drive)
+            elif response.result.names:
+                self._ask_descriptors(drive, list(response.result.names), [])
+        self._call(drive, ListParameters, 'list_parameters', ListParameters.Request(), take)
+
+    def _ask_descriptors(self, drive: str, names: list[str], known: list[ParameterInfo]) -> None:
+        def take(response: DescribeParameters.Response | None) -> None:
+            if response is None:
+                self._asked.discard(drive)
+                return
+            found = [*known, *map(parameter_info, response.descriptors)]
+            self._model.described(drive, found)
+            if names[_BATCH:]:
+                self._ask_descriptors(drive, names[_BATCH:], found)
+        self._call(drive, DescribeParameters, 'describe_parameters',
+                   DescribeParameters.Request(names=names[:_BATCH]), take)
+
+    def _call(self, node: str, service_type: Any, service: str, request: Any,
+              done: Callable[[Any], None]) -> None:
+        before = self._calls.pop((node, service), None)
+        if before is not None:
+            before.close()
+        if is_ros_name(node):
+            self._calls[node, service] = Call(self._node, service_type, f'{node}/{service}',
+                                              request, done, self._now)
+
+
+def _keep(have: dict[str, Any], wanted: Iterable[str], make: Callable[[str], Any],
+          close: Callable[[Any], None]) -> None:
+    """Make what is wanted and missing, close what is there and not wanted."""
+    names = set(wanted)
+    for name in have.keys() - names:
+        close(have.pop(name))
+    for name in names - have.keys():
+        have[name] = make(name)
+
+
+def _close_all(inboxes: tuple[Inbox, ...]) -> None:
+    for inbox in inboxes:
+        inbox.close()
+
+
+def _text(value: Any) -> str:
+    plain = plain_value(value)
+    return '' if plain is None else printable(str(plain))
+
+
+def _number(value: Any) -> float:
+    plain = plain_value(value)
+    return float(plain) if isinstance(plain, (int, float)) else math.nan

@@ -1,0 +1,61 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""The loop of the live view: look, draw, listen to the keyboard."""
+
+from collections.abc import Callable
+import time
+
+from drive_can_bridge.monitor.model import Model
+from drive_can_bridge.monitor.source import Source
+from drive_can_bridge.view.keys import Choice, Key
+from drive_can_bridge.view.page import closely, page, Setting, to_read, Wish
+from drive_can_bridge.view.screen import Screen
+
+#: s between two pages; longer where drawing one takes more than its share of a processor
+FRAME_PERIOD = 0.25
+_FRAME_SHARE = 0.04
+_FRAME_PERIOD_MAX = 1.0
+
+
+def show(source: Source, model: Model, setting: Setting, *, ended: Callable[[], bool],
+         quit_code: int) -> int:
+    """
+    Draw until the end, or until the user has enough.
+
+    :return: 0, or ``quit_code`` after the key that quits.
+    """
+    choice, read = Choice(), None
+    with Screen() as screen:
+        due = time.monotonic()
+        while not (ended() or screen.gone):
+            begun, now = time.thread_time(), time.monotonic()
+            size = screen.size
+            read = look(source, model, choice, read, size=size, now=now)
+            snapshot = model.look(now, time.time())
+            drives = [drive.name for drive in snapshot.drives]
+            choice = choice.among(drives)
+            screen.draw(page(snapshot, choice, setting, width=size[0], height=size[1]))
+            cost = (time.thread_time() - begun) / _FRAME_SHARE
+            due = max(due, now) + min(max(FRAME_PERIOD, cost), _FRAME_PERIOD_MAX)
+            for key in screen.wait(max(0.0, due - time.monotonic())):
+                if key is Key.QUIT:
+                    return quit_code
+                choice = choice.press(key, drives)
+                due = now  # whoever presses a key wants to see what it does
+    return 0
+
+
+def look(source: Source, model: Model, choice: Choice, read: Wish | None, *,
+         size: tuple[int, int], now: float) -> Wish | None:
+    """
+    Bring the model up to date, for what was chosen.
+
+    :param read: what was read last, and need not be read again.
+    :return: what was read last now.
+    """
+    source.focus(closely(choice))
+    source.poll(now)
+    wanted = to_read(model.look(now, 0.0), choice, width=size[0], height=size[1])
+    if wanted is None or wanted == read:
+        return read
+    source.read(wanted.drive, list(wanted.names))
+    return wanted

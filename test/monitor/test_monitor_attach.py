@@ -1,0 +1,161 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""``drive_can monitor`` and bridges that somebody else started, each a process of its own."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+import signal
+
+import pytest
+from running import Running, Terminal
+from waiting import wait_for
+
+pytest.importorskip('rclpy')
+
+FILE = """
+/**/drive_can_bridge:
+  ros__parameters:
+    diagnostics_period: 0.5
+    buses:
+      main: {interface: slcan, channel: somewhere, bitrate: 500000, reconnect_period: 0.2}
+    drives:
+      conveyor:
+        bus: main
+        protocol: datamodel_extended
+        station: 1
+        profile: datamodel_example
+        cyclic_request: [speed_setpoint]
+        cyclic_response: [actual_speed, status_word]
+      lift:
+        bus: main
+        protocol: datamodel_extended
+        station: 2
+        profile: datamodel_control_example
+        cyclic_request: [control_word, speed_setpoint]
+        cyclic_response: [status_word]
+"""
+Run = Callable[..., Running]
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Iterator[Run]:
+    """Return what starts commands of the package, each with a directory of its own."""
+    running: list[Running] = []
+
+    def start(*command: str, **options: object) -> Running:
+        running.append(Running(tmp_path / str(len(running)), *command, **options))
+        return running[-1]
+    yield start
+    for each in running:
+        each.close()
+
+
+def bridge(run: Run, directory: Path, namespace: str = '') -> Running:
+    """Start simulated drives and a bridge for them."""
+    file, links = directory / 'drives.yaml', directory / f'links{namespace.replace("/", "_")}'
+    file.write_text(FILE, encoding='utf-8')
+    run('drive_can', 'simulate', '--params-file', str(file), '--pty-link', str(links))
+    wait_for((links / 'main').is_symlink, 'the drives')
+    place = ['-r', f'__ns:={namespace}'] if namespace else []
+    return run('drive_can_bridge', '--ros-args', '--params-file', str(file), '-p',
+               f'buses.main.channel:={links / "main"}', *place)
+
+
+def test_it_attaches_to_whatever_comes_and_says_what_went(run: Run, tmp_path: Path) -> None:
+    monitor = run('drive_can', 'monitor')
+    only = run('drive_can', 'monitor', '--namespace', '/cell2')
+    wait_for(lambda: 'drive_can monitor: ROS domain' in monitor.errors)
+    assert monitor.lines == []
+
+    first = bridge(run, tmp_path, '/cell1')
+    monitor.line(r'^conveyor online actual_speed=-?\d+\.\d rpm status_word=\d+$')
+    monitor.line(r'^lift online status_word=\d+$')
+    second = bridge(run, tmp_path, '/cell2')
+    monitor.line('^cell1/conveyor online actual_speed=')
+    monitor.line('^cell2/conveyor online actual_speed=')
+    only.line('^conveyor online actual_speed=')
+
+    # killed: nobody says that it has gone
+    seen = len(monitor.lines)
+    assert first.end(signal.SIGKILL) == -signal.SIGKILL
+    monitor.line('^cell1/lift offline$', since=seen)
+    monitor.line('^cell2/lift online', since=seen)
+    # the bridge says it itself
+    seen = len(monitor.lines)
+    assert second.end(signal.SIGINT) == 0
+    monitor.line('^cell2/lift offline$', since=seen)
+
+    assert not any('cell' in line for line in only.lines)
+    for each, signum in ((monitor, signal.SIGINT), (only, signal.SIGTERM)):
+        assert each.end(signum) == 0
+        assert 'Traceback' not in each.errors
+
+
+def test_the_bridge_does_not_notice(run: Run, tmp_path: Path) -> None:
+    watched = bridge(run, tmp_path)
+    monitor = run('drive_can', 'monitor')
+    monitor.line('^conveyor online actual_speed=')
+    assert monitor.end(signal.SIGKILL) == -signal.SIGKILL
+    again = run('drive_can', 'monitor')
+    again.line('^conveyor online actual_speed=')
+    assert again.end(signal.SIGINT) == 0
+    assert 'WARN' not in watched.errors.replace('real-time', '')
+    assert watched.end(signal.SIGINT) == 0
+
+
+def test_keys_show_a_drive_and_read_its_parameters(run: Run, tmp_path: Path) -> None:
+    pytest.importorskip('rich')
+    terminal = Terminal(100, 29)
+    monitor = run('drive_can', 'monitor', job=True, **terminal.options)
+    terminal.shows('No bridge yet. Looking for one in ROS domain')
+    bridge(run, tmp_path)
+    terminal.shows('2 drives.*conveyor.*lift')
+    terminal.type('\x1b[B')  # the next one
+    terminal.type('\r')
+    terminal.shows('/lift.*bus main, station 2.*enabled.*fault.*ready')
+    terminal.type('p')
+    terminal.shows('parameters of lift.*ramp_time.*1.00.*P30')
+    terminal.type('l')
+    terminal.shows('lift: online')
+    before = len(terminal.read())
+    terminal.resize(60, 20)
+    terminal.shows('log, the newest below', since=before)
+
+    # Ctrl-Z, and back
+    before = len(terminal.read())
+    terminal.type('\x1a')
+    terminal.shows('\x1b\\[\\?1049l', since=before)
+    wait_for(lambda: stopped(monitor), 'that it stops')
+    assert terminal.echoes
+    before = len(terminal.read())
+    monitor.process.send_signal(signal.SIGCONT)
+    terminal.shows('log, the newest below', since=before)
+    assert not terminal.echoes
+
+    terminal.type('q')
+    assert monitor.process.wait(20.0) == 0
+    assert terminal.echoes
+    assert 'Traceback' not in terminal.read()
+    terminal.close()
+
+
+def stopped(process: Running) -> bool:
+    """Tell whether a process stands still."""
+    status = Path(f'/proc/{process.process.pid}/stat').read_text(encoding='ascii')
+    return status.rpartition(')')[2].split()[0] == 'T'
+
+
+@pytest.mark.parametrize('arguments', [['--namespace', 'no-name'], ['something'], ['--speed']])
+def test_wrong_usage(run: Run, arguments: list[str]) -> None:
+    monitor = run('drive_can', 'monitor', *arguments)
+    assert monitor.process.wait(60.0) == 2
+    assert monitor.errors.startswith('usage: ')
+
+
+def test_without_ros_it_says_what_to_install(run: Run, tmp_path: Path) -> None:
+    (tmp_path / 'rclpy.py').write_text("raise ModuleNotFoundError('no', name='rclpy')\n",
+                                       encoding='utf-8')
+    monitor = run('drive_can', 'monitor', environment={
+        'PYTHONPATH': f'{tmp_path}:{Path(__file__).parents[2]}'})
+    assert monitor.process.wait(60.0) == 1
+    [line] = monitor.errors.splitlines()
+    assert 'drive_can monitor: needs ROS 2' in line

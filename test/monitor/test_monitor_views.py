@@ -1,0 +1,119 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Pages of fixed times and values: golden ones, and that they fit everywhere."""
+
+from monitor_builders import drive_status, many_drives, model_of, seen, three_drives
+import pytest
+from views import golden_file, plain, shown, SIZES, VIEWS
+
+from drive_can_bridge.monitor.model import Model
+from drive_can_bridge.view.keys import Choice, HINTS, Key, keys_in, Page
+from drive_can_bridge.view.page import closely, to_read
+
+
+@pytest.mark.parametrize(('width', 'height'), SIZES)
+@pytest.mark.parametrize('name', VIEWS)
+def test_the_page_is_the_golden_one(name: str, width: int, height: int) -> None:
+    snapshot, choice = VIEWS[name]
+    golden = golden_file(name, width, height).read_text(encoding='utf-8')
+    assert plain(snapshot, choice, width, height) == golden
+
+
+ANYTHING = [seen(model) for model in (
+    three_drives(), many_drives(40), Model(), model_of([drive_status()]))]
+
+
+@pytest.mark.parametrize('width', [10, 40, 79, 99, 100, 109, 110, 300])
+@pytest.mark.parametrize('page', Page)
+def test_it_fits_everywhere(width: int, page: Page) -> None:
+    for snapshot in ANYTHING:
+        for height in (3, 10, 29, 30, 80):
+            lines = plain(snapshot, Choice(page), width, height).rstrip('\n').split('\n')
+            assert len(lines) == height
+            assert all(len(line) <= width for line in lines)
+            assert 'Layout' not in ''.join(lines)
+
+
+def test_the_last_line_names_the_keys() -> None:
+    for page, hints in HINTS.items():
+        last = plain(seen(three_drives()), Choice(page), 80, 24).rstrip('\n').split('\n')[-1]
+        assert last.rstrip() == '  '.join(' '.join(hint) for hint in hints)
+    narrow = plain(seen(three_drives()), Choice(), 30, 10).rstrip('\n').split('\n')[-1]
+    assert narrow.rstrip().endswith('q quit')
+
+
+def test_the_marked_drive_is_among_those_that_fit() -> None:
+    for number in (0, 7, 20, 39):
+        name = f'/axis_{number}'
+        text = plain(seen(many_drives()), Choice(drive=name), 80, 24)
+        assert f'▸ axis_{number} ' in text
+        assert ' of 40 ' in text
+
+
+def test_columns_stay_where_they_are_whatever_the_values() -> None:
+    for width, height in SIZES:
+        places = set()
+        for speed in (0.0, -3276.8, 3.14):
+            model = three_drives()
+            model.responded('/conveyor', [('actual_speed', speed), ('motor_current', 0.0),
+                                          ('status_word', 0)], 1000.0)
+            line = next(line for line in plain(seen(model), Choice(), width, height).split('\n')
+                        if 'conveyor' in line)
+            places.add((line.rindex('rpm'), len(line.rstrip()) if width == 60 else 0))
+        assert len(places) == 1
+
+
+def test_colours_are_left_out_where_they_are_not_wanted(monkeypatch: pytest.MonkeyPatch) -> None:
+    snapshot = seen(three_drives())
+    assert '\x1b[1;32m' in shown(snapshot, Choice(), 80, 24, colours=True)
+    monkeypatch.setenv('NO_COLOR', '1')
+    assert '32m' not in shown(snapshot, Choice(), 80, 24, colours=True)
+
+
+# -- keys -----------------------------------------------------------------------------------------
+
+@pytest.mark.parametrize(('typed', 'keys'), [
+    ('q', [Key.QUIT]), ('\x1b[A\x1b[B', [Key.UP, Key.DOWN]), ('\x1bOBjk', [
+        Key.DOWN, Key.DOWN, Key.UP]), ('\r', [Key.OPEN]), ('\x1b', [Key.BACK]),
+    ('\x1b[6~ b', [Key.NEXT_PAGE, Key.NEXT_PAGE, Key.PREVIOUS_PAGE]), ('x\x00ü', []),
+    ('\x1b[1;5Cq', [Key.QUIT]), ('\x1b[200~p', [Key.PARAMETERS]), ('\x1b\x1b', [
+        Key.BACK, Key.BACK]), ('', [])])
+def test_keys_are_found_in_what_is_typed(typed: str, keys: list[Key]) -> None:
+    assert keys_in(typed) == keys
+
+
+def test_keys_change_what_is_chosen() -> None:
+    drives = ['/a', '/b', '/c']
+    choice = Choice().press(Key.DOWN, drives)
+    assert choice.drive == '/a'
+    choice = choice.press(Key.UP, drives)
+    assert choice.drive == '/c'
+    choice = choice.press(Key.OPEN, drives).press(Key.PARAMETERS, drives)
+    assert (choice.page, closely(choice)) == (Page.PARAMETERS, '/c')
+    choice = choice.press(Key.NEXT_PAGE, drives).press(Key.READ, drives)
+    assert (choice.screen, choice.wish) == (1, 1)
+    choice = choice.press(Key.BACK, drives)
+    assert (choice.page, choice.screen) == (Page.DRIVE, 0)
+    choice = choice.press(Key.BACK, drives)
+    assert (choice.page, closely(choice)) == (Page.DRIVES, None)
+    assert choice.among(['/a']).drive == '/a'
+    assert choice.among([]).drive is None
+    assert Choice().press(Key.PREVIOUS_PAGE, drives) == Choice()
+
+
+def test_parameters_are_read_for_the_screen_that_is_shown_and_for_no_other() -> None:
+    snapshot = seen(three_drives())
+    choice = Choice(Page.PARAMETERS, '/conveyor')
+    everything = to_read(snapshot, choice, width=80, height=24)
+    assert everything is not None
+    # what is write-only is never asked for
+    assert everything.names == ('speed_setpoint', 'torque_limit', 'actual_speed', 'motor_current',
+                                'status_word', 'ramp_time')
+    first = to_read(snapshot, choice, width=80, height=8)
+    assert first is not None
+    assert first.names == everything.names[:4]
+    again = to_read(snapshot, choice.press(Key.READ, []), width=80, height=8)
+    assert again is not None
+    assert again.names == first.names
+    assert again != first
+    assert to_read(snapshot, Choice(Page.DRIVE, '/conveyor'), width=80, height=24) is None
+    assert to_read(snapshot, Choice(Page.PARAMETERS, '/nobody'), width=80, height=24) is None
