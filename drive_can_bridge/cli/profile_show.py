@@ -12,9 +12,6 @@ from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.profiles.catalogue import available, check, Checked, description, find
 from drive_can_bridge.profiles.trust import TRUST_WORDS
 
-_HEADINGS = ('name', 'address', 'type', 'scale', 'unit', 'access', 'storage', 'allowed',
-             'verified', 'description')
-
 
 def run_list(args: Namespace) -> int:
     """Print which profiles there are."""
@@ -58,10 +55,10 @@ def run_show(args: Namespace) -> int:
     if profile.identity:
         print(f'identity: {", ".join(profile.identity)}')
     print()
-    rows = [_row(name, parameter) for name, parameter in profile.parameters.items()]
-    used = [place for place in range(len(_HEADINGS)) if any(row[place] for row in rows)]
-    print_table([_HEADINGS[place] for place in used],
-                [[row[place] for place in used] for row in rows])
+    print_table(
+        ('name', 'address', 'type', 'scale', 'unit', 'access', 'storage', 'allowed', 'verified',
+         'description'),
+        [_row(name, parameter) for name, parameter in profile.parameters.items()])
     return 0
 
 

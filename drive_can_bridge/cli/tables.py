@@ -22,11 +22,14 @@ _GAP = '  '
 def print_table(headings: Sequence[str], rows: Iterable[Sequence[str]], *,
                 numbers: Sequence[str] = ()) -> None:
     """
-    Print a table on standard output.
+    Print a table on standard output. Columns without any content are left out.
 
     :param numbers: headings of columns that are aligned to the right.
     """
     written = [[printable(cell) for cell in row] for row in rows]
+    used = [place for place in range(len(headings)) if any(row[place] for row in written)]
+    headings = [headings[place] for place in used]
+    written = [[row[place] for place in used] for row in written]
     if sys.stdout.isatty():
         _print_fitting(headings, written, numbers)
     else:
@@ -50,9 +53,10 @@ def plain_lines(headings: Sequence[str], rows: Sequence[Sequence[str]], *,
 def _print_fitting(headings: Sequence[str], rows: Sequence[Sequence[str]],
                    numbers: Sequence[str]) -> None:
     table = Table(box=None, pad_edge=False, header_style='bold')
-    for heading in headings:
+    for place, heading in enumerate(headings):
+        # a name that is broken in two cannot be copied
         table.add_column(heading, justify='right' if heading in numbers else 'left',
-                         overflow='fold')
+                         overflow='fold', no_wrap=place == 0 or heading in numbers)
     for row in rows:
         table.add_row(*(Text(cell) for cell in row))
     Console().print(table)

@@ -166,6 +166,9 @@ def _carriers(named: dict[str, Draft]) -> tuple[str, ...]:
     profile = _profile(named, tuple(FAMILIES))
     missed = {protocol: len({complaint.key.split('.')[1] for complaint in family_complaints(
         replace(profile, protocols=(protocol,)), protocol)}) for protocol in FAMILIES}
+    # registers have no elements: all of an array would be one and the same
+    missed['canopen_pkw'] += sum('subindex' in draft.entry and 'index' not in draft.entry
+                                 for draft in named.values())
     fewest = min(missed.values())
     carriers = tuple(protocol for protocol, count in missed.items() if count == fewest)
     return carriers if fewest == 0 else carriers[:1]

@@ -142,8 +142,9 @@ class _RowReader:
             found['number'] = integer(number, hexadecimal=Column.NUMBER in self._table.hexadecimal)
         if index:
             pair = _PAIR.fullmatch(index)
-            if pair is not None:
-                index, element = pair[1], pair[2]
+            if pair is not None:  # 2004:0A, as CANopen writes it
+                index = pair[1]
+                found['subindex'] = integer(pair[2], hexadecimal=True)
             found['index'] = integer(index, hexadecimal=True)
         subindex = self._cell(row, Column.SUBINDEX)
         if subindex:
@@ -155,7 +156,7 @@ class _RowReader:
             found['subindex'] = integer(
                 element, hexadecimal=Column.SUBINDEX in self._table.hexadecimal)
         elif index:
-            found['subindex'] = 0
+            found.setdefault('subindex', 0)
         for key, largest in (('number', 65535), ('index', 65535), ('subindex', 255)):
             if found.get(key, 0) > largest:
                 raise Unusable(f'{key} {found[key]} is out of range, allowed is 0 to {largest}')

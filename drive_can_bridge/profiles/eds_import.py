@@ -144,9 +144,12 @@ class _ObjectReader:
             count = int(head.get('CompactSubObj'), 0)
             if not 0 <= count <= _ELEMENTS_MAX:
                 raise Unusable(f'CompactSubObj {count} is out of range')
-            entry = self._understood(index, head, self._sections.names.get(index))
+            entry = self._understood(index, head)
+            # with names the library calls the others after the first one
+            named = self._understood(index, head, self._sections.names.get(index))
             for sub in range(1, count + 1):
-                self._take(head, entry[sub], parent=entry.name)
+                self._take(head, (named if sub in named.subindices else entry)[sub],
+                           parent=entry.name)
         except (*_ERRORS, Unusable) as error:
             self._leave_out(head, _words(error, head))
 
@@ -271,10 +274,10 @@ def _words(error: Exception, section: Section) -> str:
     for key in ('ObjectType', 'DataType', 'SubNumber', 'CompactSubObj', 'PDOMapping', 'Factor'):
         value = section.get(key)
         try:
-            if value:
+            if key.lower() in section.values:
                 float(value) if key == 'Factor' else int(value, 0)
         except ValueError:
-            return f"{key} '{value}' is no number"
+            return f"{key} '{value}' is no number" if value else f'{key} is empty'
     if isinstance(error, (KeyError, AttributeError, TypeError)):
         return 'is no object that can be understood'
     return one_line(str(error)) or 'is no object that can be understood'

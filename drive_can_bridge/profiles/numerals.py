@@ -25,7 +25,7 @@ _PLAIN = re.compile(r'[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?')
 _GROUPED = re.compile(r'[1-9][0-9]{0,2}(?:[.,][0-9]{3})+')
 _SEPARATOR = re.compile(
     r'\s*(?:\.\.\.?|…|÷|~|\bbis\b|\bto\b|\ba\b|\bfino a\b|\s-\s|–|—)\s*', re.IGNORECASE)
-_DASHES = str.maketrans({'−': '-', '‐': '-', '‑': '-', '﹣': '-', '-': '-', ',': ',', '.': '.'})
+_DASHES = str.maketrans(dict.fromkeys('\u2212\u2010\u2011\uff0d', '-'))
 _SPACES = re.compile("(?<=[0-9])[\\s'’](?=[0-9]{3}(?![0-9]))")
 
 

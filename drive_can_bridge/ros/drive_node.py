@@ -72,8 +72,9 @@ class DriveNode:
         self._control: ControlServices | None = None
         self._calls = 0  # service calls that wait for their answer
         self.requests_refused = 0
-        self._identity = IdentityReader(drive.profile, self._submit_quietly, identified,
-                                        lambda text: self.warn(text, text))
+        self._identity = IdentityReader(
+            drive.profile, submit=self._submit_quietly, online=lambda: session.online,
+            tell=identified, warn=lambda text: self.warn(text, text))
         self.rejected_text = ''
         self.foreign_text = ''
         # a local remapping wins over a process-wide ``__node:=``, which would rename every drive;

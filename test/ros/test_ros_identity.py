@@ -98,6 +98,31 @@ def test_what_cannot_be_read_is_left_out(bridge: StartBridge, client: Client, tm
     identity_becomes(client, 'serial_number=4711 supply=0 factory_made=false')
 
 
+def test_a_drive_that_answers_none_of_it_is_left_alone(
+        bridge: StartBridge, client: Client, tmp_path: Path, keys: dict[str, object],
+        capfd: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / 'who.yaml'
+    lines = [line for line in SPEED.splitlines() if 'speed' in line or not line.startswith('  ')]
+    path.write_text('\n'.join(line for line in lines if 'identity' not in line))
+    one = bridge(parameters(conveyor={**keys, 'parameter_timeout': 0.2, 'parameter_retries': 0}),
+                 autostart=False)
+    path.write_text(SPEED)
+    assert one.node.start()
+    told = ''
+
+    def given_up() -> bool:
+        nonlocal told
+        told += capfd.readouterr().err
+        return told.count('identity: ') == 2
+
+    wait_until(given_up)
+    one.played['conveyor'].set_value('actual_speed', 12.5)
+    assert client.get('/conveyor', 'actual_speed') == [12.5]
+    assert client.get(BRIDGE, NAME) == ['']
+    told += capfd.readouterr().err
+    assert told.count('identity: ') == 2
+
+
 def test_a_profile_without_identity_asks_nothing(bridge: StartBridge, client: Client) -> None:
     one = bridge()
     one.online()

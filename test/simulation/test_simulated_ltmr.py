@@ -13,7 +13,7 @@ import pytest
 
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.frame import EXTENDED_IDENTIFIER_MAX, Frame, Route
-from drive_can_bridge.core.parameters import Access, Parameter, ParameterType, Storage
+from drive_can_bridge.core.parameters import Access, Parameter, ParameterType
 from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.simulation.canopen_pkw import SimulatedPkwDrive
 from drive_can_bridge.simulation.drive import Surroundings
@@ -404,7 +404,7 @@ class TestConfigurationMode:
         assert made.write(652, 60, 0.3) == ['485#8C02002A00000000']
         assert made.write(606, 10, 0.3) == ['485#5E02002A00000000']
         assert (made.read(652, 0.4), made.read(606, 0.4)) == (50, 5)
-        assert made.drive.wear == {'flc1_ratio': 1, 'configuration': 1}
+        assert made.drive.wear == {'flc1_ratio': 1, 'general_configuration': 1}
         made.write(601, 1, 0.5)
         made.write(652, 60, 0.6)
         assert made.read(652, 0.7) == 60

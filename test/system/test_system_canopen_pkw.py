@@ -273,11 +273,15 @@ READ_455 = 't5058C7010025', 't5058C70100A5'
 WITNESS = {**PUMP, 'cyclic_response': ['system_status_1']}
 
 
+#: registers 62, 64 to 74 and 76: what the bridge reads once to know who it talks to
+IDENTITY = {f'{register:02X}00': '3412' for register in (62, *range(64, 75), 76)}
+
+
 class Controller:
     """An LTMR in literal text: what it answers to which line, and nothing that is ours."""
 
     def __init__(self) -> None:
-        self.words = {'C701': '4100', '8C02': '2100', 'C002': '0000'}
+        self.words = {'C701': '4100', '8C02': '2100', 'C002': '0000', **IDENTITY}
         self.function = '00'
         self.operational = False
         self.acknowledges = True
@@ -342,8 +346,8 @@ def test_bytes_of_the_manual(processes: Processes, client: Client, namespace: st
         # whatever the first function byte is, the next request has another
         functions = [line[11:13] for line in frames if line.startswith('t505')]
         assert all(one != other for one, other in zip(functions, functions[1:]))
-        assert {line for line in frames if line.startswith('t5058C701')} == {
-            f'{head}00000000' for head in READ_455}
+        wait_for(lambda: {line for line in peer.lines if line.startswith('t5058C701')} == {
+            f'{head}00000000' for head in READ_455}, 'reads of 455 with both toggles')
 
         assert client.get(drive, 'flc1_ratio') == [33.0]
         assert client.set(drive, flc1_ratio=50.0) == [(True, '')]
@@ -367,7 +371,9 @@ def test_bytes_of_the_manual(processes: Processes, client: Client, namespace: st
         # the last word to the controller is to stop
         assert controller.words['C002'] == '0000'
         known = ('t00020105', 't5058C701002', 't5058C70100A', 't50588C02002', 't50588C0200A',
-                 't50580F27', 't5058C00200', 't5058000000')
+                 't50580F27', 't5058C00200', 't5058000000',
+                 *(f't5058{register}002' for register in IDENTITY),
+                 *(f't5058{register}00A' for register in IDENTITY))
         frames = [line for line in peer.lines if line[:1] in ('t', 'T')]
         assert not [line for line in frames if not line.startswith(known)]
     finally:

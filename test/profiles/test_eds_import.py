@@ -1,0 +1,243 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""EDS files, good ones and others, through the library canopen."""
+
+import builtins
+from pathlib import Path
+from typing import Any
+
+from import_builders import bring_in, Outcome
+import pytest
+
+from drive_can_bridge.core.parameters import Access, Parameter, ParameterType, Storage
+from drive_can_bridge.profiles.errors import ImportFailed
+
+EDS = """\
+[FileInfo]
+FileName=small.eds
+[DeviceInfo]
+VendorName=Müller & Söhne
+ProductName=Drive 3000
+[Comments]
+Lines=1
+Line1=anything = at all
+[MandatoryObjects]
+SupportedObjects=2
+1=0x1000
+2=0x1018
+[1000]
+ParameterName=Device type
+DataType=0x0007
+AccessType=ro
+[1017]
+ParameterName=Producer heartbeat time
+ObjectType=0x7
+DataType=0x0006
+AccessType=rw
+DefaultValue=nonsense
+[1018]
+ParameterName=Identity object
+ObjectType=0x9
+SubNumber=2
+[1018sub0]
+ParameterName=Highest sub-index
+DataType=0x0005
+AccessType=ro
+[1018Sub1]
+ParameterName=Vendor-ID
+DataType=0x0007
+AccessType=ro
+[2000]
+ParameterName=Ramp time
+DataType=0x0006            ; UNSIGNED16
+AccessType=rww
+LowLimit=1
+HighLimit=0x1770
+StorageLocation=PERSIST_COMM
+Factor=0.01
+Unit=s
+Description=From standstill to maximum speed
+[2001]
+ParameterName=Speed setpoint
+DataType=0x0003
+AccessType=rw
+LowLimit=0x8AD0
+HighLimit=30000
+StorageLocation=RAM
+Factor=0.1
+Unit=1/min
+[2002]
+ParameterName=Flag
+DataType=0x0001
+AccessType=rw
+[2003]
+ParameterName=Name of the drive
+DataType=0x0009
+AccessType=ro
+[2010]
+ParameterName=Temperatures
+ObjectType=0x8
+DataType=0x0003
+AccessType=ro
+CompactSubObj=2
+[2010Name]
+NrOfEntries=1
+1=Motor
+[2020]
+ParameterName=Mode
+DataType=0x00A0
+AccessType=rw
+[A0]
+ParameterName=ours
+[A0sub1]
+ParameterName=type
+DataType=0x0005
+AccessType=ro
+DefaultValue=0x0006
+"""
+
+
+@pytest.fixture(autouse=True)
+def library() -> None:
+    """Skip where the library is not installed."""
+    pytest.importorskip('canopen')
+
+
+def bring(folder: Path, old: str = '', new: str = '', name: str = 'small.eds') -> Outcome:
+    if old not in EDS:
+        raise ValueError(f'{old!r} is not in the file')
+    return bring_in(folder, EDS.replace(old, new, 1) if old else EDS, name)
+
+
+def line_of(text: str, occurrence: int = 1) -> int:
+    """Return the line of a text in the file."""
+    place = -1
+    for _ in range(occurrence):
+        place = EDS.index(text, place + 1)
+    return EDS.count('\n', 0, place) + 1
+
+
+def test_everything_that_an_entry_can_have(tmp_path: Path) -> None:
+    made = bring(tmp_path)
+    assert made.profile.description == 'Müller & Söhne Drive 3000'
+    assert made.profile.protocols == ('canopen_pkw',)
+    assert made.profile.identity == ('identity_object_vendor_id',)
+    assert list(made.parameters) == [
+        'device_type', 'producer_heartbeat_time', 'identity_object_vendor_id', 'ramp_time',
+        'speed_setpoint', 'flag', 'temperatures_motor', 'temperatures_2', 'mode']
+    assert made.parameters['ramp_time'] == Parameter(
+        'ramp_time', index=0x2000, subindex=0, scale=0.01, unit='s', scaled=True,
+        storage=Storage.EEPROM, minimum=0.01, maximum=60.0,
+        description='Ramp time; From standstill to maximum speed')
+    assert made.parameters['speed_setpoint'] == Parameter(
+        'speed_setpoint', ParameterType.INT16, index=0x2001, subindex=0, scale=0.1, unit='rpm',
+        scaled=True, storage=Storage.RAM, minimum=-3000.0, maximum=3000.0,
+        description='Speed setpoint')
+    assert made.parameters['flag'].type is ParameterType.BOOL
+    assert made.parameters['temperatures_2'] == Parameter(
+        'temperatures_2', ParameterType.INT16, index=0x2010, subindex=2,
+        access=Access.READ_ONLY, description='Temperatures_2')
+    assert made.parameters['mode'].type is ParameterType.UINT16
+    assert [name for name, each in made.parameters.items() if each.protected] == [
+        'producer_heartbeat_time']
+    assert made.left_out == [f'{line_of("[2003]")}: [2003]: Name of the drive: VISIBLE_STRING is '
+                             'none of the types of 16 or 32 bits']
+    assert made.oddities == []
+
+
+def test_dcf_and_other_names(tmp_path: Path) -> None:
+    for name in ('small.dcf', 'SMALL.EDS', 'small.txt'):
+        assert len(bring(tmp_path, name=name).parameters) == 9
+
+
+@pytest.mark.parametrize(('old', 'new', 'lost', 'place', 'reason'), [
+    # bad numbers
+    ('DataType=0x0007', 'DataType=0xZZ', 'device_type', '[1000]', "DataType '0xZZ' is no number"),
+    ('DataType=0x0003', 'DataType=', 'speed_setpoint', '[2001]', 'DataType is empty'),
+    ('ObjectType=0x7', 'ObjectType=seven', 'producer_heartbeat_time', '[1017]',
+     "ObjectType 'seven' is no number"),
+    ('Factor=0.01', 'Factor=a lot', 'ramp_time', '[2000]', "Factor 'a lot' is no number"),
+    ('CompactSubObj=2', 'CompactSubObj=x', 'temperatures_motor', '[2010]',
+     "CompactSubObj 'x' is no number"),
+    ('CompactSubObj=2', 'CompactSubObj=999', 'temperatures_motor', '[2010]',
+     'CompactSubObj 999 is out of range'),
+    ('AccessType=rww', 'AccessType=sometimes', 'ramp_time', '[2000]',
+     "access 'sometimes' is none of those that are known here"),
+    # bad limits
+    ('LowLimit=1\n', 'LowLimit=abc\n', 'ramp_time', '[2000]', "LowLimit 'abc' is no number"),
+    ('LowLimit=1\n', 'LowLimit=9000\n', 'ramp_time', '[2000]',
+     'LowLimit 9000 is above HighLimit 6000'),
+    # missing keys and sections
+    ('DataType=0x0006            ; UNSIGNED16\n', '', 'ramp_time', '[2000]',
+     'DataType is missing'),
+    ('ParameterName=Ramp time\n', '', 'ramp_time', '[2000]', 'ParameterName is missing'),
+    ('[1000]', '[10000]', 'device_type', '[MandatoryObjects]', 'section [1000] is missing'),
+    ('[1018]', '[Identity]', 'identity_object_vendor_id', '[1018Sub1]',
+     'section [1018] is missing'),
+    ('ObjectType=0x9', 'ObjectType=nine', 'identity_object_vendor_id', '[1018Sub1]',
+     'cannot be understood'),
+])
+def test_a_broken_section_costs_that_entry_only(tmp_path: Path, old: str, new: str, lost: str,
+                                                place: str, reason: str) -> None:
+    good = set(bring(tmp_path).parameters)
+    made = bring(tmp_path, old, new)
+    assert lost in good - set(made.parameters)
+    assert len(good - set(made.parameters)) <= 2
+    assert any(place in line and reason in line for line in made.left_out), made.left_out
+    assert all(int(line.split(':')[0]) <= EDS.count('\n') for line in made.left_out)
+
+
+def test_lines_are_those_of_the_file(tmp_path: Path) -> None:
+    made = bring(tmp_path, 'LowLimit=1\n', 'LowLimit=abc\n')
+    assert f"{line_of('[2000]')}: [2000]: Ramp time: LowLimit 'abc' is no number" in made.left_out
+
+
+@pytest.mark.parametrize(('old', 'new', 'oddity'), [
+    ('ParameterName=Flag', 'ParameterName=Flag\nParameterName=Again',
+     'parametername stands twice, the first in line'),
+    ('ParameterName=Flag', 'ParameterName=Flag\nwhat is this', 'neither a section nor KEY=VALUE'),
+    ('[FileInfo]', '[FileInfo]\n[FileInfo]', 'stands twice, the first in line 1 counts'),
+    ('SubNumber=2', 'SubNumber=4', '2 of 4 sections [1018sub…] are missing'),
+    ('SubNumber=2', 'SubNumber=two', "SubNumber 'two' is no number"),
+])
+def test_what_is_odd_costs_nothing(tmp_path: Path, old: str, new: str, oddity: str) -> None:
+    made = bring(tmp_path, old, new)
+    assert len(made.parameters) == 9
+    assert len(made.oddities) == 1 and oddity in made.oddities[0]
+
+
+def test_an_object_that_stands_twice(tmp_path: Path) -> None:
+    made = bring_in(tmp_path, EDS + '[2001]\nParameterName=Other\nDataType=6\nAccessType=rw\n',
+                    'small.eds')
+    assert 'speed_setpoint' in made.parameters and 'other' not in made.parameters
+    assert made.left_out[0].endswith(f'stands twice, the first in line {line_of("[2001]")} counts')
+
+
+@pytest.mark.parametrize('encoding', ['utf-8', 'utf-8-sig', 'utf-16', 'cp1252', 'latin-1'])
+def test_encodings(tmp_path: Path, encoding: str) -> None:
+    made = bring_in(tmp_path, EDS.replace('\n', '\r\n').encode(encoding), 'small.eds')
+    assert made.profile.description == 'Müller & Söhne Drive 3000'
+    assert len(made.parameters) == 9
+
+
+@pytest.mark.parametrize('content', ['', 'just text', '[DeviceInfo]\nVendorName=x\n',
+                                     '<?xml version="1.0"?>', 'Nr;Name\n1;a\n'])
+def test_no_eds(tmp_path: Path, content: str) -> None:
+    with pytest.raises(ImportFailed, match='small.eds: '):
+        bring_in(tmp_path, content, 'small.eds')
+
+
+def test_the_same_file_gives_the_same_text(tmp_path: Path) -> None:
+    assert bring(tmp_path).imported.built.text == bring(tmp_path).imported.built.text
+
+
+def test_without_the_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    real = builtins.__import__
+
+    def without(name: str, *args: Any, **kwargs: Any) -> Any:
+        if name.startswith('canopen'):
+            raise ImportError(name)
+        return real(name, *args, **kwargs)
+
+    monkeypatch.setattr(builtins, '__import__', without)
+    with pytest.raises(ImportFailed, match=r"pip install 'drive_can_bridge\[eds\]'"):
+        bring(tmp_path)

@@ -1,0 +1,263 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""``drive_can profile`` as a user calls it."""
+
+import json
+import os
+from pathlib import Path
+import pty
+import subprocess
+import sys
+from typing import Any
+
+import pytest
+
+from drive_can_bridge.cli.main import main
+
+CSV = 'Nr;Name;Einheit;Auflösung\n30;Rampe;s;0,01\n31;Höchstdrehzahl;1/min;0,1\nx;Kaputt;;\n'
+BROKEN = """\
+protocols: [datamodel_extended, cannord]
+parameters:
+  speed: {number: 50, tpye: int16}
+  wide: {number: 51, type: uint32}
+  far: {number: 3000}
+"""
+
+
+@pytest.fixture
+def table(tmp_path: Path) -> Path:
+    path = tmp_path / 'antrieb.csv'
+    path.write_bytes(CSV.encode('cp1252'))
+    return path
+
+
+def documents(capsys: pytest.CaptureFixture[str]) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+
+
+class TestList:
+
+    def test_shipped_ones(self, capsys: pytest.CaptureFixture[str]) -> None:
+        assert main(['profile', 'list']) == 0
+        out, err = capsys.readouterr()
+        lines = out.splitlines()
+        assert lines[0].split() == ['name', 'parameters', 'verified', 'protocols', 'description']
+        assert [line.split()[0] for line in lines[1:]] == [
+            'datamodel_control_example', 'datamodel_example', 'nord_sk500e', 'tesys_t_ltmr']
+        assert lines[4].endswith('Motor management controller TeSys T LTMR with CANopen')
+        assert err == ''
+
+    def test_those_of_a_directory_come_first(self, tmp_path: Path,
+                                             capsys: pytest.CaptureFixture[str]) -> None:
+        mine = tmp_path / 'nord_sk500e.yaml'
+        mine.write_text('description: mine\nprotocols: [cannord]\nparameters: {a: {number: 1}}\n')
+        (tmp_path / 'broken.yaml').write_text(BROKEN)
+        assert main(['profile', '--json', 'list', '--directory', str(tmp_path)]) == 0
+        found = {each['name']: each for each in documents(capsys)}
+        assert found['nord_sk500e'] == {
+            'name': 'nord_sk500e', 'path': str(mine), 'description': 'mine',
+            'protocols': ['cannord'], 'parameters': 1, 'verified': 0, 'unverified': 0,
+            'problems': 0}
+        assert found['broken']['problems'] == 3
+        assert len(found) == 5
+
+    def test_no_such_directory(self, capsys: pytest.CaptureFixture[str]) -> None:
+        assert main(['profile', 'list', '--directory', '/nowhere']) == 1
+        assert capsys.readouterr().err == '/nowhere is no directory\n'
+
+
+class TestShow:
+
+    def test_table(self, capsys: pytest.CaptureFixture[str]) -> None:
+        assert main(['profile', 'show', 'nord_sk500e']) == 0
+        lines = capsys.readouterr().out.splitlines()
+        assert lines[0] == 'NORD inverter SK 500E, protocol CANnord (cannord)'
+        row = next(line for line in lines if line.startswith('telegram_timeout '))
+        assert row.split()[1:13] == ['P513', 'int16', '0.1', 's', 'rw', 'eeprom', '-0.1', 'to',
+                                     '100', 's', 'no', 'Time']
+
+    def test_json(self, capsys: pytest.CaptureFixture[str]) -> None:
+        assert main(['profile', 'show', 'tesys_t_ltmr', '--json']) == 0
+        found = {each['name']: each for each in documents(capsys)}
+        assert len(found) == 94
+        assert found['flc1_ratio'] == {
+            'name': 'flc1_ratio', 'address': 'P652', 'number': 652, 'index': 0x2007,
+            'subindex': 3, 'type': 'uint16', 'scale': 1.0, 'offset': 0.0, 'unit': '%',
+            'access': 'rw', 'storage': 'eeprom', 'minimum': 5.0, 'maximum': 100.0,
+            'neutral': None, 'bits': {}, 'word_order': None, 'protected': False,
+            'description': 'Full load current in percent of the largest one of the controller; a '
+                           'small contactor rating raises the minimum',
+            'source': 'installation_guide (unit, step, limits), memory (number)',
+            'verified': False, 'open': 'number'}
+
+    def test_file(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        path = tmp_path / 'a.yaml'
+        path.write_text('protocols: [cannord]\nparameters: {speed: {number: 1}}\n')
+        assert main(['profile', 'show', str(path)]) == 0
+        assert 'speed' in capsys.readouterr().out
+
+    @pytest.mark.parametrize(('name', 'words'), [
+        ('nord_sk500', "did you mean 'nord_sk500e'?"), ('./none.yaml', 'no such file')])
+    def test_unknown(self, name: str, words: str, capsys: pytest.CaptureFixture[str]) -> None:
+        assert main(['profile', 'show', name]) == 1
+        assert words in capsys.readouterr().err
+
+    def test_broken(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        path = tmp_path / 'a.yaml'
+        path.write_text(BROKEN)
+        assert main(['profile', 'show', str(path)]) == 1
+        out, err = capsys.readouterr()
+        assert out == '' and len(err.splitlines()) == 3
+
+
+class TestCheck:
+
+    def test_good_and_bad(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        good, bad = tmp_path / 'good.yaml', tmp_path / 'bad.yaml'
+        good.write_text('protocols: [cannord]\nparameters: {a: {number: 1, verified: true}}\n')
+        bad.write_text(BROKEN)
+        assert main(['profile', 'check', str(good)]) == 0
+        assert capsys.readouterr() == (
+            f'{good}: all right: 1 parameter, 1 verified, 0 not; cannord\n', '')
+        assert main(['profile', 'check', str(bad), str(good), '/nowhere.yaml']) == 1
+        out, err = capsys.readouterr()
+        assert out.startswith(f'{good}: all right')
+        assert err.replace(str(bad), 'bad.yaml').splitlines() == [
+            "bad.yaml:3: parameters.speed.tpye: unknown key, did you mean 'type'?",
+            'bad.yaml:4: parameters.wide.type: uint32 does not exist in datamodel_extended, '
+            'allowed are bool, int16, uint16',
+            'bad.yaml:5: parameters.far.number: 3000 is out of range, allowed is 0 to 2047',
+            '/nowhere.yaml: No such file or directory']
+
+    def test_json(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        path = tmp_path / 'bad.yaml'
+        path.write_text(BROKEN)
+        assert main(['profile', 'check', '--json', str(path)]) == 1
+        [found] = documents(capsys)
+        assert (found['file'], found['ok'], found['parameters']) == (str(path), False, 2)
+        assert found['problems'][0] == {
+            'line': 3, 'key': 'parameters.speed.tpye',
+            'message': "unknown key, did you mean 'type'?"}
+
+
+class TestImport:
+
+    def test_tells_what_it_did(self, table: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        target = table.with_suffix('.yaml')
+        assert main(['profile', 'import', str(table), '-o', str(target)]) == 0
+        out, err = capsys.readouterr()
+        assert out == f'{target}: 2 of 3 entries of the file, 1 left out (see above), 2 with a ' \
+                      'remark in the profile; datamodel_extended, datamodel_standard, cannord, ' \
+                      'canopen_pkw\n'
+        assert err.splitlines() == [
+            f'{table}: columns: number=Nr, name=Name, unit=Einheit, scale=Auflösung',
+            f"{table}:4: x Kaputt: 'x' is no number"]
+        assert main(['profile', 'check', str(target)]) == 0
+        assert not list(table.parent.glob('.*'))  # nothing half written stays
+
+    def test_json(self, table: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        target = table.with_suffix('.yaml')
+        assert main(['profile', 'import', '--json', str(table), '-o', str(target)]) == 0
+        [found] = documents(capsys)
+        # options may stand anywhere
+        assert main(['profile', '-o', str(target), '--json', 'import', str(table)]) == 0
+        assert documents(capsys) == [found]
+        assert found['parameters'] == 2 and found['entries'] == 3 and found['remarks'] == 2
+        assert found['left_out'] == [
+            {'line': 4, 'section': '', 'what': 'x Kaputt', 'reason': "'x' is no number"}]
+
+    def test_standard_output(self, table: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        assert main(['profile', 'import', str(table)]) == 0
+        out = capsys.readouterr().out
+        target = table.with_suffix('.yaml')
+        assert main(['profile', 'import', str(table), '-o', str(target)]) == 0
+        assert out == target.read_text()
+
+    def test_overwrites_what_differs_only_when_told(
+            self, table: Path, capsys: pytest.CaptureFixture[str],
+            monkeypatch: pytest.MonkeyPatch) -> None:
+        target = table.with_suffix('.yaml')
+        command = ['profile', 'import', str(table), '-o', str(target)]
+        with open('/dev/null') as nobody:
+            monkeypatch.setattr('sys.stdin', nobody)
+            assert main(command) == 0
+            assert main(command) == 0  # nothing would change
+            target.write_text('edited by hand')
+            assert main(command) == 2
+            assert '--yes overwrites it' in capsys.readouterr().err
+            assert target.read_text() == 'edited by hand'
+            assert main([*command, '--yes']) == 0
+        assert target.read_text().startswith('# Made from antrieb.csv')
+
+    @pytest.mark.parametrize(('options', 'words'), [
+        (['--columns', 'nr=Nr'], "'nr' is no column, there are: number, index"),
+        (['--columns', 'number'], 'number has no heading'),
+        (['--columns', 'number=Nr,number=Name'], 'number stands twice'),
+        (['--columns', 'number=Nummer'], "no row has the headings 'Nummer'; there are: Nr, Name"),
+        (['--protocols', 'canopen'], "'canopen' is unknown, there are: datamodel_extended"),
+        (['--protocols', 'cannord,cannord'], 'stands twice'),
+        (['--json'], 'say where the profile goes with -o FILE'),
+    ])
+    def test_wrong_usage(self, table: Path, options: list[str], words: str,
+                         capsys: pytest.CaptureFixture[str]) -> None:
+        assert main(['profile', 'import', str(table), *options]) == 2
+        out, err = capsys.readouterr()
+        assert out == '' and words in err and len(err.splitlines()) == 1
+
+    def test_columns_with_commas(self, tmp_path: Path,
+                                 capsys: pytest.CaptureFixture[str]) -> None:
+        path = tmp_path / 'a.csv'
+        path.write_text('Nr;Text, kurz;Faktor\n1;Speed;2\n')
+        assert main(['profile', 'import', str(path), '--columns',
+                     'number=Nr,name="Text, kurz",scale=']) == 0
+        out = capsys.readouterr().out
+        assert '  speed:\n    {number: 1, type: uint16,\n' in out
+
+    def test_missing_file(self, capsys: pytest.CaptureFixture[str]) -> None:
+        assert main(['profile', 'import', '/nowhere.csv']) == 1
+        assert capsys.readouterr().err == 'drive_can: /nowhere.csv: No such file or directory\n'
+
+    def test_no_directory_to_write_to(self, table: Path,
+                                      capsys: pytest.CaptureFixture[str]) -> None:
+        assert main(['profile', 'import', str(table), '-o', '/nowhere/a.yaml']) == 1
+        assert 'No such file or directory' in capsys.readouterr().err
+
+
+def in_terminal(*arguments: str, **environment: str) -> str:
+    """Run the command in a terminal of 60 columns and return what it shows."""
+    master, slave = pty.openpty()
+    child = subprocess.Popen(
+        [sys.executable, '-m', 'drive_can_bridge.cli.main', *arguments], stdout=slave,
+        stderr=slave, stdin=slave,
+        env={'PATH': '/usr/bin:/bin', 'TERM': 'xterm-256color', 'COLUMNS': '60', **environment})
+    os.close(slave)
+    shown = b''
+    while True:
+        try:
+            part = os.read(master, 65536)
+        except OSError:  # how a pseudo-terminal says that the other side is closed
+            break
+        if not part:
+            break
+        shown += part
+    assert child.wait(20) == 0
+    os.close(master)
+    return shown.decode()
+
+
+def test_fits_a_terminal_and_obeys_no_color() -> None:
+    shown = in_terminal('profile', 'list')
+    assert '\x1b[1m' in shown
+    plain = in_terminal('profile', 'list', NO_COLOR='1')
+    assert '\x1b[3' not in plain
+    assert all(len(line) <= 60 for line in plain.replace('\x1b[1m', '').replace(
+        '\x1b[0m', '').splitlines())
+    assert 'tesys_t_ltmr' in plain
+
+
+def test_what_goes_to_a_pipe_is_neither_cut_nor_wrapped() -> None:
+    shown = subprocess.run(
+        [sys.executable, '-m', 'drive_can_bridge.cli.main', 'profile', 'show', 'tesys_t_ltmr'],
+        capture_output=True, text=True, check=True, env={'COLUMNS': '40', 'PATH': '/usr/bin'})
+    rows = shown.stdout.split('\n\n')[1].splitlines()
+    assert len(rows) == 95
+    assert max(map(len, rows)) > 150 and '\x1b' not in shown.stdout
