@@ -100,6 +100,8 @@ def _drive(drive: DriveConfiguration) -> Iterator[DeclaredParameter]:
     yield DeclaredParameter(
         identity_name(drive.name), '', 'Found out by the bridge when the drive comes online: the '
         'section identity of its profile. Empty while not known.', False)
+    yield DeclaredParameter(f'{prefix}profile_sha256', drive.profile.sha256,
+                            'SHA-256 of the file of the profile, as it was read.', False)
     options = FAMILIES[drive.protocol].options_schema
     for key, value in drive.family_options.items():
         yield DeclaredParameter(prefix + key, value, options[key].get('description', ''), False)

@@ -119,8 +119,9 @@ def _forget_findings(tree: Tree) -> None:
     """Leave out what the bridge finds out by itself: ``ros2 param dump`` writes that too."""
     drives = tree.data.get('drives')
     for drive in drives.values() if isinstance(drives, dict) else ():
-        if isinstance(drive, dict) and isinstance(drive.get('identity'), str):
-            del drive['identity']
+        for key in ('identity', 'profile_sha256'):
+            if isinstance(drive, dict) and isinstance(drive.get(key), str):
+                del drive[key]
 
 
 def _names(tree: Tree, key: str) -> list[str]:

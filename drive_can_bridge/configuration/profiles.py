@@ -2,6 +2,8 @@
 """Find and read profiles: ``profile:`` is an absolute path, or a name looked up as NAME.yaml."""
 
 from collections.abc import Sequence
+from dataclasses import replace
+import hashlib
 from pathlib import Path as FilePath
 
 from drive_can_bridge.configuration.problems import Problem, show, suggestion, Tree
@@ -50,7 +52,7 @@ class ProfileStore:
             return path
         if path not in self._loaded:
             try:
-                self._loaded[path] = read_profile(path)
+                self._loaded[path] = _with_digest(read_profile(path), path)
             except OSError as error:
                 return f'{path} cannot be read ({error.strerror}), allowed is a readable file'
         return self._loaded[path]
@@ -73,6 +75,11 @@ class ProfileStore:
         places = ', '.join(map(str, self._directories)) or 'no directory'
         hint = suggestion(name, known) if known else 'there is no profile at all'
         return f'{show(name)} is unknown, {hint} (searched: {places})'
+
+
+def _with_digest(loaded: LoadedProfile, path: FilePath) -> LoadedProfile:
+    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    return replace(loaded, profile=replace(loaded.profile, sha256=digest))
 
 
 def _is_file(path: FilePath) -> bool:

@@ -80,6 +80,7 @@ class Profile:
     :param protocols: the families the drive type speaks.
     :param parameters: the table, in the order of the file, by name.
     :param identity: names of the parameters that tell a drive from another one of its type.
+    :param sha256: of the file, hexadecimal.
     """
 
     name: str
@@ -90,3 +91,4 @@ class Profile:
     control: ControlTable | None = None
     identity: tuple[str, ...] = ()
     restore: RestoreTable = RestoreTable()
+    sha256: str = ''

@@ -14,6 +14,7 @@ outs, EEPROM gaps) instead of one period. Drives of equal periods take turns (:m
 """
 
 from collections.abc import Callable, Sequence
+import math
 import threading
 import time
 from typing import Any, Protocol
@@ -110,11 +111,13 @@ class BusExchange:
     All drives of one bus.
 
     :param routes: for each session, in the same order, the identifiers it wants to see.
+    :param counted: further identifiers, on which nobody else should send.
     :param prepare_thread: called first in each of the two threads.
     """
 
     def __init__(self, bus: BusConfiguration, sessions: Sequence[Session],
                  routes: Sequence[Sequence[Route]], listener: BusListener, *,
+                 counted: Sequence[Route] = (),
                  clock: Callable[[], float] = steady_now,
                  prepare_thread: Callable[[], object] = lambda: None) -> None:
         self.bus = bus
@@ -128,7 +131,8 @@ class BusExchange:
         self._routes = [list(entries) for entries in routes]
         # a send may hold up every drive of the bus: never for more than half a cycle
         shortest = min((session.drive.period for session in sessions), default=0.1)
-        self.link = Link(bus, [route for entries in routes for route in entries], self,
+        filters = [*(route for entries in routes for route in entries), *counted]
+        self.link = Link(bus, filters, self,
                          send_timeout=min(0.5 * shortest, 0.05), stations=len(self._sessions),
                          prepare_thread=prepare_thread)
         for session, phase in zip(sessions, spread([each.drive.period for each in sessions])):
@@ -186,11 +190,12 @@ class BusExchange:
         """
         with self.lock:
             now = self._clock()
-            self._notice_lost_time(now)  # a signal may come before anybody has noticed
+            lost = self.active and now - self._last_pass >= LOST_TIME  # nobody has noticed yet
             self.active = False
             for member in self._members:
-                member.session.deactivate(now)
-                self._pump(member)
+                if lost:
+                    self._stop_one(member, lambda session: session.time_lost(now))
+                self._stop_one(member, lambda session: session.deactivate(now))
         self._alarm.ring()
         end = now + STOP_MARGIN + max(
             (session.longest_stop for session in self._sessions), default=0.0)
@@ -199,8 +204,7 @@ class BusExchange:
                 self._give_up()
                 return False
             if not self._thread.is_alive():  # the neutral frames go out all the same
-                with self.lock:
-                    self._pass()
+                self._pass_to_stop()
             time.sleep(0.002)
         return True
 
@@ -212,6 +216,22 @@ class BusExchange:
                 if not member.session.stopped:
                     member.session.give_up(now)
                     self._pump(member)
+
+    def _pass_to_stop(self) -> None:
+        """Serve the stops, without the timer thread and without commands."""
+        with self.lock:
+            for member in self._members:
+                if member.due <= self._clock():
+                    self._stop_one(member, lambda session: session.handle_timer(self._clock()))
+
+    def _stop_one(self, member: Member, step: Callable[[Session], None]) -> None:
+        """Do what stops one drive: should that fail, the others are stopped all the same."""
+        try:
+            step(member.session)
+            self._pump(member)
+        except Exception as error:  # noqa: BLE001  the last resort: it is told, and costs no other
+            member.due = math.inf
+            self.bus_reason = f'{member.session.drive.name}: {type(error).__name__}: {error}'
 
     def close(self) -> None:
         """End both threads and close the bus."""

@@ -35,11 +35,15 @@ class Claim(NamedTuple):
 
     Two claims collide when some identifier matches both, unless both carry the same non-empty
     ``shared`` mark (a broadcast identifier is shared on purpose).
+
+    :param heard: frames of others on it are for the session; False: the bus counts them, as
+        frames that nobody should send.
     """
 
     route: Route
     purpose: str
     shared: str = ''
+    heard: bool = True
 
     def overlaps(self, other: 'Claim') -> bool:
         """Tell whether an identifier exists that both claim."""

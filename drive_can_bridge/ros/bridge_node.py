@@ -203,10 +203,13 @@ class BridgeNode(LifecycleNode):
             drives = [drive for drive in configuration.drives.values() if drive.bus == bus.name]
             families = [FAMILIES[drive.protocol] for drive in drives]
             sessions = make_sessions(drives)
-            routes = [[claim.route for claim in family.claims(drive)]
-                      for family, drive in zip(families, drives)]
-            exchange = BusExchange(bus, sessions, routes, self,
-                                   prepare_thread=self._prepare_thread)
+            claims = [family.claims(drive) for family, drive in zip(families, drives)]
+            exchange = BusExchange(
+                bus, sessions, [[claim.route for claim in entries if claim.heard]
+                                for entries in claims], self,
+                counted=[claim.route for entries in claims for claim in entries
+                         if not claim.heard],
+                prepare_thread=self._prepare_thread)
             self.exchanges[bus.name] = exchange
             for drive, session, family in zip(drives, sessions, families):
                 node = DriveNode(

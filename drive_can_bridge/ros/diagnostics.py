@@ -126,10 +126,16 @@ class DriveReporter:
         """Return the report of this moment."""
         drive, session = self._drive, self._drive.session
         statistics = session.statistics
-        state = session.state
         rejected = statistics.rejected - self._rejected
         self._rejected = statistics.rejected
-        level, message = self._judge(state, rejected, now)
+        # the session belongs to the threads of the bus; what is computed of many samples does not
+        with drive.exchange.lock:
+            state = session.state
+            level, message = self._judge(state, rejected, now)
+            command_age = session.setpoints.age(now)
+            more = session.facts()
+            if session.control is not None:
+                more = {'control_state': session.control.state, **more}
         self._latencies = statistics.latency.count, statistics.latency.total
         self._requests = statistics.requests_ok + statistics.requests_failed
         facts = {
@@ -138,17 +144,15 @@ class DriveReporter:
             'missed_exchanges': str(statistics.missed),
             **_times('latency', statistics.latency),
             **_times('period_error', statistics.period_error),
-            'command_age_s': f'{session.setpoints.age(now):.3f}',
+            'command_age_s': f'{command_age:.3f}',
             'commands_refused': str(statistics.commands_refused),
             'frames_rejected': str(statistics.rejected),
             'parameter_requests_ok': str(statistics.requests_ok),
             'parameter_requests_failed': str(
                 statistics.requests_failed + drive.requests_refused),
             'last_parameter_error': statistics.last_request_error,
+            **more,
         }
-        if session.control is not None:
-            facts['control_state'] = session.control.state
-        facts.update(session.facts())
         return Report(f'drive {drive.name}', level, message, facts)
 
     def _judge(self, state: DriveState, rejected: int, now: float) -> tuple[bytes, str]:

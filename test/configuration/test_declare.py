@@ -1,6 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The parameters that the node declares, and those that may change while it runs."""
 
+import hashlib
 from pathlib import Path
 
 from configuration_builders import changed, FILE, load
@@ -17,6 +18,7 @@ def test_all_effective_values(tmp_path: Path) -> None:
     text = changed(text, '[speed, limit]', '[]')
     text = text[:text.index('      lift:')]
     declared = declared_parameters(load(tmp_path, text))
+    sha256 = hashlib.sha256((tmp_path / 'table.yaml').read_bytes()).hexdigest()
     assert [(name, value) for name, value, _, _ in declared] == [
         ('autostart', True),
         ('diagnostics_period', 1.0),
@@ -41,6 +43,7 @@ def test_all_effective_values(tmp_path: Path) -> None:
         ('drives.conveyor.parameter_retries', 2),
         ('drives.conveyor.verify_writes', True),
         ('drives.conveyor.identity', ''),
+        ('drives.conveyor.profile_sha256', sha256),
         ('drives.conveyor.mapping', 'verify'),
         ('drives.conveyor.request_map_base', 122),
         ('drives.conveyor.response_map_base', 126),

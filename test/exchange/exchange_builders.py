@@ -103,7 +103,8 @@ class Bench:
         self.now = 10.0
         self.step = 0.0
         self.sessions = list(sessions) or make_sessions(drives)
-        self.routes = [[claim.route for claim in FAMILIES[entry.protocol].claims(entry)]
+        self.routes = [[claim.route for claim in FAMILIES[entry.protocol].claims(entry)
+                        if claim.heard]
                        for entry in drives]
         self.bus_notes = BusNotes()
         self.exchange = BusExchange(

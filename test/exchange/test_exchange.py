@@ -13,10 +13,9 @@ from waiting import wait_for
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlTicket
 from drive_can_bridge.core.events import Noted, RequestCompleted, StationFound, StationLost
-from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.core.requests import Failure, ReadValue
 from drive_can_bridge.exchange.exchange import BusExchange, PASS_PERIOD
-from drive_can_bridge.transport import link
 
 ZEROS = '0000000000000000'
 NEUTRAL = f'003FFFF0#{ZEROS}'
@@ -77,11 +76,15 @@ def test_eleven_bit_twin_of_a_response_reaches_nobody() -> None:
 
 
 def test_routes_become_filters_of_the_link(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(link, 'open_port', lambda bus, routes, stations: routes)
     bench = Bench()
+    counted = Route(0x000, 0x7FF, False)
     made = BusExchange(BusConfiguration('main', 'virtual', 'x'), bench.sessions, bench.routes,
-                       BusNotes())
-    assert list(made.link._open()) == all_routes(bench)  # type: ignore[call-overload]
+                       BusNotes(), counted=[counted])
+    opened: list[list[Route]] = []
+    monkeypatch.setattr('drive_can_bridge.transport.link.open_port',
+                        lambda bus, routes, stations: opened.append(list(routes)))
+    made.link._open()
+    assert opened == [[*all_routes(bench), counted]]
     assert made.link._send_timeout == pytest.approx(0.01)  # half a cycle
 
 
@@ -403,6 +406,39 @@ def test_defect_in_the_timer_thread_is_told_not_swallowed() -> None:
     assert bench.exchange.deactivate() is True
     assert bench.link.take() == [NEUTRAL] * 3
     bench.exchange.close()
+
+
+@pytest.mark.parametrize('broken', ['handle_timer', 'deactivate'])
+def test_a_session_that_fails_keeps_no_other_from_its_stop(
+        broken: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = Bench(drive(name='first', station=1, mapping='assume'),
+                  drive(name='second', station=2, mapping='assume'))
+    bench.exchange.bus_opened()
+    bench.exchange.activate()
+    bench.at(10.0)
+    bench.at(10.02)
+
+    def fail(*_: object) -> None:
+        raise ZeroDivisionError('a defect')
+    monkeypatch.setattr(bench.sessions[0], broken, fail)
+    bench.link.take()
+    bench.step = 0.001
+    # it cannot be said that all of them were stopped, and that is told by whoever asked
+    assert bench.exchange.deactivate() is False
+    assert [text for text in bench.link.take() if text.startswith('005')] == [
+        f'005FFFF0#{ZEROS}'] * 3
+    assert bench.sessions[1].stopped
+    assert bench.exchange.bus_reason == 'first: ZeroDivisionError: a defect'
+
+
+def test_frames_that_nobody_else_should_send_are_counted() -> None:
+    bench = Bench(drive('canopen_pkw', name='first', station=1))
+    bench.exchange.bus_opened()
+    bench.exchange.activate()
+    bench.hears('000#8100', 10.1)       # NMT: reset all nodes
+    bench.hears('000#0201', 10.2)
+    assert bench.exchange.frames_rejected == 2
+    assert bench.sessions[0].statistics.rejected == 0
 
 
 def test_whatever_is_due_sooner_wakes_the_timer() -> None:

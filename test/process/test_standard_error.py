@@ -36,8 +36,8 @@ def test_everything_arrives_whoever_writes_it() -> None:
             libc.write(2, b'library\\n', 8)
             for number in range(20_000):
                 libc.write(2, b'x' * 99 + b'\\n', 100)
-                if number % 100 == 0:
-                    time.sleep(0)
+                if number % 100 == 99:
+                    assert output.flush(30.0)
         os.write(2, b'afterwards\\n')
         """, stderr=subprocess.PIPE)
     lines = done.stderr.decode().splitlines()

@@ -1,10 +1,15 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The parameters of the bridge's own node."""
 
+from pathlib import Path
+import subprocess
+
 from bridges import CONVEYOR, LIFT, parameters, StartBridge
 from clients import Client, wait_until
 import pytest
 from rcl_interfaces.srv import DescribeParameters, ListParameters
+
+from drive_can_bridge.resources import profiles_directory
 
 BRIDGE = '/drive_can_bridge'
 
@@ -35,6 +40,20 @@ def test_everything_can_be_read(bridge: StartBridge, client: Client) -> None:
                                           'drives.conveyor.rearm'])).descriptors
     assert [entry.read_only for entry in descriptors] == [True, False]
     assert all(entry.description for entry in descriptors)
+
+
+def test_the_digest_of_the_profile(bridge: StartBridge, client: Client, tmp_path: Path) -> None:
+    profile = tmp_path / 'mine.yaml'
+    profile.write_text((profiles_directory() / 'datamodel_example.yaml').read_text(
+        encoding='utf-8') + '# ours\n', encoding='utf-8')
+    bridge(parameters(conveyor=CONVEYOR, lift={**LIFT, 'profile': str(profile), 'cyclic_request': [
+        'speed_setpoint'], 'cyclic_response': ['actual_speed']}))
+    names = ['drives.conveyor.profile_sha256', 'drives.lift.profile_sha256']
+    command = ['sha256sum', str(profiles_directory() / 'datamodel_example.yaml'), str(profile)]
+    listed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert client.get(BRIDGE, *names) == [line.split()[0] for line in listed.splitlines()]
+    [(done, reason)] = client.set(BRIDGE, drives__conveyor__profile_sha256='0')
+    assert not done and 'read-only' in reason
 
 
 @pytest.mark.parametrize('name, value', [

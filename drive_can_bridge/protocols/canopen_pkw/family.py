@@ -113,7 +113,8 @@ class CanopenPkw(Family):
             identifiers.heartbeat: f'heartbeats of node {node}',
         }
         # all CANopen nodes of a bus listen to the one NMT identifier
-        return [*_claims(purposes), *_claims({network.NMT_IDENTIFIER: 'NMT'}, shared='NMT')]
+        return [*_claims(purposes),
+                *_claims({network.NMT_IDENTIFIER: 'NMT'}, shared='NMT', heard=False)]
 
     def reserved(self, drive: DriveConfiguration) -> list[Claim]:
         """Return the rest of what a node listens to and sends on from the factory."""
@@ -216,7 +217,7 @@ class CanopenPkw(Family):
             taken.update(dict.fromkeys(mine, parameter.name))
 
 
-def _claims(purposes: dict[int, str], *, shared: str = '') -> list[Claim]:
+def _claims(purposes: dict[int, str], *, shared: str = '', heard: bool = True) -> list[Claim]:
     return [Claim(Route(identifier, STANDARD_IDENTIFIER_MAX, False),
-                  f'{identifier:03X}h ({purpose})', shared)
+                  f'{identifier:03X}h ({purpose})', shared, heard)
             for identifier, purpose in purposes.items()]
