@@ -16,7 +16,7 @@ help:
 	@echo 'make test    types and all tests; ARGS="..." goes to pytest (-n 0: one after the other)'
 	@echo '             DRIVE_CAN_TEST_PROFILE=long: what is random looks longer, as in CI'
 	@echo 'make bench   measurements; ARGS="..." goes to bench/run.py'
-	@echo 'make pictures  those of README and docs, from a demo that runs; ARGS="..." goes to docs/pictures.py'
+	@echo 'make pictures  those of README and docs, from a demo that runs'
 	@echo 'make lint    style'
 	@echo 'make setup   only the virtual environment that all of them use, in $(VENV)'
 	@echo 'make clean   removes it and everything else that was built'

@@ -94,7 +94,7 @@ def flood_figures(found: dict[str, Any]) -> list[Figure]:
 
 
 def monitor_figures(found: dict[str, Any]) -> list[Figure]:
-    """What a bridge notices of a monitor, and what the monitor takes."""
+    """Monitor: what a bridge notices of it, and what it takes."""
     before, beside = found['without'], found['with']
     periods = [p99(each['period_errors']) for each in (before, beside)]
     shares = [each['cpu'] / each['elapsed'] for each in (before, beside)]
@@ -146,7 +146,8 @@ FIGURES: dict[str, Callable[[Any], list[Figure]]] = {
     'unsubscribed': lambda found: exchange_figures(found, 'nobody subscribed', 1.0),
     'ordinary': lambda found: exchange_figures(found, 'all of it at ordinary priority', 1.5),
     'diy': diy_figures, 'latency': latency_figures, 'service': service_figures,
-    'flood': flood_figures, 'monitor': monitor_figures, 'drives': drives_figures, 'start': start_figures,
+    'flood': flood_figures, 'monitor': monitor_figures, 'drives': drives_figures,
+    'start': start_figures,
 }
 
 

@@ -68,8 +68,9 @@ def _watch(demo: 'subprocess.Popen[bytes]') -> RenderableType:
         now = time.monotonic()
         client.poll(now)
         snapshot = model.look(now, time.time())
-        moving = [drive for drive in snapshot.drives if drive.state == 'online' and drive.setpoints]
-        if full_at is None and len(moving) == len(snapshot.drives) - 1 > 0:
+        moving = sum(drive.state == 'online' and bool(drive.setpoints)
+                     for drive in snapshot.drives)
+        if full_at is None and moving == len(snapshot.drives) - 1 > 0:
             full_at = now + TREND_SPAN
         if full_at is not None and now >= full_at:
             break
