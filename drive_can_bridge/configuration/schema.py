@@ -8,6 +8,7 @@ base and from the keys of every protocol family; the result is shipped as a file
 compares. To write it anew: ``python3 -m drive_can_bridge.configuration.schema``.
 """
 
+from collections.abc import Mapping
 from copy import deepcopy
 from functools import lru_cache
 from importlib import resources
@@ -18,6 +19,9 @@ from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.protocols.family import Family
 
 Schema = dict[str, Any]
+
+#: keys that some family has for itself
+ALL_OPTIONS = frozenset(key for family in FAMILIES.values() for key in family.options_schema)
 
 PARAMETER_FILE = 'parameter_file.schema.json'
 PROFILE = 'profile.schema.json'
@@ -93,10 +97,11 @@ def defaults(name: str) -> dict[str, Any]:
             .items() if isinstance(option, dict) and 'default' in option}
 
 
-def family_defaults(family: Family) -> dict[str, Any]:
-    """Return the default values of the keys that only this family has."""
-    return {key: deepcopy(option['default']) for key, option in family.options_schema.items()
-            if 'default' in option}
+def as_numbers(name: str, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Make floats of the integers that were given where a definition wants a number."""
+    properties = definition(name)['properties']
+    return {key: float(value) if properties.get(key, {}).get('type') == 'number' else value
+            for key, value in values.items()}
 
 
 def text(schema: Schema) -> str:

@@ -5,7 +5,7 @@ The checked configuration, as the rest of the program receives it.
 Times are seconds. Everything in here has passed every check: nobody downstream checks again.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from drive_can_bridge.core.parameters import Parameter
@@ -62,7 +62,7 @@ class DriveConfiguration:
     :param cyclic_request: parameters sent each cycle, in slot order (control word included where
         the configuration lists it).
     :param cyclic_response: parameters received each cycle, in slot order.
-    :param family_options: the keys that only this protocol family has, with defaults filled in.
+    :param options: the keys that only this protocol family has: its own frozen dataclass.
     :param profile_key: the profile as the configuration names it.
     """
 
@@ -82,8 +82,13 @@ class DriveConfiguration:
     verify_writes: bool = True
     control_timeout: float = 2.0
     joint: JointConfiguration | None = None
-    family_options: dict[str, Any] = field(default_factory=dict)
+    options: Any = None
     profile_key: str = ''
+
+    @property
+    def family_options(self) -> dict[str, Any]:
+        """The options by name."""
+        return asdict(self.options)
 
 
 @dataclass(frozen=True)

@@ -55,7 +55,7 @@ def drive(tmp_path: Path) -> DriveConfiguration:
 
 
 def with_options(drive: DriveConfiguration, **options: object) -> DriveConfiguration:
-    return replace(drive, family_options={**drive.family_options, **options})
+    return replace(drive, options=replace(drive.options, **options))
 
 
 def test_defaults(drive: DriveConfiguration) -> None:
@@ -140,8 +140,7 @@ def test_inverters_keep_off_the_predefined_set(tmp_path: Path) -> None:
 def test_claims_collide_with_the_same_node_only(drive: DriveConfiguration) -> None:
     own = [*FAMILY.claims(drive), *FAMILY.reserved(drive)]
     for station in range(1, 128):
-        node = replace(drive, station=station, family_options={
-            **drive.family_options, **FAMILY.station_defaults(station)})
+        node = replace(drive, station=station, options=FAMILY.make_options(station, {}))
         others = [*FAMILY.claims(node), *FAMILY.reserved(node)]
         assert any(mine.overlaps(other) for mine in own for other in others) == (station == 5)
 

@@ -1,6 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The shipped JSON Schemas: up to date, correct, and in agreement with the shipped examples."""
 
+from dataclasses import asdict
 import json
 from pathlib import Path
 from typing import Any
@@ -34,11 +35,11 @@ def test_is_a_schema(document: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize('family', FAMILIES.values())
 def test_keys_of_families_have_defaults_that_fit(family: Any) -> None:
-    calculated = family.station_defaults(1)
+    made = asdict(family.make_options(1, {}))
+    assert set(made) == set(family.options_schema)
     for key, option in family.options_schema.items():
-        assert ('default' in option) is not (key in calculated)
-        default = option.get('default', calculated.get(key))
-        assert Draft202012Validator(option).is_valid(default)
+        assert option.get('default', made[key]) == made[key]
+        assert Draft202012Validator(option).is_valid(made[key])
         assert option['description']
 
 
@@ -76,7 +77,8 @@ def test_example_shows_every_key_of_a_drive() -> None:
     assert set(parameters['drives']['conveyor']) == (
         known - foreign | set(family.options_schema))
     given = {**parameters['drives']['conveyor']}
-    for key, value in {**schema.defaults('drive'), **schema.family_defaults(family)}.items():
+    for key, value in {**schema.defaults('drive'),
+                       **asdict(family.make_options(1, {}))}.items():
         if key not in ('cyclic_request', 'cyclic_response') and key in given:
             assert given[key] == value, key
 
@@ -98,8 +100,9 @@ def test_keys_of_several_families() -> None:
 
     def wrong(**keys: object) -> list[str]:
         drive = {'bus': 'main', 'station': 1, 'profile': 'x', **keys}
-        _, problems = check_schema(Tree(drive), document, 'drive')
-        return [f'{problem.key}: {problem.message}' for problem in problems]
+        tree = Tree(drive)
+        check_schema(tree, document, 'drive')
+        return [f'{problem.key}: {problem.message}' for problem in tree.problems]
 
     assert wrong(protocol='other', mapping=2, layout='b') == []
     assert wrong(protocol='datamodel_extended', mapping='assume') == []

@@ -366,6 +366,6 @@ def test_raw_names(drive: DriveConfiguration) -> None:
     assert (parameter.storage, parameter.listed) == (None, False)
     for name in ('p65536', 'p-1', 'p30.1', 'x1000.1', 'P30', 'speed', ''):
         assert FAMILY.raw_parameter(drive, name) is None
-    moved = replace(drive, family_options={**drive.family_options, 'parameter_offset': -1})
+    moved = replace(drive, options=replace(drive.options, parameter_offset=-1))
     assert FAMILY.raw_parameter(moved, 'p0') is None
     assert FAMILY.raw_parameter(moved, 'p1') is not None

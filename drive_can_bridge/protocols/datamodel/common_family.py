@@ -10,56 +10,18 @@ and from 1 on the other.
 from abc import abstractmethod
 from collections.abc import Iterator
 import re
-from typing import Any
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.protocols.datamodel.extended import CYCLIC_PARAMETER, SLOTS
 from drive_can_bridge.protocols.datamodel.mapping import REQUEST_MAP_BASE, RESPONSE_MAP_BASE
+from drive_can_bridge.protocols.datamodel.options import NUMBER_MAX
 from drive_can_bridge.protocols.family import Complaint, Family
 
 #: the manual recommends not to cycle faster
 FASTEST_PERIOD = 0.005
-#: the manual's least time between two EEPROM writes
-EEPROM_WRITE_GAP = 0.02
-NUMBER_MAX = 0xFFFF
-
 _RAW_NAME = re.compile(r'p([0-9]{1,5})', re.ASCII)
 _PROTOCOLS = frozenset(('datamodel_extended', 'datamodel_standard'))
-
-#: keys of both protocols
-COMMON_OPTIONS: dict[str, Any] = {
-    'request_map_base': {
-        'description': 'Number of the first of the four parameters that map the request.',
-        'type': 'integer', 'minimum': 1, 'maximum': NUMBER_MAX - SLOTS,
-        'default': REQUEST_MAP_BASE,
-    },
-    'response_map_base': {
-        'description': 'Number of the first of the four parameters that map the response.',
-        'type': 'integer', 'minimum': 1, 'maximum': NUMBER_MAX - SLOTS,
-        'default': RESPONSE_MAP_BASE,
-    },
-    'parameter_offset': {
-        'description': 'Added to every parameter number on the wire.',
-        'type': 'integer', 'minimum': -NUMBER_MAX, 'maximum': NUMBER_MAX, 'default': 0,
-    },
-    'eeprom_write_gap': {
-        'description': 's between EEPROM writes to the station; the manual demands 0.02.',
-        'type': 'number', 'minimum': EEPROM_WRITE_GAP, 'maximum': 60.0,
-        'default': EEPROM_WRITE_GAP,
-    },
-    'length_policy': {
-        'description': 'lenient accepts responses with fewer than 8 bytes that hold what is '
-                       'needed, strict does not.',
-        'enum': ['lenient', 'strict'],
-        'default': 'lenient',
-    },
-    'allow_fast_cycle': {
-        'description': 'Permit a period under 5 ms.',
-        'type': 'boolean',
-        'default': False,
-    },
-}
 
 
 class DataModelFamily(Family):

@@ -2,14 +2,13 @@
 """The row of the family table for the DataModel protocol with 11-bit identifiers."""
 
 from collections.abc import Iterator
-from typing import Any
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Route, STANDARD_IDENTIFIER_MAX
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.datamodel import standard_round
-from drive_can_bridge.protocols.datamodel.common_family import COMMON_OPTIONS, DataModelFamily
-from drive_can_bridge.protocols.datamodel.standard import REQUEST_ID_BASE, RESPONSE_ID_BASE
+from drive_can_bridge.protocols.datamodel.common_family import DataModelFamily
+from drive_can_bridge.protocols.datamodel.options import StandardOptions
 from drive_can_bridge.protocols.family import Claim, Complaint
 
 _BASES = ('request_id_base', 'response_id_base')
@@ -21,31 +20,7 @@ class DataModelStandard(DataModelFamily):
 
     name = 'datamodel_standard'
     cyclic = False
-    options_schema: dict[str, Any] = {
-        **COMMON_OPTIONS,
-        'request_id_base': {
-            'description': 'CanStdRxIDbase of the drive; plus station it is the identifier of '
-                           'requests.',
-            'type': 'integer', 'minimum': 0, 'maximum': STANDARD_IDENTIFIER_MAX - 1,
-            'default': REQUEST_ID_BASE,
-        },
-        'response_id_base': {
-            'description': 'CanStdTxIDbase of the drive; plus station it is the identifier of '
-                           'responses.',
-            'type': 'integer', 'minimum': 0, 'maximum': STANDARD_IDENTIFIER_MAX - 1,
-            'default': RESPONSE_ID_BASE,
-        },
-        'quarantine': {
-            'description': 's of silence after a read that was not answered: a late answer does '
-                           'not say what it answers.',
-            'type': 'number', 'minimum': 0.0, 'maximum': 60.0, 'default': 0.1,
-        },
-        'refresh_interval': {
-            'description': 's after which unchanged cyclic_request values are written again; '
-                           '0: only on change.',
-            'type': 'number', 'minimum': 0.0, 'maximum': 3600.0, 'default': 0.5,
-        },
-    }
+    options_type = StandardOptions
 
     def claims(self, drive: DriveConfiguration) -> list[Claim]:
         """Return both identifiers of the drive."""
