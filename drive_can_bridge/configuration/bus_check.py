@@ -4,7 +4,7 @@
 from typing import Any, Protocol
 
 from drive_can_bridge.configuration.problems import Path, Tree
-from drive_can_bridge.configuration.schema import as_numbers, defaults, definition
+from drive_can_bridge.configuration.schema import complete, definition
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.words import hint, nearest, show
 
@@ -35,15 +35,13 @@ def check_buses(tree: Tree, adapters: Adapters | None) -> dict[str, BusConfigura
     buses: dict[str, BusConfiguration] = {}
     for name, entry in tree.data.get('buses', {}).items():
         path, known = ('buses', name), len(tree.problems)
-        values = {**defaults('bus'), **entry}
+        values = complete('bus', entry)
         keywords = _check_adapter(tree, path, values, adapters)
         _check_keys(tree, path, entry, keywords)
         if 'interface' not in entry or 'channel' not in entry:
             continue
-        ours = definition('bus')['properties']
-        bus = BusConfiguration(
-            name=name, options={key: value for key, value in entry.items() if key not in ours},
-            **as_numbers('bus', {key: value for key, value in values.items() if key in ours}))
+        bus = BusConfiguration(name=name, **values, options={
+            key: value for key, value in entry.items() if key not in values})
         _look_for_twin(tree, bus, buses)
         if len(tree.problems) == known:
             buses[name] = bus

@@ -14,9 +14,7 @@ from drive_can_bridge.configuration.joint_check import check_joint
 from drive_can_bridge.configuration.problems import Path, Tree
 from drive_can_bridge.configuration.profile_check import LoadedProfile
 from drive_can_bridge.configuration.profiles import ProfileStore
-from drive_can_bridge.configuration.schema import (
-    ALL_OPTIONS, as_numbers, defaults, definition,
-)
+from drive_can_bridge.configuration.schema import ALL_OPTIONS, complete
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Access, Parameter, Storage
 from drive_can_bridge.core.profile import Profile
@@ -121,19 +119,19 @@ class DriveChecker:
 
     def _build(self, family: Family, lists: dict[str, tuple[Parameter, ...]],
                ) -> DriveConfiguration:
-        values = {**defaults('drive'), **family.drive_defaults, **self._entry, **lists}
-        values.setdefault('station', 1)
+        values = complete('drive', {
+            'bus': '', 'station': 1, **family.drive_defaults, **self._entry, **lists})
+        made = {key: values.pop(key, '') for key in _MADE}
         profile = _NO_PROFILE if self._loaded is None else self._loaded.profile
         if family.control_built_in:  # a section for the other protocols of the profile
             profile = replace(profile, control=None)
-        given = {key: self._entry[key] for key in family.options_schema if key in self._entry}
-        plain = {key: values.get(key, '') for key in definition('drive')['properties']
-                 if key not in (*_MADE, *ALL_OPTIONS)}
+        given = {key: values[key] for key in family.options_schema if key in self._entry}
+        for key in ALL_OPTIONS:
+            values.pop(key, None)
         return DriveConfiguration(
-            name=self._name, profile=profile, profile_key=values.get('profile', ''),
-            protocol=family.name, rearm_immediate=values['rearm'] == 'immediate',
-            options=family.make_options(values['station'], given),
-            **as_numbers('drive', plain))
+            name=self._name, profile=profile, profile_key=made['profile'], protocol=family.name,
+            rearm_immediate=made['rearm'] == 'immediate',
+            options=family.make_options(values['station'], given), **values)
 
     def _check_control(self, family: Family) -> None:
         """Check that a control section is not for a family that has its control built in."""

@@ -4,7 +4,7 @@
 from typing import Any
 
 from drive_can_bridge.configuration.problems import Path, Tree
-from drive_can_bridge.configuration.schema import as_numbers, defaults
+from drive_can_bridge.configuration.schema import complete
 from drive_can_bridge.core.configuration import DriveConfiguration, JointConfiguration
 from drive_can_bridge.core.parameters import Parameter, ValueKind
 from drive_can_bridge.core.units import (
@@ -37,7 +37,7 @@ class _JointChecker:
 
     def check(self, entry: dict[str, Any]) -> JointConfiguration | None:
         """Return the joint, or None after noting what is wrong."""
-        values = as_numbers('joint', {**defaults('joint'), **entry})
+        values = complete('joint', entry)
         named = {key: entry[key] for key in _KEYS if key in entry}
         if not named and not any((*self._path, key) in self._tree.damaged for key in _KEYS):
             self._tree.wrong(self._path, 'names no quantity, allowed is at least one of '

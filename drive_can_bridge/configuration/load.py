@@ -17,7 +17,7 @@ from drive_can_bridge.configuration.parameter_file import read_parameter_file
 from drive_can_bridge.configuration.problems import Path, report, Tree
 from drive_can_bridge.configuration.profiles import ProfileStore
 from drive_can_bridge.configuration.schema import (
-    ALL_OPTIONS, as_numbers, defaults, definition, parameter_file_schema,
+    ALL_OPTIONS, complete, definition, parameter_file_schema,
 )
 from drive_can_bridge.configuration.schema_check import check_schema
 from drive_can_bridge.configuration.traffic_check import (
@@ -64,7 +64,7 @@ def configuration_from_overrides(overrides: Mapping[str, object], *,
 def _configuration(tree: Tree, adapters: Adapters | None) -> BridgeConfiguration:
     _forget_findings(tree)
     check_schema(tree, parameter_file_schema(), 'bridge', override=_Override(tree))
-    values = as_numbers('bridge', {**defaults('bridge'), **tree.data})
+    values = complete('bridge', tree.data)
     _look_for_directories(tree, values['profile_directories'])
     store = ProfileStore(values['profile_directories'])
     buses = check_buses(tree, adapters)

@@ -4,8 +4,9 @@ The JSON Schemas of the parameter file and of profiles.
 
 They serve twice: the check below runs on them, and editors use the shipped files for completion
 (``# yaml-language-server: $schema=…``). The schema of the parameter file is put together from a
-base and from the keys of every protocol family; the result is shipped as a file, which a test
-compares. To write it anew: ``python3 -m drive_can_bridge.configuration.schema``.
+base and from the keys of every protocol family; that of profiles names the families. The results
+are shipped as files, which a test compares. To write them anew:
+``python3 -m drive_can_bridge.configuration.schema``.
 """
 
 from collections.abc import Mapping
@@ -13,6 +14,8 @@ from copy import deepcopy
 from functools import lru_cache
 from importlib import resources
 import json
+import re
+from types import MappingProxyType
 from typing import Any
 
 from drive_can_bridge.protocols.families import FAMILIES
@@ -26,14 +29,15 @@ ALL_OPTIONS = frozenset(key for family in FAMILIES.values() for key in family.op
 PARAMETER_FILE = 'parameter_file.schema.json'
 PROFILE = 'profile.schema.json'
 _BASE = 'base.json'
+_FOLDER = resources.files(f'{__package__}') / 'schemas'
+_FAMILY_LIST = re.compile(r'("protocols": \{.*?"enum": )\[[^]]*\]', re.DOTALL)
 #: accepts nothing. Not ``false``: jsonschema forgets the path of what that refuses
 FORBIDDEN: Schema = {'not': {}}
 
 
 def load(name: str) -> Schema:
     """Load one of the shipped schema files."""
-    folder = resources.files(f'{__package__}') / 'schemas'
-    schema: Schema = json.loads((folder / name).read_text(encoding='utf-8'))
+    schema: Schema = json.loads((_FOLDER / name).read_text(encoding='utf-8'))
     return schema
 
 
@@ -45,8 +49,8 @@ def parameter_file_schema() -> Schema:
 
 @lru_cache(maxsize=None)
 def profile_schema() -> Schema:
-    """Return the schema of a profile."""
-    return load(PROFILE)
+    """Return the schema of a profile, with the names of all families."""
+    return json.loads(shipped()[PROFILE])  # type: ignore[no-any-return]
 
 
 def compose(base: Schema, families: list[Family]) -> Schema:
@@ -91,29 +95,47 @@ def definition(name: str) -> Schema:
     return found
 
 
-def defaults(name: str) -> dict[str, Any]:
+@lru_cache(maxsize=None)
+def defaults(name: str) -> Mapping[str, Any]:
     """Return the default values of a definition's keys (those that have one)."""
-    return {key: deepcopy(option['default']) for key, option in definition(name)['properties']
-            .items() if isinstance(option, dict) and 'default' in option}
+    return MappingProxyType({
+        key: option['default'] for key, option in definition(name)['properties'].items()
+        if isinstance(option, dict) and 'default' in option})
 
 
-def as_numbers(name: str, values: Mapping[str, Any]) -> dict[str, Any]:
-    """Make floats of the integers that were given where a definition wants a number."""
-    properties = definition(name)['properties']
-    return {key: float(value) if properties.get(key, {}).get('type') == 'number' else value
-            for key, value in values.items()}
+@lru_cache(maxsize=None)
+def _numbers(name: str) -> frozenset[str]:
+    """Return the keys of a definition that want a number, for which an integer is accepted."""
+    return frozenset(key for key, option in definition(name)['properties'].items()
+                     if isinstance(option, dict) and option.get('type') == 'number')
 
 
-def text(schema: Schema) -> str:
-    """Return a schema as the text of its shipped file."""
-    return json.dumps(schema, indent=2, ensure_ascii=False) + '\n'
+def complete(name: str, given: Mapping[str, Any]) -> dict[str, Any]:
+    """
+    Return the values of a definition's keys: those given, else the defaults.
+
+    :param given: values that fit the definition; other keys are left out.
+    """
+    known, numbers = definition(name)['properties'], _numbers(name)
+    return {key: float(value) if key in numbers else value
+            for key, value in {**defaults(name), **given}.items() if key in known}
+
+
+def shipped() -> dict[str, str]:
+    """Return what the shipped schema files have to contain, by their names."""
+    profile = (_FOLDER / PROFILE).read_text(encoding='utf-8')
+    families = json.dumps(list(FAMILIES))
+    return {
+        PARAMETER_FILE: json.dumps(
+            parameter_file_schema(), indent=2, ensure_ascii=False) + '\n',
+        PROFILE: _FAMILY_LIST.sub(lambda found: f'{found[1]}{families}', profile, count=1)}
 
 
 def main() -> None:
-    """Write the shipped schema of the parameter file."""
-    target = resources.files(f'{__package__}') / 'schemas' / PARAMETER_FILE
-    with open(str(target), 'w', encoding='utf-8') as file:
-        file.write(text(parameter_file_schema()))
+    """Write the shipped schemas."""
+    for name, text in shipped().items():
+        with open(str(_FOLDER / name), 'w', encoding='utf-8') as file:
+            file.write(text)
 
 
 if __name__ == '__main__':

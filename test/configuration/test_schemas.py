@@ -22,10 +22,17 @@ EXAMPLES = sorted(CONFIG.glob('*.yaml'))
 PROFILES = sorted(CONFIG.glob('profiles/*.yaml'))
 
 
-def test_shipped_file_is_up_to_date() -> None:
-    """To write it anew: ``python3 -m drive_can_bridge.configuration.schema``."""
-    assert schema.text(schema.load(schema.PARAMETER_FILE)) == schema.text(
-        schema.parameter_file_schema())
+@pytest.mark.parametrize('name', [schema.PARAMETER_FILE, schema.PROFILE])
+def test_shipped_files_are_up_to_date(name: str) -> None:
+    """To write them anew: ``python3 -m drive_can_bridge.configuration.schema``."""
+    path = Path(schema.__file__).parent / 'schemas' / name
+    assert path.read_text(encoding='utf-8') == schema.shipped()[name]
+
+
+def test_profiles_may_name_every_family() -> None:
+    protocols = schema.profile_schema()['properties']['protocols']
+    assert protocols['items']['enum'] == list(FAMILIES)
+    assert protocols['description'] == 'The protocol families that the drive type speaks.'
 
 
 @pytest.mark.parametrize('document', [schema.load(schema.PARAMETER_FILE), schema.profile_schema()])
