@@ -57,7 +57,7 @@ class DataModelTable:
         self._maps = {*self._request_entries, *self._response_entries}
         self.clear_maps()
         # with 11-bit identifiers there is no mapping, and as little to configure
-        if options.get('mapping') != 'configure':
+        if getattr(configuration.options, 'mapping', '') != 'configure':
             self._preset(self._request_entries, configuration.cyclic_request)
             self._preset(self._response_entries, configuration.cyclic_response)
 

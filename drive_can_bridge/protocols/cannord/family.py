@@ -214,7 +214,7 @@ class Cannord(Family):
             yield Complaint('period', f'{member.period:g} s differs from {leader.period:g} s of '
                                       f'{led}, allowed is the same')
         for key in _COMMON_OPTIONS:
-            mine, other = member.family_options[key], leader.family_options[key]
+            mine, other = getattr(member.options, key), getattr(leader.options, key)
             if mine != other:
                 yield Complaint(key, f'{str(mine).lower()} differs from {str(other).lower()} of '
                                      f'{led}, allowed is the same')

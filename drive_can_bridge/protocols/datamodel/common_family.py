@@ -61,7 +61,7 @@ class DataModelFamily(Family):
     def _check_maps(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         offset = drive.family_options['parameter_offset']
         for key in ('request_map_base', 'response_map_base'):
-            base = drive.family_options[key]
+            base = getattr(drive.options, key)
             if not 0 <= base + offset <= NUMBER_MAX - SLOTS:
                 yield Complaint(key, f'{base} with parameter_offset {offset} is out of range, '
                                      f'allowed on the wire is 0 to {NUMBER_MAX - SLOTS}')
@@ -90,7 +90,7 @@ class DataModelFamily(Family):
                                 f'{parameter.address}, allowed is one of them')
             numbers.setdefault(parameter.number, parameter.name)
             for key in ('request_map_base', 'response_map_base'):
-                base = drive.family_options[key]
+                base = getattr(drive.options, key)
                 if base <= parameter.number < base + SLOTS:
                     yield Complaint('cyclic_request',
                                     f"'{parameter.name}' ({parameter.address}) is a mapping "

@@ -11,9 +11,6 @@ from drive_can_bridge.protocols.datamodel.common_family import DataModelFamily
 from drive_can_bridge.protocols.datamodel.options import StandardOptions
 from drive_can_bridge.protocols.family import Claim, Complaint
 
-_BASES = ('request_id_base', 'response_id_base')
-_DIRECTION = {'request_id_base': 'request', 'response_id_base': 'response'}
-
 
 class DataModelStandard(DataModelFamily):
     """DataModel, 11-bit identifiers: single reads and writes, from which an exchange is made."""
@@ -24,14 +21,11 @@ class DataModelStandard(DataModelFamily):
 
     def claims(self, drive: DriveConfiguration) -> list[Claim]:
         """Return both identifiers of the drive."""
-        found = []
-        for base in _BASES:
-            identifier = drive.family_options[base] + drive.station
-            # one that does not fit is refused as such: it must not look like another one
-            if 0 <= identifier <= STANDARD_IDENTIFIER_MAX:
-                found.append(Claim(Route(identifier, STANDARD_IDENTIFIER_MAX, False),
-                                   f'11-bit identifier {identifier:03X}h'))
-        return found
+        # one that does not fit is refused as such: it must not look like another one
+        return [Claim(Route(identifier, STANDARD_IDENTIFIER_MAX, False),
+                      f'11-bit identifier {identifier:03X}h')
+                for identifier in (base + drive.station for base in _bases(drive).values())
+                if 0 <= identifier <= STANDARD_IDENTIFIER_MAX]
 
     def bits_per_second(self, drive: DriveConfiguration) -> float:
         """Return the worst-case load: a round of reads and every setpoint, each period."""
@@ -50,20 +44,24 @@ class DataModelStandard(DataModelFamily):
     # -- parts of the check -----------------------------------------------------------------------
 
     def _check_station(self, drive: DriveConfiguration) -> Iterator[Complaint]:
-        options = drive.family_options
-        highest = STANDARD_IDENTIFIER_MAX - max(options[base] for base in _BASES)
+        bases = _bases(drive)
+        highest = STANDARD_IDENTIFIER_MAX - max(bases.values())
         if drive.station < 1:
             yield Complaint('station', f'{drive.station} is out of range, '
                                        f'allowed is 1 to {highest} ({self.name})')
-        for base in _BASES:
-            identifier = options[base] + drive.station
+        for direction, base in bases.items():
+            identifier = base + drive.station
             if identifier > STANDARD_IDENTIFIER_MAX:
                 yield Complaint(
-                    'station', f'{drive.station} is out of range: the identifier of '
-                    f'{_DIRECTION[base]}s, {options[base]:X}h + {drive.station} = '
-                    f'{identifier:X}h, does not fit 11 bits; allowed is 1 to {highest} with these '
-                    f'bases')
+                    'station', f'{drive.station} is out of range: the identifier of {direction}s, '
+                    f'{base:X}h + {drive.station} = {identifier:X}h, does not fit 11 bits; '
+                    f'allowed is 1 to {highest} with these bases')
                 break
-        if options[_BASES[0]] == options[_BASES[1]]:
-            yield Complaint('response_id_base', f'{options[_BASES[1]]} is request_id_base, too: '
+        if bases['request'] == bases['response']:
+            yield Complaint('response_id_base', f'{bases["response"]} is request_id_base, too: '
                                                 'allowed are bases that differ')
+
+
+def _bases(drive: DriveConfiguration) -> dict[str, int]:
+    options: StandardOptions = drive.options
+    return {'request': options.request_id_base, 'response': options.response_id_base}
