@@ -14,7 +14,9 @@ from typing import NamedTuple
 
 from drive_can_bridge.configuration.problems import Path, Problem, Tree
 from drive_can_bridge.configuration.tree_reader import DUPLICATE, Rules, TreeReader
-from drive_can_bridge.configuration.yaml_nodes import BrokenYaml, Node, read_documents
+from drive_can_bridge.configuration.yaml_nodes import (
+    BrokenYaml, Kind, Node, read_documents,
+)
 from drive_can_bridge.core.words import show, suggestion
 
 PARAMETERS_KEY = 'ros__parameters'
@@ -51,7 +53,7 @@ class _FileReader:
             self._note(error.line, (), str(error))
             return
         for _, root in documents:
-            if root.is_mapping:
+            if root.kind is Kind.MAPPING:
                 self._names(root, ())
             else:
                 self._note(root.line, (), 'no mapping, allowed is '
@@ -70,7 +72,7 @@ class _FileReader:
         """Read a mapping above ``ros__parameters``: its keys are node names or namespaces."""
         has_parameters = False
         for key, value in node.pairs:
-            if not key.is_scalar or not key.text:
+            if key.kind is not Kind.SCALAR or not key.text:
                 self._note(key.line, path, 'a key that is no name, allowed are node names')
                 continue
             here = (*path, key.text)
@@ -88,7 +90,7 @@ class _FileReader:
             elif key.text.startswith(PARAMETERS_KEY):
                 # rcl compares the beginning only, and would take it for the real one.
                 self._note(key.line, here, f'misspelt, allowed is {PARAMETERS_KEY}')
-            elif value.is_mapping:
+            elif value.kind is Kind.MAPPING:
                 self._names(value, here)
             else:
                 hint = suggestion(key.text, [PARAMETERS_KEY]) if path else \
@@ -105,7 +107,7 @@ class _FileReader:
         elif not all(map(_TOKEN.fullmatch, name.removeprefix('/').split('/'))):
             self._note(line, path, f'{show(name)} is no node name (rcl refuses the file), allowed '
                                    'is for example /**/drive_can_bridge')
-        if not node.is_mapping:
+        if node.kind is not Kind.MAPPING:
             self._note(line, (*path, PARAMETERS_KEY), 'no mapping, allowed are parameters')
             return
         reader = TreeReader(self._file, Rules.PARAMETERS)

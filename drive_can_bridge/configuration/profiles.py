@@ -7,7 +7,7 @@ from pathlib import Path as FilePath
 from drive_can_bridge.configuration.problems import Problem, Tree
 from drive_can_bridge.configuration.profile_check import LoadedProfile, profile_from_tree
 from drive_can_bridge.configuration.tree_reader import Rules, TreeReader
-from drive_can_bridge.configuration.yaml_nodes import BrokenYaml, read_documents
+from drive_can_bridge.configuration.yaml_nodes import BrokenYaml, Kind, read_documents
 from drive_can_bridge.core.words import show, suggestion
 from drive_can_bridge.resources import profiles_directory
 
@@ -90,7 +90,7 @@ def read_profile(path: FilePath) -> LoadedProfile:
         documents = read_documents(path)
     except BrokenYaml as error:
         return _unusable(file, error.line, str(error))
-    if not documents or not documents[0].root.is_mapping:
+    if not documents or documents[0].root.kind is not Kind.MAPPING:
         return _unusable(file, 1, 'no mapping, allowed are protocols, parameters, control, '
                                   'description')
     reader = TreeReader(file, Rules.PROFILE)

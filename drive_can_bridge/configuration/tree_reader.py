@@ -9,7 +9,7 @@ from enum import Enum
 from typing import Any
 
 from drive_can_bridge.configuration.problems import Path, Problem, Tree
-from drive_can_bridge.configuration.yaml_nodes import Node
+from drive_can_bridge.configuration.yaml_nodes import Kind, Node
 from drive_can_bridge.core.words import describe_type, show
 
 #: how the problem of a key that stands twice begins
@@ -78,11 +78,11 @@ class TreeReader:
                 target[key.text] = read
 
     def _value(self, node: Node, path: Path) -> Any:
-        if node.is_scalar:
+        if node.kind is Kind.SCALAR:
             return self._scalar(node, path)
-        if node.is_list:
+        if node.kind is Kind.LIST:
             return self._list(node, path)
-        if node.is_alias:
+        if node.kind is Kind.ALIAS:
             self._note(path, f'an alias{self._why}, allowed is the value itself')
         elif self._parameters and not node.items:
             self._note(path, 'an empty mapping (rcl garbles what follows), allowed is to leave '
@@ -94,7 +94,7 @@ class TreeReader:
         return _UNREADABLE
 
     def _scalar(self, node: Node, path: Path) -> Any:
-        if node.is_empty:
+        if not node.text and not node.quoted:
             self._note(path, f'no value{self._why}, allowed is a value, or [] for an empty list')
         elif '\0' in node.text:
             self._note(path, 'a NUL character, allowed is text without')
@@ -107,10 +107,11 @@ class TreeReader:
         for item in node.items:
             here = (*path, len(items))
             self.tree.lines[here] = item.line
-            value = self._scalar(item, here) if item.is_scalar else _UNREADABLE
-            if item.is_alias:
+            plain = item.kind is Kind.SCALAR
+            value = self._scalar(item, here) if plain else _UNREADABLE
+            if item.kind is Kind.ALIAS:
                 self._note(path, f'an alias{self._why}, allowed is the value itself', at=here)
-            elif not item.is_scalar:
+            elif not plain:
                 self._note(path, 'a list or mapping in a list, allowed are plain values', at=here)
             elif value is _UNREADABLE:
                 self.tree.damaged.add(path)
@@ -125,8 +126,9 @@ class TreeReader:
 
 def _key_problem(key: Node) -> str:
     """Say why a key cannot be one; '' if it can."""
-    if not key.is_scalar:
-        return f'{"an alias" if key.is_alias else "a list or mapping"} as a key, allowed is a name'
+    if key.kind is not Kind.SCALAR:
+        kind = 'an alias' if key.kind is Kind.ALIAS else 'a list or mapping'
+        return f'{kind} as a key, allowed is a name'
     if not key.text:
         return 'an empty key, allowed is a name'
     return 'a key with a NUL character, allowed is a name' if '\0' in key.text else ''

@@ -7,9 +7,11 @@ seen what rcl refuses (PyYAML's composer follows aliases and refuses anchors tha
 It takes no recursion, so that no nesting of a file ends in the depths of the C stack.
 """
 
+from collections.abc import Iterator
+from enum import Enum
 from errno import EFBIG, EINVAL
 from pathlib import Path as FilePath
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import yaml
 
@@ -32,61 +34,40 @@ class BrokenYaml(Exception):
         self.line = line
 
 
+class Kind(Enum):
+    """What a node is."""
+
+    SCALAR = 'scalar'
+    LIST = 'list'
+    MAPPING = 'mapping'
+    ALIAS = 'alias'
+
+
 class Node(NamedTuple):
     """
-    A scalar, list, mapping or alias.
+    A part of a YAML text.
 
-    :param event: the event it begins with.
+    :param line: where it begins, counted from 1.
     :param items: of a list; of a mapping its keys and values in turn.
+    :param text: of a scalar, without quotes.
     """
 
-    event: Any
+    kind: Kind
+    line: int
     items: list['Node']
-
-    @property
-    def line(self) -> int:
-        """Line of its beginning, counted from 1."""
-        return int(self.event.start_mark.line) + 1
-
-    @property
-    def is_scalar(self) -> bool:
-        """A single value, which may be empty."""
-        return isinstance(self.event, yaml.ScalarEvent)
-
-    @property
-    def is_list(self) -> bool:
-        """A sequence, in YAML's words."""
-        return isinstance(self.event, yaml.SequenceStartEvent)
-
-    @property
-    def is_mapping(self) -> bool:
-        """Keys with values."""
-        return isinstance(self.event, yaml.MappingStartEvent)
-
-    @property
-    def is_alias(self) -> bool:
-        """A name that stands for another node."""
-        return isinstance(self.event, yaml.AliasEvent)
-
-    @property
-    def text(self) -> str:
-        """A scalar as it is written, without quotes."""
-        return str(self.event.value)
-
-    @property
-    def is_empty(self) -> bool:
-        """A scalar that is not there: ``key:`` and no more."""
-        return not self.event.value and self.event.style not in ("'", '"')
+    text: str = ''
+    quoted: bool = False
+    tag: str | None = None
 
     @property
     def scalar(self) -> Scalar:
         """The value of a scalar, as rcl reads it."""
-        return read_scalar(self.text, quoted=self.event.style in ("'", '"'), tag=self.event.tag)
+        return read_scalar(self.text, quoted=self.quoted, tag=self.tag)
 
     @property
-    def pairs(self) -> list[tuple['Node', 'Node']]:
+    def pairs(self) -> Iterator[tuple['Node', 'Node']]:
         """Keys and values of a mapping."""
-        return list(zip(self.items[::2], self.items[1::2]))
+        return zip(self.items[::2], self.items[1::2])
 
 
 class Document(NamedTuple):
@@ -115,23 +96,28 @@ def read_documents(path: FilePath) -> list[Document]:
 def _documents(data: bytes) -> list[Document]:
     starts: list[int] = []
     roots: list[Node] = []
-    #: the lists to which nodes are added, from the documents down to the innermost node
-    open_lists = [roots]
+    # the lists that nodes are added to: that of the documents, and those of all open nodes
+    growing = [roots]
     line = 1
     try:
         for event in yaml.parse(data, Loader=_LOADER):
-            if isinstance(event, yaml.NodeEvent):
-                node = Node(event, [])
-                line = node.line
-                open_lists[-1].append(node)
-                if isinstance(event, yaml.CollectionStartEvent):
-                    open_lists.append(node.items)
-                    if len(open_lists) > DEPTH_MAX + 1:
-                        raise BrokenYaml(line, f'nested too deep, allowed are {DEPTH_MAX} levels')
+            line = event.start_mark.line + 1 if event.start_mark else line
+            if isinstance(event, yaml.ScalarEvent):
+                growing[-1].append(Node(Kind.SCALAR, line, [], event.value,
+                                        event.style in ("'", '"'), event.tag))
+            elif isinstance(event, yaml.AliasEvent):
+                growing[-1].append(Node(Kind.ALIAS, line, []))
+            elif isinstance(event, yaml.CollectionStartEvent):
+                kind = Kind.LIST if isinstance(event, yaml.SequenceStartEvent) else Kind.MAPPING
+                node = Node(kind, line, [])
+                growing[-1].append(node)
+                growing.append(node.items)
+                if len(growing) > DEPTH_MAX + 1:
+                    raise BrokenYaml(line, f'nested too deep, allowed are {DEPTH_MAX} levels')
             elif isinstance(event, yaml.CollectionEndEvent):
-                open_lists.pop()
+                growing.pop()
             elif isinstance(event, yaml.DocumentStartEvent):
-                starts.append(event.start_mark.line + 1)
+                starts.append(line)
     except (yaml.YAMLError, ValueError, OverflowError) as error:
         raise _broken(error, line) from None
     return list(map(Document, starts, roots))
