@@ -18,7 +18,8 @@ def check_control(tree: Tree, parameters: dict[str, Parameter], names: tuple[str
     """
     control = tree.data['control']
     words = control.get('words', {})
-    parameter = _find(tree, ('control', 'parameter'), control, parameters, names)
+    parameter = look_up(tree, ('control', 'parameter'), control.get('parameter'), parameters,
+                        names)
     if parameter is not None:
         if not parameter.writable:
             tree.wrong(('control', 'parameter'), f'{show(parameter.name)} is read-only, allowed '
@@ -35,19 +36,22 @@ def check_control(tree: Tree, parameters: dict[str, Parameter], names: tuple[str
         _check_status(tree, control['status'], parameters, names)
 
 
-def _find(tree: Tree, path: Path, section: dict[str, Any], parameters: dict[str, Parameter],
-          names: tuple[str, ...]) -> Parameter | None:
-    """Return the parameter that a section names, if it is all right."""
-    name = section.get('parameter')
+def look_up(tree: Tree, path: Path, name: str | None, parameters: dict[str, Parameter],
+            names: tuple[str, ...], *, at: Path | None = None) -> Parameter | None:
+    """
+    Return the parameter that a section names, if it is all right.
+
+    One with problems of its own is known.
+    """
     if name is not None and name not in names and not tree.is_damaged(('parameters',)):
-        tree.wrong(path, f'{show(name)} is unknown, {suggestion(name, names)}')
+        tree.wrong(path, f'{show(name)} is unknown, {suggestion(name, names)}', at=at)
     return parameters.get(name or '')
 
 
 def _check_status(tree: Tree, status: dict[str, Any], parameters: dict[str, Parameter],
                   names: tuple[str, ...]) -> None:
     path = ('control', 'status')
-    parameter = _find(tree, (*path, 'parameter'), status, parameters, names)
+    parameter = look_up(tree, (*path, 'parameter'), status.get('parameter'), parameters, names)
     if parameter is not None and not parameter.readable:
         tree.wrong((*path, 'parameter'), f'{show(parameter.name)} is write-only, allowed is one '
                                          'with access ro or rw')

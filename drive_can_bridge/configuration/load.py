@@ -6,6 +6,7 @@ Both ways run the same checks, and all of them: a user sees every problem at onc
 """
 
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -63,7 +64,7 @@ def configuration_from_overrides(overrides: Mapping[str, object], *,
 
 def _configuration(tree: Tree, adapters: Adapters | None) -> BridgeConfiguration:
     _forget_findings(tree)
-    check_schema(tree, parameter_file_schema(), 'bridge', override=_Override(tree))
+    check_schema(tree, parameter_file_schema(), 'bridge', override=partial(_sentence, tree))
     values = complete('bridge', tree.data)
     _look_for_directories(tree, values['profile_directories'])
     store = ProfileStore(values['profile_directories'])
@@ -131,40 +132,22 @@ def _look_for_directories(tree: Tree, directories: list[str]) -> None:
             tree.suspicious(path, f'{show(entry)} is no directory', at=(*path, position))
 
 
-class _Override:
-    """Sentences that need to know more than the schema does."""
-
-    def __init__(self, tree: Tree) -> None:
-        self._tree = tree
-
-    def __call__(self, path: Path, value: Any, keyword: str) -> str | None:
-        if keyword == 'not' and path[:1] == ('buses',):
-            return 'set by the bridge itself, allowed is to leave it out'
-        if path[:1] != ('drives',) or len(path) != 3:
-            return None
-        if path[2] == 'protocol' and keyword != 'required':
-            return _unknown_protocol(value) if keyword == 'enum' else ''
-        protocol = self._tree.data['drives'][path[1]].get('protocol')
-        if keyword == 'not':
-            owners = [family.name for family in FAMILIES.values()
-                      if path[2] in family.options_schema]
-            return f'a key of {", ".join(owners)}, allowed with {protocol} is to leave it out'
-        if keyword == 'additionalProperties':
-            return self._unknown_key(str(path[2]), protocol)
+def _sentence(tree: Tree, path: Path, value: Any, keyword: str) -> str | None:
+    """Say what needs to know more than the schema does, see :data:`schema_check.Override`."""
+    if path[:1] != ('drives',) or len(path) != 3 or keyword not in (
+            'enum', 'type', 'additionalProperties'):
         return None
-
-    def _unknown_key(self, key: str, protocol: Any) -> str | None:
-        family = FAMILIES.get(protocol) if isinstance(protocol, str) else None
-        common = [name for name in definition('drive')['properties'] if name not in ALL_OPTIONS]
-        if family is not None:
-            return f'unknown key, {suggestion(key, [*common, *family.options_schema])}'
-        if key in ALL_OPTIONS:      # perhaps of the family that is meant
+    if path[2] == 'protocol' and keyword != 'additionalProperties':
+        if keyword == 'type':  # is told as a value that is unknown
             return ''
-        return f'unknown key, {suggestion(key, common)}'
-
-
-def _unknown_protocol(value: Any) -> str:
-    available = ', '.join(FAMILIES)
-    if not isinstance(value, str):
-        return f'{show(value)} is no protocol; available: {available}'
-    return f'{show(value)} is unknown{hint(value, FAMILIES)}; available: {available}'
+        what = f'unknown{hint(value, FAMILIES)}' if isinstance(value, str) else 'no protocol'
+        return f'{show(value)} is {what}; available: {", ".join(FAMILIES)}'
+    if keyword != 'additionalProperties':
+        return None
+    protocol = tree.data['drives'][path[1]].get('protocol')
+    family = FAMILIES.get(protocol) if isinstance(protocol, str) else None
+    if family is None and path[2] in ALL_OPTIONS:  # perhaps of the family that is meant
+        return ''
+    known = [name for name in definition('drive')['properties'] if name not in ALL_OPTIONS]
+    return 'unknown key, ' + suggestion(
+        str(path[2]), [*known, *(family.options_schema if family else ())])

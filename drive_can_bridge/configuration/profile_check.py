@@ -6,6 +6,7 @@ Checked here is what holds for every drive that uses the profile. What a protoco
 with it is the family's business, see :meth:`drive_can_bridge.protocols.family.Family.check`.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path as FilePath
 import re
@@ -31,6 +32,11 @@ RESERVED = frozenset((
     'get_parameters', 'set_parameters', 'set_parameters_atomically', 'list_parameters',
     'describe_parameters', 'get_parameter_types', 'enable', 'reset_fault', 'quick_stop',
 ))
+#: what the values of a parameter's keys become
+_MADE: dict[str, Callable[[Any], Any]] = {
+    'type': ParameterType, 'access': Access, 'storage': Storage,
+    'bits': lambda bits: tuple(bits.items()),
+    **dict.fromkeys(('scale', 'offset', 'minimum', 'maximum'), float)}
 _RAW_NAME = re.compile(r'p[0-9]+|x[0-9a-f]+', re.ASCII)
 
 
@@ -91,29 +97,10 @@ def profile_from_tree(tree: Tree) -> LoadedProfile:
 
 
 def _parameter(name: str, entry: dict[str, Any]) -> Parameter:
-    def number(key: str) -> float | None:
-        return float(entry[key]) if key in entry else None
-
     return Parameter(
-        name=name,
-        type=ParameterType(entry.get('type', 'uint16')),
-        number=entry.get('number'),
-        scale=float(entry.get('scale', 1.0)),
-        offset=float(entry.get('offset', 0.0)),
-        unit=entry.get('unit', ''),
-        access=Access(entry.get('access', 'rw')),
-        storage=Storage(entry['storage']) if 'storage' in entry else None,
-        minimum=number('minimum'),
-        maximum=number('maximum'),
-        neutral=entry.get('neutral'),
-        description=entry.get('description', ''),
-        bits=tuple(entry.get('bits', {}).items()),
-        subindex=entry.get('subindex'),
-        index=entry.get('index'),
-        word_order=entry.get('word_order'),
-        protected=entry.get('protected', False),
-        verified=entry.get('verified'),
-        scaled=any(key in entry for key in ('scale', 'offset', 'unit')))
+        name=name, scaled=any(key in entry for key in ('scale', 'offset', 'unit')),
+        **{key: _MADE[key](value) if key in _MADE else value for key, value in entry.items()
+           if key in Parameter.__dataclass_fields__})
 
 
 # -- names ----------------------------------------------------------------------------------------

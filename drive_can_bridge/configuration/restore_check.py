@@ -4,6 +4,7 @@
 from collections.abc import Iterator
 from typing import Any
 
+from drive_can_bridge.configuration.control_check import look_up
 from drive_can_bridge.configuration.problems import Path, Tree
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import Parameter, ParameterType
@@ -23,12 +24,11 @@ def check_identity(tree: Tree, parameters: dict[str, Parameter], names: tuple[st
     seen: set[str] = set()
     for position, name in enumerate(tree.data.get('identity', ())):
         at = ('identity', position)
-        parameter = parameters.get(name)
         if name in seen:
             tree.wrong(('identity',), f'{show(name)} stands twice, allowed is once', at=at)
-        elif parameter is None:
-            _unknown(tree, ('identity',), name, names, at)
-        elif not parameter.readable:
+            continue
+        parameter = look_up(tree, ('identity',), name, parameters, names, at=at)
+        if parameter is not None and not parameter.readable:
             tree.wrong(('identity',), f'{show(name)} is write-only, allowed are parameters with '
                                       'access ro or rw', at=at)
         seen.add(name)
@@ -38,10 +38,10 @@ def check_restore(tree: Tree, parameters: dict[str, Parameter], names: tuple[str
     """Check the ``restore`` section likewise."""
     for phase, name, value in _steps(tree):
         path = ('restore', phase, name)
-        parameter = parameters.get(name)
+        parameter = look_up(tree, path, name, parameters, names)
         if parameter is None:
-            _unknown(tree, path, name, names, path)
-        elif not parameter.writable:
+            continue
+        if not parameter.writable:
             tree.wrong(path, f'{show(name)} is read-only, allowed are parameters with access rw '
                              'or wo')
         elif isinstance(value, dict):
@@ -97,9 +97,3 @@ def _steps(tree: Tree) -> Iterator[tuple[str, str, Any]]:
         if isinstance(steps, dict):
             for name, value in steps.items():
                 yield phase, name, value
-
-
-def _unknown(tree: Tree, path: Path, name: str, names: tuple[str, ...], at: Path) -> None:
-    """Complain about a name that is not in the table; one with problems of its own is known."""
-    if name not in names and not tree.is_damaged(('parameters',)):
-        tree.wrong(path, f'{show(name)} is unknown, {suggestion(name, names)}', at=at)

@@ -31,8 +31,6 @@ PROFILE = 'profile.schema.json'
 _BASE = 'base.json'
 _FOLDER = resources.files(f'{__package__}') / 'schemas'
 _FAMILY_LIST = re.compile(r'("protocols": \{.*?"enum": )\[[^]]*\]', re.DOTALL)
-#: accepts nothing. Not ``false``: jsonschema forgets the path of what that refuses
-FORBIDDEN: Schema = {'not': {}}
 
 
 def load(name: str) -> Schema:
@@ -76,7 +74,8 @@ def compose(base: Schema, families: list[Family]) -> Schema:
         drive['properties'][key] = options[0] if len(options) == 1 else True
     for family in families:
         special = {
-            key: family.options_schema.get(key, FORBIDDEN) for key, options in variants.items()
+            key: family.options_schema.get(key) or _forbidden(key, family, families)
+            for key, options in variants.items()
             if key not in family.options_schema or len(options) > 1}
         if special:
             conditions.append({
@@ -87,6 +86,13 @@ def compose(base: Schema, families: list[Family]) -> Schema:
     if conditions:
         drive['allOf'] = conditions
     return schema
+
+
+def _forbidden(key: str, family: Family, families: list[Family]) -> Schema:
+    """Accept nothing. Not by ``false``: jsonschema forgets the path of what that refuses."""
+    owners = ', '.join(other.name for other in families if key in other.options_schema)
+    message = f'a key of {owners}, allowed with {family.name} is to leave it out'
+    return {'not': {}, 'errorMessage': message}
 
 
 def definition(name: str) -> Schema:

@@ -100,6 +100,8 @@ def _sentences(error: ValidationError, tree: Tree) -> Iterator[tuple[Path, str, 
 
 def _message(error: ValidationError) -> str:
     value, schema = error.instance, error.schema
+    if error.validator == 'not' and 'errorMessage' in schema:
+        return str(schema['errorMessage'])
     if error.validator == 'type':
         if isinstance(value, float) and not math.isfinite(value):
             return f'{show(value)} is not a finite number, allowed is {allowed(schema)}'
@@ -112,8 +114,6 @@ def _message(error: ValidationError) -> str:
         return f'{show(value)} is unknown{remark}, allowed is {allowed(schema)}'
     if error.validator in ('minimum', 'maximum'):
         return f'{show(value)} is out of range, allowed is {allowed(schema)}'
-    if error.validator == 'not' and not error.validator_value:
-        return 'not allowed here, allowed is to leave it out'
     if error.validator == 'not':
         return f'{show(value)} is useless, allowed is any other number'
     if error.validator == 'minLength':

@@ -116,6 +116,6 @@ def test_keys_of_several_families() -> None:
     assert wrong(protocol='other', mapping='assume') == [
         "mapping: 'assume' is a string, allowed is an integer"]
     assert wrong(protocol='datamodel_extended', layout='a') == [
-        'layout: not allowed here, allowed is to leave it out']
+        'layout: a key of other, allowed with datamodel_extended is to leave it out']
     assert wrong(protocol='other', length_policy='strict') == [
-        'length_policy: not allowed here, allowed is to leave it out']
+        'length_policy: a key of datamodel_extended, allowed with other is to leave it out']
