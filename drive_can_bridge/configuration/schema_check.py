@@ -17,7 +17,7 @@ from jsonschema.validators import extend
 
 from drive_can_bridge.configuration.problems import Path, Tree
 from drive_can_bridge.configuration.schema import Schema
-from drive_can_bridge.core.words import describe_type, hint, number, show, suggestion
+from drive_can_bridge.core.words import describe_type, hint, show, suggestion, value_text
 
 #: gives another sentence for an error, or None to keep the usual one; '' hides it
 Override = Callable[[Path, Any, str], 'str | None']
@@ -150,7 +150,7 @@ def allowed(schema: Any) -> str:
         return f'a list of {count}{noun}s' + (f' of {limits}' if limits else '')
     low, high = schema.get('minimum'), schema.get('maximum')
     if low is not None and high is not None:
-        return f'{text} of {number(low)} to {number(high)}'
+        return f'{text} of {value_text(low)} to {value_text(high)}'
     if low is not None:
-        return f'{text} of at least {number(low)}'
+        return f'{text} of at least {value_text(low)}'
     return text

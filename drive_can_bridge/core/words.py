@@ -10,9 +10,9 @@ _TEXT_MAX = 40
 _WORDS_MAX = 30
 
 
-def number(value: float) -> str:
-    """Write a number without binary noise: ``3000``, ``0.1``."""
-    return f'{value:.12g}'
+def value_text(value: float) -> str:
+    """Write a value as one would publish it, without binary noise: ``3000``, ``0.1``, ``true``."""
+    return str(value).lower() if isinstance(value, bool) else f'{value:.12g}'
 
 
 def show(value: Any) -> str:
@@ -23,7 +23,7 @@ def show(value: Any) -> str:
         text = value if len(value) <= _TEXT_MAX else value[:_TEXT_MAX - 1] + '…'
         return f"'{text}'"
     if isinstance(value, float):
-        text = number(value)
+        text = value_text(value)
         return f'{text}.0' if math.isfinite(value) and text.lstrip('-').isdigit() else text
     if isinstance(value, int):
         return str(value)

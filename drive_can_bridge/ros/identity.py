@@ -14,7 +14,7 @@ from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.core.requests import (
     BRIDGE_INACTIVE, BUS_DOWN, Failure, NO_ANSWER_OFFLINE, Outcome, ReadRequest, ReadValue,
 )
-from drive_can_bridge.ros.values import value_text
+from drive_can_bridge.core.words import value_text
 
 #: the drive or its bus has gone, which is told elsewhere
 _GONE = frozenset([BRIDGE_INACTIVE, BUS_DOWN, NO_ANSWER_OFFLINE])

@@ -8,12 +8,12 @@ A fault is written ``silent`` or ``late=0.15``. Some are states, which add up an
 
 from collections.abc import Callable
 from dataclasses import dataclass
-import difflib
 from enum import Enum
 import math
 
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.words import nearest
 
 
 class FaultKind(Enum):
@@ -117,8 +117,8 @@ def parse_fault(text: str) -> Fault:
     name, argument = name.strip(), argument.strip()
     kind = _BY_NAME.get(name)
     if kind is None:
-        near = difflib.get_close_matches(name, _BY_NAME, 1)
-        hint = f' (nearest: {near[0]})' if near else ''
+        near = nearest(name, _BY_NAME)
+        hint = f' (nearest: {near})' if near else ''
         raise ValueRefused(f"unknown fault '{name}'{hint}; allowed: "
                            f"{', '.join(usage for usage, _ in USAGE)}")
     rule = _RULES[kind]
