@@ -72,7 +72,9 @@ def _check_keys(tree: Tree, path: Path, entry: dict[str, Any], keywords: set[str
             continue
         slip = nearest(key, ours, cutoff=_SLIP)
         if slip is not None:
-            tree.wrong((*path, key), f"unknown key, did you mean '{slip}'?")
+            set_by_us = 'not' in ours[slip]
+            tree.wrong((*path, key), f"unknown key, did you mean '{slip}'?"
+                       + ' It is set by the bridge itself' * set_by_us)
         elif keywords is not None:
             tree.suspicious((*path, key), f'the adapter for {entry["interface"]} does not name '
                             f'this key{hint(key, keywords)}; it is handed over all the same')

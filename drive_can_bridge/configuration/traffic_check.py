@@ -40,14 +40,16 @@ def check_identifiers(tree: Tree, drives: Iterable[DriveConfiguration]) -> None:
         on_bus = claimed.setdefault(drive.bus, [])
         family = FAMILIES[drive.protocol]
         own = [*family.claims(drive), *family.reserved(drive)]
-        hit = next(((claim, other) for mine in own for claim, other in on_bus
+        hit = next(((mine, claim, other) for mine in own for claim, other in on_bus
                     if mine.overlaps(claim)), None)
         if hit is not None:
-            claim, other = hit
+            mine, claim, other = hit
+            what = claim.purpose if claim.purpose == mine.purpose else \
+                f'one identifier, {mine.purpose} here and {claim.purpose} there'
             tree.wrong(
                 ('drives', drive.name, 'station'),
                 f'{drive.station} collides with drive {other.name} (station {other.station}) on '
-                f'bus {drive.bus}: both use {claim.purpose}; allowed is a station of its own')
+                f'bus {drive.bus}: both use {what}; allowed is a station of its own')
         on_bus.extend((claim, drive) for claim in own)
 
 

@@ -114,7 +114,8 @@ def test_other_families_keep_off_the_predefined_set(tmp_path: Path, protocol: st
         'protocols: [datamodel_standard]\nparameters: {status: {number: 1, access: ro}}\n')
     assert problems(tmp_path, text, PROFILE) == [
         'f.yaml:21: drives.fan.station: 1 collides with drive pump (station 5) on bus main: both '
-        f'use {purpose}; predefined_set); allowed is a station of its own']
+        f'use one identifier, 11-bit identifier {purpose[:4]} here and {purpose}; predefined_set) '
+        'there; allowed is a station of its own']
     without = changed(text, 'station: 5', 'station: 5\n        predefined_set: false')
     assert problems(tmp_path, without, PROFILE) == []
 
@@ -132,7 +133,8 @@ def test_inverters_keep_off_the_predefined_set(tmp_path: Path) -> None:
     (tmp_path / 'other.yaml').write_text('protocols: [cannord]\nparameters: {speed: {}}\n')
     assert problems(tmp_path, text, PROFILE) == [
         'f.yaml:21: drives.fan.station: 64 collides with drive pump (station 5) on bus main: both '
-        'use 080h (SYNC; predefined_set); allowed is a station of its own']
+        'use one identifier, process data to station 64 here and 080h (SYNC; predefined_set) '
+        'there; allowed is a station of its own']
     without = changed(text, 'station: 5', 'station: 5\n        predefined_set: false')
     assert problems(tmp_path, without, PROFILE) == []
 
