@@ -3,7 +3,7 @@
 
 from pathlib import Path
 
-from configuration_builders import changed, FILE, load, problems, PROFILE, warnings
+from configuration_builders import changed, FILE, load, problems, PROFILE, PROTOCOLS, warnings
 import pytest
 
 from drive_can_bridge.protocols.families import FAMILIES
@@ -36,17 +36,14 @@ CASES = [
     ('        bus: main\n', '',
      ['f.yaml:10: drives.conveyor.bus: missing, allowed is a string']),
     ('        protocol: datamodel_extended\n', '',
-     ['f.yaml:10: drives.conveyor.protocol: missing, allowed is datamodel_extended, '
-      'datamodel_standard, cannord or canopen_pkw']),
+     [f'f.yaml:10: drives.conveyor.protocol: missing, allowed is {PROTOCOLS}']),
     ('        protocol: datamodel_extended\n', '        xyz: 1\n',
-     ['f.yaml:10: drives.conveyor.protocol: missing, allowed is datamodel_extended, '
-      'datamodel_standard, cannord or canopen_pkw',
+     [f'f.yaml:10: drives.conveyor.protocol: missing, allowed is {PROTOCOLS}',
       'f.yaml:12: drives.conveyor.xyz: unknown key, allowed: bus, protocol, station, profile, '
       'period, cyclic_request, cyclic_response, missed_limit, command_timeout, rearm, '
       'parameter_timeout, control_timeout, parameter_retries, verify_writes, joint']),
     ('        protocol: datamodel_extended\n', '        mapping: verify\n',  # of some family
-     ['f.yaml:10: drives.conveyor.protocol: missing, allowed is datamodel_extended, '
-      'datamodel_standard, cannord or canopen_pkw']),
+     [f'f.yaml:10: drives.conveyor.protocol: missing, allowed is {PROTOCOLS}']),
     ('period: 0.02', 'period: 0.004',
      ['f.yaml:15: drives.conveyor.period: 0.004 s is too fast, allowed is at least 0.005 s '
       'unless allow_fast_cycle is true']),

@@ -4,6 +4,7 @@
 from dataclasses import asdict
 import json
 from pathlib import Path
+import re
 from typing import Any
 
 from jsonschema import Draft202012Validator
@@ -33,6 +34,15 @@ def test_profiles_may_name_every_family() -> None:
     protocols = schema.profile_schema()['properties']['protocols']
     assert protocols['items']['enum'] == list(FAMILIES)
     assert protocols['description'] == 'The protocol families that the drive type speaks.'
+
+
+def test_pages_know_every_family() -> None:
+    checkout = Path(__file__).resolve().parents[2]
+    rows = re.findall(r'^\| `(\w+)` \|.*\[notes\]\((docs/\w+\.md)\)',
+                      (checkout / 'README.md').read_text(encoding='utf-8'), re.MULTILINE)
+    assert [name for name, _ in rows] == list(FAMILIES)
+    for name, page in rows:
+        assert f'`protocol: {name}`' in (checkout / page).read_text(encoding='utf-8')
 
 
 @pytest.mark.parametrize('document', [schema.load(schema.PARAMETER_FILE), schema.profile_schema()])
