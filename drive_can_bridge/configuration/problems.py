@@ -12,6 +12,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Union
 
+from drive_can_bridge.core.text import printable
+
 Path = tuple[Union[str, int], ...]
 
 
@@ -33,8 +35,7 @@ class Problem(NamedTuple):
     def __str__(self) -> str:
         """Write the line that users see; it stays one, whatever a key or value contains."""
         text = f'{self.key}: {self.message}' if self.key else self.message
-        text = f'{self.file}:{self.line}: {text}' if self.file else text
-        return ''.join(character if character.isprintable() else '?' for character in text)
+        return printable(f'{self.file}:{self.line}: {text}' if self.file else text, None)
 
 
 @dataclass(frozen=True)

@@ -196,7 +196,7 @@ CASES = [
      ["f.yaml:10: drives.1a: '1a' is wrong, allowed is a name of a-z, 0-9 and _ that begins "
       'with a letter and has no __, at most 100 characters']),
     ('conveyor:', '"a\\n":',
-     ["f.yaml:10: drives.a?: 'a?' is wrong, allowed is a name of a-z, 0-9 and _ that begins "
+     ["f.yaml:10: drives.a\\n: 'a\\n' is wrong, allowed is a name of a-z, 0-9 and _ that begins "
       'with a letter and has no __, at most 100 characters']),
     ('conveyor:', 'drive_can_bridge:',
      ["f.yaml:10: drives.drive_can_bridge: 'drive_can_bridge' is the name of the bridge "
