@@ -5,7 +5,7 @@ The checked configuration, as the rest of the program receives it.
 Times are seconds. Everything in here has passed every check: nobody downstream checks again.
 """
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any
 
 from drive_can_bridge.core.parameters import Parameter
@@ -84,11 +84,6 @@ class DriveConfiguration:
     joint: JointConfiguration | None = None
     options: Any = None
     profile_key: str = ''
-
-    @property
-    def family_options(self) -> dict[str, Any]:
-        """The options by name."""
-        return asdict(self.options)
 
 
 @dataclass(frozen=True)

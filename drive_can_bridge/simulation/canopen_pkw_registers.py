@@ -39,7 +39,7 @@ class RegisterTable:
 
     def __init__(self, configuration: DriveConfiguration, registers: Registers) -> None:
         self._registers = registers
-        self._high_first: bool = configuration.family_options['word_order'] == 'high_first'
+        self._high_first: bool = configuration.options.word_order == 'high_first'
         self._cells: dict[Address, Cell] = {}
         parameters = list(registers.parameters.values())
         # what the profile says goes before what follows from the table of the vendor

@@ -95,6 +95,6 @@ class SimulatedDataModelStandardDrive(SimulatedDrive):
 
 
 def _identifiers(configuration: DriveConfiguration) -> tuple[int, int]:
-    options, station = configuration.family_options, configuration.station
-    return (standard.identifier(options['request_id_base'], station),
-            standard.identifier(options['response_id_base'], station))
+    options, station = configuration.options, configuration.station
+    return (standard.identifier(options.request_id_base, station),
+            standard.identifier(options.response_id_base, station))

@@ -1,6 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """What is wrong with a drive: one changed line each, and the lines that users see."""
 
+from dataclasses import asdict
 from pathlib import Path
 
 from configuration_builders import changed, FILE, load, problems, PROFILE, PROTOCOLS, warnings
@@ -234,7 +235,7 @@ def test_good_file(tmp_path: Path) -> None:
     assert [parameter.number for parameter in conveyor.cyclic_response] == [209, 210, 211]
     assert conveyor.profile.name == conveyor.profile_key == 'table'
     assert conveyor.profile is lift.profile
-    assert lift.family_options == {
+    assert asdict(lift.options) == {
         'mapping': 'verify', 'request_map_base': 122, 'response_map_base': 126,
         'parameter_offset': 0, 'eeprom_write_gap': 0.02, 'length_policy': 'lenient',
         'allow_fast_cycle': False}
@@ -261,7 +262,7 @@ def test_given_value(tmp_path: Path, new: str, attribute: str, value: object) ->
 def test_integer_where_a_number_is_meant(tmp_path: Path) -> None:
     text = changed(FILE, 'period: 0.02', 'period: 1\n        eeprom_write_gap: 1')
     drive = load(tmp_path, text).drives['conveyor']
-    assert repr((drive.period, drive.family_options['eeprom_write_gap'])) == '(1.0, 1.0)'
+    assert repr((drive.period, drive.options.eeprom_write_gap)) == '(1.0, 1.0)'
 
 
 def test_name_too_long(tmp_path: Path) -> None:

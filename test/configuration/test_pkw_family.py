@@ -1,7 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The family table's row of CANopen PKW, and what it makes of parameter files."""
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 from configuration_builders import changed, load, problems
@@ -60,7 +60,7 @@ def with_options(drive: DriveConfiguration, **options: object) -> DriveConfigura
 
 def test_defaults(drive: DriveConfiguration) -> None:
     assert drive.parameter_timeout == 0.5, 'longer than that of the other families'
-    assert drive.family_options == {
+    assert asdict(drive.options) == {
         'layout': 'word_le', 'word_order': 'high_first', 'abort_code_order': 'auto',
         'addressing': 'register', 'nmt_start': True, 'heartbeat_timeout': 0.0,
         'predefined_set': True,

@@ -81,7 +81,7 @@ class Cannord(Family):
 
     def claims(self, drive: DriveConfiguration) -> list[Claim]:
         """Return all identifiers of the drive on its bus; a broadcast one is shared."""
-        extended = drive.family_options['extended_identifiers']
+        extended = drive.options.extended_identifiers
         found = [Claim(route(identifier(kind, drive.station, extended=extended),
                              extended=extended), f'{purpose} {drive.station}')
                  for kind, purpose in _PURPOSES.items()]
@@ -135,7 +135,7 @@ class Cannord(Family):
 
     def _telegram_bits(self, drive: DriveConfiguration) -> int:
         """Return the worst-case length of the process frames in one direction."""
-        extended = drive.family_options['extended_identifiers']
+        extended = drive.options.extended_identifiers
         values = max(len(drive.cyclic_request), len(drive.cyclic_response))
         bits = frame_bits(main_length(min(values, MAIN_VALUES)), extended=extended)
         if values > MAIN_VALUES:
@@ -145,17 +145,17 @@ class Cannord(Family):
     def _check_kinds(self, drives: Sequence[DriveConfiguration],
                      ) -> Iterator[tuple[DriveConfiguration, Complaint]]:
         """Look for both kinds of broadcast on one bus: whoever listens, listens to both."""
-        everyone = [drive for drive in drives if drive.family_options['broadcast'] != 'none']
+        everyone = [drive for drive in drives if drive.options.broadcast != 'none']
         for drive in everyone[1:]:
-            mine = drive.family_options['broadcast']
-            other = everyone[0].family_options['broadcast']
+            mine = drive.options.broadcast
+            other = everyone[0].options.broadcast
             if mine != other:
                 yield drive, Complaint('broadcast', (
                     f"'{mine}', while drive {everyone[0].name} on the same bus has '{other}' and "
                     f"inverters obey both; allowed is '{other}' or 'none'"))
 
     def _check_lists(self, drive: DriveConfiguration) -> Iterator[Complaint]:
-        extra = drive.family_options['extra_setpoints']
+        extra = drive.options.extra_setpoints
         largest = MAIN_VALUES + EXTRA_VALUES if extra else MAIN_VALUES
         more = '' if extra else f' ({MAIN_VALUES + EXTRA_VALUES} with extra_setpoints: true)'
         for key in ('cyclic_request', 'cyclic_response'):

@@ -62,7 +62,7 @@ class CanopenPkw(Family):
 
     def reserved(self, drive: DriveConfiguration) -> list[Claim]:
         """Return the rest of what a node listens to and sends on from the factory."""
-        if not drive.family_options['predefined_set']:
+        if not drive.options.predefined_set:
             return []
         remark = 'predefined_set'
         return [*_claims({base + drive.station: f'{what} node {drive.station}; {remark}'
@@ -123,7 +123,7 @@ class CanopenPkw(Family):
                     break
 
     def _check_profile(self, drive: DriveConfiguration) -> Iterator[Complaint]:
-        addressing = drive.family_options['addressing']
+        addressing = drive.options.addressing
         for name, parameter in drive.profile.parameters.items():
             place = f'profile.parameters.{name}'
             if parameter.index is not None and parameter.subindex is None:

@@ -30,7 +30,7 @@ class DataModelFamily(Family):
     def check(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         """Yield everything that this family cannot do with the drive as configured."""
         yield from self._check_station(drive)
-        if drive.period < FASTEST_PERIOD and not drive.family_options['allow_fast_cycle']:
+        if drive.period < FASTEST_PERIOD and not drive.options.allow_fast_cycle:
             yield Complaint('period', f'{drive.period:g} s is too fast, allowed is at least '
                                       f'{FASTEST_PERIOD:g} s unless allow_fast_cycle is true')
         yield from self._check_maps(drive)
@@ -47,7 +47,7 @@ class DataModelFamily(Family):
         if match is None:
             return None
         number = int(match.group(1))
-        wire = number + drive.family_options['parameter_offset']
+        wire = number + drive.options.parameter_offset
         if number > NUMBER_MAX or not 0 <= wire < CYCLIC_PARAMETER:
             return None
         return Parameter(name=name, number=number, listed=False)
@@ -59,14 +59,14 @@ class DataModelFamily(Family):
         """Look at the station number."""
 
     def _check_maps(self, drive: DriveConfiguration) -> Iterator[Complaint]:
-        offset = drive.family_options['parameter_offset']
+        offset = drive.options.parameter_offset
         for key in ('request_map_base', 'response_map_base'):
             base = getattr(drive.options, key)
             if not 0 <= base + offset <= NUMBER_MAX - SLOTS:
                 yield Complaint(key, f'{base} with parameter_offset {offset} is out of range, '
                                      f'allowed on the wire is 0 to {NUMBER_MAX - SLOTS}')
-        request = drive.family_options['request_map_base']
-        response = drive.family_options['response_map_base']
+        request = drive.options.request_map_base
+        response = drive.options.response_map_base
         if abs(request - response) < SLOTS:
             # at the key that was given; the other one has its default
             moved = request != REQUEST_MAP_BASE and response == RESPONSE_MAP_BASE
@@ -98,7 +98,7 @@ class DataModelFamily(Family):
                                     f'{base + SLOTS - 1}')
 
     def _check_profile(self, drive: DriveConfiguration) -> Iterator[Complaint]:
-        offset = drive.family_options['parameter_offset']
+        offset = drive.options.parameter_offset
         shared = not _PROTOCOLS.issuperset(drive.profile.protocols)
         for name, parameter in drive.profile.parameters.items():
             place = f'profile.parameters.{name}'

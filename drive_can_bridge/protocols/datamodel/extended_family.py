@@ -35,7 +35,7 @@ class DataModelExtended(DataModelFamily):
     def bits_per_second(self, drive: DriveConfiguration) -> float:
         """Return the worst-case load: one exchange a period, and the look at the maps."""
         exchange = 2 * FRAME_BITS / drive.period
-        if drive.family_options['mapping'] == 'assume':
+        if drive.options.mapping == 'assume':
             return exchange
         return exchange + MAPPING_CHECK_BITS
 
@@ -53,7 +53,7 @@ class DataModelExtended(DataModelFamily):
                                        f'allowed is 1 to {STATION_MAX} ({self.name})')
 
     def _check_lists(self, drive: DriveConfiguration) -> Iterator[Complaint]:
-        offset = drive.family_options['parameter_offset']
+        offset = drive.options.parameter_offset
         for key in ('cyclic_request', 'cyclic_response'):
             listed: tuple[Parameter, ...] = getattr(drive, key)
             if len(listed) > SLOTS:
