@@ -4,7 +4,6 @@
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from drive_can_bridge.configuration.schema import family_defaults
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import Event, ProcessDataReceived, RequestCompleted
@@ -70,17 +69,12 @@ def drive(protocol: str = 'datamodel_extended', *, name: str = 'conveyor', stati
           ) -> DriveConfiguration:
     """Make a drive; further keywords are its keys, those of the family included."""
     keys = {key: value for key, value in options.items() if key in _DRIVE_KEYS}
-    row = FAMILIES[protocol]
-    family = {**family_defaults(row), **row.station_defaults(station)}
-    unknown = set(options) - set(keys) - set(family)
-    if unknown:
-        raise ValueError(f'no such keys: {unknown}')
-    family.update({key: value for key, value in options.items() if key in family})
+    own = FAMILIES[protocol].make_options(station, {
+        key: value for key, value in options.items() if key not in keys})
     profile = Profile('table', '/table.yaml', '', (protocol,), {p.name: p for p in table}, control)
     return DriveConfiguration(
         name=name, bus='main', protocol=protocol, station=station, profile=profile,
-        cyclic_request=tuple(request), cyclic_response=tuple(response), family_options=family,
-        **keys)
+        cyclic_request=tuple(request), cyclic_response=tuple(response), options=own, **keys)
 
 
 def frame(text: str) -> Frame:

@@ -1,12 +1,12 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The buses of a configuration: interface, channel, and the keys for the adapter."""
 
-from collections.abc import Iterator
 from typing import Any, Protocol
 
-from drive_can_bridge.configuration.problems import hint, nearest, Problem, show, Tree
-from drive_can_bridge.configuration.schema import defaults, definition
+from drive_can_bridge.configuration.problems import Path, Tree
+from drive_can_bridge.configuration.schema import complete, definition
 from drive_can_bridge.core.configuration import BusConfiguration
+from drive_can_bridge.core.words import hint, nearest, show
 
 #: how much a key has to look like one of ours to be taken for a slip of the pen
 _SLIP = 0.8
@@ -30,68 +30,61 @@ class Adapters(Protocol):
         """Say why an adapter cannot be set to a bit rate; None: it may be possible."""
 
 
-class BusChecker:
-    """Check the ``buses`` of a tree that has passed its schema."""
-
-    def __init__(self, tree: Tree, adapters: Adapters | None) -> None:
-        self.problems: list[Problem] = []
-        self.warnings: list[Problem] = []
-        self._tree = tree
-        self._adapters = adapters
-
-    def check(self) -> dict[str, BusConfiguration]:
-        """Return the buses that can be used."""
-        buses: dict[str, BusConfiguration] = {}
-        for name, entry in self._tree.data.get('buses', {}).items():
-            found = list(self._check_options(name, entry))
-            self.problems.extend(found)
-            if 'interface' in entry and 'channel' in entry:
-                bus = _bus(name, entry)
-                self._look_for_twin(bus, buses)
-                if not found:
-                    buses[name] = bus
-        return buses
-
-    def _check_options(self, name: str, entry: dict[str, Any]) -> Iterator[Problem]:
-        path = ('buses', name)
-        interface = entry.get('interface')
-        keywords = None
-        if self._adapters is not None and interface is not None:
-            message = self._adapters.check_interface(interface)
-            if message is not None:
-                yield self._tree.problem((*path, 'interface'), message)
-            else:
-                keywords = self._adapters.adapter_keywords(interface)
-                message = self._adapters.check_bitrate(interface, entry.get(
-                    'bitrate', defaults('bus')['bitrate']))
-                if message is not None:
-                    yield self._tree.problem((*path, 'bitrate'), message)
-        ours = definition('bus')['properties']
-        for key in entry:
-            if key in ours or (keywords is not None and key in keywords):
-                continue
-            slip = nearest(key, ours, cutoff=_SLIP)
-            if slip is not None:
-                yield self._tree.problem((*path, key), f"unknown key, did you mean '{slip}'?")
-            elif keywords is not None:
-                self.warnings.append(self._tree.problem(
-                    (*path, key), f'the adapter for {interface} does not name this key'
-                                  f'{hint(key, keywords)}; it is handed over all the same'))
-
-    def _look_for_twin(self, bus: BusConfiguration, others: dict[str, BusConfiguration]) -> None:
-        for other in others.values():
-            if (bus.interface, str(bus.channel)) == (other.interface, str(other.channel)):
-                self.warnings.append(self._tree.problem(
-                    ('buses', bus.name, 'channel'),
-                    f'{show(bus.channel)} is also the channel of bus {other.name}; identifiers '
-                    'and load are checked for each bus alone'))
-                return
+def check_buses(tree: Tree, adapters: Adapters | None) -> dict[str, BusConfiguration]:
+    """Check the ``buses`` of a tree that has passed its schema; return those that can be used."""
+    buses: dict[str, BusConfiguration] = {}
+    for name, entry in tree.data.get('buses', {}).items():
+        path, known = ('buses', name), len(tree.problems)
+        values = complete('bus', entry)
+        keywords = _check_adapter(tree, path, values, adapters)
+        _check_keys(tree, path, entry, keywords)
+        if 'interface' not in entry or 'channel' not in entry:
+            continue
+        bus = BusConfiguration(name=name, **values, options={
+            key: value for key, value in entry.items() if key not in values})
+        _look_for_twin(tree, bus, buses)
+        if len(tree.problems) == known:
+            buses[name] = bus
+    return buses
 
 
-def _bus(name: str, entry: dict[str, Any]) -> BusConfiguration:
-    values = {**defaults('bus'), **entry}
+def _check_adapter(tree: Tree, path: Path, values: dict[str, Any], adapters: Adapters | None,
+                   ) -> set[str] | None:
+    """Check what the adapter decides; return the keywords that it takes, None: unknown."""
+    interface = values.get('interface')
+    if adapters is None or interface is None:
+        return None
+    message = adapters.check_interface(interface)
+    if message is not None:
+        tree.wrong((*path, 'interface'), message)
+        return None
+    message = adapters.check_bitrate(interface, values['bitrate'])
+    if message is not None:
+        tree.wrong((*path, 'bitrate'), message)
+    return adapters.adapter_keywords(interface)
+
+
+def _check_keys(tree: Tree, path: Path, entry: dict[str, Any], keywords: set[str] | None) -> None:
+    """Look for keys that are neither ours nor the adapter's."""
     ours = definition('bus')['properties']
-    return BusConfiguration(
-        name=name, interface=values['interface'], channel=values['channel'],
-        bitrate=values['bitrate'], reconnect_period=float(values['reconnect_period']),
-        options={key: value for key, value in entry.items() if key not in ours})
+    for key in entry:
+        if key in ours or (keywords is not None and key in keywords):
+            continue
+        slip = nearest(key, ours, cutoff=_SLIP)
+        if slip is not None:
+            set_by_us = 'not' in ours[slip]
+            tree.wrong((*path, key), f"unknown key, did you mean '{slip}'?"
+                       + ' It is set by the bridge itself' * set_by_us)
+        elif keywords is not None:
+            tree.suspicious((*path, key), f'the adapter for {entry["interface"]} does not name '
+                            f'this key{hint(key, keywords)}; it is handed over all the same')
+
+
+def _look_for_twin(tree: Tree, bus: BusConfiguration, others: dict[str, BusConfiguration]) -> None:
+    for other in others.values():
+        if (bus.interface, str(bus.channel)) == (other.interface, str(other.channel)):
+            tree.suspicious(
+                ('buses', bus.name, 'channel'),
+                f'{show(bus.channel)} is also the channel of bus {other.name}; identifiers and '
+                'load are checked for each bus alone')
+            return

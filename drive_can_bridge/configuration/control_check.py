@@ -1,16 +1,15 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The ``control`` section of a profile: words that fit, conditions that can come true."""
 
-from collections.abc import Iterator
 from typing import Any
 
-from drive_can_bridge.configuration.problems import Problem, show, suggestion, Tree
+from drive_can_bridge.configuration.problems import Path, Tree
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.core.profile import ControlTable, StatusPattern
+from drive_can_bridge.core.words import show, suggestion
 
 
-def check_control(tree: Tree, parameters: dict[str, Parameter],
-                  names: tuple[str, ...]) -> Iterator[Problem]:
+def check_control(tree: Tree, parameters: dict[str, Parameter], names: tuple[str, ...]) -> None:
     """
     Check the ``control`` section of a profile's tree.
 
@@ -19,56 +18,54 @@ def check_control(tree: Tree, parameters: dict[str, Parameter],
     """
     control = tree.data['control']
     words = control.get('words', {})
-    name = control.get('parameter')
-    parameter = parameters.get(name or '')
-    if name is not None and name not in names and not tree.is_damaged(('parameters',)):
-        yield tree.problem(('control', 'parameter'),
-                           f'{show(name)} is unknown, {suggestion(name, names)}')
-    elif parameter is not None:
+    parameter = look_up(tree, ('control', 'parameter'), control.get('parameter'), parameters,
+                        names)
+    if parameter is not None:
         if not parameter.writable:
-            yield tree.problem(('control', 'parameter'), f'{show(name)} is read-only, allowed is '
-                                                         'one with access rw or wo')
-        yield from _check_words(tree, parameter, words)
+            tree.wrong(('control', 'parameter'), f'{show(parameter.name)} is read-only, allowed '
+                                                 'is one with access rw or wo')
+        largest = _largest_word(parameter)
+        for key, word in words.items():
+            if word > largest:
+                tree.wrong(('control', 'words', key), f'{word} does not fit {parameter.name}, '
+                           f'allowed is 0 to {largest} ({parameter.type.value})')
     if 'disable' in words and words['disable'] == words.get('enable'):
-        yield tree.problem(('control', 'words', 'enable'), f'{show(words["enable"])} is the word '
-                           'for disable too, allowed is another one')
-    yield from _check_status(tree, parameters, names)
+        tree.wrong(('control', 'words', 'enable'), f'{show(words["enable"])} is the word for '
+                                                   'disable too, allowed is another one')
+    if isinstance(control.get('status'), dict):
+        _check_status(tree, control['status'], parameters, names)
 
 
-def _check_words(tree: Tree, parameter: Parameter, words: dict[str, int]) -> Iterator[Problem]:
-    largest = _largest_word(parameter)
-    for key, word in words.items():
-        if word > largest:
-            yield tree.problem(('control', 'words', key), f'{word} does not fit {parameter.name}, '
-                               f'allowed is 0 to {largest} ({parameter.type.value})')
+def look_up(tree: Tree, path: Path, name: str | None, parameters: dict[str, Parameter],
+            names: tuple[str, ...], *, at: Path | None = None) -> Parameter | None:
+    """
+    Return the parameter that a section names, if it is all right.
 
-
-def _check_status(tree: Tree, parameters: dict[str, Parameter],
-                  names: tuple[str, ...]) -> Iterator[Problem]:
-    status = tree.data['control'].get('status')
-    if not isinstance(status, dict):
-        return
-    name = status.get('parameter')
-    parameter = parameters.get(name or '')
-    largest = 0xFFFFFFFF if parameter is None else _largest_word(parameter)
+    One with problems of its own is known.
+    """
     if name is not None and name not in names and not tree.is_damaged(('parameters',)):
-        yield tree.problem(('control', 'status', 'parameter'),
-                           f'{show(name)} is unknown, {suggestion(name, names)}')
-    elif parameter is not None and not parameter.readable:
-        yield tree.problem(('control', 'status', 'parameter'),
-                           f'{show(name)} is write-only, allowed is one with access ro or rw')
+        tree.wrong(path, f'{show(name)} is unknown, {suggestion(name, names)}', at=at)
+    return parameters.get(name or '')
+
+
+def _check_status(tree: Tree, status: dict[str, Any], parameters: dict[str, Parameter],
+                  names: tuple[str, ...]) -> None:
+    path = ('control', 'status')
+    parameter = look_up(tree, (*path, 'parameter'), status.get('parameter'), parameters, names)
+    if parameter is not None and not parameter.readable:
+        tree.wrong((*path, 'parameter'), f'{show(parameter.name)} is write-only, allowed is one '
+                                         'with access ro or rw')
     for key in ('ready', 'enabled', 'fault'):
         if key not in status:
             continue
         mask, value = status[key]
-        path = ('control', 'status', key)
-        if mask > largest and parameter is not None:
-            yield tree.problem(path, f'mask {mask} does not fit {parameter.name}, allowed is '
-                                     f'1 to {largest} ({parameter.type.value})')
+        if parameter is not None and mask > _largest_word(parameter):
+            tree.wrong((*path, key), f'mask {mask} does not fit {parameter.name}, allowed is 1 to '
+                                     f'{_largest_word(parameter)} ({parameter.type.value})')
         if mask == 0:
-            yield tree.problem(path, 'mask 0 looks at no bit, allowed is a mask with at least one')
+            tree.wrong((*path, key), 'mask 0 looks at no bit, allowed is a mask with at least one')
         elif value & ~mask:
-            yield tree.problem(path, f'value {value} has bits outside of mask {mask} and never '
+            tree.wrong((*path, key), f'value {value} has bits outside of mask {mask} and never '
                                      'matches, allowed are bits of the mask')
 
 

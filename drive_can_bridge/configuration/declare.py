@@ -1,14 +1,14 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The node's parameters: what to declare, and what may change while it runs."""
 
-from collections.abc import Iterator
+from collections.abc import Container, Iterator, Mapping
+from dataclasses import is_dataclass
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from drive_can_bridge.configuration.schema import definition
+from drive_can_bridge.configuration.schema import ALL_OPTIONS, definition
 from drive_can_bridge.configuration.schema_check import check_value
-from drive_can_bridge.core.configuration import (
-    BridgeConfiguration, BusConfiguration, DriveConfiguration, JointConfiguration,
-)
+from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.protocols.families import FAMILIES
 
 #: keys of a drive that may change while the bridge runs
@@ -57,64 +57,43 @@ def check_dynamic(name: str, value: object) -> str | None:
 
 
 def _bridge(configuration: BridgeConfiguration) -> Iterator[DeclaredParameter]:
-    for key, value in (
-            ('autostart', configuration.autostart),
-            ('diagnostics_period', configuration.diagnostics_period),
-            ('profile_directories', list(configuration.profile_directories))):
-        yield DeclaredParameter(key, value, _description('bridge', key), key in DYNAMIC_KEYS)
+    yield from _section('', 'bridge', configuration, DYNAMIC_KEYS, {
+        'profile_directories': list(configuration.profile_directories)})
     for bus in configuration.buses.values():
-        yield from _bus(bus)
+        prefix = f'buses.{bus.name}.'
+        yield from _section(prefix, 'bus', bus)
+        for key, value in bus.options.items():
+            yield DeclaredParameter(prefix + key, value, 'Handed to the adapter.', False)
     for drive in configuration.drives.values():
-        yield from _drive(drive)
+        prefix = f'drives.{drive.name}.'
+        yield from _section(prefix, 'drive', drive, DYNAMIC_DRIVE_KEYS, {
+            'profile': drive.profile_key,
+            'cyclic_request': [parameter.name for parameter in drive.cyclic_request],
+            'cyclic_response': [parameter.name for parameter in drive.cyclic_response],
+            'rearm': 'immediate' if drive.rearm_immediate else 'neutral'})
+        yield DeclaredParameter(
+            identity_name(drive.name), '', 'Found out by the bridge when the drive comes online: '
+            'the section identity of its profile. Empty while not known.', False)
+        yield DeclaredParameter(f'{prefix}profile_sha256', drive.profile.sha256,
+                                'SHA-256 of the file of the profile, as it was read.', False)
+        for key, option in FAMILIES[drive.protocol].options_schema.items():
+            yield DeclaredParameter(prefix + key, getattr(drive.options, key),
+                                    option['description'], False)
+        if drive.joint is not None:
+            yield from _section(f'{prefix}joint.', 'joint', drive.joint)
 
 
-def _bus(bus: BusConfiguration) -> Iterator[DeclaredParameter]:
-    prefix = f'buses.{bus.name}.'
-    for key in ('interface', 'channel', 'bitrate', 'reconnect_period'):
-        yield DeclaredParameter(prefix + key, getattr(bus, key), _description('bus', key), False)
-    for key, value in bus.options.items():
-        yield DeclaredParameter(prefix + key, value, 'Handed to the adapter.', False)
+def _section(prefix: str, name: str, section: object, dynamic: Container[str] = (),
+             special: Mapping[str, object] = MappingProxyType({}),
+             ) -> Iterator[DeclaredParameter]:
+    """
+    Declare the keys that a definition names.
 
-
-def _drive(drive: DriveConfiguration) -> Iterator[DeclaredParameter]:
-    prefix = f'drives.{drive.name}.'
-    values = {
-        'bus': drive.bus,
-        'protocol': drive.protocol,
-        'station': drive.station,
-        'profile': drive.profile_key,
-        'period': drive.period,
-        'cyclic_request': [parameter.name for parameter in drive.cyclic_request],
-        'cyclic_response': [parameter.name for parameter in drive.cyclic_response],
-        'missed_limit': drive.missed_limit,
-        'command_timeout': drive.command_timeout,
-        'rearm': 'immediate' if drive.rearm_immediate else 'neutral',
-        'parameter_timeout': drive.parameter_timeout,
-        'control_timeout': drive.control_timeout,
-        'parameter_retries': drive.parameter_retries,
-        'verify_writes': drive.verify_writes,
-    }
-    for key, value in values.items():
-        yield DeclaredParameter(prefix + key, value, _description('drive', key),
-                                key in DYNAMIC_DRIVE_KEYS)
-    yield DeclaredParameter(
-        identity_name(drive.name), '', 'Found out by the bridge when the drive comes online: the '
-        'section identity of its profile. Empty while not known.', False)
-    yield DeclaredParameter(f'{prefix}profile_sha256', drive.profile.sha256,
-                            'SHA-256 of the file of the profile, as it was read.', False)
-    options = FAMILIES[drive.protocol].options_schema
-    for key, value in drive.family_options.items():
-        yield DeclaredParameter(prefix + key, value, options[key].get('description', ''), False)
-    if drive.joint is not None:
-        yield from _joint(prefix + 'joint.', drive.joint)
-
-
-def _joint(prefix: str, joint: JointConfiguration) -> Iterator[DeclaredParameter]:
-    for key in definition('joint')['properties']:
-        value = getattr(joint, key)
-        if value is not None:
-            yield DeclaredParameter(prefix + key, value, _description('joint', key), False)
-
-
-def _description(name: str, key: str) -> str:
-    return str(definition(name)['properties'][key].get('description', ''))
+    :param special: values that the section does not have under the name of their key.
+    """
+    for key, option in definition(name)['properties'].items():
+        value = special.get(key, getattr(section, key, None))
+        if key in ALL_OPTIONS or value is None or is_dataclass(value) or isinstance(value, dict):
+            continue
+        yield DeclaredParameter(prefix + key, value, option.get('description', ''),
+                                key in dynamic)

@@ -6,25 +6,27 @@ A drive is built even when parts of it are wrong, with defaults in place of the 
 that everything else about it can be checked in the same run.
 """
 
-from collections.abc import Container, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
-from drive_can_bridge.configuration.joint_check import JointChecker
-from drive_can_bridge.configuration.problems import Path, Problem, show, suggestion, Tree
+from drive_can_bridge.configuration.joint_check import check_joint
+from drive_can_bridge.configuration.problems import Path, Tree
 from drive_can_bridge.configuration.profile_check import LoadedProfile
 from drive_can_bridge.configuration.profiles import ProfileStore
-from drive_can_bridge.configuration.schema import defaults, family_defaults
+from drive_can_bridge.configuration.schema import ALL_OPTIONS, complete
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import Access, Parameter, Storage
 from drive_can_bridge.core.profile import Profile
+from drive_can_bridge.core.words import show, suggestion
 from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.protocols.family import Complaint, Family
 
 BRIDGE_NAME = 'drive_can_bridge'
 _NO_PROFILE = Profile('', '', '', ())
-_LISTS = ('cyclic_request', 'cyclic_response')
+LISTS = ('cyclic_request', 'cyclic_response')
+#: keys that a drive does not simply have as they are given
+_MADE = ('profile', 'protocol', 'rearm', 'joint')
 
 
 class DriveChecker:
@@ -35,8 +37,6 @@ class DriveChecker:
     """
 
     def __init__(self, tree: Tree, name: str, buses: list[str], store: ProfileStore) -> None:
-        self.problems: list[Problem] = []
-        self.warnings: list[Problem] = []
         self._tree = tree
         self._name = name
         self._path: Path = ('drives', name)
@@ -48,44 +48,34 @@ class DriveChecker:
     def check(self) -> DriveConfiguration | None:
         """Return the drive as far as it is known; None where not even the protocol is."""
         if self._name == BRIDGE_NAME:
-            self._note((), f'{show(self._name)} is the name of the bridge itself, allowed is any '
-                           'other')
+            self._wrong((), f'{show(self._name)} is the name of the bridge itself, allowed is any '
+                            'other')
         bus = self._entry.get('bus')
         if bus is not None and bus not in self._buses:
-            self._note(('bus',), f'{show(bus)} is unknown, {suggestion(bus, self._buses)}')
+            self._wrong(('bus',), f'{show(bus)} is unknown, {suggestion(bus, self._buses)}')
         family = FAMILIES.get(self._entry.get('protocol', ''))
         self._load_profile(family)
-        lists = {key: self._list(key) for key in _LISTS}
+        lists = {key: self._list(key) for key in LISTS}
         if family is None:
             return None
         drive = self._build(family, lists)
         self._check_control(family)
         self._check_setpoints(drive)
         self._check_status(drive)
-        if not family.cyclic and not drive.cyclic_response and not self._is_damaged(_LISTS[1]):
-            self._note((_LISTS[1],), f'empty, allowed in {family.name} is at least one parameter')
-        self.problems.extend(self._placed(family.check(drive)))
-        self.warnings.extend(self._placed(family.warnings(drive)))
-        if 'joint' not in self._entry:
-            return drive
-        checker = JointChecker(self._tree, self._path, drive)
-        joint = checker.check(self._entry['joint'])
-        self.problems.extend(checker.problems)
-        self.warnings.extend(checker.warnings)
-        return DriveConfiguration(**{**vars(drive), 'joint': joint})
+        if not family.cyclic and not drive.cyclic_response and not self._is_damaged(LISTS[1]):
+            self._wrong((LISTS[1],), f'empty, allowed in {family.name} is at least one parameter')
+        self._place(family.check(drive), Tree.wrong)
+        self._place(family.warnings(drive), Tree.suspicious)
+        return replace(drive, joint=check_joint(self._tree, drive))
 
-    def usable(self, keys: Container[str]) -> bool:
+    def is_sound(self, *keys: str) -> bool:
         """Tell whether none of these keys has a problem."""
-        own = [place[2] for place in self._tree.damaged if place[:2] == self._path
-               and len(place) > 2]
-        noted = [problem.key.split('.')[2] for problem in self.problems
-                 if problem.file == self._tree.file and problem.key.count('.') > 1]
-        return not any(str(key) in keys for key in [*own, *noted])
+        return all(self._tree.is_sound((*self._path, key)) for key in keys)
 
     # -- parts ------------------------------------------------------------------------------------
 
-    def _note(self, keys: tuple[str, ...], message: str, *, at: Path | None = None) -> None:
-        self.problems.append(self._tree.problem((*self._path, *keys), message, at=at))
+    def _wrong(self, keys: tuple[str, ...], message: str, *, at: Path | None = None) -> None:
+        self._tree.wrong((*self._path, *keys), message, at=at)
 
     def _is_damaged(self, key: str) -> bool:
         return self._tree.is_damaged((*self._path, key))
@@ -96,14 +86,14 @@ class DriveChecker:
             return
         loaded = self._store.load(name)
         if isinstance(loaded, str):
-            self._note(('profile',), loaded)
+            self._wrong(('profile',), loaded)
             return
         if loaded.tree.is_damaged(('parameters',)):
             return
         self._loaded = loaded
         protocols = loaded.profile.protocols
         if family is not None and protocols and family.name not in protocols:
-            self._note(('profile',), f'{show(name)} is for {", ".join(protocols)}, allowed is a '
+            self._wrong(('profile',), f'{show(name)} is for {", ".join(protocols)}, allowed is a '
                                      f'profile for {family.name}')
 
     def _list(self, key: str) -> tuple[Parameter, ...]:
@@ -113,46 +103,35 @@ class DriveChecker:
         for position, name in enumerate(self._entry.get(key, [])):
             at = (*path, position)
             if any(parameter.name == name for parameter in found):
-                self._note((key,), f'{show(name)} stands twice, allowed is once', at=at)
+                self._wrong((key,), f'{show(name)} stands twice, allowed is once', at=at)
                 continue
             parameter = Parameter(name=name, listed=False)
             if self._loaded is not None:
                 if name not in self._loaded.names:
-                    self._note((key,), f'{show(name)} is not in the profile, '
+                    self._wrong((key,), f'{show(name)} is not in the profile, '
                                        f'{suggestion(name, self._loaded.names)}', at=at)
                 parameter = self._loaded.profile.parameters.get(name, parameter)
             message = _direction_problem(key, parameter)
             if message:
-                self._note((key,), message, at=at)
+                self._wrong((key,), message, at=at)
             found.append(parameter)
         return tuple(found)
 
     def _build(self, family: Family, lists: dict[str, tuple[Parameter, ...]],
                ) -> DriveConfiguration:
-        values = {**defaults('drive'), **family.drive_defaults, **self._entry}
-        options = {**family_defaults(family),
-                   **family.station_defaults(values.get('station', 1))}
-        options.update({key: self._entry[key] for key in family.options_schema
-                        if key in self._entry})
-        for key, option in family.options_schema.items():
-            if option.get('type') == 'number' and key in options:
-                options[key] = float(options[key])
+        values = complete('drive', {
+            'bus': '', 'station': 1, **family.drive_defaults, **self._entry, **lists})
+        made = {key: values.pop(key, '') for key in _MADE}
         profile = _NO_PROFILE if self._loaded is None else self._loaded.profile
         if family.control_built_in:  # a section for the other protocols of the profile
             profile = replace(profile, control=None)
+        given = {key: values[key] for key in family.options_schema if key in self._entry}
+        for key in ALL_OPTIONS:
+            values.pop(key, None)
         return DriveConfiguration(
-            name=self._name, bus=values.get('bus', ''), protocol=family.name,
-            station=values.get('station', 1), profile=profile,
-            period=float(values['period']),
-            cyclic_request=lists['cyclic_request'], cyclic_response=lists['cyclic_response'],
-            missed_limit=values['missed_limit'],
-            command_timeout=float(values['command_timeout']),
-            rearm_immediate=values['rearm'] == 'immediate',
-            parameter_timeout=float(values['parameter_timeout']),
-            parameter_retries=values['parameter_retries'],
-            verify_writes=values['verify_writes'],
-            control_timeout=float(values['control_timeout']),
-            family_options=options, profile_key=values.get('profile', ''))
+            name=self._name, profile=profile, profile_key=made['profile'], protocol=family.name,
+            rearm_immediate=made['rearm'] == 'immediate',
+            options=family.make_options(values['station'], given), **values)
 
     def _check_control(self, family: Family) -> None:
         """Check that a control section is not for a family that has its control built in."""
@@ -160,9 +139,8 @@ class DriveChecker:
             return
         others = [name for name in self._loaded.profile.protocols if name != family.name]
         if self._loaded.profile.control is not None and not others:
-            self.problems.append(self._loaded.tree.problem(
-                ('control',), f'control is built in for {family.name}, allowed is to leave it '
-                              'out'))
+            self._loaded.tree.wrong(('control',), f'control is built in for {family.name}, '
+                                                  'allowed is to leave it out')
 
     def _check_setpoints(self, drive: DriveConfiguration) -> None:
         """Check that what is sent without a command lies in the limits."""
@@ -173,13 +151,12 @@ class DriveChecker:
                 continue
             if _direction_problem('cyclic_request', parameter):
                 continue
-            try:
-                parameter.check_limits(float(parameter.value_from_raw(0)))
-            except ValueRefused:
-                self._note(('cyclic_request',), f'{show(parameter.name)} has no neutral value and '
-                           f'raw 0 is out of its range, allowed is a neutral of '
-                           f'{parameter.range_text}',
-                           at=(*self._path, 'cyclic_request', position))
+            low, high = parameter.raw_limits
+            if not low <= 0 <= high:
+                self._wrong(('cyclic_request',), f'{show(parameter.name)} has no neutral value '
+                            'and raw 0 is out of its range, allowed is a neutral of '
+                            f'{parameter.range_text}',
+                            at=(*self._path, 'cyclic_request', position))
 
     def _check_status(self, drive: DriveConfiguration) -> None:
         control = drive.profile.control
@@ -187,19 +164,20 @@ class DriveChecker:
                 or self._is_damaged('cyclic_response'):
             return
         if all(parameter.name != control.status_parameter for parameter in drive.cyclic_response):
-            self.warnings.append(self._tree.problem(
+            self._tree.suspicious(
                 (*self._path, 'cyclic_response'),
                 f'{show(control.status_parameter)} is missing: without the status word the bridge '
-                'cannot tell whether the drive is enabled'))
+                'cannot tell whether the drive is enabled')
 
-    def _placed(self, complaints: Iterator[Complaint]) -> Iterator[Problem]:
+    def _place(self, complaints: Iterator[Complaint],
+               note: Callable[[Tree, Path, str], None]) -> None:
         """Put what a family complains about where it belongs."""
         for key, message in complaints:
             parts = tuple(key.split('.')) if key else ()
             if parts[:1] == ('profile',) and len(parts) > 1 and self._loaded is not None:
-                yield self._loaded.tree.problem(parts[1:], message)
+                note(self._loaded.tree, parts[1:], message)
             elif not self._tree.is_damaged((*self._path, *parts)):
-                yield self._tree.problem((*self._path, *parts), message)
+                note(self._tree, (*self._path, *parts), message)
 
 
 def _direction_problem(key: str, parameter: Parameter) -> str:

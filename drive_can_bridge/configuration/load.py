@@ -5,24 +5,30 @@ From a parameter file, or from the parameter overrides of a node, to a checked c
 Both ways run the same checks, and all of them: a user sees every problem at once.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
+from functools import partial
 from pathlib import Path as FilePath
 from typing import Any
 
-from drive_can_bridge.configuration.bus_check import Adapters, BusChecker
+from drive_can_bridge.configuration.bus_check import Adapters, check_buses
 from drive_can_bridge.configuration.declare import check_dynamic, declared_parameters
-from drive_can_bridge.configuration.drive_check import DriveChecker
+from drive_can_bridge.configuration.drive_check import DriveChecker, LISTS
 from drive_can_bridge.configuration.overrides import tree_from_overrides
 from drive_can_bridge.configuration.parameter_file import read_parameter_file
-from drive_can_bridge.configuration.problems import (
-    hint, Path, Problem, report, show, suggestion, Tree,
-)
+from drive_can_bridge.configuration.problems import Path, report, Tree
 from drive_can_bridge.configuration.profiles import ProfileStore
-from drive_can_bridge.configuration.schema import defaults, definition, parameter_file_schema
+from drive_can_bridge.configuration.schema import (
+    ALL_OPTIONS, complete, definition, parameter_file_schema,
+)
 from drive_can_bridge.configuration.schema_check import check_schema
-from drive_can_bridge.configuration.traffic_check import collisions, misfits, overloads, too_fast
-from drive_can_bridge.core.configuration import BridgeConfiguration, DriveConfiguration
+from drive_can_bridge.configuration.traffic_check import (
+    check_identifiers, check_load, check_neighbours, check_rounds,
+)
+from drive_can_bridge.core.configuration import (
+    BridgeConfiguration, BusConfiguration, DriveConfiguration,
+)
 from drive_can_bridge.core.errors import ConfigurationError
+from drive_can_bridge.core.words import hint, show, suggestion
 from drive_can_bridge.protocols.families import FAMILIES
 
 __all__ = ['check_dynamic', 'configuration_from_file', 'configuration_from_overrides',
@@ -41,7 +47,7 @@ def configuration_from_file(path: str | FilePath, *, adapters: Adapters | None =
     tree, problems = read_parameter_file(FilePath(path))
     if tree is None:
         raise ConfigurationError(report(problems))
-    return _configuration(tree, problems, adapters)
+    return _configuration(tree, adapters)
 
 
 def configuration_from_overrides(overrides: Mapping[str, object], *,
@@ -53,66 +59,56 @@ def configuration_from_overrides(overrides: Mapping[str, object], *,
     :raises ConfigurationError: with one line per problem, ``key.path: message``; what is wrong
         inside a profile still has its file and line.
     """
-    tree, problems = tree_from_overrides(overrides)
-    return _configuration(tree, problems, adapters)
+    return _configuration(tree_from_overrides(overrides), adapters)
 
 
-def _configuration(tree: Tree, problems: list[Problem], adapters: Adapters | None,
-                   ) -> BridgeConfiguration:
+def _configuration(tree: Tree, adapters: Adapters | None) -> BridgeConfiguration:
     _forget_findings(tree)
-    bus_names, drive_count = _names(tree, 'buses'), len(_names(tree, 'drives'))
-    tree, found = check_schema(tree, parameter_file_schema(), 'bridge', override=_Override(tree))
-    problems = [*problems, *found]
-
-    bus_checker = BusChecker(tree, adapters)
-    buses = bus_checker.check()
-    problems.extend(bus_checker.problems)
-    warnings = list(bus_checker.warnings)
-
-    values = {**defaults('bridge'), **tree.data}
-    directories = tuple(values['profile_directories'])
-    warnings.extend(_missing_directories(tree, directories))
-    store = ProfileStore(directories)
+    check_schema(tree, parameter_file_schema(), 'bridge', override=partial(_sentence, tree))
+    values = complete('bridge', tree.data)
+    _look_for_directories(tree, values['profile_directories'])
+    store = ProfileStore(values['profile_directories'])
+    buses = check_buses(tree, adapters)
     drives: dict[str, DriveConfiguration] = {}
-    placed: list[DriveConfiguration] = []
-    paced: list[DriveConfiguration] = []
-    for name in tree.data.get('drives', {}):
-        checker = DriveChecker(tree, name, bus_names, store)
+    checkers = {name: DriveChecker(tree, name, _names(tree, 'buses'), store)
+                for name in tree.data.get('drives', {})}
+    for name, checker in checkers.items():
         drive = checker.check()
-        problems.extend(checker.problems)
-        warnings.extend(checker.warnings)
-        if drive is None:
-            continue
-        drives[name] = drive
-        if checker.usable(('bus', 'protocol', 'station')):
-            placed.append(drive)
-        if checker.usable(('bus', 'protocol', 'period', 'cyclic_request', 'cyclic_response')):
-            paced.append(drive)
-    problems.extend(store.problems)
-    warnings.extend(store.warnings)
-    problems.extend(collisions(tree, placed))
-    for bus in buses.values():
-        if ('buses', bus.name, 'bitrate') in tree.damaged:
-            continue
-        wrong, suspicious = overloads(tree, bus, [d for d in paced if d.bus == bus.name])
-        problems.extend(wrong)
-        warnings.extend(suspicious)
-        problems.extend(too_fast(tree, bus, [d for d in paced if d.bus == bus.name]))
-    for name in buses:
-        problems.extend(misfits(tree, [drive for drive in placed if drive.bus == name
-                                       and drive in paced]))
-    for name in tree.data.get('drives', {}):
+        if drive is not None:
+            drives[name] = drive
+    _check_together(tree, buses, drives, checkers)
+    if not _names(tree, 'drives') and not tree.is_damaged(('drives',)):
+        tree.suspicious(('drives',), 'no drive is configured')
+    found = [tree, *store.trees]
+    problems = [problem for part in found for problem in part.problems]
+    for name in checkers:
         if name not in drives and not problems:  # whatever it is: no drive gets lost in silence
             problems.append(tree.problem(('drives', name), 'cannot be used, nobody knows why'))
-    if not drive_count and not tree.is_damaged(('drives',)):
-        warnings.append(tree.problem(('drives',), 'no drive is configured'))
     if problems:
         raise ConfigurationError(report(problems))
+    values.update(buses=buses, drives=drives,
+                  profile_directories=tuple(values['profile_directories']))
     return BridgeConfiguration(
-        autostart=values['autostart'],
-        diagnostics_period=float(values['diagnostics_period']),
-        buses=buses, drives=drives, profile_directories=directories,
-        warnings=tuple(report(warnings)))
+        warnings=tuple(report(warning for part in found for warning in part.warnings)),
+        **{key: value for key, value in values.items()
+           if key in BridgeConfiguration.__dataclass_fields__})
+
+
+def _check_together(tree: Tree, buses: Mapping[str, BusConfiguration],
+                    drives: Mapping[str, DriveConfiguration],
+                    checkers: Mapping[str, DriveChecker]) -> None:
+    """Check what drives do to each other, as far as enough is known of them."""
+    placed = {name: drive for name, drive in drives.items()
+              if checkers[name].is_sound('bus', 'protocol', 'station')}
+    paced = [drive for name, drive in drives.items()
+             if checkers[name].is_sound('bus', 'protocol', 'period', *LISTS)]
+    check_identifiers(tree, placed.values())
+    for bus in buses.values():
+        here = [drive for drive in paced if drive.bus == bus.name]
+        if ('buses', bus.name, 'bitrate') not in tree.damaged:
+            check_load(tree, bus, here)
+            check_rounds(tree, bus, here)
+        check_neighbours(tree, [drive for drive in here if drive.name in placed])
 
 
 def _forget_findings(tree: Tree) -> None:
@@ -125,56 +121,34 @@ def _forget_findings(tree: Tree) -> None:
 
 
 def _names(tree: Tree, key: str) -> list[str]:
-    """Return all keys of a mapping, also of those entries that turn out to be wrong."""
-    entries = tree.data.get(key)
-    names = list(entries) if isinstance(entries, dict) else []
-    names += [str(path[1]) for path in tree.damaged if len(path) == 2 and path[0] == key]
-    return names
+    """Return all keys of a mapping, also of those entries that turned out to be wrong."""
+    names = list(tree.data.get(key, {}))
+    return names + [str(path[1]) for path in tree.damaged if len(path) == 2 and path[0] == key]
 
 
-def _missing_directories(tree: Tree, directories: Iterable[str]) -> list[Problem]:
+def _look_for_directories(tree: Tree, directories: list[str]) -> None:
     path = ('profile_directories',)
-    return [tree.problem(path, f'{show(entry)} is no directory', at=(*path, position))
-            for position, entry in enumerate(directories)
-            if entry and ('\0' in entry or not FilePath(entry).is_dir())]
+    for position, entry in enumerate(directories):
+        if entry and ('\0' in entry or not FilePath(entry).is_dir()):
+            tree.suspicious(path, f'{show(entry)} is no directory', at=(*path, position))
 
 
-class _Override:
-    """Sentences that need to know more than the schema does."""
-
-    def __init__(self, tree: Tree) -> None:
-        self._tree = tree
-
-    def __call__(self, path: Path, value: Any, keyword: str) -> str | None:
-        if keyword == 'not' and path[:1] == ('buses',):
-            return 'set by the bridge itself, allowed is to leave it out'
-        if path[:1] != ('drives',) or len(path) != 3:
-            return None
-        if path[2] == 'protocol' and keyword != 'required':
-            return _unknown_protocol(value) if keyword == 'enum' else ''
-        protocol = self._tree.data['drives'][path[1]].get('protocol')
-        if keyword == 'not':
-            owners = [family.name for family in FAMILIES.values()
-                      if path[2] in family.options_schema]
-            return f'a key of {", ".join(owners)}, allowed with {protocol} is to leave it out'
-        if keyword == 'additionalProperties':
-            return self._unknown_key(str(path[2]), protocol)
+def _sentence(tree: Tree, path: Path, value: Any, keyword: str) -> str | None:
+    """Say what needs to know more than the schema does, see :data:`schema_check.Override`."""
+    if path[:1] != ('drives',) or len(path) != 3 or keyword not in (
+            'enum', 'type', 'additionalProperties'):
         return None
-
-    def _unknown_key(self, key: str, protocol: Any) -> str | None:
-        family = FAMILIES.get(protocol) if isinstance(protocol, str) else None
-        common = [name for name in definition('drive')['properties']
-                  if not any(name in other.options_schema for other in FAMILIES.values())]
-        if family is not None:
-            return f'unknown key, {suggestion(key, [*common, *family.options_schema])}'
-        options = {name for other in FAMILIES.values() for name in other.options_schema}
-        if key in options:      # perhaps of the family that is meant
+    if path[2] == 'protocol' and keyword != 'additionalProperties':
+        if keyword == 'type':  # is told as a value that is unknown
             return ''
-        return f'unknown key, {suggestion(key, common)}'
-
-
-def _unknown_protocol(value: Any) -> str:
-    available = ', '.join(FAMILIES)
-    if not isinstance(value, str):
-        return f'{show(value)} is no protocol; available: {available}'
-    return f'{show(value)} is unknown{hint(value, FAMILIES)}; available: {available}'
+        what = f'unknown{hint(value, FAMILIES)}' if isinstance(value, str) else 'no protocol'
+        return f'{show(value)} is {what}; available: {", ".join(FAMILIES)}'
+    if keyword != 'additionalProperties':
+        return None
+    protocol = tree.data['drives'][path[1]].get('protocol')
+    family = FAMILIES.get(protocol) if isinstance(protocol, str) else None
+    if family is None and path[2] in ALL_OPTIONS:  # perhaps of the family that is meant
+        return ''
+    known = [name for name in definition('drive')['properties'] if name not in ALL_OPTIONS]
+    return 'unknown key, ' + suggestion(
+        str(path[2]), [*known, *(family.options_schema if family else ())])

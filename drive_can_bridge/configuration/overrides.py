@@ -5,17 +5,15 @@ from array import array
 from collections.abc import Mapping
 from typing import Any
 
-from drive_can_bridge.configuration.problems import Path, Problem, Tree
+from drive_can_bridge.configuration.problems import Path, Tree
 
 
-def tree_from_overrides(overrides: Mapping[str, object]) -> tuple[Tree, list[Problem]]:
+def tree_from_overrides(overrides: Mapping[str, object]) -> Tree:
     """
     Nest dotted names.
 
     rcl turns ``[]`` into a parameter without type, which rclpy shows as None; hence None is the
-    empty list.
-
-    :return: the tree, and a problem for every name that is a value and holds others.
+    empty list. A name that is a value and holds others is noted as a problem.
     """
     tree = Tree({})
     holders: dict[Path, str | int] = {}
@@ -32,9 +30,9 @@ def tree_from_overrides(overrides: Mapping[str, object]) -> tuple[Tree, list[Pro
                 break
         else:
             target[path[-1]] = _plain(overrides[name])
-    return tree, [
-        tree.problem(path, f"has a value, and '{below}' below it; allowed is one of them")
-        for path, below in holders.items()]
+    for path, below in holders.items():
+        tree.wrong(path, f"has a value, and '{below}' below it; allowed is one of them")
+    return tree
 
 
 def _plain(value: object) -> object:

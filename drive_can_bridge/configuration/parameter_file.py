@@ -8,12 +8,16 @@ holds ``buses``. What makes rcl refuse the whole file counts in every section, w
 parameters counts in ours.
 """
 
-from dataclasses import dataclass
 from pathlib import Path as FilePath
 import re
+from typing import NamedTuple
 
-from drive_can_bridge.configuration.problems import Path, Problem, show, suggestion, Tree
-from drive_can_bridge.configuration.reader import BrokenYaml, DUPLICATE, Events, Rules, TreeReader
+from drive_can_bridge.configuration.problems import Path, Problem, Tree
+from drive_can_bridge.configuration.tree_reader import DUPLICATE, Rules, TreeReader
+from drive_can_bridge.configuration.yaml_nodes import (
+    BrokenYaml, Kind, Node, read_documents,
+)
+from drive_can_bridge.core.words import show, suggestion
 
 PARAMETERS_KEY = 'ros__parameters'
 #: tells the section of a bridge from those of other nodes
@@ -22,87 +26,78 @@ MARK = 'buses'
 _TOKEN = re.compile(r'[A-Za-z_][A-Za-z0-9_]*|\*\*?', re.ASCII)
 
 
-@dataclass(frozen=True)
-class Section:
-    """The parameters of one node name."""
+class Section(NamedTuple):
+    """The parameters of one node name; the tree has the problems that only they have."""
 
     name: str
     tree: Tree
-    garbled: list[Problem]
 
 
-class FileReader:
-    """Read all sections of a parameter file, and note what rcl does not take."""
+class _FileReader:
+    """
+    Read all sections of a parameter file, and note what rcl does not take.
 
-    def __init__(self, file: str) -> None:
+    :raises OSError: the file cannot be read.
+    """
+
+    def __init__(self, path: FilePath) -> None:
         self.sections: list[Section] = []
         self.problems: list[Problem] = []
         self.broken = False
-        self._file = file
-
-    def read(self, data: bytes) -> None:
-        """Read a whole file. Never raises; see ``problems``."""
+        self._file = str(path)
+        self._lines: dict[Path, int] = {}
         try:
-            events = Events(data)
-            names: dict[Path, int] = {}
-            while events.head is not None:
-                if events.at('MappingStart'):
-                    self._names(events, (), names)
-                elif events.at('Scalar') or events.at('SequenceStart') or events.at('Alias'):
-                    self._note(events.line, (), 'no mapping, allowed is '
-                                                f'NODE_NAME: {{{PARAMETERS_KEY}: …}}')
-                    events.skip()
-                else:
-                    events.take()
+            documents = read_documents(path)
         except BrokenYaml as error:
             self.broken = True
-            # what was noted on the way here may only follow from what is broken
-            self.problems.clear()
             self._note(error.line, (), str(error))
+            return
+        for _, root in documents:
+            if root.kind is Kind.MAPPING:
+                self._names(root, ())
+            else:
+                self._note(root.line, (), 'no mapping, allowed is '
+                                          f'NODE_NAME: {{{PARAMETERS_KEY}: …}}')
+
+    def sections_with(self, key: str) -> list[Section]:
+        """Return the sections that have a key, or one that begins with it and a dot."""
+        return [section for section in self.sections if any(
+            str(place[0]).split('.')[0] == key for place in section.tree.lines if place)]
 
     def _note(self, line: int, path: Path, message: str) -> None:
         self.problems.append(Problem(self._file, line, '/'.join(map(str, path)) or 'yaml',
                                      message))
 
-    def _names(self, events: Events, path: Path, seen: dict[Path, int]) -> None:
+    def _names(self, node: Node, path: Path) -> None:
         """Read a mapping above ``ros__parameters``: its keys are node names or namespaces."""
-        events.take()
-        parameters_line = 0
-        while not events.at('MappingEnd'):
-            line = events.line
-            if not events.at('Scalar') or not events.head.value:
-                self._note(line, path, 'a key that is no name, allowed are node names')
-                events.skip()
-                events.skip()
+        has_parameters = False
+        for key, value in node.pairs:
+            if key.kind is not Kind.SCALAR or not key.text:
+                self._note(key.line, path, 'a key that is no name, allowed are node names')
                 continue
-            key = str(events.take().value)
-            here = (*path, key)
-            if parameters_line:
-                self._note(line, here, f'stands beside {PARAMETERS_KEY} (rcl refuses or garbles '
-                                       'the file), allowed is a section of its own')
-            if here in seen:
-                self._note(line, here, f'{DUPLICATE}, allowed is one (the first is in line '
-                                       f'{seen[here]})')
-                events.skip()
+            here = (*path, key.text)
+            if has_parameters:
+                self._note(key.line, here, f'stands beside {PARAMETERS_KEY} (rcl refuses or '
+                                           'garbles the file), allowed is a section of its own')
+            if here in self._lines:
+                self._note(key.line, here, f'{DUPLICATE}, allowed is one (the first is in line '
+                                           f'{self._lines[here]})')
                 continue
-            seen[here] = line
-            if key.startswith(PARAMETERS_KEY) and key != PARAMETERS_KEY:
+            self._lines[here] = key.line
+            if key.text == PARAMETERS_KEY:
+                has_parameters = True
+                self._parameters(value, path, key.line)
+            elif key.text.startswith(PARAMETERS_KEY):
                 # rcl compares the beginning only, and would take it for the real one.
-                self._note(line, here, f'misspelt, allowed is {PARAMETERS_KEY}')
-                events.skip()
-            elif key == PARAMETERS_KEY:
-                parameters_line = line
-                self._parameters(events, path, line)
-            elif events.at('MappingStart') and len(path) < 32:
-                self._names(events, here, seen)
+                self._note(key.line, here, f'misspelt, allowed is {PARAMETERS_KEY}')
+            elif value.kind is Kind.MAPPING:
+                self._names(value, here)
             else:
-                hint = suggestion(key, [PARAMETERS_KEY]) if path else \
+                hint = suggestion(key.text, [PARAMETERS_KEY]) if path else \
                     f'allowed is {PARAMETERS_KEY} below it'
-                self._note(line, here, f'no mapping (rcl refuses the file), {hint}')
-                events.skip()
-        events.take()
+                self._note(key.line, here, f'no mapping (rcl refuses the file), {hint}')
 
-    def _parameters(self, events: Events, path: Path, line: int) -> None:
+    def _parameters(self, node: Node, path: Path, line: int) -> None:
         name = ''
         for part in map(str, path):
             name += part if not name or name.endswith('/') else f'/{part}'
@@ -112,21 +107,13 @@ class FileReader:
         elif not all(map(_TOKEN.fullmatch, name.removeprefix('/').split('/'))):
             self._note(line, path, f'{show(name)} is no node name (rcl refuses the file), allowed '
                                    'is for example /**/drive_can_bridge')
-        if not events.at('MappingStart'):
+        if node.kind is not Kind.MAPPING:
             self._note(line, (*path, PARAMETERS_KEY), 'no mapping, allowed are parameters')
-            events.skip()
             return
-        reader = TreeReader(events, self._file, Rules.PARAMETERS)
-        try:
-            reader.read()
-        finally:
-            self.sections.append(Section(name, reader.tree, reader.garbled))
-            self.problems.extend(reader.problems)
-
-
-def _sections_with(reader: FileReader, key: str) -> list[Section]:
-    return [section for section in reader.sections
-            if any(str(place[0]).split('.')[0] == key for place in section.tree.lines if place)]
+        reader = TreeReader(self._file, Rules.PARAMETERS)
+        reader.read(node)
+        self.sections.append(Section(name, reader.tree))
+        self.problems.extend(reader.refused)
 
 
 def section_names(path: FilePath) -> list[str]:
@@ -135,9 +122,7 @@ def section_names(path: FilePath) -> list[str]:
 
     :raises OSError: the file cannot be read.
     """
-    reader = FileReader(str(path))
-    reader.read(path.read_bytes())
-    return [section.name for section in reader.sections]
+    return [section.name for section in _FileReader(path).sections]
 
 
 def duplicate_keys(path: FilePath, node: str) -> list[Problem]:
@@ -149,13 +134,12 @@ def duplicate_keys(path: FilePath, node: str) -> list[Problem]:
     :param node: full name of the node.
     :return: nothing where the file has gone since: launch removes those that it wrote.
     """
-    reader = FileReader(str(path))
     try:
-        reader.read(path.read_bytes())
+        reader = _FileReader(path)
     except OSError:
         return []
     found = [problem for section in reader.sections if _is_for(section.name, node)
-             for problem in section.garbled]
+             for problem in section.tree.problems]
     found += [problem for problem in reader.problems if _is_for(problem.key, node)]
     return [problem for problem in found if problem.message.startswith(DUPLICATE)]
 
@@ -171,32 +155,30 @@ def read_parameter_file(path: FilePath) -> tuple[Tree | None, list[Problem]]:
     """
     Read the bridge's section of a parameter file.
 
-    :return: the section's tree, or None where there is not exactly one; and what is wrong.
+    :return: the section's tree, or None where there is not exactly one; and what is wrong, which
+        a tree has, too.
     :raises OSError: the file cannot be read.
     """
-    file = str(path)
-    reader = FileReader(file)
-    reader.read(path.read_bytes())
+    reader = _FileReader(path)
     problems = reader.problems
     if reader.broken:
         return None, problems
     # one with drives, but without buses, is meant for us, too: what is wrong with it can be told
-    ours = _sections_with(reader, MARK) or _sections_with(reader, 'drives')
-    for section in ours:
-        problems.extend(section.garbled)
+    ours = reader.sections_with(MARK) or reader.sections_with('drives')
     if len(ours) == 1:
-        return ours[0].tree, problems
-    if ours:
-        first, *others = ours
-        problems.extend(
-            Problem(file, section.tree.line((MARK,)), MARK,
-                    f'in a second section, {section.name}; allowed is one section that holds it '
-                    f'(the first is {first.name})')
-            for section in others)
-    elif not problems:
+        tree = ours[0].tree
+        tree.problems[:0] = problems
+        return tree, tree.problems
+    for section in ours:
+        problems.extend(section.tree.problems)
+    for section in ours[1:]:
+        problems.append(Problem(
+            str(path), section.tree.line((MARK,)), MARK, f'in a second section, {section.name}; '
+            f'allowed is one section that holds it (the first is {ours[0].name})'))
+    if not problems:
         names = ', '.join(section.name for section in reader.sections)
         found = f'; the file has: {names}' if names else ''
         problems.append(Problem(
-            file, 1, MARK, 'no section of the file holds it, allowed is one '
-                           f'/**/drive_can_bridge: {{{PARAMETERS_KEY}: {{{MARK}: …}}}}{found}'))
+            str(path), 1, MARK, 'no section of the file holds it, allowed is one '
+            f'/**/drive_can_bridge: {{{PARAMETERS_KEY}: {{{MARK}: …}}}}{found}'))
     return None, problems

@@ -6,9 +6,11 @@ from dataclasses import replace
 import hashlib
 from pathlib import Path as FilePath
 
-from drive_can_bridge.configuration.problems import Problem, show, suggestion, Tree
+from drive_can_bridge.configuration.problems import Problem, Tree
 from drive_can_bridge.configuration.profile_check import LoadedProfile, profile_from_tree
-from drive_can_bridge.configuration.reader import BrokenYaml, Events, Rules, TreeReader
+from drive_can_bridge.configuration.tree_reader import Rules, TreeReader
+from drive_can_bridge.configuration.yaml_nodes import BrokenYaml, Kind, read_documents
+from drive_can_bridge.core.words import show, suggestion
 from drive_can_bridge.resources import profiles_directory
 
 SUFFIX = '.yaml'
@@ -32,20 +34,15 @@ class ProfileStore:
         self._loaded: dict[FilePath, LoadedProfile] = {}
 
     @property
-    def problems(self) -> list[Problem]:
-        """What is wrong in the profiles read so far."""
-        return [problem for loaded in self._loaded.values() for problem in loaded.problems]
-
-    @property
-    def warnings(self) -> list[Problem]:
-        """What is suspicious in the profiles read so far."""
-        return [warning for loaded in self._loaded.values() for warning in loaded.warnings]
+    def trees(self) -> list[Tree]:
+        """The profiles read so far, with what was found in them."""
+        return [loaded.tree for loaded in self._loaded.values()]
 
     def load(self, name: str) -> LoadedProfile | str:
         """
         Return a profile, or why there is none.
 
-        A profile that was found is returned even when it has problems: see ``problems``.
+        A profile that was found is returned even when it has problems: see ``trees``.
         """
         path = self._find(name)
         if isinstance(path, str):
@@ -95,45 +92,27 @@ def read_profile(path: FilePath) -> LoadedProfile:
 
     :raises OSError: the file cannot be read.
     """
-    data = path.read_bytes()
     file = str(path)
-    problems: list[Problem] = []
-    tree = Tree({}, file)
-    broken = True
     try:
-        events = Events(data)
-        while events.head is not None and not events.at('MappingStart'):
-            if events.at('Scalar') or events.at('SequenceStart') or events.at('Alias'):
-                break
-            events.take()
-        if events.head is not None and events.at('MappingStart'):
-            reader = TreeReader(events, file, Rules.PROFILE)
-            tree = reader.tree
-            try:
-                reader.read()
-            finally:
-                problems += reader.problems + reader.garbled
-            broken = False
-            _expect_end(events, file, problems)
-        else:
-            problems.append(Problem(file, 1, 'yaml', 'no mapping, allowed are protocols, '
-                                                     'parameters, control, description'))
+        documents = read_documents(path)
     except BrokenYaml as error:
-        # what was noted on the way here may only follow from what is broken
-        problems = [Problem(file, error.line, 'yaml', str(error))]
-        broken = True
-    if broken:
-        tree.damaged.add(())
+        return _unusable(file, error.line, str(error))
+    if not documents or documents[0].root.kind is not Kind.MAPPING:
+        return _unusable(file, 1, 'no mapping, allowed are protocols, parameters, control, '
+                                  'description')
+    reader = TreeReader(file, Rules.PROFILE)
+    reader.read(documents[0].root)
+    tree = reader.tree
+    tree.problems[:0] = reader.refused
+    if len(documents) > 1:
+        tree.problems.append(Problem(file, documents[1].line, 'yaml', 'a second document, allowed '
+                                                                      'is one'))
+    return profile_from_tree(tree)
+
+
+def _unusable(file: str, line: int, message: str) -> LoadedProfile:
+    tree = Tree({}, file, damaged={()})
     loaded = profile_from_tree(tree)
-    # What follows from a file that could not be read to its end is not worth mentioning.
-    loaded.problems[:] = problems if broken else problems + loaded.problems
+    # what follows from a file that could not be read is not worth mentioning
+    tree.problems[:] = [Problem(file, line, 'yaml', message)]
     return loaded
-
-
-def _expect_end(events: Events, file: str, problems: list[Problem]) -> None:
-    while events.head is not None:
-        if events.at('DocumentStart'):
-            problems.append(Problem(file, events.line, 'yaml', 'a second document, allowed is '
-                                                               'one'))
-            return
-        events.take()

@@ -4,16 +4,17 @@
 from collections.abc import Iterator
 from typing import Any
 
-from drive_can_bridge.configuration.problems import Path, Problem, show, suggestion, Tree
+from drive_can_bridge.configuration.control_check import look_up
+from drive_can_bridge.configuration.problems import Path, Tree
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.core.profile import RestoreStep, RestoreTable
+from drive_can_bridge.core.words import show, suggestion
 
 _PHASES = ('before', 'after')
 
 
-def check_identity(tree: Tree, parameters: dict[str, Parameter],
-                   names: tuple[str, ...]) -> Iterator[Problem]:
+def check_identity(tree: Tree, parameters: dict[str, Parameter], names: tuple[str, ...]) -> None:
     """
     Check the ``identity`` section of a profile's tree.
 
@@ -23,47 +24,41 @@ def check_identity(tree: Tree, parameters: dict[str, Parameter],
     seen: set[str] = set()
     for position, name in enumerate(tree.data.get('identity', ())):
         at = ('identity', position)
-        parameter = parameters.get(name)
         if name in seen:
-            yield tree.problem(('identity',), f'{show(name)} stands twice, allowed is once', at=at)
-        elif parameter is None:
-            yield from _unknown(tree, ('identity',), name, names, at)
-        elif not parameter.readable:
-            yield tree.problem(('identity',), f'{show(name)} is write-only, allowed are '
-                                              'parameters with access ro or rw', at=at)
+            tree.wrong(('identity',), f'{show(name)} stands twice, allowed is once', at=at)
+            continue
+        parameter = look_up(tree, ('identity',), name, parameters, names, at=at)
+        if parameter is not None and not parameter.readable:
+            tree.wrong(('identity',), f'{show(name)} is write-only, allowed are parameters with '
+                                      'access ro or rw', at=at)
         seen.add(name)
 
 
-def check_restore(tree: Tree, parameters: dict[str, Parameter],
-                  names: tuple[str, ...]) -> Iterator[Problem]:
+def check_restore(tree: Tree, parameters: dict[str, Parameter], names: tuple[str, ...]) -> None:
     """Check the ``restore`` section likewise."""
     for phase, name, value in _steps(tree):
         path = ('restore', phase, name)
-        parameter = parameters.get(name)
+        parameter = look_up(tree, path, name, parameters, names)
         if parameter is None:
-            yield from _unknown(tree, path, name, names, path)
-        elif not parameter.writable:
-            yield tree.problem(path, f'{show(name)} is read-only, allowed are parameters with '
-                                     'access rw or wo')
+            continue
+        if not parameter.writable:
+            tree.wrong(path, f'{show(name)} is read-only, allowed are parameters with access rw '
+                             'or wo')
         elif isinstance(value, dict):
-            yield from _check_bits(tree, path, parameter, value)
+            _check_bits(tree, path, parameter, value)
         else:
             try:
                 parameter.raw_from_value(value)
-            except (ValueRefused, OverflowError):
+            except ValueRefused:
                 allowed = 'true or false' if parameter.type is ParameterType.BOOL \
                     else parameter.range_text
-                yield tree.problem(path, f'{show(value)} cannot be written, allowed is {allowed}')
+                tree.wrong(path, f'{show(value)} cannot be written, allowed is {allowed}')
 
 
-def restore_table(tree: Tree, parameters: dict[str, Parameter], *, usable: bool) -> RestoreTable:
-    """
-    Make the table of the section.
-
-    :param usable: False: something is wrong in it, and nothing of it may be used.
-    """
-    damaged = any(place[:1] == ('restore',) for place in tree.damaged)
-    if not usable or damaged or any(name not in parameters for _, name, _ in _steps(tree)):
+def restore_table(tree: Tree, parameters: dict[str, Parameter]) -> RestoreTable:
+    """Make the table of the section; where something is wrong, nothing of it may be used."""
+    if not tree.is_sound(('restore',)) or any(
+            name not in parameters for _, name, _ in _steps(tree)):
         return RestoreTable()
     made: dict[str, list[RestoreStep]] = {phase: [] for phase in _PHASES}
     for phase, name, value in _steps(tree):
@@ -84,16 +79,15 @@ def _step(parameter: Parameter, value: Any) -> RestoreStep:
     return RestoreStep(parameter.name, bits, mask)
 
 
-def _check_bits(tree: Tree, path: Path, parameter: Parameter,
-                value: dict[str, bool]) -> Iterator[Problem]:
+def _check_bits(tree: Tree, path: Path, parameter: Parameter, value: dict[str, bool]) -> None:
     known = [bit for bit, _ in parameter.bits]
     for bit in value:
         if bit not in known:
-            yield tree.problem((*path, bit), f'{show(bit)} is no bit of {parameter.name}, '
-                                             f'{suggestion(bit, known)}')
+            tree.wrong((*path, bit), f'{show(bit)} is no bit of {parameter.name}, '
+                                     f'{suggestion(bit, known)}')
     if not parameter.readable:
-        yield tree.problem(path, f'{show(parameter.name)} is write-only: its other bits cannot be '
-                                 'kept, allowed is a value')
+        tree.wrong(path, f'{show(parameter.name)} is write-only: its other bits cannot be kept, '
+                         'allowed is a value')
 
 
 def _steps(tree: Tree) -> Iterator[tuple[str, str, Any]]:
@@ -103,10 +97,3 @@ def _steps(tree: Tree) -> Iterator[tuple[str, str, Any]]:
         if isinstance(steps, dict):
             for name, value in steps.items():
                 yield phase, name, value
-
-
-def _unknown(tree: Tree, path: Path, name: str, names: tuple[str, ...],
-             at: Path) -> Iterator[Problem]:
-    """Complain about a name that is not in the table; one with problems of its own is known."""
-    if name not in names and not tree.is_damaged(('parameters',)):
-        yield tree.problem(path, f'{show(name)} is unknown, {suggestion(name, names)}', at=at)

@@ -7,8 +7,6 @@ find either good values or none.
 """
 
 from collections.abc import Callable, Iterator
-from copy import deepcopy
-from dataclasses import replace
 import math
 import re
 from typing import Any
@@ -17,10 +15,9 @@ from jsonschema import Draft202012Validator
 from jsonschema.exceptions import ValidationError
 from jsonschema.validators import extend
 
-from drive_can_bridge.configuration.problems import (
-    describe_type, hint, Path, Problem, show, suggestion, Tree,
-)
+from drive_can_bridge.configuration.problems import Path, Tree
 from drive_can_bridge.configuration.schema import Schema
+from drive_can_bridge.core.words import describe_type, hint, show, suggestion, value_text
 
 #: gives another sentence for an error, or None to keep the usual one; '' hides it
 Override = Callable[[Path, Any, str], 'str | None']
@@ -47,27 +44,24 @@ _Validator = extend(
 
 
 def check_schema(tree: Tree, schema: Schema, start: str = '', *,
-                 override: Override | None = None) -> tuple[Tree, list[Problem]]:
+                 override: Override | None = None) -> None:
     """
-    Check a tree.
+    Check a tree, note what is wrong in it, and cut that out.
 
     :param schema: a whole schema document.
     :param start: name of the definition that describes the tree; '' for the document itself.
     :param override: see :data:`Override`; called with path, value and the violated keyword.
-    :return: the tree without what is wrong, and the problems.
     """
     root: Schema = {'$ref': f'#/$defs/{start}', '$defs': schema['$defs']} if start else schema
-    sound = replace(tree, data=deepcopy(tree.data), damaged=set(tree.damaged))
-    problems: list[Problem] = []
+    found: list[tuple[Path, str, Path]] = []
     for error in _Validator(root).iter_errors(tree.data):
         for path, message, at in _sentences(error, tree):
-            if override is not None:
-                changed = override(path, error.instance, str(error.validator))
-                message = message if changed is None else changed
-            _cut(sound, path)
-            if message:
-                problems.append(tree.problem(path, message, at=at))
-    return sound, problems
+            changed = override(path, error.instance, str(error.validator)) if override else None
+            found.append((path, message if changed is None else changed, at))
+    for path, message, at in found:
+        tree.cut(path)
+        if message:
+            tree.wrong(path, message, at=at)
 
 
 def check_value(value: Any, schema: Schema) -> str | None:
@@ -75,16 +69,6 @@ def check_value(value: Any, schema: Schema) -> str | None:
     for error in _Validator(schema).iter_errors(value):
         return _message(error)
     return None
-
-
-def _cut(tree: Tree, path: Path) -> None:
-    """Remove a value that is not to be used."""
-    tree.damaged.add(path)
-    parent: Any = tree.data
-    for part in path[:-1]:
-        parent = parent.get(part) if isinstance(parent, dict) else None
-    if isinstance(parent, dict) and path:
-        parent.pop(path[-1], None)
 
 
 def _sentences(error: ValidationError, tree: Tree) -> Iterator[tuple[Path, str, Path]]:
@@ -116,6 +100,8 @@ def _sentences(error: ValidationError, tree: Tree) -> Iterator[tuple[Path, str, 
 
 def _message(error: ValidationError) -> str:
     value, schema = error.instance, error.schema
+    if error.validator == 'not' and 'errorMessage' in schema:
+        return str(schema['errorMessage'])
     if error.validator == 'type':
         if isinstance(value, float) and not math.isfinite(value):
             return f'{show(value)} is not a finite number, allowed is {allowed(schema)}'
@@ -128,8 +114,6 @@ def _message(error: ValidationError) -> str:
         return f'{show(value)} is unknown{remark}, allowed is {allowed(schema)}'
     if error.validator in ('minimum', 'maximum'):
         return f'{show(value)} is out of range, allowed is {allowed(schema)}'
-    if error.validator == 'not' and not error.validator_value:
-        return 'not allowed here, allowed is to leave it out'
     if error.validator == 'not':
         return f'{show(value)} is useless, allowed is any other number'
     if error.validator == 'minLength':
@@ -166,7 +150,7 @@ def allowed(schema: Any) -> str:
         return f'a list of {count}{noun}s' + (f' of {limits}' if limits else '')
     low, high = schema.get('minimum'), schema.get('maximum')
     if low is not None and high is not None:
-        return f'{text} of {low:.12g} to {high:.12g}'
+        return f'{text} of {value_text(low)} to {value_text(high)}'
     if low is not None:
-        return f'{text} of at least {low:.12g}'
+        return f'{text} of at least {value_text(low)}'
     return text

@@ -62,7 +62,7 @@ class DriveConfiguration:
     :param cyclic_request: parameters sent each cycle, in slot order (control word included where
         the configuration lists it).
     :param cyclic_response: parameters received each cycle, in slot order.
-    :param family_options: the keys that only this protocol family has, with defaults filled in.
+    :param options: the keys that only this protocol family has: its own frozen dataclass.
     :param profile_key: the profile as the configuration names it.
     """
 
@@ -82,7 +82,7 @@ class DriveConfiguration:
     verify_writes: bool = True
     control_timeout: float = 2.0
     joint: JointConfiguration | None = None
-    family_options: dict[str, Any] = field(default_factory=dict)
+    options: Any = None
     profile_key: str = ''
 
 

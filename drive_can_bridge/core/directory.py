@@ -8,13 +8,13 @@ storage, limits. Only its value is raw: the unsigned integer on the wire.
 
 from collections.abc import Callable
 from dataclasses import replace
-import difflib
 
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import (
     Access, Parameter, ParameterType, Storage, ValueKind,
 )
 from drive_can_bridge.core.text import printable
+from drive_can_bridge.core.words import nearest
 
 
 # Strictest first: where several listed parameters have one address, a raw name obeys them all.
@@ -65,9 +65,9 @@ class ParameterDirectory:
 
     def unknown(self, name: str, *, hint: bool = True) -> str:
         """Say that a name is unknown, with the nearest known one (which takes milliseconds)."""
-        near = difflib.get_close_matches(name, self.listed, n=1) if hint else []
+        near = nearest(name, self.listed) if hint else None
         shown = printable(name, NAME_SHOWN)
-        return f'unknown parameter {shown}' + (f', did you mean {near[0]}?' if near else '')
+        return f'unknown parameter {shown}' + (f', did you mean {near}?' if near else '')
 
     def raw_from_user(self, parameter: Parameter, value: object) -> int:
         """

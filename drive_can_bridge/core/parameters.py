@@ -18,6 +18,7 @@ import math
 from typing import Union
 
 from drive_can_bridge.core.errors import ValueRefused
+from drive_can_bridge.core.words import value_text
 
 Value = Union[float, int, bool]
 
@@ -203,18 +204,20 @@ class Parameter:
         self.check_limits(value)
         if not self.scaled:
             if isinstance(value, float) and not value.is_integer():
-                raise ValueRefused(f'{value:.12g} is not an integer')
+                raise ValueRefused(f'{value_text(value)} is not an integer')
             raw = int(value)
         else:
             raw = math.floor(self._steps(value) + 0.5)
         low, high = self.type.raw_range
         if not low <= raw <= high:
-            raise ValueRefused(f'{value:.12g} is not representable: {self.type.value} carries '
-                               f'{_in_words(self.value_range)}{self._unit_suffix}')
+            raise ValueRefused(
+                f'{value_text(value)} is not representable: {self.type.value} carries '
+                f'{_in_words(self.value_range)}{self._unit_suffix}')
         low, high = self.raw_limits
         if low > high:
-            raise ValueRefused(f'{value:.12g} is not representable: {self.type.value} has no '
-                               f'value in {self.range_text}')
+            raise ValueRefused(
+                f'{value_text(value)} is not representable: {self.type.value} has no value in '
+                f'{self.range_text}')
         return min(max(raw, low), high)
 
     @cached_property
@@ -252,18 +255,20 @@ class Parameter:
         below = self.minimum is not None and value < self.minimum - slack
         above = self.maximum is not None and value > self.maximum + slack
         if below or above:
-            raise ValueRefused(f'{value:.12g} is out of range: {self.range_text}')
+            raise ValueRefused(f'{value_text(value)} is out of range: {self.range_text}')
 
     @property
     def range_text(self) -> str:
         """Allowed physical range in words, ``-3000 to 3000 rpm``."""
-        if self.minimum is None and self.maximum is None:
-            return f'{_in_words(self.value_range)}{self._unit_suffix}'
-        if self.minimum is None:
-            return f'at most {self.maximum:.12g}{self._unit_suffix}'
-        if self.maximum is None:
-            return f'at least {self.minimum:.12g}{self._unit_suffix}'
-        return f'{_in_words((self.minimum, self.maximum))}{self._unit_suffix}'
+        if self.minimum is not None and self.maximum is not None:
+            text = _in_words((self.minimum, self.maximum))
+        elif self.minimum is not None:
+            text = f'at least {value_text(self.minimum)}'
+        elif self.maximum is not None:
+            text = f'at most {value_text(self.maximum)}'
+        else:
+            text = _in_words(self.value_range)
+        return text + self._unit_suffix
 
     @property
     def _unit_suffix(self) -> str:
@@ -271,4 +276,4 @@ class Parameter:
 
 
 def _in_words(ends: tuple[float, float]) -> str:
-    return f'{ends[0]:.12g} to {ends[1]:.12g}'
+    return f'{value_text(ends[0])} to {value_text(ends[1])}'

@@ -4,7 +4,6 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
-from drive_can_bridge.configuration.schema import family_defaults
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.protocols.families import FAMILIES
@@ -27,18 +26,17 @@ def family_complaints(profile: Profile, protocol: str) -> list[Complaint]:
     return min(found, key=len)
 
 
-def _options(family: Family) -> Iterator[dict[str, object]]:
-    options = {**family_defaults(family), **family.station_defaults(1)}
+def _options(family: Family) -> Iterator[object]:
     key, values = _CHOICES.get(family.name, ('', ()))
-    yield from ({**options, key: value} for value in values) if values else (options,)
+    for given in [{key: value} for value in values] or [{}]:
+        yield family.make_options(1, given)
 
 
-def _complaints(profile: Profile, family: Family,
-                options: dict[str, object]) -> Iterator[Complaint]:
+def _complaints(profile: Profile, family: Family, options: object) -> Iterator[Complaint]:
     if family.control_built_in:
         profile = replace(profile, control=None)
     drive = DriveConfiguration(name='drive', bus='bus', protocol=family.name, station=1,
-                               profile=profile, family_options=options)
+                               profile=profile, options=options)
     for complaint in family.check(drive):
         if complaint.key.startswith(_OURS):
             yield complaint._replace(key=complaint.key.removeprefix(_OURS))

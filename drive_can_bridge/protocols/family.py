@@ -8,6 +8,7 @@ through the row in :mod:`drive_can_bridge.protocols.families`.
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -15,6 +16,7 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Route
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.session import Session
+from drive_can_bridge.protocols.options import FamilyOptions, make_options, options_schema
 
 
 class Complaint(NamedTuple):
@@ -62,18 +64,27 @@ class Family(ABC):
     cyclic: bool
     #: knows control and status word by itself; profiles have no ``control`` section
     control_built_in: bool = False
-    #: JSON Schema properties of the keys that only this family has; each has a ``default``
-    options_schema: dict[str, Any]
+    #: the keys that only this family has
+    options_type: type[FamilyOptions] = FamilyOptions
     #: keys that all families have, but whose default is another one here
     drive_defaults: Mapping[str, Any] = MappingProxyType({})
+
+    @cached_property
+    def options_schema(self) -> dict[str, Any]:
+        """JSON Schema properties of the keys that only this family has."""
+        return options_schema(self.options_type)
+
+    def make_options(self, station: int, given: Mapping[str, Any]) -> Any:
+        """
+        Make the options of a drive.
+
+        :param given: values that fit the schema; the others get their defaults.
+        """
+        return make_options(self.options_type, given)
 
     @abstractmethod
     def check(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         """Yield everything that this family cannot do with the drive as configured."""
-
-    def station_defaults(self, station: int) -> dict[str, Any]:
-        """Return the default values of keys of this family that depend on the station."""
-        return {}
 
     def check_together(self, drives: Sequence[DriveConfiguration],
                        ) -> Iterator[tuple[DriveConfiguration, Complaint]]:

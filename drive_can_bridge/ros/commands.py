@@ -34,10 +34,11 @@ from drive_can_bridge.core.parameters import Value, ValueKind
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.setpoints import CommandOutcome
 from drive_can_bridge.core.text import printable
+from drive_can_bridge.core.words import value_text
 from drive_can_bridge.ros.command_topic import CommandTopic
 from drive_can_bridge.ros.polled_group import PolledGroup
 from drive_can_bridge.ros.quality import command_quality, overriding
-from drive_can_bridge.ros.values import TOPIC_TYPES, value_text
+from drive_can_bridge.ros.values import TOPIC_TYPES
 
 RCLError = rclpy_implementation.RCLError
 

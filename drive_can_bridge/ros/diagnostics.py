@@ -12,10 +12,10 @@ from rclpy.qos import QoSProfile
 from drive_can_bridge.core.session import DriveState
 from drive_can_bridge.core.statistics import Statistic
 from drive_can_bridge.core.text import printable
+from drive_can_bridge.core.words import value_text
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.ros.drive_node import DriveNode
 from drive_can_bridge.ros.quality import overriding
-from drive_can_bridge.ros.values import value_text
 from drive_can_bridge.transport.error_frames import ADVICE_DISTURBED, BUS_OFF, BusError
 from drive_can_bridge.transport.link import steady_now
 

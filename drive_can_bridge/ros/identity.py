@@ -13,7 +13,7 @@ from functools import partial
 
 from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.core.requests import Failure, Outcome, ReadRequest, ReadValue
-from drive_can_bridge.ros.values import value_text
+from drive_can_bridge.core.words import value_text
 
 #: reads in a row that failed, after which the drive is left alone
 FAILURES_MAX = 2

@@ -68,11 +68,6 @@ def value_of(message: ParameterValue) -> object:
     return value if isinstance(value, (bool, int, float, str)) else list(value)
 
 
-def value_text(value: Value) -> str:
-    """Write a value as one would publish it: ``0``, ``12.5``, ``false``."""
-    return str(value).lower() if isinstance(value, bool) else f'{value:.12g}'
-
-
 def constraints(parameter: Parameter, role: Role | None) -> str:
     """
     Return what tools want to know of a parameter: ``unit="N m" number=209 type=int16 …``.

@@ -50,17 +50,17 @@ class SimulatedCannordInverter(SimulatedDrive):
         super().__init__(configuration, surroundings)
         if not isinstance(self.plant, InverterPlant):
             raise ConfigurationError([f'{self.name}: an inverter needs an InverterPlant'])
-        options = configuration.family_options
+        options = configuration.options
         self._requested = configuration.cyclic_request
         self._reported = configuration.cyclic_response
         self.table = CannordTable(configuration.profile.parameters, self.registers)
         self._timeout_parameter = self.table.numbered(TELEGRAM_TIMEOUT)
         self._leaves_factory(TELEGRAM_TIMEOUT, 0)
         self._leaves_factory(CAN_ADDRESS, configuration.station)
-        self._extended: bool = options['extended_identifiers']
-        self._swap: bool = options['swap_setpoints_2_3']
-        self._extra: bool = options['extra_setpoints']
-        self._layout = ParameterLayout(options['value_order'], options['index_byte'])
+        self._extended: bool = options.extended_identifiers
+        self._swap: bool = options.swap_setpoints_2_3
+        self._extra: bool = options.extra_setpoints
+        self._layout = ParameterLayout(options.value_order, options.index_byte)
         self._identifiers = {kind: self._identifier(kind) for kind in MessageObject}
         self._broadcasts = _broadcast_identifiers(configuration)
         self._length = SHORT_LENGTH
@@ -71,7 +71,7 @@ class SimulatedCannordInverter(SimulatedDrive):
     @classmethod
     def routes(cls, configuration: DriveConfiguration) -> list[Route]:
         """Return the four identifiers of the address, and the broadcasts that are listened to."""
-        extended = configuration.family_options['extended_identifiers']
+        extended = configuration.options.extended_identifiers
         own = [identifiers.identifier(kind, configuration.station, extended=extended)
                for kind in MessageObject]
         return [identifiers.route(value, extended=extended)
@@ -254,9 +254,9 @@ class SimulatedCannordInverter(SimulatedDrive):
 
 def _broadcast_identifiers(configuration: DriveConfiguration) -> tuple[int, ...]:
     """Return the identifiers of the broadcasts that an inverter obeys: both, or none."""
-    options = configuration.family_options
-    if options['broadcast'] == 'none':
+    options = configuration.options
+    if options.broadcast == 'none':
         return ()
-    extended = options['extended_identifiers']
+    extended = options.extended_identifiers
     return (identifiers.group_identifier(configuration.station, extended=extended),
             identifiers.all_identifier(extended=extended))

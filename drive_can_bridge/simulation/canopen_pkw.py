@@ -52,12 +52,12 @@ class SimulatedPkwDrive(SimulatedDrive):
     def __init__(self, configuration: DriveConfiguration,
                  surroundings: Surroundings = ALONE) -> None:
         super().__init__(configuration, surroundings)
-        options = configuration.family_options
+        options = configuration.options
         self.table = RegisterTable(configuration, self.registers)
-        self._layout = pkw.Layout(options['layout'])
-        self._abort_code_order: str = options['abort_code_order']
+        self._layout = pkw.Layout(options.layout)
+        self._abort_code_order: str = options.abort_code_order
         self._identifiers = Identifiers.of(configuration)
-        watched: float = options['heartbeat_timeout']
+        watched: float = options.heartbeat_timeout
         self.node = CanopenNode(
             configuration.station, name=DEVICE_NAME, objects=_DeviceObjects(self),
             heartbeat=round(1000.0 * watched / HEARTBEATS_WATCHED) if watched else HEARTBEAT)

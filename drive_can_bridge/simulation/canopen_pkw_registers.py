@@ -43,7 +43,7 @@ class RegisterTable:
 
     def __init__(self, configuration: DriveConfiguration, registers: Registers) -> None:
         self._registers = registers
-        self._word_order: str = configuration.family_options['word_order']
+        self._word_order: str = configuration.options.word_order
         self._cells: dict[Address, Cell] = {}
         parameters = list(registers.parameters.values())
         # what the profile says goes before what follows from the table of the vendor

@@ -95,9 +95,9 @@ class StandardWire(Wire):
     """11-bit identifiers: reads of one to four parameters, writes of one, nothing cyclic."""
 
     def __init__(self, configuration: DriveConfiguration) -> None:
-        options, self._station = configuration.family_options, configuration.station
-        self._request = standard.identifier(options['request_id_base'], self._station)
-        self._response = standard.identifier(options['response_id_base'], self._station)
+        options, self._station = configuration.options, configuration.station
+        self._request = standard.identifier(options.request_id_base, self._station)
+        self._response = standard.identifier(options.response_id_base, self._station)
 
     def routes(self) -> list[Route]:
         return [Route(identifier, STANDARD_IDENTIFIER_MAX, False)

@@ -21,9 +21,9 @@ _CLOCK_TOLERANCE = 1e-6
 
 def map_parameters(configuration: DriveConfiguration) -> dict[str, Parameter]:
     """Return the entries of both maps that the profile does not list, ``p122`` and so on."""
-    options = configuration.family_options
+    options = configuration.options
     listed = {parameter.number for parameter in configuration.profile.parameters.values()}
-    numbers = [base + slot for base in (options['request_map_base'], options['response_map_base'])
+    numbers = [base + slot for base in (options.request_map_base, options.response_map_base)
                for slot in range(SLOTS)]
     return {f'p{number}': Parameter(f'p{number}', number=number, storage=Storage.EEPROM)
             for number in numbers if number not in listed}
@@ -39,8 +39,8 @@ class DataModelTable:
 
     def __init__(self, configuration: DriveConfiguration, registers: Registers, *,
                  eeprom_time: float, violation: Callable[[str], None]) -> None:
-        options = configuration.family_options
-        self._offset: int = options['parameter_offset']
+        options = configuration.options
+        self._offset: int = options.parameter_offset
         self._registers = registers
         self._eeprom_time = eeprom_time
         self._violation = violation
@@ -50,12 +50,12 @@ class DataModelTable:
             if p.number is not None}
         # what is sent again and again is volatile, unless the profile says otherwise
         self._volatile = {p.name for p in configuration.cyclic_request if p.storage is None}
-        self._request_entries = self._entries(options['request_map_base'])
-        self._response_entries = self._entries(options['response_map_base'])
+        self._request_entries = self._entries(options.request_map_base)
+        self._response_entries = self._entries(options.response_map_base)
         self._maps = {*self._request_entries, *self._response_entries}
         self.clear_maps()
         # with 11-bit identifiers there is no mapping, and as little to configure
-        if options.get('mapping') != 'configure':
+        if getattr(configuration.options, 'mapping', '') != 'configure':
             self._preset(self._request_entries, configuration.cyclic_request)
             self._preset(self._response_entries, configuration.cyclic_response)
 

@@ -8,12 +8,12 @@ A fault is written ``silent`` or ``late=0.15``. Some are states, which add up an
 
 from collections.abc import Callable
 from dataclasses import dataclass
-import difflib
 from enum import Enum
 import math
 
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.words import nearest
 
 Argument = float | int | str
 
@@ -91,8 +91,8 @@ def parse_fault(text: str) -> Fault:
     word, equals, argument = (part.strip() for part in text.partition('='))
     kind = _BY_WORD.get(word)
     if kind is None:
-        near = difflib.get_close_matches(word, _BY_WORD, 1)
-        hint = f' (nearest: {near[0]})' if near else ''
+        near = nearest(word, _BY_WORD)
+        hint = f' (nearest: {near})' if near else ''
         raise ValueRefused(f"unknown fault '{word}'{hint}; allowed: "
                            f"{', '.join(usage for usage, _ in USAGE)}")
     if not equals and not kind.required:

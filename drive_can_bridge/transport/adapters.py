@@ -9,7 +9,6 @@ unknown keywords silently.
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-import difflib
 import importlib
 import inspect
 import logging
@@ -17,6 +16,8 @@ from typing import Any
 
 import can
 import can.interfaces
+
+from drive_can_bridge.core.words import show, suggestion
 
 
 def adapter_keywords(interface: str) -> set[str] | None:
@@ -46,9 +47,7 @@ def check_interface(interface: str) -> str | None:
     """Say why an interface can never be used on this machine; None: it may."""
     known = sorted(can.interfaces.BACKENDS)
     if interface not in can.interfaces.BACKENDS:
-        match = difflib.get_close_matches(interface, known, n=1)
-        hint = f"did you mean '{match[0]}'?" if match else f'allowed: {", ".join(known)}'
-        return f"'{interface}' is no interface of python-can, {hint}"
+        return f'{show(interface)} is no interface of python-can, {suggestion(interface, known)}'
     try:
         adapter = _adapter_class(interface)
     except _Unusable as error:

@@ -8,6 +8,10 @@ from typing import Any
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.errors import ConfigurationError
+from drive_can_bridge.protocols.families import FAMILIES
+
+#: the families as a sentence lists them
+PROTOCOLS = f'{", ".join(list(FAMILIES)[:-1])} or {list(FAMILIES)[-1]}'
 
 #: a good file; tests change a line of it. The line numbers in tests count from here.
 FILE = """\

@@ -27,6 +27,9 @@ CASES = [
       '1000000']),
     ('bitrate: 125000', 'bitrat: 125000',
      ["f.yaml:8: buses.main.bitrat: unknown key, did you mean 'bitrate'?"]),
+    ('bitrate: 125000', 'can_filter: 1',
+     ["f.yaml:8: buses.main.can_filter: unknown key, did you mean 'can_filters'? It is set by the "
+      'bridge itself']),
     ('bitrate: 125000', 'reconect_period: 1',
      ["f.yaml:8: buses.main.reconect_period: unknown key, did you mean 'reconnect_period'?"]),
     ('bitrate: 125000', 'reconnect_period: 0',

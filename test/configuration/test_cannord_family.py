@@ -1,6 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The family table's row of CANnord, and parameter files with such drives."""
 
+from dataclasses import asdict
 from pathlib import Path
 
 from configuration_builders import changed, load, problems, warnings
@@ -82,7 +83,7 @@ def test_a_good_file(tmp_path: Path) -> None:
     assert problems(tmp_path, FILE, PROFILE) == []
     assert warnings(tmp_path, FILE, PROFILE) == []
     lift = load(tmp_path, FILE, PROFILE).drives['lift']
-    assert lift.family_options == {
+    assert asdict(lift.options) == {
         'extended_identifiers': False, 'broadcast': 'none', 'value_order': 'high_first',
         'index_byte': 'low', 'swap_setpoints_2_3': False, 'extra_setpoints': False,
         'parameter_set': 1, 'persist_writes': False}

@@ -24,7 +24,7 @@ def drive(tmp_path: Path) -> DriveConfiguration:
 
 
 def with_options(drive: DriveConfiguration, **options: object) -> DriveConfiguration:
-    return replace(drive, family_options={**drive.family_options, **options})
+    return replace(drive, options=replace(drive.options, **options))
 
 
 def test_claims_are_all_frames_of_the_station(drive: DriveConfiguration) -> None:

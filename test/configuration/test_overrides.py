@@ -107,5 +107,5 @@ def test_numbers(good: dict[str, Any]) -> None:
 
 
 def test_topic_names_keep_their_dots() -> None:
-    tree, _ = tree_from_overrides({'qos_overrides./a.b.c': 1, 'x.y': 2})
+    tree = tree_from_overrides({'qos_overrides./a.b.c': 1, 'x.y': 2})
     assert tree.data == {'qos_overrides./a.b.c': 1, 'x': {'y': 2}}

@@ -1,7 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The family table's row of CANopen PKW, and what it makes of parameter files."""
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 from configuration_builders import changed, load, problems
@@ -55,12 +55,12 @@ def drive(tmp_path: Path) -> DriveConfiguration:
 
 
 def with_options(drive: DriveConfiguration, **options: object) -> DriveConfiguration:
-    return replace(drive, family_options={**drive.family_options, **options})
+    return replace(drive, options=replace(drive.options, **options))
 
 
 def test_defaults(drive: DriveConfiguration) -> None:
     assert drive.parameter_timeout == 0.5, 'longer than that of the other families'
-    assert drive.family_options == {
+    assert asdict(drive.options) == {
         'layout': 'word_le', 'word_order': 'high_first', 'abort_code_order': 'auto',
         'addressing': 'register', 'nmt_start': True, 'heartbeat_timeout': 0.0,
         'predefined_set': True,
@@ -114,7 +114,8 @@ def test_other_families_keep_off_the_predefined_set(tmp_path: Path, protocol: st
         'protocols: [datamodel_standard]\nparameters: {status: {number: 1, access: ro}}\n')
     assert problems(tmp_path, text, PROFILE) == [
         'f.yaml:21: drives.fan.station: 1 collides with drive pump (station 5) on bus main: both '
-        f'use {purpose}; predefined_set); allowed is a station of its own']
+        f'use one identifier, 11-bit identifier {purpose[:4]} here and {purpose}; predefined_set) '
+        'there; allowed is a station of its own']
     without = changed(text, 'station: 5', 'station: 5\n        predefined_set: false')
     assert problems(tmp_path, without, PROFILE) == []
 
@@ -132,7 +133,8 @@ def test_inverters_keep_off_the_predefined_set(tmp_path: Path) -> None:
     (tmp_path / 'other.yaml').write_text('protocols: [cannord]\nparameters: {speed: {}}\n')
     assert problems(tmp_path, text, PROFILE) == [
         'f.yaml:21: drives.fan.station: 64 collides with drive pump (station 5) on bus main: both '
-        'use 080h (SYNC; predefined_set); allowed is a station of its own']
+        'use one identifier, process data to station 64 here and 080h (SYNC; predefined_set) '
+        'there; allowed is a station of its own']
     without = changed(text, 'station: 5', 'station: 5\n        predefined_set: false')
     assert problems(tmp_path, without, PROFILE) == []
 
@@ -140,8 +142,7 @@ def test_inverters_keep_off_the_predefined_set(tmp_path: Path) -> None:
 def test_claims_collide_with_the_same_node_only(drive: DriveConfiguration) -> None:
     own = [*FAMILY.claims(drive), *FAMILY.reserved(drive)]
     for station in range(1, 128):
-        node = replace(drive, station=station, family_options={
-            **drive.family_options, **FAMILY.station_defaults(station)})
+        node = replace(drive, station=station, options=FAMILY.make_options(station, {}))
         others = [*FAMILY.claims(node), *FAMILY.reserved(node)]
         assert any(mine.overlaps(other) for mine in own for other in others) == (station == 5)
 

@@ -4,7 +4,7 @@
 from pathlib import Path
 
 from configuration_builders import (
-    changed, FILE, load, problems, PROFILE, warnings,
+    changed, FILE, load, problems, PROFILE, PROTOCOLS, warnings,
 )
 import pytest
 
@@ -157,15 +157,14 @@ CASES = [
       'datamodel_extended']),
     ('protocols: [datamodel_extended]', 'protocols: [datamodel]',
      ["table.yaml:2: protocols: 'datamodel' is unknown (did you mean 'datamodel_standard'?), "
-      'allowed is datamodel_extended, datamodel_standard, cannord or canopen_pkw']),
+      f'allowed is {PROTOCOLS}']),
     ('protocols: [datamodel_extended]', 'protocols: []',
      ['table.yaml:2: protocols: a list of 0 values, allowed are at least 1']),
     ('protocols: [datamodel_extended]', 'protocols: datamodel_extended',
      ["table.yaml:2: protocols: 'datamodel_extended' is a string, allowed is a list of "
-      'datamodel_extended, datamodel_standard, cannord or canopen_pkw']),
+      f'{PROTOCOLS}']),
     ('protocols: [datamodel_extended]\n', '',
-     ['table.yaml:1: protocols: missing, allowed is a list of datamodel_extended, '
-      'datamodel_standard, cannord or canopen_pkw']),
+     [f'table.yaml:1: protocols: missing, allowed is a list of {PROTOCOLS}']),
     ('parameter: word', 'parameter: wrod',
      ["table.yaml:17: control.parameter: 'wrod' is unknown, did you mean 'word'?"]),
     ('parameter: word', 'parameter: actual',
@@ -213,8 +212,7 @@ CASES = [
     ('description: for tests\n', 'just text\n---\n',
      ['table.yaml:1: yaml: no mapping, allowed are protocols, parameters, control, description']),
     ('description: for tests\n', '--- {}\n--- \n',
-     ['table.yaml:1: protocols: missing, allowed is a list of datamodel_extended, '
-      'datamodel_standard, cannord or canopen_pkw',
+     [f'table.yaml:1: protocols: missing, allowed is a list of {PROTOCOLS}',
       'table.yaml:1: parameters: missing, allowed is a mapping',
       'table.yaml:2: yaml: a second document, allowed is one']),
     ('limit: {number: 51, type: uint16}', 'limit: 5',

@@ -1,8 +1,10 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The shipped JSON Schemas: up to date, correct, and in agreement with the shipped examples."""
 
+from dataclasses import asdict
 import json
 from pathlib import Path
+import re
 from typing import Any
 
 from jsonschema import Draft202012Validator
@@ -21,10 +23,26 @@ EXAMPLES = sorted(CONFIG.glob('*.yaml'))
 PROFILES = sorted(CONFIG.glob('profiles/*.yaml'))
 
 
-def test_shipped_file_is_up_to_date() -> None:
-    """To write it anew: ``python3 -m drive_can_bridge.configuration.schema``."""
-    assert schema.text(schema.load(schema.PARAMETER_FILE)) == schema.text(
-        schema.parameter_file_schema())
+@pytest.mark.parametrize('name', [schema.PARAMETER_FILE, schema.PROFILE])
+def test_shipped_files_are_up_to_date(name: str) -> None:
+    """To write them anew: ``python3 -m drive_can_bridge.configuration.schema``."""
+    path = Path(schema.__file__).parent / 'schemas' / name
+    assert path.read_text(encoding='utf-8') == schema.shipped()[name]
+
+
+def test_profiles_may_name_every_family() -> None:
+    protocols = schema.profile_schema()['properties']['protocols']
+    assert protocols['items']['enum'] == list(FAMILIES)
+    assert protocols['description'] == 'The protocol families that the drive type speaks.'
+
+
+def test_pages_know_every_family() -> None:
+    checkout = Path(__file__).resolve().parents[2]
+    rows = re.findall(r'^\| `(\w+)` \|.*\[notes\]\((docs/\w+\.md)\)',
+                      (checkout / 'README.md').read_text(encoding='utf-8'), re.MULTILINE)
+    assert [name for name, _ in rows] == list(FAMILIES)
+    for name, page in rows:
+        assert f'`protocol: {name}`' in (checkout / page).read_text(encoding='utf-8')
 
 
 @pytest.mark.parametrize('document', [schema.load(schema.PARAMETER_FILE), schema.profile_schema()])
@@ -34,11 +52,11 @@ def test_is_a_schema(document: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize('family', FAMILIES.values())
 def test_keys_of_families_have_defaults_that_fit(family: Any) -> None:
-    calculated = family.station_defaults(1)
+    made = asdict(family.make_options(1, {}))
+    assert set(made) == set(family.options_schema)
     for key, option in family.options_schema.items():
-        assert ('default' in option) is not (key in calculated)
-        default = option.get('default', calculated.get(key))
-        assert Draft202012Validator(option).is_valid(default)
+        assert option.get('default', made[key]) == made[key]
+        assert Draft202012Validator(option).is_valid(made[key])
         assert option['description']
 
 
@@ -76,7 +94,8 @@ def test_example_shows_every_key_of_a_drive() -> None:
     assert set(parameters['drives']['conveyor']) == (
         known - foreign | set(family.options_schema))
     given = {**parameters['drives']['conveyor']}
-    for key, value in {**schema.defaults('drive'), **schema.family_defaults(family)}.items():
+    for key, value in {**schema.defaults('drive'),
+                       **asdict(family.make_options(1, {}))}.items():
         if key not in ('cyclic_request', 'cyclic_response') and key in given:
             assert given[key] == value, key
 
@@ -98,14 +117,15 @@ def test_keys_of_several_families() -> None:
 
     def wrong(**keys: object) -> list[str]:
         drive = {'bus': 'main', 'station': 1, 'profile': 'x', **keys}
-        _, problems = check_schema(Tree(drive), document, 'drive')
-        return [f'{problem.key}: {problem.message}' for problem in problems]
+        tree = Tree(drive)
+        check_schema(tree, document, 'drive')
+        return [f'{problem.key}: {problem.message}' for problem in tree.problems]
 
     assert wrong(protocol='other', mapping=2, layout='b') == []
     assert wrong(protocol='datamodel_extended', mapping='assume') == []
     assert wrong(protocol='other', mapping='assume') == [
         "mapping: 'assume' is a string, allowed is an integer"]
     assert wrong(protocol='datamodel_extended', layout='a') == [
-        'layout: not allowed here, allowed is to leave it out']
+        'layout: a key of other, allowed with datamodel_extended is to leave it out']
     assert wrong(protocol='other', length_policy='strict') == [
-        'length_policy: not allowed here, allowed is to leave it out']
+        'length_policy: a key of datamodel_extended, allowed with other is to leave it out']

@@ -1,7 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Drives with 11-bit DataModel identifiers in a parameter file, alone and beside others."""
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 import re
 
@@ -47,7 +47,7 @@ def drive(tmp_path: Path) -> DriveConfiguration:
 
 
 def test_defaults(drive: DriveConfiguration) -> None:
-    assert drive.family_options == {
+    assert asdict(drive.options) == {
         'request_map_base': 122, 'response_map_base': 126, 'parameter_offset': 0,
         'request_id_base': 0x3F0, 'response_id_base': 0x7F0, 'eeprom_write_gap': 0.02,
         'quarantine': 0.1, 'length_policy': 'lenient', 'refresh_interval': 0.5,
@@ -60,13 +60,13 @@ def test_all_keys(tmp_path: Path) -> None:
         'refresh_interval: 0', 'length_policy: strict', 'eeprom_write_gap: 0.05',
         'parameter_offset: -1', 'request_map_base: 200', 'response_map_base: 300',
         'allow_fast_cycle: true')).drives['conveyor']
-    assert drive.family_options == {
+    assert asdict(drive.options) == {
         'request_map_base': 200, 'response_map_base': 300, 'parameter_offset': -1,
         'request_id_base': 0x300, 'response_id_base': 0x380, 'eeprom_write_gap': 0.05,
         'quarantine': 1.0, 'length_policy': 'strict', 'refresh_interval': 0.0,
         'allow_fast_cycle': True}
-    assert isinstance(drive.family_options['quarantine'], float)
-    assert isinstance(drive.family_options['refresh_interval'], float)
+    assert isinstance(drive.options.quarantine, float)
+    assert isinstance(drive.options.refresh_interval, float)
 
 
 def test_mapping_is_of_another_family(tmp_path: Path) -> None:
@@ -366,6 +366,6 @@ def test_raw_names(drive: DriveConfiguration) -> None:
     assert (parameter.storage, parameter.listed) == (None, False)
     for name in ('p65536', 'p-1', 'p30.1', 'x1000.1', 'P30', 'speed', ''):
         assert FAMILY.raw_parameter(drive, name) is None
-    moved = replace(drive, family_options={**drive.family_options, 'parameter_offset': -1})
+    moved = replace(drive, options=replace(drive.options, parameter_offset=-1))
     assert FAMILY.raw_parameter(moved, 'p0') is None
     assert FAMILY.raw_parameter(moved, 'p1') is not None

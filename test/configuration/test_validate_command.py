@@ -92,6 +92,49 @@ def test_no_file(name: str, line: str) -> None:
     assert (done.returncode, done.stdout, done.stderr) == (1, '', line)
 
 
+def test_pipe_is_not_waited_for(tmp_path: Path) -> None:
+    path = tmp_path / 'pipe.yaml'
+    os.mkfifo(path)
+    done = run('validate', str(path))
+    assert (done.returncode, done.stdout, done.stderr) == (
+        1, '', f'drive_can: {path}: not a regular file, allowed is one\n')
+    os.mkfifo(tmp_path / 'table.yaml')
+    good = tmp_path / 'f.yaml'
+    good.write_text(changed(FILE, '    autostart: true\n',
+                            f'    profile_directories: [{tmp_path}]\n'), encoding='utf-8')
+    done = run('validate', str(good))
+    assert done.returncode == 1
+    assert f"{good}:14: drives.conveyor.profile: 'table' is unknown" in done.stderr
+
+
+def test_file_that_is_too_large(tmp_path: Path) -> None:
+    path = write(tmp_path)
+    with path.open('ab') as file:
+        file.truncate(5 << 20)
+    done = run('validate', str(path))
+    assert (done.returncode, done.stdout, done.stderr) == (
+        1, '', f'drive_can: {path}: too large, allowed are 4 MiB\n')
+    path = write(tmp_path)
+    with (tmp_path / 'table.yaml').open('ab') as file:
+        file.truncate(5 << 20)
+    done = run('validate', str(path))
+    assert done.stderr.splitlines()[0] == (
+        f'{path}:14: drives.conveyor.profile: {tmp_path}/table.yaml cannot be read (too large, '
+        'allowed are 4 MiB), allowed is a readable file')
+
+
+@pytest.mark.parametrize('nest', ['[', '{a: ', '- ', '? ', '[{', '!!map {a: '])
+def test_absurd_nesting(tmp_path: Path, nest: str) -> None:
+    deep = nest * (200_000 // len(nest))
+    path = write(tmp_path, FILE + f'/other:\n  ros__parameters:\n    a:\n     {deep}')
+    done = run('validate', str(path))
+    assert done.stderr == f'{path}:29: yaml: nested too deep, allowed are 32 levels\n'
+    path = write(tmp_path, profile=f'protocols: [cannord]\nparameters:\n {deep}')
+    done = run('validate', str(path))
+    assert done.stderr == (
+        f'{tmp_path}/table.yaml:3: yaml: nested too deep, allowed are 32 levels\n')
+
+
 @pytest.mark.parametrize('arguments', [
     [], ['validate'], ['validate', 'a', 'b'], ['validat', 'a'], ['validate', '--nothing', 'a'],
     ['--nothing'], ['simulate'], ['simulate', '--params-file']], ids=' '.join)

@@ -9,8 +9,8 @@ from drive_can_bridge.protocols.cannord.identifiers import all_identifier, group
 
 def broadcast_identifier(drive: DriveConfiguration) -> int | None:
     """Return the broadcast identifier that a drive listens to; None: it has none."""
-    kind = drive.family_options['broadcast']
-    extended = drive.family_options['extended_identifiers']
+    kind = drive.options.broadcast
+    extended = drive.options.extended_identifiers
     if kind == 'all':
         return all_identifier(extended=extended)
     if kind == 'group':
@@ -24,6 +24,6 @@ def groups(drives: Sequence[DriveConfiguration]) -> list[list[DriveConfiguration
     for drive in drives:
         shared = broadcast_identifier(drive)
         if shared is not None:
-            key = shared, drive.family_options['extended_identifiers']
+            key = shared, drive.options.extended_identifiers
             found.setdefault(key, []).append(drive)
     return [sorted(together, key=lambda drive: drive.station) for together in found.values()]

@@ -3,7 +3,6 @@
 
 from collections.abc import Iterator, Sequence
 import re
-from typing import Any
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter, ParameterType
@@ -12,11 +11,12 @@ from drive_can_bridge.protocols.cannord.broadcast import broadcast_identifier, g
 from drive_can_bridge.protocols.cannord.identifiers import (
     ADDRESS_MAX, identifier, MessageObject, route,
 )
+from drive_can_bridge.protocols.cannord.options import CannordOptions
 from drive_can_bridge.protocols.cannord.parameter_frame import INDEX_MAX, NUMBER_MAX
 from drive_can_bridge.protocols.cannord.process_data import (
     EXTRA_LENGTH, EXTRA_VALUES, main_length, MAIN_VALUES,
 )
-from drive_can_bridge.protocols.cannord.states import PARAMETER_SETS, STATUS_WORD
+from drive_can_bridge.protocols.cannord.states import STATUS_WORD
 from drive_can_bridge.protocols.family import Claim, Complaint, Family
 
 #: s that an inverter takes at most to answer process data (BU 0060 page 50)
@@ -53,45 +53,7 @@ class Cannord(Family):
     name = 'cannord'
     cyclic = True
     control_built_in = True
-    options_schema: dict[str, Any] = {
-        'extended_identifiers': {
-            'description': 'Use 29-bit identifiers: the 11-bit ones followed by 18 zero bits.',
-            'type': 'boolean', 'default': False,
-        },
-        'broadcast': {
-            'description': 'Send control word and setpoints in one frame for several drives: '
-                           'to the group of 32 addresses, or to all. The drive with the lowest '
-                           'station takes the commands.',
-            'enum': ['none', 'group', 'all'], 'default': 'none',
-        },
-        'value_order': {
-            'description': 'Which half of a parameter value comes first in the parameter frame.',
-            'enum': ['high_first', 'low_first'], 'default': 'high_first',
-        },
-        'index_byte': {
-            'description': 'Which byte of IND carries the sub-index: low is byte 2, high byte 3.',
-            'enum': ['low', 'high'], 'default': 'low',
-        },
-        'swap_setpoints_2_3': {
-            'description': 'Words 3 and 4 of the 8-byte process frames change places '
-                           '(SK 300E, SK 700E, SK 750E).',
-            'type': 'boolean', 'default': False,
-        },
-        'extra_setpoints': {
-            'description': 'SK 540E, SK 545E: setpoints and actual values 4 and 5 travel in a '
-                           'frame of 5 bytes after the main one.',
-            'type': 'boolean', 'default': False,
-        },
-        'parameter_set': {
-            'description': 'Parameter set that the control word chooses.',
-            'type': 'integer', 'minimum': 1, 'maximum': PARAMETER_SETS, 'default': 1,
-        },
-        'persist_writes': {
-            'description': 'Write parameters without storage in the profile to EEPROM (true) or '
-                           'to RAM only (false).',
-            'type': 'boolean', 'default': False,
-        },
-    }
+    options_type = CannordOptions
 
     def check(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         """Yield everything that this family cannot do with the drive as configured."""
@@ -119,7 +81,7 @@ class Cannord(Family):
 
     def claims(self, drive: DriveConfiguration) -> list[Claim]:
         """Return all identifiers of the drive on its bus; a broadcast one is shared."""
-        extended = drive.family_options['extended_identifiers']
+        extended = drive.options.extended_identifiers
         found = [Claim(route(identifier(kind, drive.station, extended=extended),
                              extended=extended), f'{purpose} {drive.station}')
                  for kind, purpose in _PURPOSES.items()]
@@ -173,7 +135,7 @@ class Cannord(Family):
 
     def _telegram_bits(self, drive: DriveConfiguration) -> int:
         """Return the worst-case length of the process frames in one direction."""
-        extended = drive.family_options['extended_identifiers']
+        extended = drive.options.extended_identifiers
         values = max(len(drive.cyclic_request), len(drive.cyclic_response))
         bits = frame_bits(main_length(min(values, MAIN_VALUES)), extended=extended)
         if values > MAIN_VALUES:
@@ -183,17 +145,17 @@ class Cannord(Family):
     def _check_kinds(self, drives: Sequence[DriveConfiguration],
                      ) -> Iterator[tuple[DriveConfiguration, Complaint]]:
         """Look for both kinds of broadcast on one bus: whoever listens, listens to both."""
-        everyone = [drive for drive in drives if drive.family_options['broadcast'] != 'none']
+        everyone = [drive for drive in drives if drive.options.broadcast != 'none']
         for drive in everyone[1:]:
-            mine = drive.family_options['broadcast']
-            other = everyone[0].family_options['broadcast']
+            mine = drive.options.broadcast
+            other = everyone[0].options.broadcast
             if mine != other:
                 yield drive, Complaint('broadcast', (
                     f"'{mine}', while drive {everyone[0].name} on the same bus has '{other}' and "
                     f"inverters obey both; allowed is '{other}' or 'none'"))
 
     def _check_lists(self, drive: DriveConfiguration) -> Iterator[Complaint]:
-        extra = drive.family_options['extra_setpoints']
+        extra = drive.options.extra_setpoints
         largest = MAIN_VALUES + EXTRA_VALUES if extra else MAIN_VALUES
         more = '' if extra else f' ({MAIN_VALUES + EXTRA_VALUES} with extra_setpoints: true)'
         for key in ('cyclic_request', 'cyclic_response'):
@@ -252,7 +214,7 @@ class Cannord(Family):
             yield Complaint('period', f'{member.period:g} s differs from {leader.period:g} s of '
                                       f'{led}, allowed is the same')
         for key in _COMMON_OPTIONS:
-            mine, other = member.family_options[key], leader.family_options[key]
+            mine, other = getattr(member.options, key), getattr(leader.options, key)
             if mine != other:
                 yield Complaint(key, f'{str(mine).lower()} differs from {str(other).lower()} of '
                                      f'{led}, allowed is the same')

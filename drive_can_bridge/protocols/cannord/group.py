@@ -69,7 +69,7 @@ class LeaderSession(GroupSession):
         own = drives[0]
         self._group = GroupControl(
             [drive.name for drive in drives],
-            parameter_set=own.family_options['parameter_set'], timeout=own.control_timeout)
+            parameter_set=own.options.parameter_set, timeout=own.control_timeout)
         super().__init__(own, self._group, places=places)
         self.members: list[GroupSession] = [self]
         self._turn = 0

@@ -8,10 +8,11 @@ Every function that has tasks to send is a generator for :class:`.channel.TaskCh
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 
-from drive_can_bridge.core.parameters import Parameter, Storage, Value
+from drive_can_bridge.core.parameters import Parameter, Storage
 from drive_can_bridge.core.requests import (
     Failure, NO_ANSWER_OFFLINE, NOT_SENT, Outcome, ReadRequest, ReadValue, Request, Written,
 )
+from drive_can_bridge.core.words import value_text
 from drive_can_bridge.protocols.cannord.channel import Ask, Procedure, Reply
 from drive_can_bridge.protocols.cannord.parameter_frame import (
     error_text, ParameterFrame, Response, Task, WRITE_TASKS,
@@ -125,8 +126,8 @@ def write_parameter(parameter: Parameter, raw: int, conditions: Conditions,
     if reply.contrary is not None:
         found = parameter.raw_from_word(
             reply.contrary.value if double else reply.contrary.word)
-        return Failure(f'read back {_text(parameter.value_from_raw(found))} '
-                       f'instead of {_text(parameter.value_from_raw(raw))}')
+        return Failure(f'read back {value_text(parameter.value_from_raw(found))} '
+                       f'instead of {value_text(parameter.value_from_raw(raw))}')
     return conditions.unanswered(1)
 
 
@@ -185,7 +186,3 @@ def _width_text(parameter: Parameter, answer: ParameterFrame) -> str:
     wanted = 'int32 or uint32' if answer.identifier in _DOUBLE else 'bool, int16 or uint16'
     return (f'the drive answers with {width}, the profile says {parameter.type.value}: '
             f'correct the profile to {wanted}')
-
-
-def _text(value: Value) -> str:
-    return f'{value:g}' if isinstance(value, float) else str(value)

@@ -75,23 +75,23 @@ class CannordSession(Session):
 
     def __init__(self, drive: DriveConfiguration, control: CannordControl | None = None, *,
                  places: int = 0) -> None:
-        options = drive.family_options
+        options = drive.options
         self._machine = control or CannordControl(
-            parameter_set=options['parameter_set'], timeout=drive.control_timeout)
+            parameter_set=options.parameter_set, timeout=drive.control_timeout)
         super().__init__(drive, self._machine)
-        self._extended: bool = options['extended_identifiers']
+        self._extended: bool = options.extended_identifiers
         self.request_identifier, self._response_identifier, self._task_identifier, \
             self._task_response_identifier = (
                 identifier(kind, drive.station, extended=self._extended)
                 for kind in MessageObject)
         places = max(places, values_needed(drive))
-        self._swap: bool = options['swap_setpoints_2_3']
+        self._swap: bool = options.swap_setpoints_2_3
         self._length = main_length(min(places, MAIN_VALUES))
         self._extra = places > MAIN_VALUES
         self._main_response = drive.cyclic_response[:MAIN_VALUES]
         self._extra_response = drive.cyclic_response[MAIN_VALUES:]
         self._channel = TaskChannel(
-            ParameterLayout(options['value_order'], options['index_byte']), self._send_task,
+            ParameterLayout(options.value_order, options.index_byte), self._send_task,
             timeout=drive.parameter_timeout, attempts=drive.parameter_retries + 1)
         self._conditions = self._make_conditions()
         self._cycling = False
@@ -430,7 +430,7 @@ class CannordSession(Session):
         return procedures.Conditions(
             offline=lambda: not self.online, last_value=self._last_value,
             timeout=drive.parameter_timeout, attempts=drive.parameter_retries + 1,
-            persist=drive.family_options['persist_writes'])
+            persist=drive.options.persist_writes)
 
     def _last_value(self, name: str) -> int | None:
         """Return the raw integer of a parameter that was received last."""

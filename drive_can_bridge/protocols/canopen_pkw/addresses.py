@@ -101,7 +101,7 @@ def round_spans(drive: DriveConfiguration) -> list[Span]:
     status = drive.profile.parameters.get(table.status_parameter or '') if table else None
     if status is not None and status not in wanted:
         wanted.append(status)
-    addressing = drive.family_options['addressing']
+    addressing = drive.options.addressing
     return [span_of(parameter, addressing) for parameter in wanted
             if address_of(parameter, addressing) is not None]
 

@@ -1,7 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The row of the family table for the CANopen PKW mailbox."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from drive_can_bridge.core.configuration import DriveConfiguration
@@ -11,6 +11,7 @@ from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.canopen_pkw import addresses, network, pkw
 from drive_can_bridge.protocols.canopen_pkw.addresses import Span
 from drive_can_bridge.protocols.canopen_pkw.identifiers import Identifiers
+from drive_can_bridge.protocols.canopen_pkw.options import PkwOptions
 from drive_can_bridge.protocols.family import Claim, Complaint, Family
 from drive_can_bridge.protocols.polling import round_time
 
@@ -25,70 +26,14 @@ class CanopenPkw(Family):
     cyclic = False
     #: a device may take its time: nothing is documented
     drive_defaults = {'parameter_timeout': 0.5}
-    options_schema: dict[str, Any] = {
-        'layout': {
-            'description': 'Place of the bytes in the PDO: word_le (every word low byte first), '
-                           'dword_swapped (words of each pair change places), word_be (every '
-                           'word high byte first).',
-            'enum': [layout.value for layout in pkw.Layout],
-            'default': 'word_le',
-        },
-        'word_order': {
-            'description': 'Which word of a 32-bit value comes first (lower register); a '
-                           'parameter of the profile may override it.',
-            'enum': ['high_first', 'low_first'],
-            'default': 'high_first',
-        },
-        'abort_code_order': {
-            'description': 'Which half of an abort code word 3 holds; auto finds out.',
-            'enum': ['auto', 'low_first', 'high_first'],
-            'default': 'auto',
-        },
-        'addressing': {
-            'description': 'register: parameters are reached by number; canopen: by index and '
-                           'subindex.',
-            'enum': ['register', 'canopen'],
-            'default': 'register',
-        },
-        'nmt_start': {
-            'description': 'Send NMT start to the node at start, after its boot-up frame, when '
-                           'its heartbeat says stopped or pre-operational, and once a second '
-                           'while it is offline.',
-            'type': 'boolean',
-            'default': True,
-        },
-        'heartbeat_timeout': {
-            'description': 's without heartbeat until the drive counts as offline; 0: not '
-                           'watched. The producer (1017h) is not configured by the bridge.',
-            'type': 'number', 'minimum': 0, 'maximum': 3600, 'default': 0.0,
-        },
-        'predefined_set': {
-            'description': 'Keep other drives off all identifiers of the predefined connection '
-                           'set of the node, also those that the bridge does not use: what they '
-                           'send there would be commands to it.',
-            'type': 'boolean',
-            'default': True,
-        },
-        'request_cob_id': {
-            'description': 'Identifier of requests to the device (receive PDO4); by default '
-                           '500h + node.',
-            'type': 'integer', 'minimum': 1, 'maximum': STANDARD_IDENTIFIER_MAX,
-        },
-        'response_cob_id': {
-            'description': 'Identifier of responses (transmit PDO4); by default 480h + node.',
-            'type': 'integer', 'minimum': 1, 'maximum': STANDARD_IDENTIFIER_MAX,
-        },
-        'refresh_interval': {
-            'description': 's: unchanged values of cyclic_request are written again this often; '
-                           '0: only on change.',
-            'type': 'number', 'minimum': 0, 'maximum': 3600, 'default': 1.0,
-        },
-    }
+    options_type = PkwOptions
 
-    def station_defaults(self, station: int) -> dict[str, Any]:
-        """Return the predefined COB-IDs of a node."""
-        return {'request_cob_id': network.REQUEST_BASE + station,
-                'response_cob_id': network.RESPONSE_BASE + station}
+    def make_options(self, station: int, given: Mapping[str, Any]) -> PkwOptions:
+        """Make the options; the COB-IDs are the predefined ones of the node by default."""
+        options: PkwOptions = super().make_options(station, {
+            'request_cob_id': network.REQUEST_BASE + station,
+            'response_cob_id': network.RESPONSE_BASE + station, **given})
+        return options
 
     def check(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         """Yield everything that this family cannot do with the drive as configured."""
@@ -118,7 +63,7 @@ class CanopenPkw(Family):
 
     def reserved(self, drive: DriveConfiguration) -> list[Claim]:
         """Return the rest of what a node listens to and sends on from the factory."""
-        if not drive.family_options['predefined_set']:
+        if not drive.options.predefined_set:
             return []
         remark = 'predefined_set'
         return [*_claims({base + drive.station: f'{what} node {drive.station}; {remark}'
@@ -179,7 +124,7 @@ class CanopenPkw(Family):
                     break
 
     def _check_profile(self, drive: DriveConfiguration) -> Iterator[Complaint]:
-        addressing = drive.family_options['addressing']
+        addressing = drive.options.addressing
         for name, parameter in drive.profile.parameters.items():
             place = f'profile.parameters.{name}'
             if parameter.index is not None and parameter.subindex is None:

@@ -25,8 +25,8 @@ class Identifiers(NamedTuple):
     @classmethod
     def of(cls, drive: DriveConfiguration) -> 'Identifiers':
         """Return those of a configured drive."""
-        node, options = drive.station, drive.family_options
+        node, options = drive.station, drive.options
         return cls(
-            request=options['request_cob_id'], response=options['response_cob_id'],
+            request=options.request_cob_id, response=options.response_cob_id,
             emergency=network.EMERGENCY_BASE + node,
             heartbeat=network.HEARTBEAT_BASE + node)

@@ -75,20 +75,20 @@ class PkwSession(Session):
         if table is not None:
             control = ControlMachine(table, timeout=drive.control_timeout)
         super().__init__(drive, control)
-        options = drive.family_options
+        options = drive.options
         self._identifiers = Identifiers.of(drive)
-        self._layout = Layout(options['layout'])
-        self._addressing: str = options['addressing']
-        self._word_order: str = options['word_order']
+        self._layout = Layout(options.layout)
+        self._addressing: str = options.addressing
+        self._word_order: str = options.word_order
         self._notes = PacedNotes(lambda note: self._events.append(note))
-        self._node = Node(drive.station, nmt_start=options['nmt_start'],
-                          heartbeat_timeout=options['heartbeat_timeout'])
+        self._node = Node(drive.station, nmt_start=options.nmt_start,
+                          heartbeat_timeout=options.heartbeat_timeout)
         self._channel = Channel(Mailbox(
-            self._send, order=options['abort_code_order'], timeout=drive.parameter_timeout))
+            self._send, order=options.abort_code_order, timeout=drive.parameter_timeout))
         self._conditions = self._make_conditions()
         self._setpoint_writer = SetpointWriter(
             self._channel, self.setpoints, self._warn, self.told, addressing=self._addressing,
-            word_order=self._word_order, refresh=options['refresh_interval'])
+            word_order=self._word_order, refresh=options.refresh_interval)
         self._control_writer: ControlWriter | None = None
         self._status: Parameter | None = None
         if control is not None and table is not None:
@@ -97,7 +97,7 @@ class PkwSession(Session):
                 self._channel, control, word, self._control_changed, self._warn, self.told,
                 disable=table.disable, addressing=self._addressing,
                 word_order=self._word_order,
-                refresh=options['refresh_interval'] if word in drive.cyclic_request else 0.0)
+                refresh=options.refresh_interval if word in drive.cyclic_request else 0.0)
             self._status = drive.profile.parameters.get(table.status_parameter or '')
         self._response_spans = [addresses.span_of(parameter, self._addressing)
                                 for parameter in drive.cyclic_response]

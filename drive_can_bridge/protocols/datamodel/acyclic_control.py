@@ -166,4 +166,4 @@ def control_by_hand(drive: DriveConfiguration, channel: AcyclicChannel,
         return None
     return AcyclicControl(channel, control, word=parameters.get(word),
                           status=parameters.get(status), changed=changed, told=told,
-                          offset=drive.family_options['parameter_offset'])
+                          offset=drive.options.parameter_offset)

@@ -38,10 +38,10 @@ class DataModelSession(Session):
         if table is not None:
             control = ControlMachine(table, timeout=drive.control_timeout)
         super().__init__(drive, control)
-        options = drive.family_options
-        self._offset: int = options['parameter_offset']
-        self._request_base: int = options['request_map_base'] + self._offset
-        self._response_base: int = options['response_map_base'] + self._offset
+        options = drive.options
+        self._offset: int = options.parameter_offset
+        self._request_base: int = options.request_map_base + self._offset
+        self._response_base: int = options.response_map_base + self._offset
         # where each of ``request_parameters`` is written by number
         self._sent_by_number = {
             (parameter.number or 0) + self._offset: place
@@ -50,7 +50,7 @@ class DataModelSession(Session):
         self._channel = AcyclicChannel(
             encode_read=encode_read, encode_write=self._write, send=self._outbox.put,
             timeout=drive.parameter_timeout, attempts=drive.parameter_retries + 1,
-            eeprom_gap=options['eeprom_write_gap'], polling=polling)
+            eeprom_gap=options.eeprom_write_gap, polling=polling)
         self._together = together
         self._conditions = self._make_conditions()
         status_name = table.status_parameter or '' if table is not None else ''
@@ -112,9 +112,9 @@ class DataModelSession(Session):
 
     @property
     def map_cells(self) -> Cells:
-        options = self.drive.family_options     # numbers of the profile, as in ``cells``
-        return frozenset(options[base] + slot for base in ('request_map_base', 'response_map_base')
-                         for slot in range(SLOTS))
+        options = self.drive.options     # numbers of the profile, as in ``cells``
+        return frozenset(base + slot for slot in range(SLOTS)
+                         for base in (options.request_map_base, options.response_map_base))
 
     # -- for the families -------------------------------------------------------------------------
 

@@ -10,56 +10,18 @@ and from 1 on the other.
 from abc import abstractmethod
 from collections.abc import Iterator
 import re
-from typing import Any
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.protocols.datamodel.extended import CYCLIC_PARAMETER, SLOTS
 from drive_can_bridge.protocols.datamodel.mapping import REQUEST_MAP_BASE, RESPONSE_MAP_BASE
+from drive_can_bridge.protocols.datamodel.options import NUMBER_MAX
 from drive_can_bridge.protocols.family import Complaint, Family
 
 #: the manual recommends not to cycle faster
 FASTEST_PERIOD = 0.005
-#: the manual's least time between two EEPROM writes
-EEPROM_WRITE_GAP = 0.02
-NUMBER_MAX = 0xFFFF
-
 _RAW_NAME = re.compile(r'p([0-9]{1,5})', re.ASCII)
 _PROTOCOLS = frozenset(('datamodel_extended', 'datamodel_standard'))
-
-#: keys of both protocols
-COMMON_OPTIONS: dict[str, Any] = {
-    'request_map_base': {
-        'description': 'Number of the first of the four parameters that map the request.',
-        'type': 'integer', 'minimum': 1, 'maximum': NUMBER_MAX - SLOTS,
-        'default': REQUEST_MAP_BASE,
-    },
-    'response_map_base': {
-        'description': 'Number of the first of the four parameters that map the response.',
-        'type': 'integer', 'minimum': 1, 'maximum': NUMBER_MAX - SLOTS,
-        'default': RESPONSE_MAP_BASE,
-    },
-    'parameter_offset': {
-        'description': 'Added to every parameter number on the wire.',
-        'type': 'integer', 'minimum': -NUMBER_MAX, 'maximum': NUMBER_MAX, 'default': 0,
-    },
-    'eeprom_write_gap': {
-        'description': 's between EEPROM writes to the station; the manual demands 0.02.',
-        'type': 'number', 'minimum': EEPROM_WRITE_GAP, 'maximum': 60.0,
-        'default': EEPROM_WRITE_GAP,
-    },
-    'length_policy': {
-        'description': 'lenient accepts responses with fewer than 8 bytes that hold what is '
-                       'needed, strict does not.',
-        'enum': ['lenient', 'strict'],
-        'default': 'lenient',
-    },
-    'allow_fast_cycle': {
-        'description': 'Permit a period under 5 ms.',
-        'type': 'boolean',
-        'default': False,
-    },
-}
 
 
 class DataModelFamily(Family):
@@ -68,7 +30,7 @@ class DataModelFamily(Family):
     def check(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         """Yield everything that this family cannot do with the drive as configured."""
         yield from self._check_station(drive)
-        if drive.period < FASTEST_PERIOD and not drive.family_options['allow_fast_cycle']:
+        if drive.period < FASTEST_PERIOD and not drive.options.allow_fast_cycle:
             yield Complaint('period', f'{drive.period:g} s is too fast, allowed is at least '
                                       f'{FASTEST_PERIOD:g} s unless allow_fast_cycle is true')
         yield from self._check_maps(drive)
@@ -85,7 +47,7 @@ class DataModelFamily(Family):
         if match is None:
             return None
         number = int(match.group(1))
-        wire = number + drive.family_options['parameter_offset']
+        wire = number + drive.options.parameter_offset
         if number > NUMBER_MAX or not 0 <= wire < CYCLIC_PARAMETER:
             return None
         return Parameter(name=name, number=number, listed=False)
@@ -97,14 +59,14 @@ class DataModelFamily(Family):
         """Look at the station number."""
 
     def _check_maps(self, drive: DriveConfiguration) -> Iterator[Complaint]:
-        offset = drive.family_options['parameter_offset']
+        offset = drive.options.parameter_offset
         for key in ('request_map_base', 'response_map_base'):
-            base = drive.family_options[key]
+            base = getattr(drive.options, key)
             if not 0 <= base + offset <= NUMBER_MAX - SLOTS:
                 yield Complaint(key, f'{base} with parameter_offset {offset} is out of range, '
                                      f'allowed on the wire is 0 to {NUMBER_MAX - SLOTS}')
-        request = drive.family_options['request_map_base']
-        response = drive.family_options['response_map_base']
+        request = drive.options.request_map_base
+        response = drive.options.response_map_base
         if abs(request - response) < SLOTS:
             # at the key that was given; the other one has its default
             moved = request != REQUEST_MAP_BASE and response == RESPONSE_MAP_BASE
@@ -128,7 +90,7 @@ class DataModelFamily(Family):
                                 f'{parameter.address}, allowed is one of them')
             numbers.setdefault(parameter.number, parameter.name)
             for key in ('request_map_base', 'response_map_base'):
-                base = drive.family_options[key]
+                base = getattr(drive.options, key)
                 if base <= parameter.number < base + SLOTS:
                     yield Complaint('cyclic_request',
                                     f"'{parameter.name}' ({parameter.address}) is a mapping "
@@ -136,7 +98,7 @@ class DataModelFamily(Family):
                                     f'{base + SLOTS - 1}')
 
     def _check_profile(self, drive: DriveConfiguration) -> Iterator[Complaint]:
-        offset = drive.family_options['parameter_offset']
+        offset = drive.options.parameter_offset
         shared = not _PROTOCOLS.issuperset(drive.profile.protocols)
         for name, parameter in drive.profile.parameters.items():
             place = f'profile.parameters.{name}'

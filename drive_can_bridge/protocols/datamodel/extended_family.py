@@ -2,18 +2,16 @@
 """The row of the family table for the DataModel protocol with 29-bit identifiers."""
 
 from collections.abc import Iterator
-from typing import Any
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Route
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.session import Session
-from drive_can_bridge.protocols.datamodel.common_family import (
-    COMMON_OPTIONS, DataModelFamily, NUMBER_MAX,
-)
+from drive_can_bridge.protocols.datamodel.common_family import DataModelFamily
 from drive_can_bridge.protocols.datamodel.extended import (
     SLOTS, STATION_MASK, STATION_MAX, STATION_SHIFT,
 )
+from drive_can_bridge.protocols.datamodel.options import ExtendedOptions, NUMBER_MAX
 from drive_can_bridge.protocols.family import Claim, Complaint
 
 #: worst-case stuffing, eight bytes, 29-bit identifier, with the interframe space
@@ -27,16 +25,7 @@ class DataModelExtended(DataModelFamily):
 
     name = 'datamodel_extended'
     cyclic = True
-    options_schema: dict[str, Any] = {
-        'mapping': {
-            'description': 'What to do about the maps of the drive (Reg.122-125, 126-129): '
-                           'verify refuses to cycle while they differ, configure rewrites them, '
-                           'assume does not look.',
-            'enum': ['verify', 'configure', 'assume'],
-            'default': 'verify',
-        },
-        **COMMON_OPTIONS,
-    }
+    options_type = ExtendedOptions
 
     def claims(self, drive: DriveConfiguration) -> list[Claim]:
         """Return all identifiers of the drive on its bus: every frame of its station."""
@@ -46,7 +35,7 @@ class DataModelExtended(DataModelFamily):
     def bits_per_second(self, drive: DriveConfiguration) -> float:
         """Return the worst-case load: one exchange a period, and the look at the maps."""
         exchange = 2 * FRAME_BITS / drive.period
-        if drive.family_options['mapping'] == 'assume':
+        if drive.options.mapping == 'assume':
             return exchange
         return exchange + MAPPING_CHECK_BITS
 
@@ -64,7 +53,7 @@ class DataModelExtended(DataModelFamily):
                                        f'allowed is 1 to {STATION_MAX} ({self.name})')
 
     def _check_lists(self, drive: DriveConfiguration) -> Iterator[Complaint]:
-        offset = drive.family_options['parameter_offset']
+        offset = drive.options.parameter_offset
         for key in ('cyclic_request', 'cyclic_response'):
             listed: tuple[Parameter, ...] = getattr(drive, key)
             if len(listed) > SLOTS:

@@ -70,9 +70,9 @@ class ExtendedSession(DataModelSession):
                 station, number, count),
             encode_write=lambda number, words: extended.encode_write(station, number, words),
             together=extended.SLOTS)
-        options = drive.family_options
-        self._verify: bool = options['mapping'] != 'assume'
-        self._strict: bool = options['length_policy'] == 'strict'
+        options = drive.options
+        self._verify: bool = options.mapping != 'assume'
+        self._strict: bool = options.length_policy == 'strict'
         self._request_identifier = extended.cyclic_request_identifier(station)
         self._response_identifier = self._request_identifier | extended.DIR
         self._pack = words_struct(drive.cyclic_request, unsigned=self._control_slot).pack
@@ -82,7 +82,7 @@ class ExtendedSession(DataModelSession):
             self._channel, request_base=self._request_base, response_base=self._response_base,
             request=wire_numbers(drive.cyclic_request, self._offset),
             response=wire_numbers(drive.cyclic_response, self._offset),
-            rewrite=options['mapping'] == 'configure',
+            rewrite=options.mapping == 'configure',
             emit=self._maps_reported, judged=self._maps_judged)
         self._phase = Phase.IDLE
         self._cycles_left = -1  # cycles still to be sent in LEAVING or before a stop; -1: no end

@@ -9,11 +9,12 @@ from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Union
 
-from drive_can_bridge.core.parameters import Parameter, ParameterType, Storage, Value
+from drive_can_bridge.core.parameters import Parameter, ParameterType, Storage
 from drive_can_bridge.core.requests import (
     Failure, NO_ANSWER_OFFLINE, NOT_SENT, Outcome, ReadRequest, ReadValue, Request, SENT_UNACKNOWLEDGED,
     Written,
 )
+from drive_can_bridge.core.words import value_text
 from drive_can_bridge.protocols.datamodel.channel import Procedure, Read, Step, Words, Write
 from drive_can_bridge.protocols.datamodel.extended import CYCLIC_PARAMETER, SLOTS
 from drive_can_bridge.protocols.datamodel.mapping import effective, padded
@@ -234,9 +235,5 @@ def write_maps(request_base: int, response_base: int, *, request: Sequence[int],
 def _compare(parameter: Parameter, found: int, wanted: int) -> Outcome:
     if found == wanted or parameter.type is ParameterType.BOOL and bool(found) is bool(wanted):
         return Written()
-    return Failure(f'read back {_text(parameter.value_from_raw(found))} '
-                   f'instead of {_text(parameter.value_from_raw(wanted))}')
-
-
-def _text(value: Value) -> str:
-    return f'{value:g}' if isinstance(value, float) else str(value)
+    return Failure(f'read back {value_text(parameter.value_from_raw(found))} '
+                   f'instead of {value_text(parameter.value_from_raw(wanted))}')

@@ -2,18 +2,14 @@
 """The row of the family table for the DataModel protocol with 11-bit identifiers."""
 
 from collections.abc import Iterator
-from typing import Any
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Route, STANDARD_IDENTIFIER_MAX
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.datamodel import standard_round
-from drive_can_bridge.protocols.datamodel.common_family import COMMON_OPTIONS, DataModelFamily
-from drive_can_bridge.protocols.datamodel.standard import REQUEST_ID_BASE, RESPONSE_ID_BASE
+from drive_can_bridge.protocols.datamodel.common_family import DataModelFamily
+from drive_can_bridge.protocols.datamodel.options import StandardOptions
 from drive_can_bridge.protocols.family import Claim, Complaint
-
-_BASES = ('request_id_base', 'response_id_base')
-_DIRECTION = {'request_id_base': 'request', 'response_id_base': 'response'}
 
 
 class DataModelStandard(DataModelFamily):
@@ -21,42 +17,15 @@ class DataModelStandard(DataModelFamily):
 
     name = 'datamodel_standard'
     cyclic = False
-    options_schema: dict[str, Any] = {
-        **COMMON_OPTIONS,
-        'request_id_base': {
-            'description': 'CanStdRxIDbase of the drive; plus station it is the identifier of '
-                           'requests.',
-            'type': 'integer', 'minimum': 0, 'maximum': STANDARD_IDENTIFIER_MAX - 1,
-            'default': REQUEST_ID_BASE,
-        },
-        'response_id_base': {
-            'description': 'CanStdTxIDbase of the drive; plus station it is the identifier of '
-                           'responses.',
-            'type': 'integer', 'minimum': 0, 'maximum': STANDARD_IDENTIFIER_MAX - 1,
-            'default': RESPONSE_ID_BASE,
-        },
-        'quarantine': {
-            'description': 's of silence after a read that was not answered: a late answer does '
-                           'not say what it answers.',
-            'type': 'number', 'minimum': 0.0, 'maximum': 60.0, 'default': 0.1,
-        },
-        'refresh_interval': {
-            'description': 's after which unchanged cyclic_request values are written again; '
-                           '0: only on change.',
-            'type': 'number', 'minimum': 0.0, 'maximum': 3600.0, 'default': 0.5,
-        },
-    }
+    options_type = StandardOptions
 
     def claims(self, drive: DriveConfiguration) -> list[Claim]:
         """Return both identifiers of the drive."""
-        found = []
-        for base in _BASES:
-            identifier = drive.family_options[base] + drive.station
-            # one that does not fit is refused as such: it must not look like another one
-            if 0 <= identifier <= STANDARD_IDENTIFIER_MAX:
-                found.append(Claim(Route(identifier, STANDARD_IDENTIFIER_MAX, False),
-                                   f'11-bit identifier {identifier:03X}h'))
-        return found
+        # one that does not fit is refused as such: it must not look like another one
+        return [Claim(Route(identifier, STANDARD_IDENTIFIER_MAX, False),
+                      f'11-bit identifier {identifier:03X}h')
+                for identifier in (base + drive.station for base in _bases(drive).values())
+                if 0 <= identifier <= STANDARD_IDENTIFIER_MAX]
 
     def bits_per_second(self, drive: DriveConfiguration) -> float:
         """Return the worst-case load: a round of reads and every setpoint, each period."""
@@ -75,20 +44,24 @@ class DataModelStandard(DataModelFamily):
     # -- parts of the check -----------------------------------------------------------------------
 
     def _check_station(self, drive: DriveConfiguration) -> Iterator[Complaint]:
-        options = drive.family_options
-        highest = STANDARD_IDENTIFIER_MAX - max(options[base] for base in _BASES)
+        bases = _bases(drive)
+        highest = STANDARD_IDENTIFIER_MAX - max(bases.values())
         if drive.station < 1:
             yield Complaint('station', f'{drive.station} is out of range, '
                                        f'allowed is 1 to {highest} ({self.name})')
-        for base in _BASES:
-            identifier = options[base] + drive.station
+        for direction, base in bases.items():
+            identifier = base + drive.station
             if identifier > STANDARD_IDENTIFIER_MAX:
                 yield Complaint(
-                    'station', f'{drive.station} is out of range: the identifier of '
-                    f'{_DIRECTION[base]}s, {options[base]:X}h + {drive.station} = '
-                    f'{identifier:X}h, does not fit 11 bits; allowed is 1 to {highest} with these '
-                    f'bases')
+                    'station', f'{drive.station} is out of range: the identifier of {direction}s, '
+                    f'{base:X}h + {drive.station} = {identifier:X}h, does not fit 11 bits; '
+                    f'allowed is 1 to {highest} with these bases')
                 break
-        if options[_BASES[0]] == options[_BASES[1]]:
-            yield Complaint('response_id_base', f'{options[_BASES[1]]} is request_id_base, too: '
+        if bases['request'] == bases['response']:
+            yield Complaint('response_id_base', f'{bases["response"]} is request_id_base, too: '
                                                 'allowed are bases that differ')
+
+
+def _bases(drive: DriveConfiguration) -> dict[str, int]:
+    options: StandardOptions = drive.options
+    return {'request': options.request_id_base, 'response': options.response_id_base}

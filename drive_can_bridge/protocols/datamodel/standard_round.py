@@ -11,7 +11,7 @@ FRAME_BITS = 135
 
 def places(drive: DriveConfiguration) -> list[Place]:
     """Return where the parameters of ``cyclic_response`` stand, as numbers on the wire."""
-    offset: int = drive.family_options['parameter_offset']
+    offset: int = drive.options.parameter_offset
     return [Place((parameter.number or 0) + offset) for parameter in drive.cyclic_response]
 
 
@@ -22,7 +22,7 @@ def reads(drive: DriveConfiguration) -> list[Chunk]:
     Gaps are bridged over parameters that the profile lists: about others nobody knows whether the
     drive has them, and it answers a read as a whole or not at all.
     """
-    offset: int = drive.family_options['parameter_offset']
+    offset: int = drive.options.parameter_offset
     known = {parameter.number + offset for parameter in drive.profile.parameters.values()
              if parameter.number is not None and parameter.readable}
     return plan_reads(places(drive), SLOTS, known=known)

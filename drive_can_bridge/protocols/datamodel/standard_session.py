@@ -42,24 +42,24 @@ class StandardSession(DataModelSession):
     """Rounds of reads, setpoints on change, and the acyclic frames between them."""
 
     def __init__(self, drive: DriveConfiguration) -> None:
-        options = drive.family_options
-        request = standard.identifier(options['request_id_base'], drive.station)
+        options = drive.options
+        request = standard.identifier(options.request_id_base, drive.station)
         super().__init__(
             drive,
             encode_read=lambda number, count: standard.encode_read_request(
                 request, number, count),
             encode_write=lambda number, words: standard.encode_write(request, number, *words),
-            together=1, polling=Polling(options['quarantine']))
+            together=1, polling=Polling(options.quarantine))
         self._request_identifier = request
         self._identifiers = request, standard.identifier(
-            options['response_id_base'], drive.station)
-        self._strict: bool = options['length_policy'] == 'strict'
+            options.response_id_base, drive.station)
+        self._strict: bool = options.length_policy == 'strict'
         self._places = places(drive)
         self._reads = reads(drive)
         self._status_read = None if self._status_slot is None else next(
             chunk for chunk in self._reads if chunk.address
             <= self._places[self._status_slot].address < chunk.address + chunk.size)
-        self._writes = WriteSchedule(len(drive.cyclic_request), options['refresh_interval'])
+        self._writes = WriteSchedule(len(drive.cyclic_request), options.refresh_interval)
         self._phase = Phase.IDLE
         self._beat = Beat(drive.period)
         self._in_round = False
@@ -101,7 +101,7 @@ class StandardSession(DataModelSession):
 
     @property
     def longest_stop(self) -> float:
-        return ATTEMPTS * (ANSWER_TIME + float(self.drive.family_options['quarantine']))
+        return ATTEMPTS * (ANSWER_TIME + float(self.drive.options.quarantine))
 
     def time_lost(self, now: float) -> None:
         if self._phase is Phase.POLLING:
@@ -177,7 +177,7 @@ class StandardSession(DataModelSession):
     def _patience(self) -> float:
         """Return what a round may take when a read of a user and one of its own go unanswered."""
         return 2 * (self.drive.period + self.drive.parameter_timeout
-                    + float(self.drive.family_options['quarantine']))
+                    + float(self.drive.options.quarantine))
 
     # -- setpoints --------------------------------------------------------------------------------
 

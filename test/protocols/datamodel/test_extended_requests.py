@@ -177,7 +177,7 @@ def test_read_back_of_something_else() -> None:
 def test_bool_is_read_back_as_a_bool() -> None:
     assert FLAG.type is BOOL
     for word, outcome in (('0001', 'written'), ('FFFF', 'written'),
-                          ('0000', 'read back False instead of True')):
+                          ('0000', 'read back false instead of true')):
         talk = quiet()
         assert talk.submits(write((FLAG, 1)), 10.1) == ['003002A1#0001000000000000']
         talk.until(10.11)

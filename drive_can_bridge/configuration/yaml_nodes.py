@@ -1,0 +1,133 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+YAML files as nodes with lines.
+
+Nodes are put together from PyYAML's event stream, on which rcl works as well: only there can be
+seen what rcl refuses (PyYAML's composer follows aliases and refuses anchors that stand twice).
+It takes no recursion, so that no nesting of a file ends in the depths of the C stack.
+"""
+
+from collections.abc import Iterator
+from enum import Enum
+from errno import EFBIG, EINVAL
+from pathlib import Path as FilePath
+from typing import NamedTuple
+
+import yaml
+
+from drive_can_bridge.configuration.scalars import read_scalar, Scalar
+
+# libyaml, which rcl uses as well, where PyYAML was built with it.
+_LOADER = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
+
+#: of what is read at all, in MiB and in levels
+SIZE_MAX = 4
+DEPTH_MAX = 32
+_OPENED = ('while scanning a quoted scalar', 'while parsing a flow')
+
+
+class BrokenYaml(Exception):
+    """The text is not YAML from here on."""
+
+    def __init__(self, line: int, message: str) -> None:
+        super().__init__(message)
+        self.line = line
+
+
+class Kind(Enum):
+    """What a node is."""
+
+    SCALAR = 'scalar'
+    LIST = 'list'
+    MAPPING = 'mapping'
+    ALIAS = 'alias'
+
+
+class Node(NamedTuple):
+    """
+    A part of a YAML text.
+
+    :param line: where it begins, counted from 1.
+    :param items: of a list; of a mapping its keys and values in turn.
+    :param text: of a scalar, without quotes.
+    """
+
+    kind: Kind
+    line: int
+    items: list['Node']
+    text: str = ''
+    quoted: bool = False
+    tag: str | None = None
+
+    @property
+    def scalar(self) -> Scalar:
+        """The value of a scalar, as rcl reads it."""
+        return read_scalar(self.text, quoted=self.quoted, tag=self.tag)
+
+    @property
+    def pairs(self) -> Iterator[tuple['Node', 'Node']]:
+        """Keys and values of a mapping."""
+        return zip(self.items[::2], self.items[1::2])
+
+
+class Document(NamedTuple):
+    """One of the documents of a file: where it begins, and what it holds."""
+
+    line: int
+    root: Node
+
+
+def read_documents(path: FilePath) -> list[Document]:
+    """
+    Read a YAML file.
+
+    :raises OSError: it cannot be read, is no file, or is too large.
+    :raises BrokenYaml: it is no YAML.
+    """
+    if not path.is_file() and not path.is_dir() and path.exists():  # a pipe may keep us waiting
+        raise OSError(EINVAL, 'not a regular file, allowed is one', str(path))
+    with path.open('rb') as file:
+        data = file.read((SIZE_MAX << 20) + 1)
+    if len(data) > SIZE_MAX << 20:
+        raise OSError(EFBIG, f'too large, allowed are {SIZE_MAX} MiB', str(path))
+    return _documents(data)
+
+
+def _documents(data: bytes) -> list[Document]:
+    starts: list[int] = []
+    roots: list[Node] = []
+    # the lists that nodes are added to: that of the documents, and those of all open nodes
+    growing = [roots]
+    line = 1
+    try:
+        for event in yaml.parse(data, Loader=_LOADER):
+            line = event.start_mark.line + 1 if event.start_mark else line
+            if isinstance(event, yaml.ScalarEvent):
+                growing[-1].append(Node(Kind.SCALAR, line, [], event.value,
+                                        event.style in ("'", '"'), event.tag))
+            elif isinstance(event, yaml.AliasEvent):
+                growing[-1].append(Node(Kind.ALIAS, line, []))
+            elif isinstance(event, yaml.CollectionStartEvent):
+                kind = Kind.LIST if isinstance(event, yaml.SequenceStartEvent) else Kind.MAPPING
+                node = Node(kind, line, [])
+                growing[-1].append(node)
+                growing.append(node.items)
+                if len(growing) > DEPTH_MAX + 1:
+                    raise BrokenYaml(line, f'nested too deep, allowed are {DEPTH_MAX} levels')
+            elif isinstance(event, yaml.CollectionEndEvent):
+                growing.pop()
+            elif isinstance(event, yaml.DocumentStartEvent):
+                starts.append(line)
+    except (yaml.YAMLError, ValueError, OverflowError) as error:
+        raise _broken(error, line) from None
+    return list(map(Document, starts, roots))
+
+
+def _broken(error: Exception, line: int) -> BrokenYaml:
+    mark = getattr(error, 'problem_mark', None)
+    if str(getattr(error, 'context', '')).startswith(_OPENED):
+        # What was never closed is noticed much later; the beginning is the line to look at.
+        mark = getattr(error, 'context_mark', None) or mark
+    line = mark.line + 1 if mark is not None else line
+    what = getattr(error, 'problem', None) or getattr(error, 'reason', None)
+    return BrokenYaml(line, f'not valid YAML: {what or "unreadable"}')
