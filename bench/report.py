@@ -127,6 +127,23 @@ def drives_figures(found: dict[str, dict[str, Any]]) -> list[Figure]:
     ]
 
 
+def decode_figures(found: dict[str, dict[str, float]]) -> list[Figure]:
+    """Rate at which a long trace is decoded, and memory."""
+    figures = []
+    for what in ('lines', '--summary'):
+        long, short = found[f'long {what}'], found[f'short {what}']
+        elapsed = long['elapsed'] - short['elapsed']    # without the start of the program
+        rate = (long['frames'] - short['frames']) / elapsed
+        figures += [
+            Figure(f'frames/s decoded, {what}', f'{rate:.0f}',
+                   f'{1e6 * long["cpu"] / long["frames"]:.1f} µs of CPU each', rate, 50_000.0,
+                   at_least=True),
+            Figure(f'memory of decode, {what}', f'{long["resident_mb"]:.1f} MB',
+                   f'{short["resident_mb"]:.1f} MB for a twentieth of the trace',
+                   long['resident_mb'] / short['resident_mb'], 1.05)]
+    return figures
+
+
 def start_figures(found: dict[str, Any]) -> list[Figure]:
     """Start and memory."""
     memory = found['resident_mb']
@@ -146,7 +163,8 @@ FIGURES: dict[str, Callable[[Any], list[Figure]]] = {
     'unsubscribed': lambda found: exchange_figures(found, 'nobody subscribed', 1.0),
     'ordinary': lambda found: exchange_figures(found, 'all of it at ordinary priority', 1.5),
     'diy': diy_figures, 'latency': latency_figures, 'service': service_figures,
-    'flood': flood_figures, 'monitor': monitor_figures, 'drives': drives_figures, 'start': start_figures,
+    'flood': flood_figures, 'monitor': monitor_figures, 'drives': drives_figures,
+    'decode': decode_figures, 'start': start_figures,
 }
 
 

@@ -8,8 +8,11 @@ All return plain numbers: times in s, CPU time in s, memory in MB; lists are sam
 from collections.abc import Iterator
 from contextlib import contextmanager, ExitStack
 from dataclasses import dataclass
+import os
 from pathlib import Path
 import statistics
+import subprocess
+import sys
 import tempfile
 import time
 from typing import Any
@@ -225,6 +228,35 @@ def start(drives: int, duration: float) -> dict[str, Any]:
             for _ in range(4):
                 time.sleep(duration / 4)
                 found['resident_mb'].append(bridge.resident_mb())
+    return found
+
+
+def decode(frames: int) -> dict[str, dict[str, float]]:
+    """Measure ``drive_can decode`` of a long trace: time, and memory beside a short one."""
+    found: dict[str, dict[str, float]] = {}
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        file = folder / 'bench.yaml'
+        file.write_text('/**/drive_can_bridge: {ros__parameters: {buses: {main: {interface: '
+                        'socketcan, channel: can0}}, drives: {drive0: {bus: main, protocol: '
+                        f'datamodel_extended, station: 1, profile: {HERE / "profile.yaml"}, '
+                        f'cyclic_request: [{REQUESTS}], cyclic_response: [{RESPONSES}]}}}}}}}}\n')
+        for name, count in (('short', frames // 20), ('long', frames)):
+            trace = folder / f'{name}.log'
+            with trace.open('w') as stream:
+                for cycle in range(count // 2):
+                    begin, word = 1.7e9 + 0.02 * cycle, cycle % 3000
+                    stream.write(f'({begin:.6f}) can0 003FFFF0#{word:04X}03E800000000 T\n'
+                                 f'({begin + 0.001:.6f}) can0 103FFFF0#{word:04X}00C8000001F4 R\n')
+            for what in ('lines', '--summary'):
+                command = [sys.executable, '-m', 'drive_can_bridge.cli.main', 'decode', str(trace),
+                           '--params-file', str(file), *([] if what == 'lines' else [what])]
+                begun = time.monotonic()
+                with subprocess.Popen(command, stdout=subprocess.DEVNULL) as process:
+                    _, _, usage = os.wait4(process.pid, 0)
+                found[f'{name} {what}'] = {
+                    'frames': count, 'elapsed': time.monotonic() - begun,
+                    'cpu': usage.ru_utime + usage.ru_stime, 'resident_mb': usage.ru_maxrss / 1024}
     return found
 
 

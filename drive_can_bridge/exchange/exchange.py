@@ -21,7 +21,7 @@ from typing import Any, Protocol
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlTicket
 from drive_can_bridge.core.events import Event, ProcessDataReceived
-from drive_can_bridge.core.frame import Frame, Route
+from drive_can_bridge.core.frame import bits_on_bus, Frame, Route
 from drive_can_bridge.core.requests import Request
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.exchange.alarm import Alarm
@@ -328,7 +328,7 @@ class BusExchange:
             now = self._clock()
             if now - self._last_pass >= LOST_TIME:
                 self._notice_lost_time(now)
-            self.received_bits += _bits(frame)
+            self.received_bits += bits_on_bus(len(frame[1]), frame[2])
             member = self._router.find(frame)
             if member is None:
                 self.frames_rejected += 1
@@ -387,7 +387,7 @@ class BusExchange:
             refused = []
             for place, frame in enumerate(frames):
                 if self.link.send(frame):
-                    self.sent_bits += _bits(frame)
+                    self.sent_bits += bits_on_bus(len(frame[1]), frame[2])
                 else:
                     refused.append(place)
             session.frames_left(self._clock(), refused)
@@ -404,8 +404,3 @@ class BusExchange:
             for outcome in session.take_control_outcomes():
                 member.listener.control_completed(outcome)
         member.due = session.next_timer()
-
-
-def _bits(frame: Frame) -> int:
-    """Return a frame's length on the bus without stuff bits, interframe space included."""
-    return (67 if frame[2] else 47) + 8 * len(frame[1])

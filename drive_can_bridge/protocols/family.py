@@ -15,6 +15,7 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Route
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.session import Session
+from drive_can_bridge.protocols.observer import DriveObserver, Emit
 
 
 class Complaint(NamedTuple):
@@ -124,3 +125,14 @@ class Family(ABC):
     def make_sessions(self, drives: Sequence[DriveConfiguration]) -> list[Session]:
         """Make the sessions of all drives of this family on one bus, in the same order."""
         return [self.make_session(drive) for drive in drives]
+
+    @abstractmethod
+    def make_observers(self, drives: Sequence[DriveConfiguration], emit: Emit,
+                       ) -> list[DriveObserver]:
+        """
+        Make what watches the drives of this family on one bus.
+
+        :param emit: takes every telegram.
+        :return: one for each drive, in the same order; then those of frames that are of no drive
+            in particular, whose name is ''.
+        """

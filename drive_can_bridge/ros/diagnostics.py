@@ -9,6 +9,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
+from drive_can_bridge.core.frame import STUFFING
 from drive_can_bridge.core.session import DriveState
 from drive_can_bridge.core.statistics import Statistic
 from drive_can_bridge.core.text import printable
@@ -21,8 +22,6 @@ from drive_can_bridge.transport.link import steady_now
 
 #: bus load above which a bus is never OK
 LOAD_WARNING = 70.0
-#: worst case over no stuff bits: an average frame lies between, this much above the shortest
-STUFFING = 1.11
 #: s for which a command that changed nothing is worth a warning
 COMMANDS_RECENT = 1.5
 

@@ -1,7 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The row of the family table for the CANopen PKW mailbox."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from drive_can_bridge.core.configuration import DriveConfiguration
@@ -12,6 +12,7 @@ from drive_can_bridge.protocols.canopen_pkw import addresses, network, pkw
 from drive_can_bridge.protocols.canopen_pkw.addresses import Span
 from drive_can_bridge.protocols.canopen_pkw.identifiers import Identifiers
 from drive_can_bridge.protocols.family import Claim, Complaint, Family
+from drive_can_bridge.protocols.observer import DriveObserver, Emit
 from drive_can_bridge.protocols.polling import round_time
 
 #: worst-case stuffing, eight bytes, 11-bit identifier, with the interframe space
@@ -160,6 +161,13 @@ class CanopenPkw(Family):
         # Imported late: configuration checks read this table without any need of sessions.
         from drive_can_bridge.protocols.canopen_pkw.session import PkwSession
         return PkwSession(drive)
+
+    def make_observers(self, drives: Sequence[DriveConfiguration], emit: Emit,
+                       ) -> list[DriveObserver]:
+        """Make what watches devices, and what is said to all nodes."""
+        from drive_can_bridge.protocols.canopen_pkw.observer import NmtObserver, PkwObserver
+        return [*(PkwObserver(drive, emit) for drive in drives),
+                NmtObserver({drive.station: drive.name for drive in drives}, emit)]
 
     # -- parts ------------------------------------------------------------------------------------
 

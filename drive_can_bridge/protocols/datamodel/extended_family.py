@@ -1,7 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The row of the family table for the DataModel protocol with 29-bit identifiers."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from drive_can_bridge.core.configuration import DriveConfiguration
@@ -15,6 +15,7 @@ from drive_can_bridge.protocols.datamodel.extended import (
     SLOTS, STATION_MASK, STATION_MAX, STATION_SHIFT,
 )
 from drive_can_bridge.protocols.family import Claim, Complaint
+from drive_can_bridge.protocols.observer import DriveObserver, Emit
 
 #: worst-case stuffing, eight bytes, 29-bit identifier, with the interframe space
 FRAME_BITS = 160
@@ -55,6 +56,12 @@ class DataModelExtended(DataModelFamily):
         # Imported late: configuration checks read this table without any need of sessions.
         from drive_can_bridge.protocols.datamodel.extended_session import ExtendedSession
         return ExtendedSession(drive)
+
+    def make_observers(self, drives: Sequence[DriveConfiguration], emit: Emit,
+                       ) -> list[DriveObserver]:
+        """Make what watches drives."""
+        from drive_can_bridge.protocols.datamodel.observer import ExtendedObserver
+        return [ExtendedObserver(drive, emit) for drive in drives]
 
     # -- parts of the check -----------------------------------------------------------------------
 

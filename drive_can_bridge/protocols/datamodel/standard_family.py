@@ -1,7 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The row of the family table for the DataModel protocol with 11-bit identifiers."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from drive_can_bridge.core.configuration import DriveConfiguration
@@ -11,6 +11,7 @@ from drive_can_bridge.protocols.datamodel import standard_round
 from drive_can_bridge.protocols.datamodel.common_family import COMMON_OPTIONS, DataModelFamily
 from drive_can_bridge.protocols.datamodel.standard import REQUEST_ID_BASE, RESPONSE_ID_BASE
 from drive_can_bridge.protocols.family import Claim, Complaint
+from drive_can_bridge.protocols.observer import DriveObserver, Emit
 
 _BASES = ('request_id_base', 'response_id_base')
 _DIRECTION = {'request_id_base': 'request', 'response_id_base': 'response'}
@@ -71,6 +72,12 @@ class DataModelStandard(DataModelFamily):
         # Imported late: configuration checks read this table without any need of sessions.
         from drive_can_bridge.protocols.datamodel.standard_session import StandardSession
         return StandardSession(drive)
+
+    def make_observers(self, drives: Sequence[DriveConfiguration], emit: Emit,
+                       ) -> list[DriveObserver]:
+        """Make what watches drives."""
+        from drive_can_bridge.protocols.datamodel.observer import StandardObserver
+        return [StandardObserver(drive, emit) for drive in drives]
 
     # -- parts of the check -----------------------------------------------------------------------
 
