@@ -37,6 +37,8 @@ def plan(options: argparse.Namespace) -> dict[str, Callable[[], Any]]:
         'drives': lambda: {number: scenarios.exchange(
             Load(number, period, subscribed=False), duration, floor=False)
             for number in sorted({1, 4, 8, drives})},
+        'flight': lambda: scenarios.flight(
+            Load(drives, period, subscribed=False, trace=2 * duration), duration),
         'decode': lambda: scenarios.decode(options.frames),
         'start': lambda: scenarios.start(drives, options.memory_duration),
     }

@@ -21,6 +21,9 @@ from child import Child, child, HERE
 from unix_bus import INTERFACE
 from viewer import viewer
 
+from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.trace.ring import Ring
+
 #: s until discovery and the first publishes are over
 SETTLE = 2.0
 REQUESTS = 'speed_setpoint, torque_limit, position_setpoint, digital_outputs'
@@ -35,6 +38,7 @@ class Load:
     :param subscribed: every topic has a subscriber in another process.
     :param commands: setpoints per second and drive.
     :param real_time: the exchange may have the priority that it asks for.
+    :param trace: s that the flight recorder keeps; 0: it is off.
     """
 
     drives: int
@@ -42,6 +46,7 @@ class Load:
     subscribed: bool = True
     commands: float = 0.0
     real_time: bool = True
+    trace: float = 0.0
 
     @property
     def how(self) -> tuple[str, ...]:
@@ -58,7 +63,8 @@ class Bus:
         self.file = folder / 'bench.yaml'
         lines = ['/**/drive_can_bridge:', '  ros__parameters:', '    buses:', '      main:',
                  f'        interface: {INTERFACE}', f'        channel: {self.channel}',
-                 '        bitrate: 1000000', '    drives:']
+                 '        bitrate: 1000000', f'        trace_seconds: {load.trace}',
+                 f'        trace_directory: {folder}', '    drives:']
         for number in range(load.drives):
             lines += [f'      drive{number}:', '        bus: main',
                       '        protocol: datamodel_extended', f'        station: {number + 1}',
@@ -229,6 +235,35 @@ def start(drives: int, duration: float) -> dict[str, Any]:
                 time.sleep(duration / 4)
                 found['resident_mb'].append(bridge.resident_mb())
     return found
+
+
+def flight(load: Load, duration: float) -> dict[str, Any]:
+    """Measure the flight recorder: what a frame costs, and exchanges while a trace is written."""
+    found: dict[str, Any] = {'note': _note_time()}
+    with ExitStack() as stack:
+        bus = Bus(stack, load)
+        with bridge_under(load, bus) as bridge:
+            for name in ('recording', 'writing'):
+                time.sleep(duration)
+                bridge.ask('clear')
+                if name == 'writing':   # the duration before is what is written
+                    found['trace'] = bridge.ask('trace')
+                else:
+                    time.sleep(duration)
+                found[name] = bridge.ask('result')
+    return found
+
+
+def _note_time() -> float:
+    """Return the time that keeping one frame takes, in s."""
+    ring, sample, count = Ring(60.0), Frame(0x103FFFF0, bytes(8), True), 200_000
+    best = float('inf')
+    for _ in range(5):
+        begun = time.perf_counter()
+        for step in range(count):
+            ring.note(sample, float(step), True)
+        best = min(best, time.perf_counter() - begun)
+    return best / count
 
 
 def decode(frames: int) -> dict[str, dict[str, float]]:

@@ -33,7 +33,8 @@ INTERNAL: dict[str, set[str]] = {
     'trace': {'', 'core', 'protocols', 'transport'},
     'simulation': {'', 'core', 'configuration', 'protocols', 'resources', 'transport'},
     'ros': {
-        '', 'core', 'configuration', 'protocols', 'resources', 'transport', 'exchange', 'process'},
+        '', 'core', 'configuration', 'protocols', 'resources', 'trace', 'transport', 'exchange',
+        'process'},
     'monitor': {'', 'core'},
     'view': {'', 'core', 'monitor'},
     'ros.monitor': {'', 'core', 'monitor'},
@@ -41,7 +42,8 @@ INTERNAL: dict[str, set[str]] = {
     'demo': {'', 'core', 'configuration', 'process'},
     'cli': {
         '', 'core', 'configuration', 'protocols', 'resources', 'transport', 'exchange', 'process',
-        'profiles', 'simulation', 'trace', 'monitor', 'view', 'demo', 'ros', 'ros.monitor', 'ros.demo'},
+        'profiles', 'simulation', 'trace', 'monitor', 'view', 'demo', 'ros', 'ros.monitor',
+        'ros.demo'},
 }
 
 ROS_PACKAGES = {

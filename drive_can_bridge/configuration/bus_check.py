@@ -94,4 +94,6 @@ def _bus(name: str, entry: dict[str, Any]) -> BusConfiguration:
     return BusConfiguration(
         name=name, interface=values['interface'], channel=values['channel'],
         bitrate=values['bitrate'], reconnect_period=float(values['reconnect_period']),
+        trace_seconds=float(values['trace_seconds']), trace_directory=values['trace_directory'],
+        trace_files=values['trace_files'],
         options={key: value for key, value in entry.items() if key not in ours})

@@ -70,7 +70,8 @@ def _bridge(configuration: BridgeConfiguration) -> Iterator[DeclaredParameter]:
 
 def _bus(bus: BusConfiguration) -> Iterator[DeclaredParameter]:
     prefix = f'buses.{bus.name}.'
-    for key in ('interface', 'channel', 'bitrate', 'reconnect_period'):
+    for key in ('interface', 'channel', 'bitrate', 'reconnect_period', 'trace_seconds',
+                'trace_directory', 'trace_files'):
         yield DeclaredParameter(prefix + key, getattr(bus, key), _description('bus', key), False)
     for key, value in bus.options.items():
         yield DeclaredParameter(prefix + key, value, 'Handed to the adapter.', False)

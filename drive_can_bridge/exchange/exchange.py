@@ -111,13 +111,16 @@ class BusExchange:
 
     :param routes: for each session, in the same order, the identifiers it wants to see.
     :param prepare_thread: called first in each of the two threads.
+    :param note: sees every frame that was sent or received: (frame, time, sent).
     """
 
     def __init__(self, bus: BusConfiguration, sessions: Sequence[Session],
                  routes: Sequence[Sequence[Route]], listener: BusListener, *,
                  clock: Callable[[], float] = steady_now,
-                 prepare_thread: Callable[[], object] = lambda: None) -> None:
+                 prepare_thread: Callable[[], object] = lambda: None,
+                 note: Callable[[Frame, float, bool], object] | None = None) -> None:
         self.bus = bus
+        self._note = note
         self.lock = threading.Lock()
         self._clock = clock
         self._prepare_thread = prepare_thread
@@ -329,6 +332,8 @@ class BusExchange:
             if now - self._last_pass >= LOST_TIME:
                 self._notice_lost_time(now)
             self.received_bits += bits_on_bus(len(frame[1]), frame[2])
+            if self._note is not None:
+                self._note(frame, arrived, False)
             member = self._router.find(frame)
             if member is None:
                 self.frames_rejected += 1
@@ -385,9 +390,12 @@ class BusExchange:
         frames = session.take_frames()
         while frames:
             refused = []
+            leaving = self._clock()     # nothing answers before that
             for place, frame in enumerate(frames):
                 if self.link.send(frame):
                     self.sent_bits += bits_on_bus(len(frame[1]), frame[2])
+                    if self._note is not None:
+                        self._note(frame, leaving, True)
                 else:
                     refused.append(place)
             session.frames_left(self._clock(), refused)

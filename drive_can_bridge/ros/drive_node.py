@@ -74,6 +74,7 @@ class DriveNode:
         self.requests_refused = 0
         self._identity = IdentityReader(drive.profile, self._submit_quietly, identified,
                                         lambda text: self.warn(text, text))
+        self.times_lost = 0
         self.rejected_text = ''
         self.foreign_text = ''
         # a local remapping wins over a process-wide ``__node:=``, which would rename every drive;
@@ -206,6 +207,7 @@ class DriveNode:
             self._online.publish(Bool(data=False))
             self.samples.forget()
             if self.session.active:
+                self.times_lost += 1
                 self._log.warning(f'{self.name}: offline: {event.reason}')
             else:
                 self._inform('stopped')

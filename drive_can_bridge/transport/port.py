@@ -198,6 +198,8 @@ class Port(EndPoint):
 
     def _error_frame(self, message: can.Message) -> None:
         self.error_frames += 1
+        if self.error_witness is not None:
+            self.error_witness(message.arbitration_id, bytes(message.data))
         if not self._kernel_errors:
             self.last_error = BusError('error frame', None, ADVICE_DISTURBED)
             return
