@@ -45,6 +45,7 @@ class Listener:
 
     take_commands = discard_commands = process_data = control_completed = nothing
     bus_opened = bus_lost = fatal = nothing
+    request_sent = nothing
 
 
 class Bus:
