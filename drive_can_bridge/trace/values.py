@@ -49,9 +49,10 @@ def _digits(step: float) -> int:
     if step == 0.0 or float(step).is_integer():
         return 0
     digits = max(0, math.ceil(-math.log10(abs(step)) - 1e-9))
-    while digits < _DIGITS_MAX and not math.isclose(round(step, digits), step, rel_tol=1e-2):
+    most = min(digits + 1, _DIGITS_MAX)     # of a step like 50/16384 nobody wants them all
+    while digits < most and not math.isclose(round(step, digits), step, rel_tol=1e-2):
         digits += 1
-    return min(digits, _DIGITS_MAX)
+    return min(digits, most)
 
 
 def _bits_text(parameter: Parameter, raw: int) -> str:
