@@ -33,6 +33,7 @@ SUBCOMMANDS: dict[str, tuple[str, str]] = {
                 'show all bridges and their drives, live'),
     'profile': ('drive_can_bridge.cli.profile',
                 'list, show, check and import parameter tables'),
+    'scan': ('drive_can_bridge.cli.scan', 'find the drives on a bus'),
     'record': ('drive_can_bridge.cli.record',
                'write everything on the buses of a parameter file to a trace'),
     'decode': ('drive_can_bridge.cli.decode',

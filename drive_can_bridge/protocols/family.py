@@ -16,6 +16,7 @@ from drive_can_bridge.core.frame import Route
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.observer import DriveObserver, Emit
+from drive_can_bridge.protocols.scout import Scout
 
 
 class Complaint(NamedTuple):
@@ -136,3 +137,7 @@ class Family(ABC):
         :return: one for each drive, in the same order; then those of frames that are of no drive
             in particular, whose name is ''.
         """
+
+    @abstractmethod
+    def make_scout(self) -> Scout:
+        """Make what looks for drives of this family on a bus that nobody has described."""

@@ -1,7 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """A whole trace in a few lines: what each drive and each bus did."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 import math
 from typing import Any
 
@@ -41,13 +41,19 @@ def documents(tracer: Tracer) -> Iterator[dict[str, Any]]:
                'seconds': _rounded(bus.last - bus.first, 6)}
 
 
-def table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:
-    """Yield lines of columns: the first to the left, the others to the right."""
+def table(headings: Sequence[str], rows: Sequence[Sequence[str]], *,
+          texts: Container[int] = (0,)) -> Iterator[str]:
+    """
+    Yield lines of columns, numbers to the right.
+
+    :param texts: which columns are text, to the left.
+    """
     widths = [max(len(row[place]) for row in (headings, *rows))
               for place in range(len(headings))]
     for row in (headings, *rows):
-        yield '  '.join([row[0].ljust(widths[0]), *(
-            cell.rjust(width) for cell, width in zip(row[1:], widths[1:]))]).rstrip()
+        yield '  '.join(
+            cell.ljust(width) if place in texts else cell.rjust(width)
+            for place, (cell, width) in enumerate(zip(row, widths))).rstrip()
 
 
 def _drive_cells(observed: Observed) -> Iterator[str]:

@@ -19,6 +19,7 @@ from drive_can_bridge.protocols.cannord.process_data import (
 from drive_can_bridge.protocols.cannord.states import PARAMETER_SETS, STATUS_WORD
 from drive_can_bridge.protocols.family import Claim, Complaint, Family
 from drive_can_bridge.protocols.observer import DriveObserver, Emit
+from drive_can_bridge.protocols.scout import Scout
 
 #: s that an inverter takes at most to answer process data (BU 0060 page 50)
 ANSWER_TIME = 0.003
@@ -176,6 +177,11 @@ class Cannord(Family):
         from drive_can_bridge.protocols.cannord.observer import CannordObserver
         leaders = {group[0].name for group in groups(drives)}
         return [CannordObserver(drive, emit, leads=drive.name in leaders) for drive in drives]
+
+    def make_scout(self) -> Scout:
+        """Make what looks for drives of this family."""
+        from drive_can_bridge.protocols.cannord.scout import CannordScout
+        return CannordScout()
 
     # -- parts ------------------------------------------------------------------------------------
 

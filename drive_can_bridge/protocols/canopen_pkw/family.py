@@ -14,6 +14,7 @@ from drive_can_bridge.protocols.canopen_pkw.identifiers import Identifiers
 from drive_can_bridge.protocols.family import Claim, Complaint, Family
 from drive_can_bridge.protocols.observer import DriveObserver, Emit
 from drive_can_bridge.protocols.polling import round_time
+from drive_can_bridge.protocols.scout import Scout
 
 #: worst-case stuffing, eight bytes, 11-bit identifier, with the interframe space
 FRAME_BITS = 135
@@ -168,6 +169,11 @@ class CanopenPkw(Family):
         from drive_can_bridge.protocols.canopen_pkw.observer import NmtObserver, PkwObserver
         return [*(PkwObserver(drive, emit) for drive in drives),
                 NmtObserver({drive.station: drive.name for drive in drives}, emit)]
+
+    def make_scout(self) -> Scout:
+        """Make what looks for drives of this family."""
+        from drive_can_bridge.protocols.canopen_pkw.scout import CanopenScout
+        return CanopenScout()
 
     # -- parts ------------------------------------------------------------------------------------
 

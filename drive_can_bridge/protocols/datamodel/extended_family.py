@@ -16,6 +16,7 @@ from drive_can_bridge.protocols.datamodel.extended import (
 )
 from drive_can_bridge.protocols.family import Claim, Complaint
 from drive_can_bridge.protocols.observer import DriveObserver, Emit
+from drive_can_bridge.protocols.scout import Scout
 
 #: worst-case stuffing, eight bytes, 29-bit identifier, with the interframe space
 FRAME_BITS = 160
@@ -62,6 +63,11 @@ class DataModelExtended(DataModelFamily):
         """Make what watches drives."""
         from drive_can_bridge.protocols.datamodel.observer import ExtendedObserver
         return [ExtendedObserver(drive, emit) for drive in drives]
+
+    def make_scout(self) -> Scout:
+        """Make what looks for drives of this family."""
+        from drive_can_bridge.protocols.datamodel.scout import ExtendedScout
+        return ExtendedScout()
 
     # -- parts of the check -----------------------------------------------------------------------
 

@@ -12,6 +12,7 @@ from drive_can_bridge.protocols.datamodel.common_family import COMMON_OPTIONS, D
 from drive_can_bridge.protocols.datamodel.standard import REQUEST_ID_BASE, RESPONSE_ID_BASE
 from drive_can_bridge.protocols.family import Claim, Complaint
 from drive_can_bridge.protocols.observer import DriveObserver, Emit
+from drive_can_bridge.protocols.scout import Scout
 
 _BASES = ('request_id_base', 'response_id_base')
 _DIRECTION = {'request_id_base': 'request', 'response_id_base': 'response'}
@@ -78,6 +79,11 @@ class DataModelStandard(DataModelFamily):
         """Make what watches drives."""
         from drive_can_bridge.protocols.datamodel.observer import StandardObserver
         return [StandardObserver(drive, emit) for drive in drives]
+
+    def make_scout(self) -> Scout:
+        """Make what looks for drives of this family."""
+        from drive_can_bridge.protocols.datamodel.scout import StandardScout
+        return StandardScout()
 
     # -- parts of the check -----------------------------------------------------------------------
 
