@@ -6,6 +6,7 @@ Started with a parameter file, and the word "ordinary" where no thread is to get
 priority. Prints how long it took from rclpy.init to the first exchange of every drive.
 """
 
+import queue
 import sys
 import threading
 import time
@@ -63,6 +64,18 @@ class Measured:
             'online': sum(session.online for session in self.sessions),
         }
 
+    def trace(self) -> dict[str, float]:
+        """Have a trace written; return when it is there."""
+        recorder = self.bridge._flight._recorder
+        answers: queue.SimpleQueue[tuple[str, str]] = queue.SimpleQueue()
+        begun = time.monotonic()
+        recorder.save('main', 'bench', lambda *answer: answers.put(answer))
+        path, reason = answers.get(timeout=60.0)
+        if not path:
+            raise SystemExit(reason)
+        with open(path, encoding='ascii') as file:
+            return {'elapsed': time.monotonic() - begun, 'frames': sum(1 for _ in file)}
+
     def close(self) -> None:
         """End well."""
         self.bridge.stop()
@@ -103,7 +116,7 @@ def main() -> None:
         if time.monotonic() > waited_until:
             raise SystemExit('the drives did not come online')
         time.sleep(0.005)
-    serve({'clear': measured.clear, 'result': measured.result},
+    serve({'clear': measured.clear, 'result': measured.result, 'trace': measured.trace},
           ready=time.monotonic() - begun, close=measured.close)
 
 

@@ -127,6 +127,40 @@ def drives_figures(found: dict[str, dict[str, Any]]) -> list[Figure]:
     ]
 
 
+def decode_figures(found: dict[str, dict[str, float]]) -> list[Figure]:
+    """Rate at which a long trace is decoded, and memory."""
+    figures = []
+    for what in ('lines', '--summary'):
+        long, short = found[f'long {what}'], found[f'short {what}']
+        elapsed = long['elapsed'] - short['elapsed']    # without the start of the program
+        rate = (long['frames'] - short['frames']) / elapsed
+        figures += [
+            Figure(f'frames/s decoded, {what}', f'{rate:.0f}',
+                   f'{1e6 * long["cpu"] / long["frames"]:.1f} µs of CPU each', rate, 50_000.0,
+                   at_least=True),
+            Figure(f'memory of decode, {what}', f'{long["resident_mb"]:.1f} MB',
+                   f'{short["resident_mb"]:.1f} MB for a twentieth of the trace',
+                   long['resident_mb'] / short['resident_mb'], 1.05)]
+    return figures
+
+
+def flight_figures(found: dict[str, Any]) -> list[Figure]:
+    """Cost of the flight recorder, and what it disturbs."""
+    recording, writing = found['recording'], found['writing']
+    exchange = sum(recording['cpu'].values()) / max(1, recording['exchanges'])
+    trace = found['trace']
+    periods = [p99(each['period_errors']) for each in (writing, recording)]
+    return [
+        Figure('flight recorder, share of an exchange', f'{1e6 * 2 * found["note"]:.2f} µs',
+               f'{1e6 * exchange:.0f} µs', 2 * found['note'] / exchange, 0.03),
+        Figure('exchanges missed while a trace is written',
+               f'{writing["missed"]} of {writing["exchanges"]}, {trace["frames"]} frames in '
+               f'{trace["elapsed"]:.1f} s, period error p99 {1e3 * periods[0]:.3f} ms',
+               f'{recording["missed"]} of {recording["exchanges"]}, '
+               f'{1e3 * periods[1]:.3f} ms', writing['missed'], 0.0),
+    ]
+
+
 def start_figures(found: dict[str, Any]) -> list[Figure]:
     """Start and memory."""
     memory = found['resident_mb']
@@ -147,7 +181,7 @@ FIGURES: dict[str, Callable[[Any], list[Figure]]] = {
     'ordinary': lambda found: exchange_figures(found, 'all of it at ordinary priority', 1.5),
     'diy': diy_figures, 'latency': latency_figures, 'service': service_figures,
     'flood': flood_figures, 'monitor': monitor_figures, 'drives': drives_figures,
-    'start': start_figures,
+    'decode': decode_figures, 'flight': flight_figures, 'start': start_figures,
 }
 
 

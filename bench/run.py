@@ -37,6 +37,9 @@ def plan(options: argparse.Namespace) -> dict[str, Callable[[], Any]]:
         'drives': lambda: {number: scenarios.exchange(
             Load(number, period, subscribed=False), duration, floor=False)
             for number in sorted({1, 4, 8, drives})},
+        'flight': lambda: scenarios.flight(
+            Load(drives, period, subscribed=False, trace=2 * duration), duration),
+        'decode': lambda: scenarios.decode(options.frames),
         'start': lambda: scenarios.start(drives, options.memory_duration),
     }
 
@@ -64,6 +67,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument('--period', type=float, default=0.005, help='s')
     parser.add_argument('--duration', type=float, default=5.0, help='s of each measurement')
     parser.add_argument('--memory-duration', type=float, default=60.0, help='s')
+    parser.add_argument('--frames', type=int, default=1_000_000, help='of a trace to decode')
     parser.add_argument('--repeat', type=int, default=1, help='runs; the median one is shown')
     parser.add_argument('--json', type=Path, help='write figures and samples to this file')
     parser.add_argument('--plot', type=Path, help='write the distributions to this PNG file')

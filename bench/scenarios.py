@@ -8,8 +8,11 @@ All return plain numbers: times in s, CPU time in s, memory in MB; lists are sam
 from collections.abc import Iterator
 from contextlib import contextmanager, ExitStack
 from dataclasses import dataclass
+import os
 from pathlib import Path
 import statistics
+import subprocess
+import sys
 import tempfile
 import time
 from typing import Any
@@ -17,6 +20,9 @@ from typing import Any
 from child import Child, child, HERE
 from unix_bus import INTERFACE
 from viewer import viewer
+
+from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.trace.ring import Ring
 
 #: s until discovery and the first publishes are over
 SETTLE = 2.0
@@ -32,6 +38,7 @@ class Load:
     :param subscribed: every topic has a subscriber in another process.
     :param commands: setpoints per second and drive.
     :param real_time: the exchange may have the priority that it asks for.
+    :param trace: s that the flight recorder keeps; 0: it is off.
     """
 
     drives: int
@@ -39,6 +46,7 @@ class Load:
     subscribed: bool = True
     commands: float = 0.0
     real_time: bool = True
+    trace: float = 0.0
 
     @property
     def how(self) -> tuple[str, ...]:
@@ -55,7 +63,8 @@ class Bus:
         self.file = folder / 'bench.yaml'
         lines = ['/**/drive_can_bridge:', '  ros__parameters:', '    buses:', '      main:',
                  f'        interface: {INTERFACE}', f'        channel: {self.channel}',
-                 '        bitrate: 1000000', '    drives:']
+                 '        bitrate: 1000000', f'        trace_seconds: {load.trace}',
+                 f'        trace_directory: {folder}', '    drives:']
         for number in range(load.drives):
             lines += [f'      drive{number}:', '        bus: main',
                       '        protocol: datamodel_extended', f'        station: {number + 1}',
@@ -225,6 +234,64 @@ def start(drives: int, duration: float) -> dict[str, Any]:
             for _ in range(4):
                 time.sleep(duration / 4)
                 found['resident_mb'].append(bridge.resident_mb())
+    return found
+
+
+def flight(load: Load, duration: float) -> dict[str, Any]:
+    """Measure the flight recorder: what a frame costs, and exchanges while a trace is written."""
+    found: dict[str, Any] = {'note': _note_time()}
+    with ExitStack() as stack:
+        bus = Bus(stack, load)
+        with bridge_under(load, bus) as bridge:
+            for name in ('recording', 'writing'):
+                time.sleep(duration)
+                bridge.ask('clear')
+                if name == 'writing':   # the duration before is what is written
+                    found['trace'] = bridge.ask('trace')
+                else:
+                    time.sleep(duration)
+                found[name] = bridge.ask('result')
+    return found
+
+
+def _note_time() -> float:
+    """Return the time that keeping one frame takes, in s."""
+    ring, sample, count = Ring(60.0), Frame(0x103FFFF0, bytes(8), True), 200_000
+    best = float('inf')
+    for _ in range(5):
+        begun = time.perf_counter()
+        for step in range(count):
+            ring.note(sample, float(step), True)
+        best = min(best, time.perf_counter() - begun)
+    return best / count
+
+
+def decode(frames: int) -> dict[str, dict[str, float]]:
+    """Measure ``drive_can decode`` of a long trace: time, and memory beside a short one."""
+    found: dict[str, dict[str, float]] = {}
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        file = folder / 'bench.yaml'
+        file.write_text('/**/drive_can_bridge: {ros__parameters: {buses: {main: {interface: '
+                        'socketcan, channel: can0}}, drives: {drive0: {bus: main, protocol: '
+                        f'datamodel_extended, station: 1, profile: {HERE / "profile.yaml"}, '
+                        f'cyclic_request: [{REQUESTS}], cyclic_response: [{RESPONSES}]}}}}}}}}\n')
+        for name, count in (('short', frames // 20), ('long', frames)):
+            trace = folder / f'{name}.log'
+            with trace.open('w') as stream:
+                for cycle in range(count // 2):
+                    begin, word = 1.7e9 + 0.02 * cycle, cycle % 3000
+                    stream.write(f'({begin:.6f}) can0 003FFFF0#{word:04X}03E800000000 T\n'
+                                 f'({begin + 0.001:.6f}) can0 103FFFF0#{word:04X}00C8000001F4 R\n')
+            for what in ('lines', '--summary'):
+                command = [sys.executable, '-m', 'drive_can_bridge.cli.main', 'decode', str(trace),
+                           '--params-file', str(file), *([] if what == 'lines' else [what])]
+                begun = time.monotonic()
+                with subprocess.Popen(command, stdout=subprocess.DEVNULL) as process:
+                    _, _, usage = os.wait4(process.pid, 0)
+                found[f'{name} {what}'] = {
+                    'frames': count, 'elapsed': time.monotonic() - begun,
+                    'cpu': usage.ru_utime + usage.ru_stime, 'resident_mb': usage.ru_maxrss / 1024}
     return found
 
 

@@ -30,9 +30,11 @@ INTERNAL: dict[str, set[str]] = {
     'profiles': {'', 'core', 'configuration', 'protocols', 'resources'},
     'transport': {'', 'core'},
     'exchange': {'', 'core', 'protocols', 'transport'},
+    'trace': {'', 'core', 'protocols', 'transport'},
     'simulation': {'', 'core', 'configuration', 'protocols', 'resources', 'transport'},
     'ros': {
-        '', 'core', 'configuration', 'protocols', 'resources', 'transport', 'exchange', 'process'},
+        '', 'core', 'configuration', 'protocols', 'resources', 'trace', 'transport', 'exchange',
+        'process'},
     'monitor': {'', 'core'},
     'view': {'', 'core', 'monitor'},
     'ros.monitor': {'', 'core', 'monitor'},
@@ -40,7 +42,8 @@ INTERNAL: dict[str, set[str]] = {
     'demo': {'', 'core', 'configuration', 'process'},
     'cli': {
         '', 'core', 'configuration', 'protocols', 'resources', 'transport', 'exchange', 'process',
-        'profiles', 'simulation', 'monitor', 'view', 'demo', 'ros', 'ros.monitor', 'ros.demo'},
+        'profiles', 'simulation', 'trace', 'monitor', 'view', 'demo', 'ros', 'ros.monitor',
+        'ros.demo'},
 }
 
 ROS_PACKAGES = {
@@ -55,6 +58,8 @@ EXTERNAL: dict[str, set[str]] = {
     # canopen: an optional extra, for EDS files
     'profiles': {'canopen'},
     'transport': {'can', 'serial'},
+    # its file formats; and only where a picture is drawn
+    'trace': {'can', 'matplotlib'},
     # yaml: only to tell which nodes a parameter file names when none of them is ours
     'ros': {*ROS_PACKAGES, 'yaml'},
     'ros.monitor': ROS_PACKAGES,

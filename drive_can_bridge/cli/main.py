@@ -33,9 +33,18 @@ SUBCOMMANDS: dict[str, tuple[str, str]] = {
                 'show all bridges and their drives, live'),
     'profile': ('drive_can_bridge.cli.profile',
                 'list, show, check and import parameter tables'),
+    'scan': ('drive_can_bridge.cli.scan', 'find the drives on a bus'),
+    'record': ('drive_can_bridge.cli.record',
+               'write everything on the buses of a parameter file to a trace'),
+    'decode': ('drive_can_bridge.cli.decode',
+               'say what the frames of a trace, or of a bus, mean'),
 }
 #: what runs until a signal comes: that is no failure
-ENDLESS = ('simulate', 'demo', 'monitor')
+ENDLESS = ('simulate', 'demo', 'record', 'monitor')
+#: an option that makes a subcommand one of these
+ENDLESS_OPTION = '--live'
+#: exit code of what is interrupted before it is done
+INTERRUPTED = 130
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -46,7 +55,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     :return: exit code.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
-    endless = _wanted(arguments) in ENDLESS
+    endless = _wanted(arguments) in ENDLESS or ENDLESS_OPTION in arguments
     if argv is None and endless:  # until the subcommand looks after signals itself
         signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
@@ -58,7 +67,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except KeyboardInterrupt:
-        return 0 if endless else _fail('interrupted')
+        if endless:
+            return 0
+        _fail('interrupted')
+        return INTERRUPTED
     except DriveCanError as error:
         print(error, file=sys.stderr)
         return 1

@@ -21,6 +21,9 @@ class BusConfiguration:
     :param channel: as the interface wants it; digits stay a string unless given as an integer.
     :param bitrate: bit/s.
     :param reconnect_period: s between attempts to open a lost bus.
+    :param trace_seconds: s that the flight recorder keeps; 0: it is off.
+    :param trace_directory: where its traces go; '': the default.
+    :param trace_files: how many of them are kept.
     :param options: every other key, handed to python-can as it is.
     """
 
@@ -29,6 +32,9 @@ class BusConfiguration:
     channel: str | int
     bitrate: int = 125_000
     reconnect_period: float = 1.0
+    trace_seconds: float = 0.0
+    trace_directory: str = ''
+    trace_files: int = 20
     options: dict[str, Any] = field(default_factory=dict)
 
 

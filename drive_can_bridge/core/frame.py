@@ -5,6 +5,8 @@ from typing import NamedTuple
 
 STANDARD_IDENTIFIER_MAX = 0x7FF
 EXTENDED_IDENTIFIER_MAX = 0x1FFFFFFF
+#: worst case over no stuff bits: an average frame lies between, this much above the shortest
+STUFFING = 1.11
 
 
 class Frame(NamedTuple):
@@ -45,3 +47,8 @@ class Route(NamedTuple):
         """Tell whether this route takes the frame."""
         return (frame.extended == self.extended
                 and frame.identifier & self.mask == self.identifier & self.mask)
+
+
+def bits_on_bus(length: int, extended: bool) -> int:
+    """Return a frame's length on the bus without stuff bits, interframe space included."""
+    return (67 if extended else 47) + 8 * length

@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-What a drive was told: may it be running by our word?
+What a drive was told, and so whether it may be running by our word.
 
 Whatever was told to run is told to stop. A session notes here each frame that the bus has taken;
 whenever it cannot go on as before (a stall, a lost bus, maps that differ, the end), it looks here

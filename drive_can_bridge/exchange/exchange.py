@@ -22,7 +22,7 @@ from typing import Any, Protocol
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlTicket
 from drive_can_bridge.core.events import Event, ProcessDataReceived
-from drive_can_bridge.core.frame import Frame, Route
+from drive_can_bridge.core.frame import bits_on_bus, Frame, Route
 from drive_can_bridge.core.requests import Request
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.exchange.alarm import Alarm
@@ -113,14 +113,17 @@ class BusExchange:
     :param routes: for each session, in the same order, the identifiers it wants to see.
     :param counted: further identifiers, on which nobody else should send.
     :param prepare_thread: called first in each of the two threads.
+    :param note: sees every frame that was sent or received: (frame, time, sent).
     """
 
     def __init__(self, bus: BusConfiguration, sessions: Sequence[Session],
                  routes: Sequence[Sequence[Route]], listener: BusListener, *,
                  counted: Sequence[Route] = (),
                  clock: Callable[[], float] = steady_now,
-                 prepare_thread: Callable[[], object] = lambda: None) -> None:
+                 prepare_thread: Callable[[], object] = lambda: None,
+                 note: Callable[[Frame, float, bool], object] | None = None) -> None:
         self.bus = bus
+        self._note = note
         self.lock = threading.Lock()
         self._clock = clock
         self._prepare_thread = prepare_thread
@@ -348,7 +351,9 @@ class BusExchange:
             now = self._clock()
             if now - self._last_pass >= LOST_TIME:
                 self._notice_lost_time(now)
-            self.received_bits += _bits(frame)
+            self.received_bits += bits_on_bus(len(frame[1]), frame[2])
+            if self._note is not None:
+                self._note(frame, arrived, False)
             member = self._router.find(frame)
             if member is None:
                 self.frames_rejected += 1
@@ -405,9 +410,12 @@ class BusExchange:
         frames = session.take_frames()
         while frames:
             refused = []
+            leaving = self._clock()     # nothing answers before that
             for place, frame in enumerate(frames):
                 if self.link.send(frame):
-                    self.sent_bits += _bits(frame)
+                    self.sent_bits += bits_on_bus(len(frame[1]), frame[2])
+                    if self._note is not None:
+                        self._note(frame, leaving, True)
                 else:
                     refused.append(place)
             session.frames_left(self._clock(), refused)
@@ -424,8 +432,3 @@ class BusExchange:
             for outcome in session.take_control_outcomes():
                 member.listener.control_completed(outcome)
         member.due = session.next_timer()
-
-
-def _bits(frame: Frame) -> int:
-    """Return a frame's length on the bus without stuff bits, interframe space included."""
-    return (67 if frame[2] else 47) + 8 * len(frame[1])

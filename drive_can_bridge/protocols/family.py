@@ -16,7 +16,9 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Route
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.session import Session
+from drive_can_bridge.protocols.observer import DriveObserver, Emit
 from drive_can_bridge.protocols.options import FamilyOptions, make_options, options_schema
+from drive_can_bridge.protocols.scout import Scout
 
 
 class Complaint(NamedTuple):
@@ -139,3 +141,18 @@ class Family(ABC):
     def make_sessions(self, drives: Sequence[DriveConfiguration]) -> list[Session]:
         """Make the sessions of all drives of this family on one bus, in the same order."""
         return [self.make_session(drive) for drive in drives]
+
+    @abstractmethod
+    def make_observers(self, drives: Sequence[DriveConfiguration], emit: Emit,
+                       ) -> list[DriveObserver]:
+        """
+        Make what watches the drives of this family on one bus.
+
+        :param emit: takes every telegram.
+        :return: one for each drive, in the same order; then those of frames that are of no drive
+            in particular, whose name is ''.
+        """
+
+    @abstractmethod
+    def make_scout(self) -> Scout:
+        """Make what looks for drives of this family on a bus that nobody has described."""

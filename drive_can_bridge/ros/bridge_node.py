@@ -35,6 +35,7 @@ from drive_can_bridge.process.scheduling import raise_priority
 from drive_can_bridge.protocols.families import FAMILIES, make_sessions
 from drive_can_bridge.ros.diagnostics import Diagnostics
 from drive_can_bridge.ros.drive_node import DriveNode
+from drive_can_bridge.ros.flight_watch import FlightWatch
 from drive_can_bridge.ros.log import Log
 from drive_can_bridge.ros.mailbox import Mailbox
 from drive_can_bridge.ros.node_parameters import NodeParameters
@@ -76,6 +77,7 @@ class BridgeNode(LifecycleNode):
         self._control_thread = ServiceThread('control', self.context, self.log.error,
                                              raise_priority)
         self._diagnostics: Diagnostics | None = None
+        self._flight: FlightWatch | None = None
         self._diagnostics_thread: PeriodicThread | None = None
         self._configuring = False
         self._ending = False
@@ -199,6 +201,8 @@ class BridgeNode(LifecycleNode):
             self._configuring = False
 
     def _build(self, configuration: BridgeConfiguration) -> None:
+        flight = self._flight = FlightWatch(
+            self, self.log, list(configuration.buses.values()), self._mailbox, self._spinner)
         for bus in configuration.buses.values():
             drives = [drive for drive in configuration.drives.values() if drive.bus == bus.name]
             families = [FAMILIES[drive.protocol] for drive in drives]
@@ -209,7 +213,8 @@ class BridgeNode(LifecycleNode):
                                 for entries in claims], self,
                 counted=[claim.route for entries in claims for claim in entries
                          if not claim.heard],
-                prepare_thread=self._prepare_thread)
+                prepare_thread=self._prepare_thread, note=flight.note_of(bus.name))
+            flight.attach(exchange)
             self.exchanges[bus.name] = exchange
             for drive, session, family in zip(drives, sessions, families):
                 node = DriveNode(
@@ -228,8 +233,12 @@ class BridgeNode(LifecycleNode):
         if self._misconfigured:
             raise ConfigurationError(self._misconfigured)
         self.log.info(self._priority)
-        self._diagnostics = Diagnostics(self, list(self.exchanges.values()),
-                                        list(self.drives.values()))
+        drives = list(self.drives.values())
+        flight = self._flight
+        self._diagnostics = Diagnostics(self, list(self.exchanges.values()), drives,
+                                        None if flight is None else flight.reported)
+        if flight is not None:
+            flight.watch(drives)
         self._diagnostics_thread = PeriodicThread(
             'diagnostics', configuration.diagnostics_period, self._diagnostics.publish,
             lambda text: self.log.error(f'diagnostics: {text}'))
@@ -271,6 +280,9 @@ class BridgeNode(LifecycleNode):
             self._diagnostics = None
         for exchange in self.exchanges.values():
             exchange.close()
+        if self._flight is not None:
+            self._flight.close()
+            self._flight = None
         self._leaving += self.drives.values()
         self.exchanges.clear()
         self.drives.clear()
@@ -352,6 +364,8 @@ class BridgeNode(LifecycleNode):
         if exchange is not None:  # else it was given up while it was still being opened
             self.log.error(f'bus {bus}: {reason}; tried again every '
                                     f'{exchange.bus.reconnect_period:g} s')
+        if self._flight is not None:
+            self._flight.bus_lost(bus)
 
     def fatal(self, bus: str, reason: str, *, misconfigured: bool) -> None:
         """Take note that an exchange cannot go on."""

@@ -1,6 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """``/diagnostics``: one status per bus and per drive, in words that say what to do."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 import math
 import threading
@@ -9,6 +10,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
+from drive_can_bridge.core.frame import STUFFING
 from drive_can_bridge.core.session import DriveState
 from drive_can_bridge.core.statistics import Statistic
 from drive_can_bridge.core.text import printable
@@ -21,8 +23,6 @@ from drive_can_bridge.transport.link import steady_now
 
 #: bus load above which a bus is never OK
 LOAD_WARNING = 70.0
-#: worst case over no stuff bits: an average frame lies between, this much above the shortest
-STUFFING = 1.11
 #: s for which a command that changed nothing is worth a warning
 COMMANDS_RECENT = 1.5
 
@@ -263,11 +263,18 @@ class StatusMessage:
 
 
 class Diagnostics:
-    """Publishes the reports of a bridge."""
+    """
+    Publishes the reports of a bridge.
 
-    def __init__(self, node: Node, exchanges: list[BusExchange],
-                 drives: list[DriveNode]) -> None:
+    :param reported: is told each report, and the bus that it is about.
+    """
+
+    def __init__(self, node: Node, exchanges: list[BusExchange], drives: list[DriveNode],
+                 reported: Callable[[Report, str], None] | None = None) -> None:
         self._node = node
+        self._reported = reported
+        self._bus_of = {f'bus {exchange.bus.name}': exchange.bus.name for exchange in exchanges}
+        self._bus_of.update({f'drive {drive.name}': drive.drive.bus for drive in drives})
         self._prefix = node.get_fully_qualified_name().lstrip('/')
         self._publisher = node.create_publisher(
             DiagnosticArray, '/diagnostics', QoSProfile(depth=10),
@@ -289,6 +296,8 @@ class Diagnostics:
             self._publisher.publish(message)
 
     def _status(self, report: Report) -> DiagnosticStatus:
+        if self._reported is not None:
+            self._reported(report, self._bus_of[report.name])
         found = self._statuses.get(report.name)
         if found is None:
             found = self._statuses[report.name] = StatusMessage(

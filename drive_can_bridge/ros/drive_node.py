@@ -75,6 +75,7 @@ class DriveNode:
         self._identity = IdentityReader(
             drive.profile, submit=self._submit_quietly, online=lambda: session.online,
             tell=identified, warn=lambda text: self.warn(text, text))
+        self.times_lost = 0
         self.rejected_text = ''
         self.foreign_text = ''
         # a local remapping wins over a process-wide ``__node:=``, which would rename every drive;
@@ -207,6 +208,7 @@ class DriveNode:
             self._online.publish(Bool(data=False))
             self.samples.forget()
             if self.session.active:
+                self.times_lost += 1
                 self._log.warning(f'{self.name}: offline: {event.reason}')
             else:
                 self._inform('stopped')

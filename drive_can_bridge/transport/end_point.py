@@ -2,6 +2,7 @@
 """What a link needs of an open bus."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.transport.error_frames import BusError, ERROR_ACTIVE
@@ -16,6 +17,7 @@ class EndPoint(ABC):
     :ivar last_error: the last of them that asks for something to be done; None: there was none.
     :ivar controller: state of the controller as far as it tells, '' while all is well.
     :ivar rejected_frames: what arrived and is of no use.
+    :ivar error_witness: sees the identifier and data of every error frame; None: nobody does.
     """
 
     def __init__(self) -> None:
@@ -25,6 +27,7 @@ class EndPoint(ABC):
         self.last_error: BusError | None = None
         self.controller = ERROR_ACTIVE
         self.bus_off_count = 0
+        self.error_witness: Callable[[int, bytes], None] | None = None
 
     @abstractmethod
     def receive(self, timeout: float) -> Frame | None:

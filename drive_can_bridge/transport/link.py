@@ -72,6 +72,7 @@ class Link:
     :param stations: how many drives are on the bus, for each of which a frame may wait.
     :param prepare_thread: called first in the reader thread.
     :param opener: opens the bus; None: python-can, by the configuration.
+    :ivar error_witness: sees error frames, in the reader thread; to be set before ``start``.
     """
 
     def __init__(self, bus: BusConfiguration, routes: Sequence[Route], listener: LinkListener, *,
@@ -80,6 +81,7 @@ class Link:
                  opener: Callable[[], EndPoint] | None = None) -> None:
         self.bus = bus
         self._open = opener or (lambda: open_port(bus, routes, stations=stations))
+        self.error_witness: Callable[[int, bytes], None] | None = None
         self._listener = listener
         self._send_timeout = send_timeout
         self._prepare_thread = prepare_thread
@@ -208,6 +210,7 @@ class Link:
             try:
                 self._loss = NOT_READ_YET
                 self._port = port = self._open()
+                port.error_witness = self.error_witness
                 frame = port.receive(RECEIVE_TIMEOUT)
                 self._loss = self._blocked = self._no_room_since = None
                 # after a loss nobody knows whether anybody is there before somebody was heard

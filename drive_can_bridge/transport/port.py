@@ -55,6 +55,8 @@ class Port(EndPoint):
 
     It rejects what has other identifiers (where the adapter does not keep them away), remote and
     CAN FD frames, which no protocol here has, and a serial adapter's line with bytes lost.
+
+    :ivar witness: sees every message that arrives, whatever it is; None: nobody does.
     """
 
     def __init__(self, bus: can.BusABC, *, kernel_errors: bool = False) -> None:
@@ -72,6 +74,7 @@ class Port(EndPoint):
         self._lost = False
         self._malformed_in_row = 0
         self._earliest = steady_now()   # the next frame cannot have come before
+        self.witness: Callable[[can.Message], None] | None = None
 
     def receive(self, timeout: float) -> Frame | None:
         """Wait for a frame. See the base class."""
@@ -87,6 +90,8 @@ class Port(EndPoint):
             self._earliest = steady_now()
             self._limit_line()
             return None
+        if self.witness is not None:
+            self.witness(message)
         if message.is_error_frame:
             self._error_frame(message)
             return None
@@ -193,6 +198,8 @@ class Port(EndPoint):
 
     def _error_frame(self, message: can.Message) -> None:
         self.error_frames += 1
+        if self.error_witness is not None:
+            self.error_witness(message.arbitration_id, bytes(message.data))
         if not self._kernel_errors:
             self.last_error = BusError('error frame', None, ADVICE_DISTURBED)
             return

@@ -223,7 +223,6 @@ def test_reader_that_went_away(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(('error', 'line'), [
     (ValueError('odd'), 'drive_can: internal error, please report it: ValueError: odd\n'),
-    (KeyboardInterrupt(), 'drive_can: interrupted\n'),
     (ModuleNotFoundError('no', name='rclpy'),
      'drive_can: this needs a Python module that is not installed: rclpy\n'),
     (OSError(28, 'No space left on device'), 'drive_can: No space left on device\n'),
@@ -237,3 +236,15 @@ def test_never_a_traceback(monkeypatch: pytest.MonkeyPatch, capsys: pytest.Captu
     monkeypatch.setattr(front_end, '_run', fail)
     assert front_end.main([]) == 1
     assert capsys.readouterr() == ('', line)
+
+
+def test_interrupted(monkeypatch: pytest.MonkeyPatch,
+                     capsys: pytest.CaptureFixture[str]) -> None:
+    def stop(_: object) -> int:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(front_end, '_run', stop)
+    assert front_end.main(['validate']) == 130
+    assert capsys.readouterr() == ('', 'drive_can: interrupted\n')
+    for endless in (['simulate'], ['record'], ['decode', '--live']):
+        assert front_end.main(endless) == 0

@@ -13,7 +13,7 @@ import pytest
 
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.frame import EXTENDED_IDENTIFIER_MAX, Frame, Route
-from drive_can_bridge.core.parameters import Access, Parameter, ParameterType
+from drive_can_bridge.core.parameters import Access, Parameter, ParameterType, Storage
 from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.simulation.canopen_pkw import SimulatedPkwDrive
 from drive_can_bridge.simulation.drive import Surroundings

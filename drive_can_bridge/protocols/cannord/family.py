@@ -18,6 +18,8 @@ from drive_can_bridge.protocols.cannord.process_data import (
 )
 from drive_can_bridge.protocols.cannord.states import STATUS_WORD
 from drive_can_bridge.protocols.family import Claim, Complaint, Family
+from drive_can_bridge.protocols.observer import DriveObserver, Emit
+from drive_can_bridge.protocols.scout import Scout
 
 #: s that an inverter takes at most to answer process data (BU 0060 page 50)
 ANSWER_TIME = 0.003
@@ -130,6 +132,18 @@ class Cannord(Family):
             for session in make_group(group)}
         return [made[drive.name] if drive.name in made else CannordSession(drive)
                 for drive in drives]
+
+    def make_observers(self, drives: Sequence[DriveConfiguration], emit: Emit,
+                       ) -> list[DriveObserver]:
+        """Make what watches inverters; of a broadcast group, the leader's watches broadcasts."""
+        from drive_can_bridge.protocols.cannord.observer import CannordObserver
+        leaders = {group[0].name for group in groups(drives)}
+        return [CannordObserver(drive, emit, leads=drive.name in leaders) for drive in drives]
+
+    def make_scout(self) -> Scout:
+        """Make what looks for drives of this family."""
+        from drive_can_bridge.protocols.cannord.scout import CannordScout
+        return CannordScout()
 
     # -- parts ------------------------------------------------------------------------------------
 

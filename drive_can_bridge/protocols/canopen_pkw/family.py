@@ -1,7 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The row of the family table for the CANopen PKW mailbox."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from drive_can_bridge.core.configuration import DriveConfiguration
@@ -13,7 +13,9 @@ from drive_can_bridge.protocols.canopen_pkw.addresses import Span
 from drive_can_bridge.protocols.canopen_pkw.identifiers import Identifiers
 from drive_can_bridge.protocols.canopen_pkw.options import PkwOptions
 from drive_can_bridge.protocols.family import Claim, Complaint, Family
+from drive_can_bridge.protocols.observer import DriveObserver, Emit
 from drive_can_bridge.protocols.polling import round_time
+from drive_can_bridge.protocols.scout import Scout
 
 #: worst-case stuffing, eight bytes, 11-bit identifier, with the interframe space
 FRAME_BITS = 135
@@ -106,6 +108,18 @@ class CanopenPkw(Family):
         # Imported late: configuration checks read this table without any need of sessions.
         from drive_can_bridge.protocols.canopen_pkw.session import PkwSession
         return PkwSession(drive)
+
+    def make_observers(self, drives: Sequence[DriveConfiguration], emit: Emit,
+                       ) -> list[DriveObserver]:
+        """Make what watches devices, and what is said to all nodes."""
+        from drive_can_bridge.protocols.canopen_pkw.observer import NmtObserver, PkwObserver
+        return [*(PkwObserver(drive, emit) for drive in drives),
+                NmtObserver({drive.station: drive.name for drive in drives}, emit)]
+
+    def make_scout(self) -> Scout:
+        """Make what looks for drives of this family."""
+        from drive_can_bridge.protocols.canopen_pkw.scout import CanopenScout
+        return CanopenScout()
 
     # -- parts ------------------------------------------------------------------------------------
 

@@ -153,7 +153,7 @@ class DataModelSession(Session):
 
     def _stop_by_writes(self, now: float, *, setpoints: bool = True) -> None:
         """
-        Write ``disable``, and neutral setpoints, by their numbers, and see that the drive has them.
+        Write ``disable`` and neutral setpoints by their numbers, and see that the drive has them.
 
         :param setpoints: False: what is in ``cyclic_request`` is stopped by cyclic frames.
         """
@@ -182,5 +182,5 @@ class DataModelSession(Session):
             self._warn(f'told to stop, but {"; ".join(failed)}: {MAY_RUN}')
         self._stop_ended()
 
-    def _stop_ended(self) -> None:  # noqa: B027  optional hook
+    def _stop_ended(self) -> None:
         """Go on after a stop by acyclic writes."""

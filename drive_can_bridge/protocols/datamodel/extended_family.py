@@ -1,7 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The row of the family table for the DataModel protocol with 29-bit identifiers."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Route
@@ -13,6 +13,8 @@ from drive_can_bridge.protocols.datamodel.extended import (
 )
 from drive_can_bridge.protocols.datamodel.options import ExtendedOptions, NUMBER_MAX
 from drive_can_bridge.protocols.family import Claim, Complaint
+from drive_can_bridge.protocols.observer import DriveObserver, Emit
+from drive_can_bridge.protocols.scout import Scout
 
 #: worst-case stuffing, eight bytes, 29-bit identifier, with the interframe space
 FRAME_BITS = 160
@@ -44,6 +46,17 @@ class DataModelExtended(DataModelFamily):
         # Imported late: configuration checks read this table without any need of sessions.
         from drive_can_bridge.protocols.datamodel.extended_session import ExtendedSession
         return ExtendedSession(drive)
+
+    def make_observers(self, drives: Sequence[DriveConfiguration], emit: Emit,
+                       ) -> list[DriveObserver]:
+        """Make what watches drives."""
+        from drive_can_bridge.protocols.datamodel.observer import ExtendedObserver
+        return [ExtendedObserver(drive, emit) for drive in drives]
+
+    def make_scout(self) -> Scout:
+        """Make what looks for drives of this family."""
+        from drive_can_bridge.protocols.datamodel.scout import ExtendedScout
+        return ExtendedScout()
 
     # -- parts of the check -----------------------------------------------------------------------
 

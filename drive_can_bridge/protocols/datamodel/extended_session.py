@@ -9,8 +9,8 @@ The conversation with one DataModel drive that uses 29-bit identifiers.
       │                         │  └─┼──maps differ──► DIFFERS (looks again in 1 s) │
       └──deactivate / bus down──┘    └─────────3 neutral cycles, then silence──────┘
 
-Whatever was told to run is told to stop: by neutral cycles where the request map is known to agree,
-otherwise by acyclic writes (:mod:`.safe_stop`), whatever the session is about to do next.
+Whatever was told to run is told to stop: by neutral cycles where the request map is known to
+agree, otherwise by acyclic writes (:mod:`.safe_stop`), whatever the session is about to do next.
 
 A drive reads cyclic words by *its own* maps. So the maps are read before the first cyclic frame,
 every second while cycling, and again after each loss; a drive that does not answer gets no cyclic
@@ -254,7 +254,7 @@ class ExtendedSession(DataModelSession):
         self.told.note(CYCLE, runs=self._frame_runs)
         control = self.control
         if (control is not None and self._control_slot is not None
-                and control.word == self._sent_word):  # it may have changed since the frame was made
+                and control.word == self._sent_word):  # else it has changed since
             fresh = control.word_due
             control.word_sent(now)
             if fresh:

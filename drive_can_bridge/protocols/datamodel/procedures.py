@@ -11,8 +11,8 @@ from typing import NamedTuple, Union
 
 from drive_can_bridge.core.parameters import Parameter, ParameterType, Storage
 from drive_can_bridge.core.requests import (
-    Failure, NO_ANSWER_OFFLINE, NOT_SENT, Outcome, ReadRequest, ReadValue, Request, SENT_UNACKNOWLEDGED,
-    Written,
+    Failure, NO_ANSWER_OFFLINE, NOT_SENT, Outcome, ReadRequest, ReadValue, Request,
+    SENT_UNACKNOWLEDGED, Written,
 )
 from drive_can_bridge.core.words import value_text
 from drive_can_bridge.protocols.datamodel.channel import Procedure, Read, Step, Words, Write

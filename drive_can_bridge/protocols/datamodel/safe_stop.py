@@ -1,9 +1,9 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Stop a drive by acyclic writes: ``disable`` and neutral by parameter number, which no map misroutes.
+Stop a drive by acyclic writes of ``disable`` and neutral by number, which no map can misroute.
 
 The writes go at once, whatever is under way and wherever the drive keeps the values. Nobody
-acknowledges them, so each is read back, and written again where that does not bring what it should.
+acknowledges them, so each is read back, and written again where it is not what it should be.
 """
 
 from collections.abc import Callable, Generator, Sequence

@@ -1,7 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The row of the family table for the DataModel protocol with 11-bit identifiers."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Route, STANDARD_IDENTIFIER_MAX
@@ -10,6 +10,8 @@ from drive_can_bridge.protocols.datamodel import standard_round
 from drive_can_bridge.protocols.datamodel.common_family import DataModelFamily
 from drive_can_bridge.protocols.datamodel.options import StandardOptions
 from drive_can_bridge.protocols.family import Claim, Complaint
+from drive_can_bridge.protocols.observer import DriveObserver, Emit
+from drive_can_bridge.protocols.scout import Scout
 
 
 class DataModelStandard(DataModelFamily):
@@ -40,6 +42,17 @@ class DataModelStandard(DataModelFamily):
         # Imported late: configuration checks read this table without any need of sessions.
         from drive_can_bridge.protocols.datamodel.standard_session import StandardSession
         return StandardSession(drive)
+
+    def make_observers(self, drives: Sequence[DriveConfiguration], emit: Emit,
+                       ) -> list[DriveObserver]:
+        """Make what watches drives."""
+        from drive_can_bridge.protocols.datamodel.observer import StandardObserver
+        return [StandardObserver(drive, emit) for drive in drives]
+
+    def make_scout(self) -> Scout:
+        """Make what looks for drives of this family."""
+        from drive_can_bridge.protocols.datamodel.scout import StandardScout
+        return StandardScout()
 
     # -- parts of the check -----------------------------------------------------------------------
 

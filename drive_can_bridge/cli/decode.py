@@ -1,0 +1,225 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""``drive_can decode``: what the frames of a trace, or of a bus, mean."""
+
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from collections.abc import Callable, Iterable
+from contextlib import ExitStack
+import json
+from pathlib import Path
+import sys
+import time
+from typing import Any
+
+from drive_can_bridge.cli.listening import (
+    add_params_file, add_seconds, complain, listening, load,
+)
+from drive_can_bridge.core.configuration import BridgeConfiguration
+from drive_can_bridge.core.errors import DriveCanError
+from drive_can_bridge.core.record import Record
+from drive_can_bridge.protocols.observer import Telegram
+from drive_can_bridge.trace import summary
+from drive_can_bridge.trace.files import read_records, READABLE, UnknownFormat
+from drive_can_bridge.trace.lines import LineWriter, Only, Selection
+from drive_can_bridge.trace.series import Plotter, TableWriter
+from drive_can_bridge.trace.tracer import Sink, Tracer
+
+FAILED = 1
+WRONG_USAGE = 2
+#: complaints about a file that are shown one by one
+_COMPLAINTS_MAX = 5
+#: s that a frame may take from the bus to here before it counts as missing
+_DELIVERY_TIME = 0.05
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add the subcommand to the parser of ``drive_can``."""
+    parser: ArgumentParser = subparsers.add_parser(
+        'decode', help='say what the frames of a trace, or of a bus, mean',
+        description='One line for each telegram: s since the trace began, s since the last of '
+                    'its kind, bus, drive, > request or < response, and what it carries. What '
+                    'was not answered, refused, late, unasked or malformed is named; frames of '
+                    'nobody in the parameter file are shown in hex.',
+        epilog=f'Traces: {", ".join(READABLE)}; "-" reads candump\'s text from standard input. '
+               'Direction and error frames are shown as far as the format keeps them.')
+    parser.add_argument('file', metavar='FILE', nargs='?', help='the trace')
+    parser.add_argument('--live', action='store_true',
+                        help='listen to the buses of the parameter file instead; sends nothing')
+    add_params_file(parser, 'parameter file of the bridge: names buses and drives')
+    add_seconds(parser)
+    parser.add_argument('--drive', metavar='NAME', action='append', default=[],
+                        help='only this drive; a shell pattern, repeatable')
+    parser.add_argument('--only', metavar='WHAT', type=_only, default=set(),
+                        help='some of: parameters (reads and writes beside the exchange), errors, '
+                             'changes (of cyclic values and states); separated by commas')
+    parser.add_argument('--csv', metavar='FILE', type=Path,
+                        help='write the values of the exchange, a column each, instead of lines')
+    parser.add_argument('--plot', metavar=('FILE.png', 'DRIVE.NAME'), nargs='+',
+                        help='draw these values (default: all actual values), instead of lines')
+    parser.add_argument('--summary', action='store_true',
+                        help='for each drive exchanges, missed ones, period, latency, refusals; '
+                             'for each bus its load; instead of lines')
+    parser.add_argument('--json', action='store_true',
+                        help='a JSON document a line: time, bus, drive, direction, kind, title, '
+                             'values, parameters, verdict, remark, latency_ms')
+    parser.set_defaults(run=run)
+
+
+def run(args: Namespace) -> int:
+    """
+    Decode a trace to its end, or a bus until a signal.
+
+    :return: 0; 1 where nothing could be read; 2 wrong usage.
+    :raises DriveCanError: a parameter file with problems, a bus that cannot be opened.
+    :raises OSError: a file cannot be read or written.
+    """
+    if args.file is None and args.plot and not args.live:   # options may stand before FILE
+        args.file = args.plot.pop()
+        args.plot = args.plot or None
+    if (args.file is None) is not args.live or args.plot == []:
+        complain('drive_can decode: give a trace file, or --live')
+        return WRONG_USAGE
+    configuration = load(args)
+    unknown = [name for name in args.drive if not any(c in name for c in '*?[')
+               and name not in configuration.drives]
+    if unknown:
+        complain(f'drive_can decode: --drive {unknown[0]}: no such drive; drives: '
+                 f'{", ".join(configuration.drives) or "none"}')
+        return WRONG_USAGE
+    with ExitStack() as stack:
+        sinks, endings = _sinks(args, configuration, stack)
+        tracer = Tracer(configuration, _together(sinks))
+        if args.summary:
+            endings.append(lambda: _summarise(tracer, as_json=args.json))
+        code = _live(args, configuration, tracer) if args.live else _file(args, tracer)
+        tracer.finish()
+        for ending in endings:
+            ending()
+    return code
+
+
+def _sinks(args: Namespace, configuration: BridgeConfiguration, stack: ExitStack,
+           ) -> tuple[list[Sink], list[Callable[[], None]]]:
+    """Return who takes telegrams, and what is to be done at the end."""
+    sinks: list[Sink] = []
+    endings: list[Callable[[], None]] = []
+    drives = [drive for drive in configuration.drives.values()
+              if Selection(args.drive, set()).takes('', _about(drive.name))]
+    if args.csv is not None:
+        stream = stack.enter_context(args.csv.open('w', encoding='utf-8', newline=''))
+        sinks.append(TableWriter(stream, drives))
+    if args.plot:
+        picture, *wanted = args.plot
+        plotter = Plotter(configuration, wanted)
+        sinks.append(plotter)
+        endings.append(lambda: _draw(plotter, picture))
+    if not (sinks or args.summary):
+        write = _flushed if args.live else sys.stdout.write
+        sinks.append(LineWriter(write, Selection(args.drive, args.only), as_json=args.json))
+    return sinks, endings
+
+
+def _about(drive: str) -> Telegram:
+    from drive_can_bridge.protocols.observer import Direction, Kind
+    return Telegram(0.0, drive, Direction.NEITHER, Kind.OTHER, '')
+
+
+def _together(sinks: list[Sink]) -> Sink:
+    if len(sinks) == 1:
+        return sinks[0]
+
+    def take(bus: str, telegram: Telegram) -> None:
+        for sink in sinks:
+            sink(bus, telegram)
+    return take
+
+
+def _flushed(line: str) -> None:
+    sys.stdout.write(line)
+    sys.stdout.flush()
+
+
+def _file(args: Namespace, tracer: Tracer) -> int:
+    complaints = _Complaints(args.file)
+    try:
+        frames = _run_through(read_records(Path(args.file), complaints), tracer)
+    except UnknownFormat as error:
+        complain(f'drive_can decode: {error}')
+        return WRONG_USAGE
+    complaints.conclude()
+    if not frames:
+        complain(f'{args.file}: there is no frame in it')
+        return FAILED
+    return 0
+
+
+def _run_through(records: Iterable[Record], tracer: Tracer) -> bool:
+    take = tracer.take
+    record = None
+    for record in records:
+        take(record)
+    return record is not None
+
+
+def _live(args: Namespace, configuration: BridgeConfiguration, tracer: Tracer) -> int:
+    with listening(configuration) as taps:
+        try:
+            for record in taps.records(args.seconds):
+                if record is not None:
+                    tracer.take(record)
+                else:
+                    tracer.advance(time.time() - _DELIVERY_TIME)
+        except KeyboardInterrupt:
+            pass
+    return 0
+
+
+def _draw(plotter: Plotter, path: str) -> None:
+    try:
+        plotter.draw(path)
+    except ImportError:
+        raise DriveCanError('drive_can decode: --plot needs the Python module matplotlib '
+                            '(package python3-matplotlib, or pip install matplotlib)') from None
+    except ValueError as error:     # a suffix that matplotlib does not know
+        raise DriveCanError(f'drive_can decode: --plot {path}: {error}') from None
+
+
+def _summarise(tracer: Tracer, *, as_json: bool) -> None:
+    if as_json:
+        for document in summary.documents(tracer):
+            print(json.dumps(document))
+    else:
+        for line in summary.lines(tracer):
+            print(line)
+
+
+class _Complaints:
+    """The first few lines about a damaged file, and the number of the others."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._count = 0
+
+    def __call__(self, text: str) -> None:
+        self._count += 1
+        if self._count <= _COMPLAINTS_MAX:
+            complain(f'{self._name}: {_printable(text)}')
+
+    def conclude(self) -> None:
+        """Tell how many more there were."""
+        if self._count > _COMPLAINTS_MAX:
+            complain(f'{self._name}: {self._count - _COMPLAINTS_MAX} more like that')
+
+
+def _printable(text: str) -> str:
+    """Escape what a damaged file may bring into a terminal."""
+    shown = ''.join(each if each.isprintable() else each.encode(
+        'unicode_escape').decode('ascii') for each in text)
+    return shown if len(shown) <= 256 else f'{shown[:253]}...'
+
+
+def _only(text: str) -> set[Only]:
+    known = {only.value: only for only in Only}
+    wrong = [word for word in text.split(',') if word not in known]
+    if wrong:
+        raise ArgumentTypeError(f'{wrong[0]!r} is unknown; known are {", ".join(known)}')
+    return {known[word] for word in text.split(',')}

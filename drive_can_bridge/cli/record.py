@@ -1,0 +1,202 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""``drive_can record``: everything on the buses of a parameter file, in a trace file."""
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+import sys
+import time
+from typing import Any, TextIO
+
+from drive_can_bridge.cli.listening import (
+    add_params_file, add_seconds, complain, listening, load, positive,
+)
+from drive_can_bridge.core.frame import bits_on_bus, STUFFING
+from drive_can_bridge.core.record import Record, RecordKind
+from drive_can_bridge.trace.channels import label
+from drive_can_bridge.trace.files import (
+    check_writable, LOSSES, TraceWriter, UnknownFormat, WRITABLE,
+)
+
+WRONG_USAGE = 2
+#: s between two looks at counts and file size
+_LOOK_PERIOD = 1.0
+_MEGABYTE = 1_000_000
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add the subcommand to the parser of ``drive_can``."""
+    parser: ArgumentParser = subparsers.add_parser(
+        'record', help='write everything on the buses of a parameter file to a trace',
+        description='Listen to all buses of a parameter file and write every frame to a file, '
+                    'with direction and error frames, until SIGINT or SIGTERM. Sends nothing; on '
+                    'SocketCAN it works beside a running bridge.',
+        epilog=f'Formats, by suffix: {", ".join(WRITABLE)}. Only .log, the format of candump, '
+               'loses nothing.')
+    parser.add_argument('-o', '--output', metavar='FILE', type=Path, required=True,
+                        help='the trace; an existing file is replaced')
+    add_params_file(parser, 'parameter file of the bridge: names the buses')
+    add_seconds(parser)
+    parser.add_argument('--rotate', metavar='MB', type=positive,
+                        help='begin a new file when one has that size: FILE_000, FILE_001, …')
+    parser.add_argument('--json', action='store_true',
+                        help='at the end, a JSON document for each bus: bus, file, frames, sent, '
+                             'error_frames, load_percent, seconds')
+    parser.set_defaults(run=run)
+
+
+def run(args: Namespace) -> int:
+    """
+    Record until a signal.
+
+    :return: 0, or 2 for a suffix that cannot be written.
+    :raises DriveCanError: a parameter file with problems, a bus that cannot be opened.
+    :raises OSError: a file cannot be read or written.
+    """
+    configuration = load(args)
+    buses = list(configuration.buses.values())
+    try:
+        check_writable(args.output, len(buses))
+    except UnknownFormat as error:
+        complain(f'drive_can record: {error}')
+        return WRONG_USAGE
+    for loss in LOSSES.get(args.output.suffix.lower(), ()):
+        complain(f'warning: {args.output.suffix} does not keep {loss}; .log does')
+    output = _Rotating(args.output, [label(bus) for bus in buses], args.rotate)
+    counters = {label(bus): _Counter(bus.name, bus.bitrate) for bus in buses}
+    status = _Status(sys.stderr)
+    try:
+        with listening(configuration) as taps:
+            try:
+                _record(taps.records(args.seconds), output, counters, status)
+            except KeyboardInterrupt:
+                pass
+    finally:
+        status.clear()
+        output.close()
+    for counter in counters.values():
+        print(counter.document(output) if args.json else counter.line(output))
+    return 0
+
+
+def _record(records: Any, output: '_Rotating', counters: dict[str, '_Counter'],
+            status: '_Status') -> None:
+    look_at = time.monotonic() + _LOOK_PERIOD
+    for record in records:
+        if record is not None:
+            output.write(record)
+            counters[record.channel].take(record)
+        now = time.monotonic()
+        if now >= look_at:
+            look_at = now + _LOOK_PERIOD
+            output.look()
+            status.show('  '.join(counter.status() for counter in counters.values()))
+
+
+class _Counter:
+    """What was recorded of one bus."""
+
+    def __init__(self, name: str, bitrate: int) -> None:
+        self._name = name
+        self._bitrate = bitrate
+        self._began = time.monotonic()
+        self._frames = self._sent = self._error_frames = 0
+        self._bits = self._bits_shown = 0
+        self._shown_at = self._began
+
+    def take(self, record: Record) -> None:
+        """Take an entry."""
+        if record.kind is RecordKind.ERROR:
+            self._error_frames += 1
+            return
+        self._frames += 1
+        self._sent += record.sent is True
+        self._bits += bits_on_bus(len(record.data), record.extended)
+
+    def status(self) -> str:
+        """Say how much there is so far, and how busy the bus is now."""
+        now = time.monotonic()
+        load = self._load(self._bits - self._bits_shown, now - self._shown_at)
+        self._bits_shown, self._shown_at = self._bits, now
+        return (f'{self._name}: {self._frames} frames, {self._error_frames} error frames, '
+                f'load {load:.1f} %')
+
+    def line(self, output: '_Rotating') -> str:
+        """Sum up."""
+        seconds = time.monotonic() - self._began
+        return (f'{self._name}: {self._frames} frames ({self._sent} sent by this machine), '
+                f'{self._error_frames} error frames, {seconds:.1f} s, '
+                f'load {self._load(self._bits, seconds):.1f} %: {output.names}')
+
+    def document(self, output: '_Rotating') -> str:
+        """Sum up for programs."""
+        import json
+        seconds = time.monotonic() - self._began
+        return json.dumps({
+            'bus': self._name, 'file': output.names, 'frames': self._frames, 'sent': self._sent,
+            'error_frames': self._error_frames, 'seconds': round(seconds, 3),
+            'load_percent': round(self._load(self._bits, seconds), 1)})
+
+    def _load(self, bits: int, seconds: float) -> float:
+        return 100.0 * STUFFING * bits / (max(seconds, 1e-3) * self._bitrate)
+
+
+class _Rotating:
+    """One trace file, or several of limited size."""
+
+    def __init__(self, path: Path, channels: list[str], megabytes: float | None) -> None:
+        self._path = path
+        self._channels = channels
+        self._limit = None if megabytes is None else megabytes * _MEGABYTE
+        self._number = 0
+        self._writer = self._open()
+
+    def _open(self) -> TraceWriter:
+        path = self._path
+        if self._limit is not None:
+            path = path.with_name(f'{path.stem}_{self._number:03d}{path.suffix}')
+        return TraceWriter(path, self._channels)
+
+    @property
+    def names(self) -> str:
+        """The file, or how many there are."""
+        if self._limit is None:
+            return str(self._path)
+        return f'{self._writer.path} is the last of {self._number + 1} files'
+
+    def write(self, record: Record) -> None:
+        """Write an entry."""
+        self._writer.write(record)
+
+    def look(self) -> None:
+        """Begin a new file when this one is large enough; else make it readable so far."""
+        if self._limit is not None and self._writer.size >= self._limit:
+            self._writer.close()
+            self._number += 1
+            self._writer = self._open()
+        else:
+            self._writer.flush()
+
+    def close(self) -> None:
+        """Finish the file."""
+        self._writer.close()
+
+
+class _Status:
+    """A line that is written over again and again; in a terminal only."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream if stream.isatty() else None
+        self._width = 0
+
+    def show(self, text: str) -> None:
+        """Replace the line."""
+        if self._stream is not None:
+            self._stream.write(f'\r{text.ljust(self._width)}')
+            self._stream.flush()
+            self._width = len(text)
+
+    def clear(self) -> None:
+        """Take the line away."""
+        if self._stream is not None and self._width:
+            self._stream.write(f'\r{" " * self._width}\r')
+            self._stream.flush()

@@ -1,0 +1,215 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""``drive_can scan``: which drives are on a bus that nobody has described."""
+
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from collections.abc import Sequence
+from dataclasses import replace
+import json
+from pathlib import Path
+import sys
+from typing import Any
+
+from drive_can_bridge.cli.found_file import write_parameter_file
+from drive_can_bridge.cli.listening import complain, positive
+from drive_can_bridge.cli.survey import Survey
+from drive_can_bridge.core.configuration import BusConfiguration
+from drive_can_bridge.protocols.families import FAMILIES
+from drive_can_bridge.trace.summary import table
+from drive_can_bridge.transport.adapters import adapter_keywords, check_interface
+from drive_can_bridge.transport.end_point import EndPoint
+from drive_can_bridge.transport.port import open_port
+
+FAILED = 1
+WRONG_USAGE = 2
+#: families whose reads may be commands of others: only when named
+_NAMED = tuple(name for name, family in FAMILIES.items() if not family.make_scout().unmistakable)
+_COLUMNS = ('protocol', 'station', 'how sure', 'what it said')
+
+
+class _WrongUsage(Exception):
+    """The command line cannot be obeyed."""
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add the subcommand to the parser of ``drive_can``."""
+    parser: ArgumentParser = subparsers.add_parser(
+        'scan', help='find the drives on a bus',
+        description='Listen, then ask: 29-bit DataModel reads and CANopen SDO reads, which mean '
+                    'nothing to other devices, at 30 % bus load at most. Only listens while '
+                    'another master asks. Sends reads only, never a setpoint, a control word or '
+                    'an NMT command.',
+        epilog='Exit code 0: something was found. 1: nothing, or the bus cannot be used. 2: wrong '
+               'usage, or a question that could not be asked.')
+    parser.add_argument('--interface', required=True, help='python-can interface: socketcan, …')
+    parser.add_argument('--channel', required=True, help='what it calls its channel: can0, …')
+    parser.add_argument('--bitrate', type=int, default=125_000, metavar='B', help='bit/s')
+    parser.add_argument('--listen', type=positive, default=2.0, metavar='S',
+                        help='s to listen before anything is asked (default 2)')
+    parser.add_argument('--passive', action='store_true', help='only listen')
+    parser.add_argument('--protocols', type=_protocols, default=[], metavar='NAME',
+                        help=f'ask these, too, one after the other: {", ".join(_NAMED)}; their '
+                             'reads may be commands to other devices, never asked where there is '
+                             'a CANopen node')
+    parser.add_argument('--yes', action='store_true', help='answer every question with yes')
+    parser.add_argument('--bitrates', type=_bitrates, metavar='A,B,…',
+                        help='only listen, at each of these; needs an adapter with a listen-only '
+                             'mode')
+    parser.add_argument('-o', '--output', type=Path, metavar='FILE',
+                        help='write what was found as a parameter file')
+    parser.add_argument('--json', action='store_true',
+                        help='a document for each drive: protocol, station, certainty, text')
+    parser.set_defaults(run=run)
+
+
+def run(args: Namespace) -> int:
+    """
+    Scan.
+
+    :return: 0 found something, 1 nothing, 2 wrong usage.
+    :raises TransportError: the bus cannot be used.
+    :raises OSError: the output cannot be written.
+    """
+    reason = check_interface(args.interface)
+    if reason is not None:
+        complain(f'drive_can scan: --interface: {reason}')
+        return WRONG_USAGE
+    bus = BusConfiguration('main', args.interface, args.channel, args.bitrate)
+    try:
+        if args.bitrates:
+            return _compare_bitrates(args, bus)
+        for name in args.protocols:     # before anything is sent
+            _confirm(args, name)
+        return _scan(args, bus)
+    except _WrongUsage as error:
+        complain(f'drive_can scan: {error}')
+        return WRONG_USAGE
+
+
+def _scan(args: Namespace, bus: BusConfiguration) -> int:
+    port = open_port(bus)
+    try:
+        survey = Survey(bus, port)
+        survey.listen(args.listen)
+        if not args.passive:
+            _ask(args, survey)
+    finally:
+        port.close()
+    _tell_trouble(survey, port, asked=not args.passive)
+    _show(args, survey)
+    if args.output is not None:
+        for path in write_parameter_file(
+                args.output, bus, survey.sightings,
+                [survey.scouts[each.protocol].settings(each.station)
+                 for each in survey.sightings]):
+            complain(f'written: {path}')
+    return 0 if survey.sightings or survey.nodes else FAILED
+
+
+def _ask(args: Namespace, survey: Survey) -> None:
+    for name, family in FAMILIES.items():
+        if not survey.master and survey.scouts[name].unmistakable:
+            survey.ask(family.name)
+    for name in args.protocols:
+        if survey.nodes:
+            complain(f'{name} is not asked: there is a CANopen node '
+                     f'({", ".join(map(str, survey.nodes))}), which might take its reads for '
+                     'process data')
+        elif not survey.master:
+            survey.ask(name)
+    if survey.master:
+        complain(f'there is another master ({survey.master}): only listening')
+
+
+def _confirm(args: Namespace, name: str) -> None:
+    """
+    Have it confirmed that a family is asked whose reads may be commands.
+
+    :raises _WrongUsage: nobody can be asked, or says no.
+    """
+    complain(f'{name}: {FAMILIES[name].make_scout().hazard}')
+    if args.yes or args.passive:
+        return
+    if not sys.stdin.isatty():
+        raise _WrongUsage(f'--protocols {name} needs --yes where nobody can be asked')
+    sys.stderr.write(f'Ask {name} all the same? [y/N] ')
+    sys.stderr.flush()
+    if sys.stdin.readline().strip().lower() not in ('y', 'yes'):
+        raise _WrongUsage('nothing was sent')
+
+
+def _show(args: Namespace, survey: Survey) -> None:
+    sightings = survey.sightings
+    if args.json:
+        for each in sightings:
+            print(json.dumps({'protocol': each.protocol, 'station': each.station,
+                              'certainty': each.certainty.value, 'text': each.text},
+                             ensure_ascii=False))
+        return
+    drives = {each.station for each in sightings if each.protocol == 'canopen_pkw'}
+    rows = [(each.protocol, str(each.station), each.certainty.value, each.text)
+            for each in sightings]
+    rows += [('CANopen node', str(node), '–', text)
+             for node, text in sorted(survey.nodes.items()) if node not in drives]
+    if rows:
+        for line in table(_COLUMNS, rows, texts=(0, 2, 3)):
+            print(line)
+    else:
+        print(f'no drive found, {survey.frames} frames heard')
+
+
+def _tell_trouble(survey: Survey, port: EndPoint, *, asked: bool) -> None:
+    """Say in words what is wrong with a bus, as far as it can be seen from here."""
+    if port.error_frames:
+        error = port.last_error
+        told = f': {error.text}; {error.advice}' if error is not None else ''
+        complain(f'{port.error_frames} error frames{told}')
+    if port.controller:
+        complain(f'the controller of this adapter is {port.controller}')
+    if survey.trouble:
+        complain(f'{survey.trouble}: check power, cable, termination and bit rate')
+    elif not survey.frames:
+        complain('nothing was heard: ' + (
+            'no drive answers at this bit rate; check power, cable and termination, try '
+            '--bitrates, and --protocols for drives with 11-bit identifiers' if asked else
+            'drives speak when they are asked'))
+
+
+def _compare_bitrates(args: Namespace, bus: BusConfiguration) -> int:
+    if 'listen_only' not in (adapter_keywords(bus.interface) or ()):
+        raise _WrongUsage(f'--bitrates: {bus.interface} has no listen-only mode here, and trying '
+                          'bit rates without it would disturb the bus')
+    heard = 0
+    for bitrate in args.bitrates:
+        port = open_port(replace(bus, bitrate=bitrate, options={'listen_only': True}))
+        try:
+            survey = Survey(bus, port)
+            survey.listen(args.listen)
+        finally:
+            port.close()
+        heard += survey.frames
+        print(f'{bitrate} bit/s: {survey.frames} frames, {port.error_frames} error frames'
+              + ('' if not survey.sightings else ': ' + ', '.join(
+                  f'{each.protocol} {each.station}' for each in survey.sightings)))
+    if not heard:
+        complain('nothing was heard at any of these; drives speak when they are asked, so a '
+                 'master has to be running')
+    return 0 if heard else FAILED
+
+
+def _protocols(text: str) -> list[str]:
+    names = text.split(',')
+    wrong: Sequence[str] = [name for name in names if name not in _NAMED]
+    if wrong:
+        raise ArgumentTypeError(f'{wrong[0]!r}: allowed are {", ".join(_NAMED)}; the others are '
+                                'asked anyway')
+    return names
+
+
+def _bitrates(text: str) -> list[int]:
+    try:
+        rates = [int(rate) for rate in text.split(',')]
+    except ValueError:
+        rates = [0]
+    if min(rates) < 1000:
+        raise ArgumentTypeError(f'{text}: allowed are bit rates separated by commas')
+    return rates

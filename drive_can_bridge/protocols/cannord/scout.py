@@ -1,0 +1,71 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Finding CANnord inverters: by requests and answers that follow each other, or by a read."""
+
+from typing import Any
+
+from drive_can_bridge.core.errors import RemoteProtocolError
+from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.protocols.cannord.identifiers import (
+    ADDRESS_MAX, decode_identifier, identifier, MessageObject,
+)
+from drive_can_bridge.protocols.cannord.parameter_frame import LENGTH, ParameterLayout, Task
+from drive_can_bridge.protocols.cannord.process_data import decode_main
+from drive_can_bridge.protocols.cannord.states import (
+    ACKNOWLEDGE, QUICK_STOP, READY, RUN, state_of,
+)
+from drive_can_bridge.protocols.scout import Scout
+
+#: the parameter that is read: the fault number. As a DataModel request its first byte, BCh, is no
+#: function, so that it writes nothing there
+PARAMETER = 700
+_NUMBER_BITS = 0x07FF
+#: control words that masters send; the bits of direction and parameter set left out
+_CONTROL_WORDS = (READY, RUN, QUICK_STOP, ACKNOWLEDGE)
+_CONTROL_MASK = 0x27FF
+
+
+class CannordScout(Scout):
+    """Recognises process data and parameter frames of 11 bits, and reads one parameter."""
+
+    protocol = 'cannord'
+    hazard = ('a task on 200h + 2·address is RPDO1 (process data) or TPDO of CANopen nodes, '
+              'on 300h to 3FEh RPDO2 and TPDO3: a CANopen drive may take it for a command')
+
+    def begin(self) -> None:
+        data = ParameterLayout().encode(Task.READ, PARAMETER)
+        for address in range(ADDRESS_MAX + 1):
+            self._questions.append(
+                Frame(identifier(MessageObject.PARAMETER_TASK, address), data, False))
+
+    def _hear_request(self, frame: Frame, now: float) -> None:
+        self.hear(frame, now)
+
+    def hear(self, frame: Frame, now: float) -> None:
+        if frame.extended:
+            return
+        try:
+            addressed = decode_identifier(frame.identifier)
+        except RemoteProtocolError:
+            return
+        kind, station = addressed.kind, addressed.addresses[0]
+        data = frame.data
+        if kind is MessageObject.PROCESS_REQUEST and len(data) in (4, 8) and (
+                decode_main(data).word & _CONTROL_MASK in _CONTROL_WORDS):
+            self._request(station, data, now)
+        elif kind is MessageObject.PARAMETER_TASK and len(data) == LENGTH:
+            self._request(-1 - station, data, now)
+        elif kind is MessageObject.PROCESS_RESPONSE and len(data) in (4, 8):
+            if self._answers(station, now, lambda request: len(request) == len(data)):
+                state = state_of(decode_main(data).word)
+                self._pair(station, f'process data, state "{state.value}"')
+        elif kind is MessageObject.PARAMETER_RESPONSE and len(data) == LENGTH:
+            if self._answers(-1 - station, now,
+                             lambda request: _number(request) == _number(data)):
+                self._pair(station, f'answers to tasks for P{_number(data)}')
+
+    def settings(self, station: int) -> dict[str, Any]:
+        return {}
+
+
+def _number(data: bytes) -> int:
+    return int.from_bytes(data[:2], 'little') & _NUMBER_BITS

@@ -1,0 +1,89 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Finding CANopen nodes, and among them devices with a PKW mailbox."""
+
+from typing import Any
+
+from drive_can_bridge.core.errors import RemoteProtocolError
+from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.protocols.canopen_pkw import network, sdo
+from drive_can_bridge.protocols.scout import Certainty, Scout
+
+#: the object of the mailbox, in the upper half of a mapping entry
+_MAILBOX = 0x3000
+
+
+class CanopenScout(Scout):
+    """
+    Recognises heartbeats, boot-up and emergency messages, mailbox traffic and SDO answers.
+
+    Reads objects that every node has or refuses. 600h to 67Fh mean nothing to other families.
+    """
+
+    protocol = 'canopen_pkw'
+    unmistakable = True
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.nodes: dict[int, str] = {}     # what is known of nodes, mailbox or not
+        self._mailboxes: set[int] = set()
+        self._facts: dict[int, dict[str, str]] = {}
+
+    def begin(self) -> None:
+        for node in range(1, network.NODE_MAX + 1):
+            self._questions.append(sdo.encode_upload(node, sdo.DEVICE_TYPE, 0))
+
+    def hear(self, frame: Frame, now: float) -> None:
+        if frame.extended:
+            return
+        base, node = frame.identifier & 0x780, frame.identifier & 0x7F
+        try:
+            if frame.identifier == network.NMT_IDENTIFIER:
+                network.decode_nmt(frame.data)
+                self.master = 'NMT commands'
+            elif not node:
+                return
+            elif base == network.HEARTBEAT_BASE:
+                self._fact(node, 'heartbeat', network.decode_heartbeat(frame.data).text)
+            elif base == sdo.RESPONSE_BASE:
+                self._take_upload(node, sdo.decode_upload(frame.data))
+            elif base == sdo.REQUEST_BASE and len(frame.data) == 8:
+                self.master = f'SDO requests to node {node}'
+            elif base == network.REQUEST_BASE and len(frame.data) == 8:
+                self._request(node, frame.data, now)
+            elif base == network.RESPONSE_BASE and len(frame.data) == 8:
+                # every layout repeats the four bytes of address and function, refusals aside
+                if self._answers(node, now, lambda request: request[:4] == frame.data[:4]):
+                    self._pair(node, 'PKW answers')
+                    if node in self.sightings:
+                        self._fact(node, 'PKW', 'answers')
+        except RemoteProtocolError:
+            return
+
+    def _take_upload(self, node: int, upload: sdo.Uploaded) -> None:
+        (index, subindex), value = upload
+        if index == sdo.DEVICE_TYPE:
+            self._fact(node, 'device type', 'refused' if value is None else f'{value:08X}h')
+            for entry in ((sdo.IDENTITY, 1), (sdo.IDENTITY, 2), (sdo.RPDO4_MAPPING, 1)):
+                self._questions.append(sdo.encode_upload(node, *entry))
+        elif value is None:
+            return
+        elif index == sdo.IDENTITY:
+            self._fact(node, 'vendor' if subindex == 1 else 'product', f'{value:X}h')
+        elif index == sdo.RPDO4_MAPPING:
+            self._fact(node, 'RPDO4 maps', f'{value >> 16:04X}h')
+            if value >> 16 == _MAILBOX:
+                self._mailboxes.add(node)
+                self._fact(node, 'mailbox', 'yes')
+
+    def _fact(self, node: int, name: str, text: str) -> None:
+        facts = self._facts.setdefault(node, {})
+        facts[name] = text
+        told = ', '.join(f'{key} {value}' for key, value in facts.items() if key != 'mailbox')
+        self.nodes[node] = told
+        if node in self._mailboxes:
+            self._see(node, told, Certainty.CERTAIN)
+        elif facts.get('PKW'):
+            self._see(node, told, Certainty.LIKELY)
+
+    def settings(self, station: int) -> dict[str, Any]:
+        return {}

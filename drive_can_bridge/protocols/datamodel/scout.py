@@ -1,0 +1,114 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Finding DataModel drives, with 29-bit and with 11-bit identifiers."""
+
+from typing import Any
+
+from drive_can_bridge.core.errors import RemoteProtocolError
+from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.protocols.datamodel import extended, standard
+from drive_can_bridge.protocols.datamodel.mapping import (
+    effective, REQUEST_MAP_BASE, RESPONSE_MAP_BASE,
+)
+from drive_can_bridge.protocols.scout import Certainty, Scout
+
+#: the highest station whose both identifiers fit 11 bits with the default bases
+STANDARD_STATION_MAX = 15
+#: a parameter that the manual names, and whose read is no write in any other protocol
+HARMLESS_NUMBER = 30
+
+
+class ExtendedScout(Scout):
+    """
+    Recognises 29-bit identifiers, and reads both maps of each station.
+
+    Its reads have 1 to 4 in the last four bits of the identifier, in which CANnord's 29-bit form
+    has zeros: nobody else takes them for anything.
+    """
+
+    protocol = 'datamodel_extended'
+    unmistakable = True
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.maps: dict[int, dict[int, tuple[int, ...]]] = {}
+
+    def begin(self) -> None:
+        for station in range(1, extended.STATION_MAX + 1):
+            self._questions.append(
+                extended.encode_read_request(station, REQUEST_MAP_BASE, extended.SLOTS))
+
+    def hear(self, frame: Frame, now: float) -> None:
+        try:
+            telegram = extended.decode(frame)
+        except RemoteProtocolError:
+            return
+        station = telegram.station
+        if isinstance(telegram, extended.CyclicResponse):
+            self._see(station, 'cyclic responses', Certainty.CERTAIN)
+        elif isinstance(telegram, extended.ReadResponse):
+            if telegram.number in (REQUEST_MAP_BASE, RESPONSE_MAP_BASE):
+                self._take_map(station, telegram.number, telegram.words)
+            else:
+                self._see(station, f'answers to reads of P{telegram.number}', Certainty.LIKELY)
+        else:
+            self.master = f'requests to station {station} of {self.protocol}'
+
+    def _take_map(self, station: int, base: int, words: tuple[int, ...]) -> None:
+        maps = self.maps.setdefault(station, {})
+        if len(words) == extended.SLOTS:
+            maps[base] = effective(words)
+        if RESPONSE_MAP_BASE not in maps:
+            self._questions.insert(0, extended.encode_read_request(
+                station, RESPONSE_MAP_BASE, extended.SLOTS))
+        told = ', '.join(f'{name} map {_numbers(maps[key])}' for key, name in (
+            (REQUEST_MAP_BASE, 'request'), (RESPONSE_MAP_BASE, 'response')) if key in maps)
+        self._see(station, told or 'answers to reads of its maps', Certainty.CERTAIN)
+
+    def settings(self, station: int) -> dict[str, Any]:
+        maps = self.maps.get(station, {})
+        return {'request_numbers': list(maps.get(REQUEST_MAP_BASE, ())),
+                'response_numbers': list(maps.get(RESPONSE_MAP_BASE, ()))}
+
+
+class StandardScout(Scout):
+    """
+    Recognises the default identifiers of 11 bits, and reads P30 of each station.
+
+    Not a map: a read of P122 at station 2 is task 7, a write of an EEPROM parameter, to CANnord
+    inverter 249. A read of P30 has 1Eh in that place, which is a read there, too.
+    """
+
+    protocol = 'datamodel_standard'
+    hazard = ('a read on 3F1h to 3FFh looks like TPDO3 of CANopen nodes 113 to 127, and on even '
+              'stations like a task that reads, to CANnord inverters 249 to 255')
+
+    def begin(self) -> None:
+        for station in range(1, STANDARD_STATION_MAX + 1):
+            self._questions.append(standard.encode_read_request(
+                standard.REQUEST_ID_BASE + station, HARMLESS_NUMBER, 1))
+
+    def _hear_request(self, frame: Frame, now: float) -> None:
+        station = frame.identifier - standard.REQUEST_ID_BASE
+        if frame.extended or not 1 <= station <= STANDARD_STATION_MAX:
+            return
+        try:
+            request = standard.decode_request(frame)
+        except RemoteProtocolError:
+            return
+        if isinstance(request, standard.ReadRequest):
+            self._request(station, frame.data, now)
+
+    def hear(self, frame: Frame, now: float) -> None:
+        self._hear_request(frame, now)
+        station = frame.identifier - standard.RESPONSE_ID_BASE
+        if frame.extended or not 1 <= station <= STANDARD_STATION_MAX:
+            return
+        if len(frame.data) == standard.PAYLOAD and self._answers(station, now):
+            self._pair(station, 'answers to reads')
+
+    def settings(self, station: int) -> dict[str, Any]:
+        return {'request_numbers': [], 'response_numbers': [HARMLESS_NUMBER]}
+
+
+def _numbers(numbers: tuple[int, ...]) -> str:
+    return ' '.join(map(str, numbers)) or 'empty'

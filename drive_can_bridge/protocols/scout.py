@@ -1,0 +1,133 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+Finding drives on a bus that nobody has described: what a family recognises, and what it may ask.
+
+A *scout* hears every frame and notes which stations of its family talk, and whether a master asks
+them. What it may ask are reads; but on 11-bit identifiers a read of one family is a command of
+another, so that each scout says what its questions would mean to others.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator
+from enum import Enum
+from typing import Any, NamedTuple
+
+from drive_can_bridge.core.frame import Frame
+
+#: s within which a frame may be the answer to the one before
+ANSWER_TIME = 0.1
+#: requests to a station, answered or not, that tell of a master
+_MASTER_REQUESTS = 3
+
+
+class Certainty(Enum):
+    """How sure a sighting is."""
+
+    CERTAIN = 'certain'
+    LIKELY = 'likely'
+    POSSIBLE = 'possible'
+
+
+class Sighting(NamedTuple):
+    """
+    A station that was seen.
+
+    :param text: what it said or answered.
+    """
+
+    protocol: str
+    station: int
+    text: str
+    certainty: Certainty
+
+
+class Scout(ABC):
+    """
+    Looks for the drives of one family.
+
+    :ivar protocol: name of the family.
+    :ivar sightings: by station.
+    :ivar master: what somebody else asked last; '': nobody did.
+    :ivar unmistakable: its questions mean nothing to devices of any other family.
+    :ivar hazard: what its questions would mean to devices of others.
+    """
+
+    protocol: str
+    unmistakable = False
+    hazard = ''
+
+    def __init__(self) -> None:
+        self.sightings: dict[int, Sighting] = {}
+        self.master = ''
+        self._asked: dict[int, tuple[float, bytes, bool]] = {}
+        self._ours = False      # what is heard now is a question of our own
+        self._answered_ours = False
+        self._pairs: dict[int, int] = {}
+        self._alone: dict[int, int] = {}
+        self._questions: list[Frame] = []
+
+    @abstractmethod
+    def hear(self, frame: Frame, now: float) -> None:
+        """Take a frame from the bus (not one of our own)."""
+
+    @abstractmethod
+    def begin(self) -> None:
+        """Prepare the first questions to all stations that may exist."""
+
+    @abstractmethod
+    def settings(self, station: int) -> dict[str, Any]:
+        """Return the drive keys of a parameter file that follow from what was seen."""
+
+    def asked(self, frame: Frame, now: float) -> None:
+        """Take note of a question of our own: its answer is no sign of a master."""
+        self._ours = True
+        self._hear_request(frame, now)
+        self._ours = False
+
+    def _hear_request(self, frame: Frame, now: float) -> None:
+        """Note a request, where answers are only known by what was asked."""
+        return
+
+    def take_question(self) -> Frame | None:
+        """Return the next question; answers may bring further ones."""
+        return self._questions.pop(0) if self._questions else None
+
+    def _see(self, station: int, text: str, certainty: Certainty) -> None:
+        """Note a station; what is more certain, or as certain and newer, wins."""
+        order = list(Certainty)
+        known = self.sightings.get(station)
+        if known is None or order.index(certainty) <= order.index(known.certainty):
+            self.sightings[station] = Sighting(self.protocol, station, text, certainty)
+
+    def _request(self, station: int, data: bytes, now: float) -> None:
+        """Note what looks like a request to a station; some in a row are a master's."""
+        self._asked[station] = now, data, self._ours
+        if not self._ours:
+            self._alone[station] = self._alone.get(station, 0) + 1
+            if self._alone[station] >= _MASTER_REQUESTS:
+                self.master = f'what looks like requests of {self.protocol}'
+
+    def _answers(self, station: int, now: float,
+                 fits: Callable[[bytes], bool] = lambda request: True) -> bool:
+        """Tell whether a frame of a station follows a request that it fits to."""
+        asked = self._asked.pop(station, None)
+        if asked is None or now - asked[0] > ANSWER_TIME or not fits(asked[1]):
+            return False
+        self._answered_ours = asked[2]
+        return True
+
+    def _pair(self, station: int, text: str) -> None:
+        """Note a request with its answer: one that is not our own may be chance."""
+        if self._answered_ours:
+            self._see(station, text, Certainty.LIKELY)
+            return
+        self._pairs[station] = self._pairs.get(station, 0) + 1
+        if self._pairs[station] >= 2:
+            self._see(station, text, Certainty.LIKELY)
+            self.master = f'requests to station {station} of {self.protocol}'
+
+
+def all_sightings(scouts: list[Scout]) -> Iterator[Sighting]:
+    """Yield everything that was seen, by family and station."""
+    for scout in scouts:
+        yield from (scout.sightings[station] for station in sorted(scout.sightings))

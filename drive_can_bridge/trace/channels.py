@@ -1,0 +1,46 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Which bus of a parameter file a trace means by its channel."""
+
+from collections.abc import Sequence
+
+from drive_can_bridge.core.configuration import BusConfiguration
+
+
+def label(bus: BusConfiguration) -> str:
+    """Return what a bus is called in a trace: as candump calls it, or by its name."""
+    return str(bus.channel) if bus.interface == 'socketcan' else bus.name
+
+
+class Channels:
+    """
+    Finds buses by the channels of a trace.
+
+    A name is a bus's channel or its name, a number its place in the file. The one bus of a file
+    that has only one is meant by a trace without channels, too, and by the first channel of
+    another name that turns up.
+    """
+
+    def __init__(self, buses: Sequence[BusConfiguration]) -> None:
+        self._buses = list(buses)
+        self._found: dict[str | int, BusConfiguration | None] = {}
+        self._adopted = False
+
+    def find(self, channel: str | int) -> BusConfiguration | None:
+        """Return the bus; None: it is not in the file."""
+        if channel not in self._found:
+            self._found[channel] = self._look(channel)
+        return self._found[channel]
+
+    def _look(self, channel: str | int) -> BusConfiguration | None:
+        for bus in self._buses:
+            if channel in (str(bus.channel), bus.name):
+                self._adopted = True
+                return bus
+        if len(self._buses) == 1:
+            if self._adopted and channel != '':
+                return None
+            self._adopted = channel != ''
+            return self._buses[0]
+        if isinstance(channel, int) and 0 <= channel < len(self._buses):
+            return self._buses[channel]
+        return None

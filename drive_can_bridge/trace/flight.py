@@ -1,0 +1,236 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The flight recorder of a bridge: what came before a failure, on disk before anybody asks.
+
+A thread of its own waits for a second after the event, so that what followed is in the trace, too,
+and writes in small steps between which it gives way: the exchange goes on undisturbed.
+"""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+import itertools
+import os
+from pathlib import Path
+import re
+import threading
+import time
+
+from drive_can_bridge.core.configuration import BusConfiguration
+from drive_can_bridge.trace.candump import format_record
+from drive_can_bridge.trace.channels import label
+from drive_can_bridge.trace.ring import Ring
+
+#: s after an event that belong into its trace
+AFTERMATH = 1.0
+#: least s between two traces of a bus
+SPACING = 10.0
+#: traces of a run that are never replaced by later ones: how it all began
+FIRST_KEPT = 5
+#: s that the thread may be late, because it is writing the trace of another bus
+_SLACK = 5.0
+#: entries that are written without giving way, and s for which the thread then does
+_STEP = 64
+_PAUSE = 0.0005
+#: s that the end of the bridge waits for a trace that is being written
+_END_TIMEOUT = 3.0
+
+#: takes the path of a trace, or '' and why there is none
+Done = Callable[[str, str], None]
+
+
+@dataclass
+class _Wanted:
+    """A trace that is to be written."""
+
+    reason: str
+    rank: int
+    at: float
+    done: list[Done] = field(default_factory=list)
+
+
+@dataclass
+class _Bus:
+    """One recorded bus."""
+
+    configuration: BusConfiguration
+    ring: Ring
+    folder: Path
+    wanted: _Wanted | None = None
+    last: float = -SPACING
+    last_path: str = ''
+
+
+class FlightRecorder:
+    """
+    Records all buses that ask for it, and writes traces.
+
+    :param default_folder: where traces go whose bus names no directory.
+    :param say: takes a line for the log.
+    :param complain: takes a line when a trace cannot be written.
+    """
+
+    def __init__(self, buses: Iterable[BusConfiguration], default_folder: Path,
+                 say: Callable[[str], None], complain: Callable[[str], None]) -> None:
+        self._say = say
+        self._complain = complain
+        self._buses = {bus.name: _Bus(bus, Ring(bus.trace_seconds + AFTERMATH + _SLACK),
+                                      Path(bus.trace_directory).expanduser()
+                                      if bus.trace_directory else default_folder)
+                       for bus in buses if bus.trace_seconds > 0.0}
+        self._first: dict[str, list[Path]] = {name: [] for name in self._buses}
+        self._changed = threading.Condition()
+        self._closing = False
+        self._thread = threading.Thread(target=self._run, name='flight recorder', daemon=True)
+        self._thread.start()
+
+    @property
+    def buses(self) -> list[str]:
+        """The recorded buses."""
+        return list(self._buses)
+
+    def ring(self, bus: str) -> Ring | None:
+        """Return what keeps the frames of a bus; None: it is not recorded."""
+        found = self._buses.get(bus)
+        return None if found is None else found.ring
+
+    def trigger(self, bus: str, reason: str, *, rank: int = 0) -> None:
+        """
+        Something went wrong: a trace of this bus is to be written. From any thread, at once.
+
+        :param reason: becomes part of the file's name.
+        :param rank: of several reasons within the aftermath, the highest names the file.
+        """
+        found = self._buses.get(bus)
+        if found is None:
+            return
+        with self._changed:
+            now = time.monotonic()
+            if found.wanted is not None:
+                if rank > found.wanted.rank:
+                    found.wanted.reason, found.wanted.rank = reason, rank
+            elif now - found.last >= SPACING:
+                self._want(found, _Wanted(reason, rank, now))
+
+    def save(self, bus: str, reason: str, done: Done) -> None:
+        """Write a trace because somebody asks for it; ``done`` is told the path, or why not."""
+        found = self._buses[bus]
+        with self._changed:
+            now = time.monotonic()
+            if found.wanted is not None:
+                found.wanted.done.append(done)
+                return
+            if now - found.last >= SPACING:
+                self._want(found, _Wanted(reason, 0, now, [done]))
+                return
+            ago, path = now - found.last, found.last_path
+        done('', f'bus {bus}: one trace in {SPACING:g} s at most; the last, {ago:.0f} s ago, is '
+                 f'{path or "not written"}')
+
+    def close(self) -> None:
+        """Write what is still wanted, and end the thread."""
+        with self._changed:
+            self._closing = True
+            self._changed.notify()
+        self._thread.join(_END_TIMEOUT)
+
+    def _want(self, bus: _Bus, wanted: _Wanted) -> None:
+        bus.wanted = wanted
+        bus.last = wanted.at
+        self._changed.notify()
+
+    # -- the thread -------------------------------------------------------------------------------
+
+    def _run(self) -> None:
+        while True:
+            with self._changed:
+                bus = self._next()
+                if bus is None:
+                    if self._closing:
+                        return
+                    self._changed.wait()
+                    continue
+                wanted = bus.wanted
+                if wanted is None:
+                    continue
+                pause = wanted.at + AFTERMATH - time.monotonic()
+                if pause > 0.0 and not self._closing:
+                    self._changed.wait(pause)
+                    continue
+                bus.wanted = None
+            self._write(bus, wanted)
+
+    def _next(self) -> _Bus | None:
+        """Return the bus whose trace is due first."""
+        waiting = [bus for bus in self._buses.values() if bus.wanted is not None]
+        return min(waiting, key=lambda bus: bus.last, default=None)
+
+    def _write(self, bus: _Bus, wanted: _Wanted) -> None:
+        name = bus.configuration.name
+        offset = time.time() - time.monotonic()
+        stamp = time.strftime('%Y%m%dT%H%M%SZ', time.gmtime(wanted.at + offset))
+        path = bus.folder / f'{name}_{stamp}_{_plain(wanted.reason)}.log'
+        try:
+            bus.folder.mkdir(parents=True, exist_ok=True)
+            count = self._fill(path, bus, wanted, offset)
+            if count:
+                self._remove_old(bus, path)
+        except OSError as error:
+            text = f'bus {name}: no trace of {wanted.reason}: {error.strerror or error}: {path}'
+            self._complain(text)
+            answer = '', text
+        else:
+            if not count:
+                bus.last = -SPACING
+                answer = '', (f'bus {name}: not a single frame in the last '
+                              f'{bus.configuration.trace_seconds:g} s')
+            else:
+                bus.last_path = str(path)
+                answer = str(path), ''
+                self._say(f'bus {name}: trace of {wanted.reason}, {count} frames of the last '
+                          f'{bus.configuration.trace_seconds:g} s: {path}')
+        for done in wanted.done:
+            done(*answer)
+
+    def _fill(self, path: Path, bus: _Bus, wanted: _Wanted, offset: float) -> int:
+        """Write a file that has its name only when it is complete."""
+        unfinished = path.with_suffix('.part')
+        since = wanted.at - bus.configuration.trace_seconds
+        entries = bus.ring.entries(since, label(bus.configuration), offset)
+        count = 0
+        try:
+            with unfinished.open('w', encoding='ascii', errors='replace') as file:
+                while True:
+                    lines = [format_record(record)
+                             for record in itertools.islice(entries, _STEP)]
+                    if not lines:
+                        break
+                    file.writelines(lines)
+                    count += len(lines)
+                    if not self._closing:
+                        time.sleep(_PAUSE)
+            if count:
+                os.replace(unfinished, path)
+            else:
+                unfinished.unlink()
+        except OSError:
+            unfinished.unlink(missing_ok=True)
+            raise
+        return count
+
+    def _remove_old(self, bus: _Bus, path: Path) -> None:
+        """Keep the first traces of this run, and of the others the newest."""
+        limit = bus.configuration.trace_files
+        first = self._first[bus.configuration.name]
+        if len(first) < min(FIRST_KEPT, limit - 1):
+            first.append(path)
+        name = re.compile(rf'{re.escape(bus.configuration.name)}_\d{{8}}T\d{{6}}Z_.+\.log')
+        traces = sorted(each for each in bus.folder.iterdir()   # by time: that is in the name
+                        if name.fullmatch(each.name) and each not in first)
+        for each in traces[:max(0, len(traces) + len(first) - limit)]:
+            if each != path:
+                each.unlink(missing_ok=True)
+
+
+def _plain(reason: str) -> str:
+    """Return a reason as part of a file name."""
+    return re.sub(r'[^A-Za-z0-9-]+', '_', reason).strip('_')[:100] or 'event'

@@ -1,0 +1,227 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+From entries of a trace to telegrams, with the observers of all drives.
+
+Written for a hundred million frames: a frame costs a look into two dictionaries and its handler,
+and nothing is kept of it.
+"""
+
+from collections.abc import Callable
+import math
+
+from drive_can_bridge.core.configuration import BridgeConfiguration, BusConfiguration
+from drive_can_bridge.core.frame import bits_on_bus, Frame, STUFFING
+from drive_can_bridge.core.record import Record, RecordKind
+from drive_can_bridge.protocols.families import FAMILIES
+from drive_can_bridge.protocols.observer import (
+    Direction, DriveObserver, Handler, Kind, Observed, Telegram, Verdict,
+)
+from drive_can_bridge.trace.channels import Channels
+from drive_can_bridge.transport.error_frames import decode_error_frame
+
+#: identifiers whose owner is remembered; of those of a healthy bus there are a few hundred
+_KNOWN_MAX = 50_000
+_EXTENDED = 1 << 29
+_DATA = RecordKind.DATA
+_REQUEST = Direction.REQUEST
+
+#: takes the name of the bus and the telegram
+Sink = Callable[[str, Telegram], None]
+
+
+class BusTrace:
+    """
+    One bus of a trace.
+
+    :ivar frames: entries that were frames.
+    :ivar error_frames: those that were not.
+    :ivar strays: frames of nobody in the parameter file.
+    :ivar peak_load: highest load within one second, 0 to 1 and more.
+    """
+
+    def __init__(self, name: str, bitrate: int, observers: list[DriveObserver]) -> None:
+        self.name = name
+        self.bitrate = bitrate
+        self.observers = observers
+        self.handlers: dict[int, tuple[Handler, DriveObserver] | None] = {}
+        self.deadline = math.inf
+        self.frames = 0
+        self.error_frames = 0
+        self.strays = 0
+        self.bits = 0
+        self.first = math.nan
+        self.last = math.nan
+        self.peak_load = 0.0
+        self.somebody_sent = False
+        self._second = math.nan
+        self._second_bits = 0
+
+    def find(self, identifier: int, extended: bool) -> tuple[Handler, DriveObserver] | None:
+        """Return what takes frames of this identifier, and whose it is."""
+        if len(self.handlers) >= _KNOWN_MAX:
+            self.handlers.clear()
+        found = None
+        for observer in self.observers:
+            handler = observer.handler(identifier, extended)
+            if handler is not None:
+                found = handler, observer
+                break
+        self.handlers[identifier | _EXTENDED if extended else identifier] = found
+        return found
+
+    def count(self, bits: int, time: float) -> None:
+        """Take note of a frame of this length."""
+        self.frames += 1
+        self.bits += bits
+        if not self._second <= time < self._second + 1.0:
+            self.close_second()
+            if self.first != self.first:    # NaN
+                self.first = time
+            self._second = time
+            self._second_bits = 0
+        self._second_bits += bits
+        self.last = time
+
+    def close_second(self) -> None:
+        """See whether the second that ends was the busiest."""
+        self.peak_load = max(self.peak_load,
+                             STUFFING * self._second_bits / max(self.bitrate, 1))
+
+    @property
+    def load(self) -> float:
+        """Mean load from the first frame to the last, 0 to 1 and more."""
+        elapsed = self.last - self.first
+        return STUFFING * self.bits / (elapsed * self.bitrate) if elapsed > 0.0 else math.nan
+
+
+class Tracer:
+    """
+    Says what the entries of a trace mean.
+
+    :param sink: takes every telegram, in the order of time.
+    """
+
+    def __init__(self, configuration: BridgeConfiguration, sink: Sink) -> None:
+        self._sink = sink
+        self._channels = Channels(list(configuration.buses.values()))
+        self._by_channel: dict[str | int, BusTrace] = {}
+        self.buses = {bus.name: self._make_bus(bus, configuration)
+                      for bus in configuration.buses.values()}
+        self.start = math.nan
+        self._sent: bool | None = None
+
+    def _make_bus(self, bus: BusConfiguration, configuration: BridgeConfiguration) -> BusTrace:
+        made = BusTrace(bus.name, bus.bitrate, [])
+        bus_name, sink = bus.name, self._sink
+
+        def emit(telegram: Telegram) -> None:
+            if self._sent is not None and telegram.direction is _REQUEST:
+                telegram = self._look_for_masters(made, telegram)
+            sink(bus_name, telegram)
+
+        drives = [drive for drive in configuration.drives.values() if drive.bus == bus.name]
+        for name, family in FAMILIES.items():
+            mine = [drive for drive in drives if drive.protocol == name]
+            if mine:
+                made.observers += family.make_observers(mine, emit)
+        return made
+
+    def _look_for_masters(self, bus: BusTrace, telegram: Telegram) -> Telegram:
+        """Name a second master, where the trace says who sent what."""
+        if self._sent:
+            bus.somebody_sent = True
+        elif self._sent is False and bus.somebody_sent:
+            return telegram._replace(
+                verdict=Verdict.SUSPICIOUS if telegram.verdict is Verdict.NORMAL
+                else telegram.verdict,
+                remark='; '.join(filter(None, (telegram.remark, 'sent by another master'))))
+        return telegram
+
+    def take(self, record: Record) -> None:
+        """Take an entry. The fast path."""
+        time, channel, identifier, data, extended, kind, sent = record
+        bus = self._by_channel.get(channel)
+        if bus is None:
+            bus = self._new_channel(channel)
+        if self.start != self.start:    # NaN
+            self.start = time
+        if time >= bus.deadline:
+            self._expire(bus, time)
+        if kind is not _DATA:
+            self._take_other(bus, record)
+            return
+        bus.count(bits_on_bus(len(data), extended), time)
+        key = identifier | _EXTENDED if extended else identifier
+        if key in bus.handlers:
+            found = bus.handlers[key]
+        else:
+            found = bus.find(identifier, extended)
+        if found is None:
+            bus.strays += 1
+            self._stray(bus, record)
+            return
+        handler, observer = found
+        self._sent = sent
+        handler(data, time)
+        if observer.deadline < bus.deadline:
+            bus.deadline = observer.deadline
+
+    def advance(self, now: float) -> None:
+        """Let time pass without a frame: give up what is overdue."""
+        for bus in self.buses.values():
+            if now >= bus.deadline:
+                self._expire(bus, now)
+
+    def finish(self) -> None:
+        """
+        End the trace.
+
+        What is still under way stays undecided: its answer may just have missed the end.
+        """
+        for bus in self.buses.values():
+            bus.close_second()
+
+    def observed(self) -> dict[str, Observed]:
+        """Return what was counted of each drive."""
+        return {observer.name: observer.observed for bus in self.buses.values()
+                for observer in bus.observers if observer.name}
+
+    # -- inside -----------------------------------------------------------------------------------
+
+    def _new_channel(self, channel: str | int) -> BusTrace:
+        found = self._channels.find(channel)
+        if found is not None:
+            bus = self.buses[found.name]
+        else:   # of a bus that the file does not have: shown all the same
+            bus = self.buses.setdefault(f'{channel}', BusTrace(f'{channel}', 0, []))
+        self._by_channel[channel] = bus
+        return bus
+
+    def _expire(self, bus: BusTrace, now: float) -> None:
+        self._sent = None
+        for observer in sorted(bus.observers, key=lambda each: each.deadline):
+            if observer.deadline <= now:
+                observer.expire(now)
+        bus.deadline = min((observer.deadline for observer in bus.observers), default=math.inf)
+
+    def _take_other(self, bus: BusTrace, record: Record) -> None:
+        if record.kind is RecordKind.ERROR:
+            bus.error_frames += 1
+            self._sink(bus.name, Telegram(
+                record.time, '', Direction.NEITHER, Kind.OTHER, 'error frame',
+                verdict=Verdict.SUSPICIOUS,
+                remark=decode_error_frame(record.identifier, record.data).text))
+            return
+        bus.count(bits_on_bus(len(record.data), record.extended), record.time)
+        self._sink(bus.name, Telegram(
+            record.time, '', Direction.NEITHER, Kind.OTHER,
+            'remote frame' if record.kind is RecordKind.REMOTE else 'CAN FD frame',
+            verdict=Verdict.SUSPICIOUS, remark=_hex(record)))
+
+    def _stray(self, bus: BusTrace, record: Record) -> None:
+        self._sink(bus.name, Telegram(record.time, '', Direction.NEITHER, Kind.OTHER, '',
+                                      remark=_hex(record)))
+
+
+def _hex(record: Record) -> str:
+    return str(Frame(record.identifier, record.data, record.extended))

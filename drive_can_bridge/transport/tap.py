@@ -1,0 +1,94 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+Listening to a bus without taking part: everything that its adapter reports, error frames included.
+
+Each tap has a thread of its own that opens the bus, reads it, and opens it again when it is lost.
+Nothing is ever sent.
+"""
+
+from collections.abc import Callable
+import queue
+import threading
+import time
+
+import can
+
+from drive_can_bridge.core.configuration import BusConfiguration
+from drive_can_bridge.core.errors import BusUnavailable
+from drive_can_bridge.core.record import Record
+from drive_can_bridge.transport.failures import in_words
+from drive_can_bridge.transport.messages import record_of
+from drive_can_bridge.transport.port import open_port, Port
+
+#: entries that may wait for whoever takes them; beyond, they are lost and counted
+QUEUE_MAX = 200_000
+#: s that a receive may block
+_PATIENCE = 0.05
+#: s by which a stamp may differ from now to be believed
+_STAMP_AGE_MAX = 1.0
+
+
+class Tap:
+    """
+    One bus, listened to.
+
+    :param label: what its entries give as their channel.
+    :param records: takes the entries.
+    :param complain: takes a line when the bus is lost, and when it is back.
+    :ivar lost: entries that nobody took in time.
+    :raises BusUnavailable: the bus cannot be opened now.
+    :raises BusMisconfigured: it never can.
+    """
+
+    def __init__(self, bus: BusConfiguration, label: str, records: 'queue.Queue[Record]',
+                 complain: Callable[[str], None]) -> None:
+        self.bus = bus
+        self.label = label
+        self.lost = 0
+        self._records = records
+        self._complain = complain
+        self._closing = threading.Event()
+        self._port: Port | None = self._open()
+        self._thread = threading.Thread(target=self._run, name=f'tap {bus.name}', daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Stop listening."""
+        self._closing.set()
+        self._thread.join(timeout=2.0)
+
+    def _open(self) -> Port:
+        port = open_port(self.bus)
+        port.witness = self._take
+        return port
+
+    def _take(self, message: can.Message) -> None:
+        now = time.time()
+        record = record_of(message, self.label)
+        if not abs(now - record.time) <= _STAMP_AGE_MAX:   # counted from power-up, or no stamp
+            record = record._replace(time=now)
+        try:
+            self._records.put_nowait(record)
+        except queue.Full:
+            self.lost += 1
+
+    def _run(self) -> None:
+        while not self._closing.is_set():
+            try:
+                if self._port is None:
+                    self._port = self._open()
+                    self._complain(f'bus {self.bus.name}: open again')
+                while not self._closing.is_set():
+                    self._port.receive(_PATIENCE)
+            except BusUnavailable as error:
+                if self._port is not None:
+                    self._complain(f'bus {self.bus.name}: {in_words(error)}; tried again every '
+                                   f'{self.bus.reconnect_period:g} s')
+                self._close_port()
+                self._closing.wait(self.bus.reconnect_period)
+        self._close_port()
+
+    def _close_port(self) -> None:
+        port, self._port = self._port, None
+        if port is not None:
+            port.close()

@@ -1,0 +1,216 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""The ring that keeps the last seconds, and the recorder that writes them."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+import queue
+import time
+import tracemalloc
+
+from builders import frame
+import pytest
+from waiting import wait_for
+
+from drive_can_bridge.core.configuration import BusConfiguration
+from drive_can_bridge.core.record import Record, RecordKind
+from drive_can_bridge.trace import flight, ring
+from drive_can_bridge.trace.files import read_records
+from drive_can_bridge.trace.flight import FlightRecorder
+from drive_can_bridge.trace.ring import BLOCK, Ring
+
+REQUEST, ANSWER = frame('003FFFF0#05DC000000000000'), frame('7F1#2211')
+
+
+def test_a_ring_gives_back_what_it_was_given() -> None:
+    kept = Ring(10.0)
+    kept.note(REQUEST, 100.0, True)
+    kept.note(ANSWER, 100.001, False)
+    kept.note_error(4, bytes.fromhex('0020000000000000'), 100.0005)
+    kept.note_error(0x40, b'', 100.002)
+    assert list(kept.entries(0.0, 'can0', 1000.0)) == [
+        Record(1100.0, 'can0', 0x3FFFF0, REQUEST.data, True, RecordKind.DATA, True),
+        Record(1100.0005, 'can0', 4, bytes.fromhex('0020000000000000'), True, RecordKind.ERROR),
+        Record(1100.001, 'can0', 0x7F1, b'\x22\x11', False, RecordKind.DATA, False),
+        Record(1100.002, 'can0', 0x40, b'', True, RecordKind.ERROR),
+    ]
+    assert [record.time for record in kept.entries(100.0008, '', 0.0)] == [100.001, 100.002]
+
+
+def test_a_ring_forgets_what_is_too_old() -> None:
+    kept = Ring(2.0)
+    for step in range(20 * BLOCK):
+        kept.note(REQUEST, 0.001 * step, True)
+    times = [record.time for record in kept.entries(0.0, '', 0.0)]
+    last = 0.001 * (20 * BLOCK - 1)
+    assert times[-1] == last
+    assert last - 2.0 - 0.002 * BLOCK <= times[0] <= last - 2.0
+    assert len(times) == round((last - times[0]) / 0.001) + 1
+
+
+def test_a_ring_has_an_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ring, '_BLOCKS_MAX', 3)
+    kept = Ring(1e9)
+    for step in range(10 * BLOCK):
+        kept.note(REQUEST, float(step), True)
+    assert len(list(kept.entries(0.0, '', 0.0))) <= 3 * BLOCK
+
+
+def test_what_is_read_stays_while_frames_come() -> None:
+    kept = Ring(1.0)
+    for step in range(100):
+        kept.note(REQUEST, 0.001 * step, True)
+    reading = kept.entries(0.0, '', 0.0)
+    for step in range(100, 10 * BLOCK):
+        kept.note(ANSWER, 0.001 * step, False)
+    assert [record.identifier for record in reading] == [0x3FFFF0] * 100
+
+
+def test_a_frame_leaves_nothing_behind() -> None:
+    kept = Ring(60.0)
+    kept.note(REQUEST, 0.0, True)
+    tracemalloc.start()
+    try:
+        before = tracemalloc.get_traced_memory()[0]
+        for step in range(BLOCK - 10):
+            kept.note(REQUEST, float(step), True)
+        assert tracemalloc.get_traced_memory()[0] - before < 1000
+    finally:
+        tracemalloc.stop()
+
+
+class Recording:
+    """A recorder of one bus, what it says, and its traces."""
+
+    def __init__(self, folder: Path, **keys: object) -> None:
+        self.folder = folder
+        self.said: list[str] = []
+        self.complained: list[str] = []
+        bus = BusConfiguration('main', 'virtual', 'x', **{  # type: ignore[arg-type]
+            'trace_seconds': 10.0, **keys})
+        self.recorder = FlightRecorder([bus], folder, self.said.append, self.complained.append)
+        kept = self.recorder.ring('main')
+        assert kept is not None
+        self.ring: Ring = kept
+
+    def hear(self, text: str = '003FFFF0#05DC000000000000') -> None:
+        self.ring.note(frame(text), time.monotonic(), True)
+
+    @property
+    def traces(self) -> list[Path]:
+        return sorted(self.folder.glob('*.log'))
+
+    def save(self) -> tuple[str, str]:
+        answers: queue.Queue[tuple[str, str]] = queue.Queue()
+        self.recorder.save('main', 'asked', lambda *answer: answers.put(answer))
+        return answers.get(timeout=20.0)
+
+
+@pytest.fixture
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Shorten what is waited for."""
+    monkeypatch.setattr(flight, 'AFTERMATH', 0.05)
+
+
+@contextmanager
+def recording(folder: Path, **keys: object) -> Iterator[Recording]:
+    made = Recording(folder, **keys)
+    try:
+        yield made
+    finally:
+        made.recorder.close()
+
+
+def test_a_trace_has_what_came_before_and_after(quick: None, tmp_path: Path) -> None:
+    with recording(tmp_path / 'traces') as made:
+        made.ring.note(frame('111#'), time.monotonic() - 60.0, True)    # too long ago
+        made.hear('222#01')
+        made.recorder.trigger('main', 'conveyor offline')
+        made.hear('333#02')
+        wait_for(lambda: made.said, 'a trace')
+        path, = made.traces
+        assert path.name.startswith('main_20') and path.name.endswith('Z_conveyor_offline.log')
+        records = list(read_records(path, pytest.fail))
+        assert [record.identifier for record in records] == [0x222, 0x333]
+        assert all(abs(record.time - time.time()) < 60.0 for record in records)
+        assert made.said == [f'bus main: trace of conveyor offline, 2 frames of the last 10 s: '
+                             f'{path}']
+
+
+def test_one_trace_in_ten_seconds(quick: None, tmp_path: Path) -> None:
+    with recording(tmp_path) as made:
+        made.hear()
+        path, refusal = made.save()
+        assert path == str(made.traces[0]) and not refusal
+        made.recorder.trigger('main', 'again')
+        path, refusal = made.save()
+        assert not path
+        assert refusal == (f'bus main: one trace in 10 s at most; the last, 0 s ago, is '
+                           f'{made.traces[0]}')
+        assert len(made.traces) == 1
+
+
+def test_the_gravest_reason_names_the_trace(quick: None, tmp_path: Path) -> None:
+    with recording(tmp_path) as made:
+        made.hear()
+        made.recorder.trigger('main', 'lift offline', rank=1)
+        made.recorder.trigger('main', 'bus lost', rank=2)
+        made.recorder.trigger('main', 'pump offline', rank=1)
+        wait_for(lambda: made.said, 'a trace')
+        assert made.traces[0].name.endswith('_bus_lost.log')
+
+
+def test_nothing_heard_nothing_written(quick: None, tmp_path: Path) -> None:
+    with recording(tmp_path) as made:
+        assert made.save() == ('', 'bus main: not a single frame in the last 10 s')
+        assert not list(tmp_path.iterdir())
+        made.hear()
+        assert made.save()[0]
+
+
+def test_first_and_newest_are_kept(quick: None, monkeypatch: pytest.MonkeyPatch,
+                                   tmp_path: Path) -> None:
+    monkeypatch.setattr(flight, 'SPACING', 0.0)
+    numbers = iter(range(100))
+    monkeypatch.setattr(flight.time, 'strftime',
+                        lambda *_: f'20260101T0000{next(numbers):02d}Z')
+    (tmp_path / 'main_20250101T000000Z_of_another_run.log').write_text('')
+    (tmp_path / 'main_2_20250101T000000Z_of_another_bus.log').write_text('')
+    with recording(tmp_path, trace_files=8) as made:
+        for _ in range(12):
+            made.hear()
+            made.save()
+        found = [path.name[20:24] if path.name.startswith('main_2026') else path.name
+                 for path in made.traces]
+        kept = [int(path.name.split('T0000')[1][:2]) for path in made.traces
+                if path.name.startswith('main_2026')]
+        assert kept == [0, 1, 2, 3, 4, 9, 10, 11], found
+        assert (tmp_path / 'main_2_20250101T000000Z_of_another_bus.log').exists()
+        assert len(made.traces) == 9
+
+
+def test_the_end_of_the_bridge_writes_what_is_wanted(tmp_path: Path) -> None:
+    with recording(tmp_path) as made:
+        made.hear()
+        made.recorder.trigger('main', 'fatal')
+        begun = time.monotonic()
+        made.recorder.close()
+        assert time.monotonic() - begun < flight.AFTERMATH
+        assert len(made.traces) == 1
+
+
+def test_a_place_that_cannot_be_written(quick: None, tmp_path: Path) -> None:
+    blocked = tmp_path / 'file'
+    blocked.write_text('')
+    with recording(tmp_path, trace_directory=str(blocked / 'below')) as made:
+        made.hear()
+        path, refusal = made.save()
+        assert not path and refusal in made.complained
+        assert refusal.startswith('bus main: no trace of asked: Not a directory: ')
+
+
+def test_buses_that_are_not_recorded(tmp_path: Path) -> None:
+    with recording(tmp_path) as made:
+        made.recorder.trigger('other', 'whatever')
+        assert made.recorder.ring('other') is None
+

@@ -1,0 +1,233 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Finding drives: what is found, what is asked, and that nobody is moved by it."""
+
+from collections import deque
+import json
+from pathlib import Path
+
+from foreign_devices import cannord, canopen, datamodel_extended, datamodel_standard, Device
+import pytest
+from test_trace_agrees import running
+
+from drive_can_bridge.cli import main as front_end
+from drive_can_bridge.cli.survey import LOAD_MAX, Survey
+from drive_can_bridge.configuration.load import configuration_from_file
+from drive_can_bridge.core.configuration import BusConfiguration
+from drive_can_bridge.core.errors import TransportError
+from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.protocols.families import FAMILIES
+from drive_can_bridge.resources import config_file
+from drive_can_bridge.simulation.simulation import Simulation
+from drive_can_bridge.transport.end_point import EndPoint
+
+BITRATE = 125_000
+
+
+class Bench(EndPoint):
+    """A bus with devices that obey, and a clock of its own."""
+
+    def __init__(self, *devices: Device, deaf: bool = False) -> None:
+        super().__init__()
+        self.devices = devices
+        self.now = 0.0
+        self.sent: list[tuple[float, Frame]] = []
+        self.answers: deque[Frame] = deque()
+        self._deaf = deaf
+
+    def clock(self) -> float:
+        return self.now
+
+    def receive(self, timeout: float) -> Frame | None:
+        if self.answers:
+            self.now += 0.001
+            return self.answers.popleft()
+        self.now += max(timeout, 1e-4)
+        return None
+
+    def send(self, frame: Frame, timeout: float) -> None:
+        if self._deaf:
+            raise TransportError('send: transmit queue full')
+        self.sent.append((self.now, frame))
+        self.answers.extend(answer for device in self.devices
+                            if (answer := device.hear(frame)) is not None)
+
+    def close(self) -> None:
+        pass
+
+    def survey(self) -> Survey:
+        return Survey(BusConfiguration('main', 'virtual', 'x', BITRATE), self, self.clock)
+
+
+SAFE = [name for name, family in FAMILIES.items() if family.make_scout().unmistakable]
+NAMED = [name for name in FAMILIES if name not in SAFE]
+CROWD = (
+    *(datamodel_extended(station) for station in range(128)),
+    *(datamodel_standard(station) for station in range(16)),
+    *(cannord(address) for address in range(256)),
+    *(cannord(address, extended=True) for address in range(256)),
+    *(canopen(node) for node in range(1, 128)),
+)
+
+
+def fresh(devices: tuple[Device, ...]) -> tuple[Device, ...]:
+    for device in devices:
+        device.obeyed.clear()
+    return devices
+
+
+def test_which_families_are_asked_without_being_named() -> None:
+    assert SAFE == ['datamodel_extended', 'canopen_pkw']
+
+
+@pytest.mark.parametrize('protocol', SAFE)
+def test_nobody_at_all_obeys_what_is_asked_by_default(protocol: str) -> None:
+    bench = Bench(*fresh(CROWD))
+    bench.survey().ask(protocol)
+    assert len(bench.sent) >= 127
+    assert not [device.name for device in CROWD if device.obeyed]
+
+
+@pytest.mark.parametrize('protocol', NAMED)
+def test_what_is_asked_by_name_moves_nobody_but_canopen_nodes(protocol: str) -> None:
+    bench = Bench(*fresh(CROWD))
+    bench.survey().ask(protocol)
+    assert bench.sent
+    assert not [device.name for device in CROWD
+                if device.obeyed and not device.name.startswith('canopen')]
+
+
+def test_the_devices_of_this_test_do_obey() -> None:
+    for device, command in (
+            (datamodel_extended(1), Frame(0x003FFFF0, bytes(8), True)),
+            (datamodel_standard(1), Frame(0x3F1, bytes.fromhex('063200DC05000000'), False)),
+            (cannord(100), Frame(0x0C8, bytes.fromhex('7F040020'), False)),
+            (cannord(100), Frame(0x2C8, bytes.fromhex('66200000000F27FF'), False)),
+            # the read of a map at station 2 that writes P515 of inverter 249
+            (cannord(249), Frame(0x3F2, bytes.fromhex('037A000400000000'), False)),
+            (canopen(5), Frame(0x505, bytes.fromhex('C00200AA01000000'), False)),
+            # the task for inverter 2 that is a receive PDO of node 4
+            (canopen(4), Frame(0x204, bytes.fromhex('BC12000000000000'), False))):
+        device.hear(command)
+        assert device.obeyed, device.name
+
+
+def test_drives_are_found() -> None:
+    bench = Bench(datamodel_extended(3), datamodel_extended(127), canopen(9))
+    survey = bench.survey()
+    for protocol in SAFE:
+        survey.ask(protocol)
+    assert [(each.protocol, each.station, each.text) for each in survey.sightings] == [
+        ('datamodel_extended', 3, 'request map 50 51, response map 209 210'),
+        ('datamodel_extended', 127, 'request map 50 51, response map 209 210')]
+    assert survey.nodes == {9: 'device type 00000000h, vendor 0h'}
+    assert not survey.master
+
+    bench = Bench(cannord(0), cannord(255), datamodel_standard(2), datamodel_standard(15))
+    survey = bench.survey()
+    for protocol in NAMED:
+        survey.ask(protocol)
+    assert [(each.protocol, each.station) for each in survey.sightings] == [
+        ('datamodel_standard', 2), ('datamodel_standard', 15), ('cannord', 0), ('cannord', 255)]
+    assert not survey.master
+
+
+@pytest.mark.parametrize('protocol', list(FAMILIES))
+def test_questions_leave_most_of_the_bus_to_others(protocol: str) -> None:
+    bench = Bench()
+    bench.survey().ask(protocol)
+    times = [at for at, _ in bench.sent]
+    longest = 160 if bench.sent[0][1].extended else 135     # with an answer each, worst stuffing
+    load = 2 * longest * (len(times) - 1) / BITRATE / (times[-1] - times[0])
+    assert load < LOAD_MAX * 1.15   # 11 % stuff bits are reckoned with, not the worst case
+
+
+def test_a_master_that_comes_while_asking_ends_it() -> None:
+    bench = Bench()
+    survey = bench.survey()
+    bench.answers.append(Frame(0x003FFFF0, bytes(8), True))
+    survey.ask('datamodel_extended')
+    assert survey.master == 'requests to station 1 of datamodel_extended'
+    assert len(bench.sent) <= 2
+
+
+def test_a_bus_that_takes_nothing() -> None:
+    survey = Bench(deaf=True).survey()
+    survey.ask('datamodel_extended')
+    assert survey.trouble == 'send: transmit queue full: no other node acknowledges'
+
+
+def drive_can(*arguments: object) -> int:
+    return front_end.main([str(argument) for argument in arguments])
+
+
+def test_simulated_drives_are_found_and_written(tmp_path: Path,
+                                                capsys: pytest.CaptureFixture[str]) -> None:
+    output = tmp_path / 'found.yaml'
+    with Simulation(configuration_from_file(config_file('all_families.yaml'))):
+        assert drive_can('scan', '--interface', 'virtual', '--channel', 'all_families',
+                         '--bitrate', 500_000, '--listen', 0.3, '-o', output) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[:3] for line in lines[1:]] == [
+        ['datamodel_extended', '1', 'certain'], ['canopen_pkw', '5', 'certain']]
+    assert drive_can('validate', output) == 0
+    found = configuration_from_file(output)
+    assert [(drive.protocol, drive.station) for drive in found.drives.values()] == [
+        ('datamodel_extended', 1), ('canopen_pkw', 5)]
+    capsys.readouterr()
+
+    # a bridge runs with it
+    with running(found) as bus:
+        for name in found.drives:
+            bus.wait_exchanges(name, 3)
+
+
+def test_beside_a_bridge_all_drives_are_found_by_listening(
+        capsys: pytest.CaptureFixture[str]) -> None:
+    with running(configuration_from_file(config_file('all_families.yaml'))) as bus:
+        for name in bus.sessions:
+            bus.wait_exchanges(name, 3)
+        foreign = [drive.violations for drive in bus.simulation.drives.values()]
+        assert drive_can('scan', '--interface', 'virtual', '--channel', 'all_families',
+                         '--bitrate', 500_000, '--listen', 2.0, '--json') == 0
+        assert [drive.violations for drive in bus.simulation.drives.values()] == foreign
+    out, err = capsys.readouterr()
+    assert {(each['protocol'], each['station']) for each in map(json.loads, out.splitlines())} == {
+        ('datamodel_extended', 1), ('datamodel_standard', 2), ('cannord', 50),
+        ('canopen_pkw', 5)}
+    assert 'there is another master' in err and 'only listening' in err
+
+
+def test_named_families_need_a_word(capsys: pytest.CaptureFixture[str],
+                                    monkeypatch: pytest.MonkeyPatch) -> None:
+    arguments = ('scan', '--interface', 'virtual', '--channel', 'scan_named', '--listen', 0.1,
+                 '--bitrate', 1_000_000, '--protocols', 'cannord')
+    monkeypatch.setattr('sys.stdin', open('/dev/null'))
+    assert drive_can(*arguments) == 2
+    err = capsys.readouterr().err
+    assert err.startswith('cannord: a task on 200h + 2·address is RPDO1')
+    assert err.endswith('--protocols cannord needs --yes where nobody can be asked\n')
+    assert drive_can(*arguments, '--yes') == 1
+    assert 'no drive found' in capsys.readouterr().out
+
+
+def test_named_families_are_not_asked_where_there_is_a_canopen_node(
+        capsys: pytest.CaptureFixture[str]) -> None:
+    frames: list[Frame] = []
+    with Simulation(configuration_from_file(config_file('all_families.yaml')),
+                    show_frame=lambda bus, frame, sent: frames.append(frame)):
+        drive_can('scan', '--interface', 'virtual', '--channel', 'all_families', '--bitrate',
+                  500_000, '--listen', 0.3, '--protocols', 'cannord,datamodel_standard', '--yes')
+    assert 'cannord is not asked: there is a CANopen node (5)' in capsys.readouterr().err
+    assert not [frame for frame in frames if not frame.extended
+                and 0x200 <= frame.identifier < 0x400]
+
+
+@pytest.mark.parametrize(('arguments', 'text'), [
+    (['--interface', 'nothing', '--channel', 'x'], "'nothing' is no interface of python-can"),
+    (['--interface', 'virtual', '--channel', 'x', '--bitrates', '125000'],
+     'virtual has no listen-only mode'),
+])
+def test_wrong_usage(arguments: list[str], text: str,
+                     capsys: pytest.CaptureFixture[str]) -> None:
+    assert drive_can('scan', *arguments) == 2
+    assert text in capsys.readouterr().err

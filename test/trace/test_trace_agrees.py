@@ -1,0 +1,186 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+What the bridge counts, and what a witness counts of the same conversation, agree.
+
+Real sessions and simulated drives of all families on a bus inside this process, and a tap that
+listens to it; drives fall silent and come back. Afterwards the trace is read from a file.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+import queue
+from statistics import median
+
+import pytest
+from waiting import wait_for
+
+from drive_can_bridge.configuration.load import configuration_from_file
+from drive_can_bridge.core.configuration import BridgeConfiguration
+from drive_can_bridge.core.events import Event, RequestCompleted
+from drive_can_bridge.core.record import Record
+from drive_can_bridge.core.requests import ReadRequest
+from drive_can_bridge.exchange.exchange import BusExchange
+from drive_can_bridge.protocols.families import FAMILIES, make_sessions
+from drive_can_bridge.resources import config_file
+from drive_can_bridge.simulation.simulation import Simulation
+from drive_can_bridge.trace.files import read_records, TraceWriter
+from drive_can_bridge.trace.lines import LineWriter, Selection
+from drive_can_bridge.trace.tracer import Tracer
+from drive_can_bridge.transport.tap import Tap
+
+
+class Listener:
+    """Listens to drives and bus, and keeps the answers to requests."""
+
+    def __init__(self) -> None:
+        self.answers: list[RequestCompleted] = []
+
+    def handle_event(self, event: Event) -> None:
+        if isinstance(event, RequestCompleted):
+            self.answers.append(event)
+
+    def nothing(self, *_: object, **__: object) -> None:
+        """Take no notice."""
+
+    take_commands = discard_commands = process_data = control_completed = nothing
+    bus_opened = bus_lost = fatal = nothing
+    request_sent = nothing
+
+
+class Bus:
+    """Bridge and drives on the bus of a file, and everything that was seen on it."""
+
+    def __init__(self, configuration: BridgeConfiguration) -> None:
+        self.configuration = configuration
+        bus, = configuration.buses.values()
+        drives = list(configuration.drives.values())
+        self.records: queue.Queue[Record] = queue.Queue()
+        self.tap = Tap(bus, 'main', self.records, print)  # first: it sees requests before answers
+        self.simulation = Simulation(configuration)
+        self.sessions = {drive.name: session for drive, session in zip(
+            drives, make_sessions(drives))}
+        self.listener = Listener()
+        self.exchange = BusExchange(
+            bus, list(self.sessions.values()),
+            [[claim.route for claim in FAMILIES[drive.protocol].claims(drive)]
+             for drive in drives], self.listener)
+        for session in self.sessions.values():
+            self.exchange.attach(session, self.listener)
+
+    def counted(self, name: str) -> tuple[int, int]:
+        """Return exchanges and misses as the bridge counts them."""
+        statistics = self.sessions[name].statistics
+        return statistics.exchanges, statistics.missed
+
+    def wait_exchanges(self, name: str, more: int) -> None:
+        """Wait for so many exchanges more."""
+        begun = self.counted(name)[0]
+        wait_for(lambda: self.counted(name)[0] >= begun + more, f'{more} exchanges of {name}')
+
+
+@contextmanager
+def running(configuration: BridgeConfiguration) -> Iterator[Bus]:
+    bus = Bus(configuration)
+    try:
+        with bus.simulation:
+            bus.exchange.open()
+            bus.exchange.activate()
+            try:
+                yield bus
+            finally:
+                bus.exchange.deactivate()
+                bus.exchange.close()
+    finally:
+        bus.tap.close()
+
+
+@pytest.fixture(scope='module')
+def conversation() -> tuple[Bus, list[Record]]:
+    with running(configuration_from_file(config_file('all_families.yaml'))) as bus:
+        for name in bus.sessions:
+            bus.wait_exchanges(name, 3)
+        for name, played in bus.simulation.drives.items():
+            missed = bus.counted(name)[1]
+            played.fault('silent')
+            wait_for(lambda name=name, missed=missed: bus.counted(name)[1] >= missed + 3,
+                     f'misses of {name}')
+            played.fault('ok')
+            bus.wait_exchanges(name, 3)
+        drive = bus.configuration.drives['conveyor']
+        bus.exchange.submit(bus.sessions['conveyor'], ReadRequest(
+            (drive.profile.parameters['ramp_time'],)))
+        wait_for(lambda: bus.listener.answers, 'an answer')
+    records = []
+    while not bus.records.empty():
+        records.append(bus.records.get())
+    return bus, records
+
+
+def traced(bus: Bus, records: list[Record]) -> tuple[Tracer, list[str]]:
+    lines: list[str] = []
+    tracer = Tracer(bus.configuration, LineWriter(lines.append, Selection([], set())))
+    for record in records:
+        tracer.take(record)
+    tracer.finish()
+    return tracer, lines
+
+
+def test_exchanges_and_misses_agree(conversation: tuple[Bus, list[Record]]) -> None:
+    bus, records = conversation
+    tracer, _ = traced(bus, records)
+    for name, observed in tracer.observed().items():
+        exchanges, missed = bus.counted(name)
+        # each stop and each loss ends with an answer that the bridge waits for no more
+        assert abs(observed.exchanges - exchanges) <= 1 + 2, name
+        assert abs(observed.missed - missed) <= 1, name
+        assert observed.malformed == 0, name
+        # the median: what stands still for a moment is late for one of them only
+        ours = median(bus.sessions[name].statistics.latency.samples())
+        assert abs(median(observed.latency.samples()) - ours) < max(0.5 * ours, 0.003), name
+
+
+def test_everything_is_understood(conversation: tuple[Bus, list[Record]]) -> None:
+    bus, records = conversation
+    tracer, lines = traced(bus, records)
+    trace, = tracer.buses.values()
+    assert trace.strays == trace.error_frames == 0
+    assert trace.frames == len(records)
+    assert any('conveyor < read: ramp_time' in line for line in lines)
+    assert any('pump > NMT: start node 5' in line for line in lines)
+    for name in bus.sessions:
+        assert any(f' {name} < ' in line and 'LOST' in line for line in lines), name
+
+
+@pytest.mark.parametrize('suffix', ['.log', '.asc', '.blf', '.trc', '.csv'])
+def test_a_file_says_the_same(conversation: tuple[Bus, list[Record]], suffix: str,
+                              tmp_path: Path) -> None:
+    bus, records = conversation
+    _, lines = traced(bus, records)
+    writer = TraceWriter(tmp_path / f'trace{suffix}', ['main'])
+    for record in records:
+        writer.write(record)
+    writer.close()
+    tracer, read = traced(bus, list(read_records(tmp_path / f'trace{suffix}', pytest.fail)))
+
+    def content(lines: list[str]) -> list[str]:    # stamps are kept to 0.1 or 1 ms
+        return [line.split(' ', 2)[2].split(' [')[0].split(' in ')[0] for line in lines]
+
+    if suffix in ('.log', '.csv', '.blf'):
+        assert content(read) == content(lines)
+    assert sorted(content(read)) == sorted(content(lines))
+
+
+def test_time_passes_without_frames(conversation: tuple[Bus, list[Record]]) -> None:
+    """The lines of a bus of this moment are those of a file, whenever the clock is looked at."""
+    bus, records = conversation
+    _, lines = traced(bus, records)
+    told: list[str] = []
+    tracer = Tracer(bus.configuration, LineWriter(told.append, Selection([], set())))
+    last = records[0].time
+    for record in records:
+        tracer.advance(last + 0.5 * (record.time - last))
+        tracer.take(record)
+        last = record.time
+    assert told == lines
+

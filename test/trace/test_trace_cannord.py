@@ -1,0 +1,103 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Watching CANnord inverters. Frames are those of the protocol notes, address 100."""
+
+from builders import drive, INT16, parameter, RO
+from hypothesis import given, strategies as st
+from trace_builders import Witness
+
+from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.parameters import ParameterType, Storage
+from drive_can_bridge.core.record import Record
+
+SPEED = parameter('frequency_setpoint', None, type=INT16, scale=100 / 16384, unit='%')
+ACTUAL = parameter('actual_frequency', None, type=INT16, scale=100 / 16384, unit='%', access=RO)
+RAMP = parameter('acceleration_time', 102, scale=0.01, unit='s', storage=Storage.RAM)
+RAMP_2 = parameter('acceleration_time_set_2', 102, scale=0.01, unit='s', subindex=1)
+FAULT = parameter('fault_code', 700, subindex=0, access=RO)
+POSITION = parameter('position', 613, type=ParameterType.UINT32, subindex=0x15)
+
+
+def inverter(name: str = 'mixer', station: int = 100, **options: object) -> DriveConfiguration:
+    return drive('cannord', name=name, station=station,
+                 table=(SPEED, ACTUAL, RAMP, RAMP_2, FAULT, POSITION),
+                 request=(SPEED,), response=(ACTUAL,), **options)
+
+
+def test_process_data() -> None:
+    witness = Witness(inverter())
+    assert witness.hears('0C8#7F040020', 0.0) == [
+        '0.000000 +0.000 main mixer > cyclic request: control_word 1151, '
+        'frequency_setpoint 50.0000 %']
+    answer, = witness.hears('0C9#370F0020', 0.002)
+    assert '< cyclic response: status_word 0F37h (ready_to_switch_on, ready, enabled,' in answer
+    assert answer.endswith('actual_frequency 50.0000 % (operation enabled) [2.0 ms]')
+    assert witness.observed('mixer').exchanges == 1
+
+
+def test_a_fault_is_told_without_being_asked() -> None:
+    witness = Witness(inverter())
+    witness.hears('0C8#7F040020', 0.0)
+    witness.hears('0C9#370F0020', 0.002)
+    told, = witness.hears('0C9#380B0000', 0.01)
+    assert told.endswith('(fault, told without being asked)')
+    assert witness.hears('0C9#310B0000', 0.011)[0].endswith('UNASKED: ready to switch on')
+
+
+def test_missing_answers() -> None:
+    witness = Witness(inverter())
+    witness.hears('0C8#7E040000', 0.0)
+    assert 'LOST' in witness.hears('0C8#7E040000', 0.02)[0]
+    assert 'LOST' in witness.waits(0.07)[0]
+    assert witness.observed('mixer').missed == 2
+    assert 'MALFORMED' in witness.hears('0C9#0000', 0.08)[0]
+
+
+def test_parameters() -> None:
+    witness = Witness(inverter())
+    assert witness.hears('2C8#6610000000000000', 0.0) == [
+        '0.000000 +0.000 main mixer > read: acceleration_time']
+    assert witness.hears('2C9#6610000000006700', 0.006) == [
+        '0.006000 +0.000 main mixer < read: acceleration_time 1.03 s [6.0 ms]']
+    assert witness.hears('2C8#66C0010000006400', 0.1)[0].endswith(
+        '> write: acceleration_time_set_2 1.00 s')
+    assert witness.hears('2C9#6640010000006400', 0.106)[0].endswith(
+        '< write: acceleration_time_set_2 1.00 s [6.0 ms]')
+    assert witness.hears('2C8#658215000100A086', 0.2)[0].endswith('> write: position 100000')
+    assert witness.hears('2C9#655215000100A086', 0.206)[0].endswith(
+        '< write: position 100000 [6.0 ms]')
+    witness.hears('2C8#BC62000000000000', 0.3)
+    assert witness.hears('2C9#BC42000000006400', 0.306)[0].endswith(
+        '< read: fault_code 100 [6.0 ms]')
+    witness.hears('2C8#66200000000F27FF', 0.4)
+    assert witness.hears('2C9#6670000000000200', 0.406)[0].endswith(
+        '< write: acceleration_time: REFUSED: error 2: limit exceeded [6.0 ms]')
+    witness.hears('2C8#6610000000000000', 0.5)
+    assert witness.waits(0.7)[0].endswith(
+        '< parameter response: acceleration_time: LOST: no answer')
+    observed = witness.observed('mixer')
+    assert (observed.requests, observed.refused, observed.unanswered) == (6, 1, 1)
+
+
+def test_a_broadcast_group() -> None:
+    witness = Witness(inverter('first', 0, broadcast='group'),
+                      inverter('second', 1, broadcast='group'))
+    assert witness.hears('400#7E040000', 0.0)[0].startswith(
+        '0.000000 +0.000 main first > broadcast: control_word')
+    witness.hears('000#7E040000', 0.0)
+    witness.hears('001#310B0000', 0.002)
+    witness.hears('400#7E040000', 0.02)
+    witness.hears('002#7E040000', 0.02)
+    lost, _ = witness.hears('400#7E040000', 0.04)
+    assert 'main second < cyclic response: LOST' in lost
+    assert witness.observed('first').exchanges == 1
+    assert round(witness.observed('first').period.mean, 6) == 0.02
+    assert witness.observed('second').missed == 1
+
+
+@given(st.lists(st.tuples(st.sampled_from([0xC8, 0xC9, 0x2C8, 0x2C9, 0x403]),
+                          st.binary(max_size=8), st.floats(0, 10))))
+def test_anything(frames: list[tuple[int, bytes, float]]) -> None:
+    witness = Witness(inverter(broadcast='group'), inverter('other', 101, extra_setpoints=True))
+    for identifier, data, time in frames:
+        witness.tracer.take(Record(time, 'can0', identifier, data, False))
+    witness.waits(100.0)

@@ -1,0 +1,167 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Reading and writing traces: candump's texts, python-can's formats, what is damaged."""
+
+import gzip
+from pathlib import Path
+
+from hypothesis import given, strategies as st
+import pytest
+
+from drive_can_bridge.core.record import Record, RecordKind
+from drive_can_bridge.trace.candump import format_record, parse_line
+from drive_can_bridge.trace.files import (
+    check_writable, read_records, TraceWriter, UnknownFormat, WRITABLE,
+)
+
+DATA, ERROR = RecordKind.DATA, RecordKind.ERROR
+
+
+# as candump writes them (can-utils): log file, log file with direction, screen, screen with -x
+@pytest.mark.parametrize(('line', 'record'), [
+    ('(1436509052.249713) vcan0 044#2A366C2BBA',
+     Record(1436509052.249713, 'vcan0', 0x44, bytes.fromhex('2A366C2BBA'), False)),
+    ('(1.5) can0 003FFFF0#05DC000000000000 T',
+     Record(1.5, 'can0', 0x3FFFF0, bytes.fromhex('05DC000000000000'), True, DATA, True)),
+    ('(1.5) can0 7FF# R', Record(1.5, 'can0', 0x7FF, b'', False, DATA, False)),
+    ('(1.5) can0 000003F1#00', Record(1.5, 'can0', 0x3F1, b'\0', True)),
+    ('(1.5) can0 123#R', Record(1.5, 'can0', 0x123, b'', False, RecordKind.REMOTE)),
+    ('(1.5) can0 123#R8', Record(1.5, 'can0', 0x123, b'', False, RecordKind.REMOTE)),
+    ('(1.5) can0 123##1AABB', Record(1.5, 'can0', 0x123, b'\xAA\xBB', False, RecordKind.FD)),
+    # the controller is error-passive: no data frame 004h
+    ('(1.5) can0 20000004#0020000000000000',
+     Record(1.5, 'can0', 4, bytes.fromhex('0020000000000000'), True, ERROR)),
+    ('  vcan0  7FF   [2]  11 22', Record(0.0, 'vcan0', 0x7FF, b'\x11\x22', False)),
+    (' (1.250000)  can0  RX - -  003FFFF0   [3]  0A 0B 0C',
+     Record(1.25, 'can0', 0x3FFFF0, b'\x0A\x0B\x0C', True, DATA, False)),
+    (" (1.250000)  can0  TX - -  123   [2]  41 42   'AB'",
+     Record(1.25, 'can0', 0x123, b'AB', False, DATA, True)),
+    ('  can0  123   [4]  remote request', Record(0.0, 'can0', 0x123, b'', False,
+                                                 RecordKind.REMOTE)),
+    ('  can0  20000040   [8]  00 00 00 00 00 00 00 00   ERRORFRAME',
+     Record(0.0, 'can0', 0x40, bytes(8), True, ERROR)),
+])
+def test_lines_of_candump(line: str, record: Record) -> None:
+    assert parse_line(line) == record
+    assert parse_line(f'{line}\n') == record
+
+
+@pytest.mark.parametrize('line', ['', '   \n'])
+def test_nothing(line: str) -> None:
+    assert parse_line(line) is None
+
+
+@pytest.mark.parametrize('line', [
+    'x', '(1.0) can0', '(1.0) can0 12#00', '(1.0) can0 -12#00', '(1.0) can0 800#00',
+    '(1.0) can0 123#0', '(1.0) can0 123#001122334455667788', '(nan) can0 123#00',
+    '(inf) can0 123#00', '(1.0) can0 123456789#00', '(1.0) can0 123', 'can0 123 [2] 00',
+    'can0 123 [x] 00', '(1.0) can0 0-1#00',
+])
+def test_what_is_no_line_of_candump(line: str) -> None:
+    with pytest.raises(ValueError):
+        parse_line(line)
+
+
+@given(st.one_of(
+    st.text(), st.text('(10.) can#ABCDEFRT[]8'),
+    st.builds('({}) {} {}#{} {}'.format, st.floats(), st.text(min_size=1), st.text('0123AF'),
+              st.text('0123AFR#'), st.sampled_from(['R', 'T', '', 'x']))))
+def test_any_line(line: str) -> None:
+    try:
+        record = parse_line(line)
+    except ValueError:
+        return
+    if record is not None and record.kind is DATA:
+        assert 0 <= record.identifier <= (0x1FFFFFFF if record.extended else 0x7FF)
+        assert len(record.data) <= 8
+
+
+RECORDS = st.builds(
+    Record, st.floats(0, 2e9), st.just('can0'), st.integers(0, 0x7FF), st.binary(max_size=8),
+    st.booleans(), st.sampled_from([DATA, ERROR]), st.booleans())
+
+
+@given(RECORDS)
+def test_candump_loses_nothing(record: Record) -> None:
+    read = parse_line(format_record(record))
+    assert read is not None
+    assert abs(read.time - record.time) < 1e-5
+    expected = record._replace(extended=record.extended or record.kind is ERROR)
+    assert read._replace(time=record.time) == expected
+
+
+TRACE = [
+    Record(1700000000.0, 'can0', 0x3FFFF0, bytes.fromhex('05DC000000000000'), True, DATA, True),
+    Record(1700000000.001, 'can0', 0x103FFFF0, bytes.fromhex('1122'), True, DATA, False),
+    Record(1700000000.02, 'can1', 0x3F1, bytes.fromhex('03D1000100000000'), False, DATA, True),
+    Record(1700000000.03, 'can1', 0x7F1, b'', False, DATA, False),
+]
+
+
+@pytest.mark.parametrize('suffix', WRITABLE)
+def test_every_format_keeps_the_frames(suffix: str, tmp_path: Path) -> None:
+    path = tmp_path / f'trace{suffix}'
+    one_bus = suffix in ('.csv', '.db')
+    writer = TraceWriter(path, ['can0'] if one_bus else ['can0', 'can1'])
+    for record in TRACE:
+        writer.write(record)
+    writer.close()
+    complaints: list[str] = []
+    found = list(read_records(path, complaints.append))
+    assert complaints == []
+    assert [(r.identifier, r.data, r.extended, r.kind) for r in found] == [
+        (r.identifier, r.data, r.extended, r.kind) for r in TRACE]
+    assert [round(r.time - found[0].time, 3) for r in found] == [0.0, 0.001, 0.02, 0.03]
+    if not one_bus:     # the others say that they lose this
+        assert [r.sent for r in found] == [True, False, True, False]
+        assert [r.channel for r in found] == (
+            ['can0', 'can0', 'can1', 'can1'] if suffix == '.log' else [0, 0, 1, 1])
+
+
+def test_formats_that_are_refused() -> None:
+    with pytest.raises(UnknownFormat, match='no trace is written with the suffix .pcap'):
+        check_writable(Path('a.pcap'), 1)
+    with pytest.raises(UnknownFormat, match='does not tell buses apart'):
+        check_writable(Path('a.csv'), 2)
+    with pytest.raises(UnknownFormat, match='no trace format has the suffix'):
+        list(read_records(Path('trace'), print))
+    with pytest.raises(FileNotFoundError):
+        list(read_records(Path('/nowhere/trace.db'), print))
+
+
+@pytest.mark.parametrize('suffix', ['.log', '.asc', '.csv', '.trc'])
+def test_a_damaged_line_does_not_end_a_text(suffix: str, tmp_path: Path) -> None:
+    path = tmp_path / f'trace{suffix}'
+    writer = TraceWriter(path, ['can0'])
+    for _ in range(3):
+        for record in TRACE:
+            writer.write(record)
+    writer.close()
+    lines = path.read_text().splitlines()
+    place = next(number for number, line in enumerate(lines) if '7F1' in line.upper())
+    damaged = lines[place].replace('7F1', 'xyz').replace('7f1', 'xyz')
+    lines[place] = damaged
+    path.write_text('\n'.join(lines) + '\n')
+    complaints: list[str] = []
+    found = list(read_records(path, complaints.append))
+    assert len(found) == 11
+    # a line that the reader for .asc does not take for a frame is a comment to it
+    assert len(complaints) == 1
+
+
+def test_a_packed_text(tmp_path: Path) -> None:
+    path = tmp_path / 'trace.log.gz'
+    with gzip.open(path, 'wt') as file:
+        file.writelines(format_record(record) for record in TRACE)
+    assert list(read_records(path, print)) == TRACE
+    path.write_bytes(path.read_bytes()[:-10])
+    complaints: list[str] = []
+    list(read_records(path, complaints.append))
+    assert len(complaints) == 1
+
+
+@given(st.sampled_from(['.log', '.asc', '.csv', '.trc', '.blf', '.db']), st.binary(max_size=300))
+def test_any_file(tmp_path_factory: pytest.TempPathFactory, suffix: str, content: bytes) -> None:
+    path = tmp_path_factory.mktemp('any') / f'trace{suffix}'
+    path.write_bytes(content)
+    for record in read_records(path, lambda _: None):
+        assert isinstance(record, Record)
