@@ -4,10 +4,10 @@ The control word of a drive that does not get it cyclically, or does not answer 
 
 The control word is written when it changes, before everything else that waits; one that stops the
 drive waits for nothing at all. Nothing acknowledges that: as long as the status says that the
-drive takes no notice, the word is written again, less and less often. Where that wears an EEPROM (or may), only a drive that runs on although
-it shall not gets its word again, a few times. The status word is read twice a second, and twenty
-times while a request is under way. What has its slot in the cyclic telegrams is none of this
-module's business.
+drive takes no notice, the word is written again, less and less often. Where that wears an
+EEPROM (or may), only a drive that runs on although it shall not gets its word again, a few times.
+The status word is read twice a second, and twenty times while a request is under way. What has its
+slot in the cyclic telegrams is none of this module's business.
 """
 
 from collections.abc import Callable
