@@ -15,10 +15,11 @@ step                result sent back
 
 Order: stops first (:class:`Lane`). The two other lanes run their procedures one after the other.
 Our own and those of users take turns after every step, so that neither a flood of users nor a
-silent parameter keeps the other waiting for more than one read. Where our own are the exchange itself (:class:`Polling`), they run to their
-end, and users get one step in between and whatever time is left. A control word goes before all of
-them, and takes the place of one that has not left yet (:meth:`~AcyclicChannel.write_first`).
-What stops a drive waits for nothing but the spacing of frames (:meth:`~AcyclicChannel.write_now`).
+silent parameter keeps the other waiting for more than one read. Where our own are the exchange
+itself (:class:`Polling`), they run to their end, and users get one step in between and whatever
+time is left. A control word goes before all of them, and takes the place of one that has not left
+yet (:meth:`~AcyclicChannel.write_first`). What stops a drive waits for nothing but the spacing of
+frames (:meth:`~AcyclicChannel.write_now`).
 
 Pace: at least 20 ms lie between two EEPROM writes to a station and between such a write and the
 next read (manual, "Scrittura di un parametro": "almeno 20msec"); a frame leaves only while no
