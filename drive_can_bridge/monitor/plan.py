@@ -3,8 +3,8 @@
 Whose samples to receive.
 
 A message that nobody looks at costs its bridge and its receiver as much as any other. A few drives
-are no burden; fifteen with 200 exchanges a second each are. So there is a budget: what is looked at
-closely is always sampled, the others take turns.
+are no burden; fifteen with 200 exchanges a second each are. So there is a budget: what is looked
+at closely is always sampled, the others take turns.
 """
 
 from collections.abc import Mapping, Sequence
