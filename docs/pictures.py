@@ -108,7 +108,8 @@ def architecture(path: Path) -> None:
                    border_style='bright_black', box=box.ROUNDED, width=82, height=_HEIGHT)
     picture = _row([
         _titled('ROS graph', graph, 19, 'green', _HEIGHT),
-        _arrows({2: '→', 5: '←', 10: '⇄', 13: '←'}), bridge, _arrows({4: '→', 7: '←'}), _titled('CAN', can, 22, 'yellow', _HEIGHT)])
+        _arrows({2: '→', 5: '←', 10: '⇄', 13: '←'}), bridge, _arrows({4: '→', 7: '←'}),
+        _titled('CAN', can, 22, 'yellow', _HEIGHT)])
     clients = Panel(_lines(['drive_can monitor, read, write, backup … and your own nodes: '
                             'processes of their own, clients of the graph like any other']),
                     border_style='green', box=box.ROUNDED, width=127)
