@@ -118,5 +118,5 @@ class ParameterInfo:
             scaled = step * 10 ** decimals
             if scaled >= 0.5 and math.isclose(scaled, round(scaled), rel_tol=1e-6):
                 return decimals
-        # no round number: three significant digits of a step
-        return min(max(0, 2 - math.floor(math.log10(step))), _DECIMALS_MAX)
+        # no round number: the first digit of a step
+        return min(max(0, -math.floor(math.log10(step))), _DECIMALS_MAX)

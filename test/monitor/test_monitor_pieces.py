@@ -20,7 +20,7 @@ from drive_can_bridge.monitor.values import facts_from_constraints, ParameterInf
     (info('speed', 'rpm', scale='0.1'), 12.34, '12.3'),
     (info('speed', 'rpm', scale='0.1'), -0.04, '0.0'),
     (info('speed', 'rpm', scale='0.25'), 0.25, '0.25'),
-    (info('speed', 'rpm', scale='0.003051757'), 50.0, '50.00000'),
+    (info('speed', 'rpm', scale='0.003051757'), 50.0, '50.000'),
     (info('speed', 'rpm', scale='10'), 50.0, '50'),
     (info('speed', 'rpm', scale='nonsense'), 50.0, '50.000'),
     (info('speed', 'rpm', scale='nan'), math.inf, 'inf'),
