@@ -1,8 +1,11 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """``drive_can validate`` as a user runs it, and the front end around it."""
 
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
 import os
 from pathlib import Path
+import re
 import subprocess
 import sys
 
@@ -13,13 +16,19 @@ import drive_can_bridge
 from drive_can_bridge.cli import main as front_end
 
 ROOT = Path(drive_can_bridge.__file__).resolve().parents[1]
+EXAMPLES = sorted(path.name for path in (ROOT / 'config').glob('*.yaml'))
 ENVIRONMENT = {**os.environ, 'PYTHONPATH': os.pathsep.join(
     filter(None, (str(ROOT), os.environ.get('PYTHONPATH'))))}
 
 
 def run(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, '-m', 'drive_can_bridge.cli.main', *arguments],
-                          capture_output=True, text=True, env=ENVIRONMENT, timeout=60, check=False)
+    """Run the command in this process; ``system/`` starts the executable."""
+    with redirect_stdout(StringIO()) as out, redirect_stderr(StringIO()) as err:
+        try:
+            code = front_end.main(arguments)
+        except SystemExit as end:  # how argparse ends
+            code = int(str(end.code))
+    return subprocess.CompletedProcess(arguments, code, out.getvalue(), err.getvalue())
 
 
 def test_good_file(tmp_path: Path) -> None:
@@ -85,13 +94,13 @@ def test_no_file(name: str, line: str) -> None:
 
 @pytest.mark.parametrize('arguments', [
     [], ['validate'], ['validate', 'a', 'b'], ['validat', 'a'], ['validate', '--nothing', 'a'],
-    ['--nothing']])
+    ['--nothing'], ['simulate'], ['simulate', '--params-file']], ids=' '.join)
 def test_wrong_usage(arguments: list[str]) -> None:
     done = run(*arguments)
     assert done.returncode == 2
     assert done.stdout == ''
     assert done.stderr.startswith('usage: drive_can')
-    assert 'Traceback' not in done.stderr
+    assert 'error: ' in done.stderr.splitlines()[-1]
 
 
 def test_version_and_help() -> None:
@@ -100,6 +109,45 @@ def test_version_and_help() -> None:
     assert done.returncode == 0
     for name in ('validate', 'simulate', 'demo'):
         assert f'    {name} ' in done.stdout
+        help_ = run(name, '--help')
+        assert (help_.returncode, help_.stderr) == (0, '')
+        assert help_.stdout.startswith(f'usage: drive_can {name}')
+
+
+@pytest.mark.parametrize('name', EXAMPLES)
+def test_shipped_examples(name: str) -> None:
+    file = ROOT / 'config' / name
+    done = run('validate', str(file))
+    assert (done.returncode, done.stderr) == (0, '')
+    text = file.read_text(encoding='utf-8')
+    drives = re.findall(r'^      (\w+):', text[text.index('\n    drives:'):], re.MULTILINE)
+    lines = done.stdout.splitlines()
+    assert [line.split(':')[0] for line in lines] == drives
+    for line in lines:
+        assert re.fullmatch(
+            r'\w+: bus main \(\w+ \S+\), \w+, station [0-9]+, profile \w+, period [0-9.]+ ms, '
+            r'request \[[\w, ]*\], response \[[\w, ]+\], load [0-9.]+ %', line)
+
+
+def test_problem_in_a_profile(tmp_path: Path) -> None:
+    path = write(tmp_path)
+    table = tmp_path / 'table.yaml'
+    lines = table.read_text(encoding='utf-8').splitlines(keepends=True)
+    place = next(number for number, line in enumerate(lines) if 'int16' in line)
+    lines[place] = lines[place].replace('int16', 'int8')
+    table.write_text(''.join(lines), encoding='utf-8')
+    done = run('validate', str(path))
+    assert done.returncode == 1
+    assert re.match(rf'{re.escape(str(table))}:{place + 1}: parameters\.\w+\.type: ', done.stderr)
+
+
+@pytest.mark.parametrize('content', ['', 'other: {ros__parameters: {x: 1}}'])
+def test_what_is_no_parameter_file(tmp_path: Path, content: str) -> None:
+    path = write(tmp_path, content)
+    done = run('validate', str(path))
+    assert (done.returncode, done.stdout) == (1, '')
+    assert done.stderr
+    assert all(str(path) in line for line in done.stderr.splitlines())
 
 
 def test_needs_neither_ros_nor_a_bus_library(tmp_path: Path) -> None:

@@ -39,7 +39,8 @@ class Peer:
     """
     The far end of a pseudo-terminal.
 
-    :param answers: line -> lines; a value may also be called with the line.
+    :param answers: line, or its first 10 or 5 characters -> lines; a value may also be called with
+        the line.
     """
 
     def __init__(self, link: Path,
@@ -131,7 +132,8 @@ class Peer:
                 self._answer(text)
 
     def _answer(self, text: str) -> None:
-        answer = self.answers.get(text) or self.answers.get(text[:10])
+        answer = next((self.answers[key] for key in (text, text[:10], text[:5])
+                       if key in self.answers), None)
         if callable(answer):
             for line in answer(text):
                 self.send(line.encode('latin-1') + b'\r')

@@ -8,7 +8,6 @@ compared here are literal bytes of the manual's tables, not of our codec.
 
 import json
 from pathlib import Path
-import re
 import sys
 import time
 
@@ -69,83 +68,6 @@ class Bench:
 @pytest.fixture(name='start')
 def _start(processes: Processes, client: Client, namespace: str, tmp_path: Path) -> object:
     return lambda **options: Bench(processes, client, namespace, tmp_path, **options)
-
-
-def test_commands_and_parameters(start: type[Bench]) -> None:
-    bench = start()
-    client, simulator, drive = bench.client, bench.simulator, bench.short
-
-    # all of cyclic_response in one read, its answer with junk; setpoints are neutral so far
-    simulator.frame(ASK, count=3)
-    simulator.frame(ANSWER, count=3)
-    assert simulator.frames('^3F1#0632000000000000 R$')
-    assert simulator.frames('^3F1#0633000000000000 R$')
-    assert set(simulator.frames('^3F1#06')) == set(simulator.frames(NEUTRAL))
-
-    # a setpoint that nobody armed has no effect
-    client.publish(f'{drive}/command/speed_setpoint', 150.0)
-    bench.bridge.error('short: command speed_setpoint has no effect: not armed')
-    client.value(f'{drive}/actual_speed', -0.5, 0.5)
-    assert not simulator.frames(MOVING)
-
-    for each in (bench.long, bench.short):
-        bench.arm(each)
-    bench.move(bench.short, 150.0)
-    bench.move(bench.long, -75.0)
-    client.publish(f'{drive}/command/torque_limit', 100.0)
-    # Reg.50 := 1500 = 05DCh, Reg.51 := 1000 = 03E8h, one frame each
-    simulator.frame('^3F1#063200DC05000000 R$')
-    simulator.frame('^3F1#063300E803000000 R$')
-    # -750 = FD12h with 29 bits, high byte first
-    simulator.frame('^003FFFF0#FD120000')
-    client.value(f'{drive}/actual_speed', 149.9, 150.1)
-    simulator.frame('^7F1#DC05.*A5A5 T$')
-    # unchanged setpoints are written again, but not each cycle
-    refreshed = len(simulator.frames('^3F1#063200DC05000000 R$'))
-    simulator.frame('^3F1#063200DC05000000 R$', count=refreshed + 2)
-
-    # parameters: read, written, read back, unknown, read-only, together
-    ramp, = client.get(drive, 'ramp_time')
-    simulator.frame('^3F1#031E000100000000 R$')
-    assert client.get(drive, 'p30') == [round(100 * ramp)]
-    assert client.set(drive, ramp_time=7.25) == [(True, '')]
-    assert simulator.frames('^3F1#061E00D502000000 R$')       # 725 = 02D5h
-    assert simulator.frames('^7F1#D502A5A5A5A5A5A5 T$')
-    writes = len(simulator.frames('^3F1#061E00'))
-    assert client.set(drive, ramp_time=7.25) == [(True, '')]
-    assert len(simulator.frames('^3F1#061E00')) == writes, 'the value was there already'
-    assert client.get(drive, 'speed_gain', 'speed_integral_time', 'jog_speed') != [None] * 3
-    simulator.frame('^3F1#033C000300000000 R$')               # 60 to 62 in one read
-    assert client.get(drive, 'p9999', 'ramp_time') == [None, 7.25]
-    bench.bridge.error(r'short: read p9999 \(P9999\): no answer')
-    (success, reason), = client.set(drive, actual_speed=1.0)
-    assert not success
-    assert 'read-only' in reason
-    assert client.set(drive, speed_setpoint=1.0) == [
-        (False, 'sent cyclically: publish ~/command/speed_setpoint')]
-    assert client.set(drive, p122=50) == [
-        (False, 'mapping parameter: not written while the bridge is active')]
-
-    # one parameter is all that fits a frame; the 29-bit drive takes two
-    together = {'speed_gain': 0.5, 'speed_integral_time': 0.25}
-    (success, reason), = client.set(bench.short, atomic=True, **together)
-    assert not success
-    assert 'one parameter fits' in reason
-    assert client.set(bench.long, atomic=True, **together) == [(True, '')]
-    assert simulator.frames('^003003C2#01F400FA00000000 R$')
-    assert client.get(bench.long, 'speed_gain', 'speed_integral_time') == [0.5, 0.25]
-    assert client.get(bench.short, 'speed_gain') != [0.5]
-
-    # the 11-bit drive's maps are none of the bridge's business
-    assert not simulator.frames('^3F1#037[A-F]')
-    assert not simulator.frames('^3F1#067[A-F]')
-    assert not [line for line in simulator.lines if 'violation' in line]
-    bench.end()
-    # it stands still: three times neutral
-    assert simulator.frames('^3F1#063200')[-3:] == ['3F1#0632000000000000 R'] * 3
-    # all frames of the bridge are of the manual's two kinds, padded with zeros, in 11 bits
-    known = re.compile('^3F1#(03.{4}0[1-4]00000000|06.{8}000000) R$|^00[23].{5}#')
-    assert [entry for entry in simulator.frames(' R$') if not known.match(entry)] == []
 
 
 def test_both_hold_their_periods(start: type[Bench]) -> None:

@@ -1,0 +1,148 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+What the executable says about what it cannot work with, and its exit code.
+
+Its ``main`` runs in this process; the executable itself is started by
+``system/test_system_configuration.py``.
+"""
+
+from collections.abc import Callable
+import os
+from pathlib import Path
+import re
+import sys
+from typing import Any
+
+from bridges import CONVEYOR, parameters
+import pytest
+import yaml
+
+from drive_can_bridge.ros.main import main
+
+#: how rclpy writes a line
+LOGGED = re.compile(r'\[(ERROR|FATAL)\] \[[0-9.]+\] \[[\w.]+\]: (.*)')
+NODE = '/refused/drive_can_bridge'
+
+#: runs the executable with a parameter file; returns its exit code and its standard error
+Run = Callable[..., tuple[int, list[str]]]
+
+
+@pytest.fixture(name='run')
+def _run(capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
+    # a bridge asks for a higher priority, which is none of this process's business
+    monkeypatch.setattr(os, 'setpriority', lambda *_: None)
+    monkeypatch.setattr(sys, 'setswitchinterval', lambda _: None)
+
+    def run(*arguments: str) -> tuple[int, list[str]]:
+        code = main(['drive_can_bridge', *arguments])
+        out, err = capfd.readouterr()
+        assert out == ''
+        return code, err.splitlines()
+    return run
+
+
+def with_file(file: Path) -> list[str]:
+    return ['--ros-args', '--params-file', str(file), '-r', '__ns:=/refused']
+
+
+def written(directory: Path, *, node: str = '/**/drive_can_bridge', **bus: Any) -> Path:
+    """Write a parameter file with a conveyor; ``bus``: further keys of its bus."""
+    file = directory / 'bridge.yaml'
+    content = parameters(buses={'main': {
+        'interface': 'slcan', 'channel': str(directory / 'nothing'), 'bitrate': 125_000, **bus}},
+        conveyor=CONVEYOR)
+    file.write_text(yaml.safe_dump({node: {'ros__parameters': content}}, sort_keys=False),
+                    encoding='utf-8')
+    return file
+
+
+def problem(told: tuple[int, list[str]]) -> str:
+    """Return the one problem that was logged."""
+    code, (line,) = told
+    assert code == 1
+    match = LOGGED.fullmatch(line)
+    assert match, line
+    return match.group(2)
+
+
+@pytest.mark.parametrize(('bus', 'words'), [
+    ({'interface': 'slkan'}, ("'slkan'", "'slcan'")),
+    ({'bitrate': 123_456}, ('123456', '125000')),
+    ({'reconect_period': 0.5}, ('reconnect_period',)),
+], ids=['interface', 'bit rate', 'key close to one of ours'])
+def test_bus_that_can_never_work(run: Run, tmp_path: Path, bus: dict[str, object],
+                                 words: tuple[str, ...]) -> None:
+    text = problem(run(*with_file(written(tmp_path, **bus))))
+    assert text.startswith(f'buses.main.{next(iter(bus))}:')
+    assert all(word in text for word in words)
+
+
+def test_key_that_stands_twice(run: Run, tmp_path: Path) -> None:
+    """The values that rcl hands over do not show it."""
+    file = written(tmp_path)
+    lines = file.read_text(encoding='utf-8').splitlines(keepends=True)
+    place, = [number for number, line in enumerate(lines) if line.strip().startswith('period:')]
+    lines.insert(place + 1, lines[place].replace('0.02', '0.5'))
+    # the other section is none of this node's business
+    lines += ['other:\n', '  ros__parameters:\n', '    a: 1\n', '    a: 2\n']
+    file.write_text(''.join(lines), encoding='utf-8')
+    assert problem(run(*with_file(file))) == (
+        f'{file}:{place + 2}: drives.conveyor.period: duplicate key, allowed is one (the first is '
+        f'in line {place + 1})')
+
+
+def test_file_for_another_node(run: Run, tmp_path: Path) -> None:
+    file = written(tmp_path, node='/other/can_bridge')
+    text = problem(run(*with_file(file)))
+    assert NODE in text
+    assert f'{file} is for /other/can_bridge' in text
+
+
+def test_file_with_a_namespace_of_its_own(run: Run, tmp_path: Path) -> None:
+    file = tmp_path / 'nested.yaml'
+    file.write_text('cell:\n  can_bridge:\n    ros__parameters: {a: 1}\n'
+                    'other: {ros__parameters: {b: 1}}\n', encoding='utf-8')
+    assert f'{file} is for cell/can_bridge, other' in problem(run(*with_file(file)))
+
+
+def test_no_file_at_all(run: Run) -> None:
+    text = problem(run('--ros-args', '-r', '__ns:=/refused'))
+    assert f'{NODE} got neither buses nor drives' in text
+    assert '--params-file' in text
+
+
+@pytest.mark.parametrize('content', [
+    '/**/drive_can_bridge:\n  ros__parameters:\n    buses: {main: {channel: [1, a]}}\n',
+    '/**/drive_can_bridge:\n  ros__parameters:\n    buses: &bus {}\n    drives: *bus\n',
+    None,
+], ids=['mixed list', 'alias', 'no file'])
+def test_what_rcl_refuses(run: Run, tmp_path: Path, content: str | None) -> None:
+    file = tmp_path / 'refused.yaml'
+    if content is not None:
+        file.write_text(content, encoding='utf-8')
+    code, (line,) = run(*with_file(file))
+    assert code == 1
+    assert line.startswith('drive_can_bridge: ')
+    assert str(file) in line or 'Sequence' in line
+
+
+@pytest.mark.parametrize(('arguments', 'word'), [
+    (['-r', '__ns:=not a namespace'], 'not a namespace'),
+    (['-r', 'nonsense'], 'nonsense'),
+    (['-p', 'x'], 'x'),
+    (['--unknown'], '--unknown'),
+])
+def test_ros_arguments_that_rcl_refuses(run: Run, arguments: list[str], word: str) -> None:
+    code, (line,) = run('--ros-args', *arguments)
+    assert code == 1
+    assert line.startswith('drive_can_bridge: ')
+    assert word in line
+
+
+@pytest.mark.parametrize('arguments', [['bridge.yaml'], ['--params-file', 'x.yaml'],
+                                       ['--verbose', '--ros-args', '-r', '__ns:=/x']])
+def test_arguments_that_are_not_for_ros(run: Run, arguments: list[str]) -> None:
+    code, (line,) = run(*arguments)
+    assert code == 2
+    assert arguments[0] in line
+    assert '--ros-args --params-file FILE' in line
