@@ -28,6 +28,7 @@ from rclpy.qos import (
 from rclpy.signals import SignalHandlerOptions
 
 _COUNTER = itertools.count(1)
+CLIENT = f'client_{os.getpid()}'
 LATCHED = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 EVERYTHING = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 KEEP = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
@@ -55,6 +56,11 @@ def wait_until(condition: Callable[[], Any], timeout: float = 20.0, what: str = 
             return found
         assert time.monotonic() < deadline, f'waited {timeout:g} s for {what or condition}'
         time.sleep(0.005)
+
+
+def is_client(node: str) -> bool:
+    """Tell whether the full name of a node is that of a client of this process."""
+    return node.startswith(f'/{CLIENT}_')
 
 
 class ClientContext:
@@ -112,7 +118,7 @@ class Client:
     def __init__(self, context: ClientContext) -> None:
         self._executor = context.executor
         self.node = rclpy.create_node(
-            f'client_{os.getpid()}_{next(_COUNTER)}', context=context.context,
+            f'{CLIENT}_{next(_COUNTER)}', context=context.context,
             enable_rosout=False, start_parameter_services=False)
         self.full_name = self.node.get_fully_qualified_name()
         self._services: dict[str, Any] = {}

@@ -2,7 +2,8 @@
 """
 The bridge's node with real rclpy, simulated drives and a virtual bus, all in this process.
 
-Whatever a test starts is stopped after it, and has to be gone then: threads, buses, nodes.
+Whatever a test starts is stopped after it, and has to be gone then: threads, buses, nodes. What
+the tests of a module share is stopped after the last of them, or before one that starts its own.
 """
 
 from collections.abc import Iterator
@@ -52,12 +53,64 @@ def client(_client_context: 'ClientContext') -> Iterator['Client']:
     node.close()
 
 
+class _Shared:
+    """The bridge that the tests of a module share, one at a time."""
+
+    def __init__(self, directory: Path, context: 'ClientContext') -> None:
+        self._directory = directory
+        self._context = context
+        self._content: object = None
+        self._one: Bridge | None = None
+
+    def start(self, content: object = None) -> 'Bridge':
+        if self._one is None or content != self._content:
+            self.close()
+            self._one, self._content = Bridge(self._directory, content), content
+            self._one.begin()
+        for drive in self._one.played.values():
+            drive.fault('ok')
+        self._one.online()
+        return self._one
+
+    def close(self) -> None:
+        if self._one is None:
+            return
+        one, self._one = self._one, None
+        one.close()
+        assert not one.errors, one.errors
+        del one
+        client = Client(self._context)
+        try:
+            assert_nothing_left(client)
+        finally:
+            client.close()
+
+
+@pytest.fixture(scope='module')
+def _shared(_client_context: 'ClientContext',
+            tmp_path_factory: pytest.TempPathFactory) -> Iterator[_Shared]:
+    shared = _Shared(tmp_path_factory.mktemp('shared'), _client_context)
+    yield shared
+    shared.close()
+
+
 @pytest.fixture
-def bridge(client: 'Client', tmp_path: Path) -> Iterator['StartBridge']:
+def shared_bridge(_shared: _Shared) -> 'StartBridge':
+    """
+    Return the module's bridge with these parameters, online; whoever got it before used it.
+
+    For tests that leave nothing behind but values of parameters and counters.
+    """
+    return _shared.start
+
+
+@pytest.fixture
+def bridge(client: 'Client', tmp_path: Path, _shared: _Shared) -> Iterator['StartBridge']:
     """Start bridges with their simulated drives; see :class:`bridges.Bridge`."""
     started: list[Bridge] = []
 
     def start(content: object = None, **options: object) -> Bridge:
+        _shared.close()
         one = Bridge(tmp_path, content, **options)
         started.append(one)
         one.begin()

@@ -6,7 +6,7 @@ import threading
 import time
 
 import can.interfaces.virtual
-from clients import Client, patience
+from clients import Client, is_client, patience
 
 from drive_can_bridge.ros.drive_node import DriveNode
 
@@ -37,7 +37,7 @@ def assert_nothing_left(client: Client) -> None:
     gc.collect()
     while True:
         left = {'threads': threads(), 'buses': open_channels(),
-                'nodes': sorted(set(client.nodes()) - {client.full_name})}
+                'nodes': sorted(name for name in client.nodes() if not is_client(name))}
         if not any(left.values()):
             break
         assert time.monotonic() < deadline, left

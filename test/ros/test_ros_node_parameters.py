@@ -41,9 +41,9 @@ def test_everything_can_be_read(bridge: StartBridge, client: Client) -> None:
     ('autostart', False), ('buses.main.bitrate', 125000), ('drives.conveyor.station', 5),
     ('drives.conveyor.period', 0.1), ('drives.conveyor.cyclic_request', ['speed_setpoint']),
     ('profile_directories', ['/']), ('drives.conveyor.mapping', 'assume')])
-def test_most_cannot_be_set(bridge: StartBridge, client: Client, name: str,
+def test_most_cannot_be_set(shared_bridge: StartBridge, client: Client, name: str,
                             value: object) -> None:
-    bridge()
+    shared_bridge()
     before = client.get(BRIDGE, name)
     [(success, reason)] = client.set(BRIDGE, **{name: value})
     assert not success and 'read-only' in reason
@@ -64,9 +64,9 @@ def test_most_cannot_be_set(bridge: StartBridge, client: Client, name: str,
     ('diagnostics_period', ['1'], 'a list'),
     ('drives.conveyor.color', 'red', 'undeclared'),
     ('drives.elevator.rearm', 'neutral', 'undeclared')])
-def test_bad_values_are_refused_in_words(bridge: StartBridge, client: Client, name: str,
+def test_bad_values_are_refused_in_words(shared_bridge: StartBridge, client: Client, name: str,
                                          value: object, words: str) -> None:
-    one = bridge()
+    one = shared_bridge()
     before = client.get(BRIDGE, name)
     [(success, reason)] = client.set(BRIDGE, **{name: value})
     assert not success and words in reason, reason
@@ -95,8 +95,8 @@ def test_dynamic_ones_take_effect(bridge: StartBridge, client: Client) -> None:
     assert session.setpoints.rearm_immediate
 
 
-def test_changes_are_announced(bridge: StartBridge, client: Client) -> None:
-    bridge()
+def test_changes_are_announced(shared_bridge: StartBridge, client: Client) -> None:
+    shared_bridge()
     events = client.parameter_events(BRIDGE)
     client.set(BRIDGE, drives__conveyor__command_timeout=1.5)
     wait_until(lambda: {'drives.conveyor.command_timeout': 1.5} in events)
