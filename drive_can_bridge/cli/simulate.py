@@ -21,9 +21,7 @@ from typing import Any, TextIO, TypeVar
 
 from drive_can_bridge.core.configuration import BridgeConfiguration, BusConfiguration
 from drive_can_bridge.core.errors import ConfigurationError, TransportError, ValueRefused
-from drive_can_bridge.simulation.console import (
-    Console, describe, help_lines, LineReader, wear_lines,
-)
+from drive_can_bridge.simulation.console import Console, describe, help_lines, LineReader
 from drive_can_bridge.simulation.faults import Fault, parse_fault
 from drive_can_bridge.simulation.plant import Mechanics
 from drive_can_bridge.simulation.player import ShowFrame
@@ -128,11 +126,11 @@ def _simulate(stack: ExitStack, configuration: BridgeConfiguration,
             output.say(f'bus {bus.name}: {bus.interface} {bus.channel}')
     stack.enter_context(simulation)
     for drive in simulation.drives.values():
-        output.say(f'drive {describe(drive)}')
+        output.say(f'drive {describe(drive)[0]}')
     status = _wait(simulation, wake, Console(simulation, say=output.say, complain=_complain))
     simulation.stop()
     for drive in simulation.drives.values():
-        for line in (describe(drive), *wear_lines(drive)):
+        for line in describe(drive):
             output.say(line)
         for rule, count in drive.violations.items():
             output.say(f'{drive.name}: violation: {rule}: {count} times')

@@ -20,7 +20,7 @@ from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.simulation import names, scales
 from drive_can_bridge.simulation.control import Operation
 from drive_can_bridge.simulation.motor import Motor, Ramp, Rates, Travel
-from drive_can_bridge.simulation.names import Quantity, RampKind, RampUse
+from drive_can_bridge.simulation.names import Quantity, RampUse
 from drive_can_bridge.simulation.plant import Mechanics
 from drive_can_bridge.simulation.registers import Registers
 
@@ -87,7 +87,7 @@ class Axes:
             rated = scales.rated_speed(speed)
             turns = scales.revolutions_per_unit(speed, rated)
         elif mover is not None:
-            rated, turns = scales.travel_speed(mover), scales.revolutions_per_position(mover)
+            rated, turns = scales.travel_speed(mover), 1.0 / scales.per_revolution(mover)
         self.motor = Motor(rated, turns, mechanics.load)
 
     @property
@@ -153,7 +153,7 @@ class Axes:
         """Return what a new drive has in a ramp parameter."""
         ramp = self.ramps[parameter.name]
         seconds = QUICK_STOP_TIME if ramp.use is RampUse.QUICK_STOP else RAMP_TIME
-        if ramp.kind is RampKind.RATE:
+        if not ramp.is_time:
             return self.motor.rated_speed / seconds
         return seconds * 1000.0 if parameter.unit == 'ms' else seconds
 
@@ -164,7 +164,7 @@ class Axes:
         quick: float | None = None
         for name, ramp in self.ramps.items():
             value = self._registers.commanded(name)
-            if ramp.kind is RampKind.TIME:
+            if ramp.is_time:
                 seconds = value / 1000.0 if ramp.parameter.unit == 'ms' else value
                 rate = rated / max(seconds, RAMP_TIME_MIN)
             else:

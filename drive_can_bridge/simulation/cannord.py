@@ -43,6 +43,7 @@ class SimulatedCannordInverter(SimulatedDrive):
     """One inverter. See the base class."""
 
     plant: InverterPlant
+    table: CannordTable
 
     def __init__(self, configuration: DriveConfiguration,
                  surroundings: Surroundings = ALONE) -> None:
@@ -218,12 +219,6 @@ class SimulatedCannordInverter(SimulatedDrive):
         self._length = SHORT_LENGTH
         self._silent_since = math.inf
         self._timed_out = False
-
-    # -- by hand ----------------------------------------------------------------------------------
-
-    def raw_name(self, name: str) -> str | None:
-        """Understand ``p102`` and ``p102.1``."""
-        return self.table.name_of(name)
 
     def _leaves_factory(self, number: int, raw: int) -> None:
         """Give a parameter of known meaning its value, if the profile lists it."""

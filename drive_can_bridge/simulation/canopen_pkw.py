@@ -16,9 +16,9 @@ from drive_can_bridge.core.frame import Frame, Route, STANDARD_IDENTIFIER_MAX
 from drive_can_bridge.core.parameters import Value
 from drive_can_bridge.protocols.canopen_pkw import abort_codes, network, pkw
 from drive_can_bridge.protocols.canopen_pkw.identifiers import Identifiers
-from drive_can_bridge.protocols.canopen_pkw.network import Emergency, NmtCommand
+from drive_can_bridge.protocols.canopen_pkw.network import Emergency, NmtCommand, NmtState
 from drive_can_bridge.simulation.canopen.node import CanopenNode
-from drive_can_bridge.simulation.canopen.sdo import checked_length, Objects, Refused
+from drive_can_bridge.simulation.canopen.sdo import checked_length, Refused
 from drive_can_bridge.simulation.canopen_pkw_registers import RegisterTable
 from drive_can_bridge.simulation.drive import ALONE, SimulatedDrive, Surroundings
 from drive_can_bridge.simulation.faults import Fault
@@ -46,6 +46,8 @@ JUNK = (0x5A5A, 0x5A5A)
 
 class SimulatedPkwDrive(SimulatedDrive):
     """One controller with a PKW mailbox. See the base class."""
+
+    table: RegisterTable
 
     def __init__(self, configuration: DriveConfiguration,
                  surroundings: Surroundings = ALONE) -> None:
@@ -80,12 +82,12 @@ class SimulatedPkwDrive(SimulatedDrive):
 
     def next_timer(self) -> float:
         """Return when :meth:`handle_timer` wants to be called; infinity: never."""
-        return min(super().next_timer(), self.node.nmt.next_timer(), self._looks_at)
+        return min(super().next_timer(), self.node.next_timer(), self._looks_at)
 
     def handle_timer(self, now: float) -> None:
         """Do what is due: held back answers, boot-up frame, heartbeat, a look at the motor."""
         super().handle_timer(now)
-        self._outbox += self.node.nmt.handle_timer(now)
+        self._outbox += self.node.handle_timer(now)
         self._look(now)
 
     def _look(self, now: float) -> None:
@@ -105,16 +107,16 @@ class SimulatedPkwDrive(SimulatedDrive):
         """Take a frame while there is power."""
         if frame.extended:
             return
-        if self.node.nmt.starting:
+        if self.node.state is NmtState.BOOT_UP:
             # whoever is ready to receive has sent its boot-up frame
-            self._outbox += self.node.nmt.handle_timer(now)
+            self._outbox += self.node.handle_timer(now)
         identifier, data, _ = frame
         if identifier == network.NMT_IDENTIFIER:
             self._obey(data, now)
         elif identifier == self._identifiers.request:
             self._take_request(data, now)
         elif identifier == self.node.request_identifier:
-            if self.node.nmt.communicates:
+            if self.node.communicates:
                 self.requests += 1
                 for answer in self.node.serve(data, now):
                     self._answer(answer, now)
@@ -135,7 +137,7 @@ class SimulatedPkwDrive(SimulatedDrive):
             self._reset_communication(self._deaf_until)
 
     def _take_request(self, data: bytes, now: float) -> None:
-        if not self.node.nmt.operational:
+        if self.node.state is not NmtState.OPERATIONAL:
             self._violation('request while the node is not operational (ignored)')
             return
         try:
@@ -182,10 +184,6 @@ class SimulatedPkwDrive(SimulatedDrive):
         super().fault(fault, now)
         self._look(now)
 
-    def raw_name(self, name: str) -> str | None:
-        """Understand ``p455`` and ``x2004.6``."""
-        return self.table.name_of(name)
-
     # -- faults -----------------------------------------------------------------------------------
 
     def power_lost(self, back_at: float, *, forget: bool) -> None:
@@ -223,7 +221,7 @@ class SimulatedPkwDrive(SimulatedDrive):
         return [answer._replace(data=pkw.encode(message, self._layout))]
 
 
-class _DeviceObjects(Objects):
+class _DeviceObjects:
     """The registers, the mailbox and PDO4 of a controller, as SDOs see them."""
 
     def __init__(self, drive: SimulatedPkwDrive) -> None:

@@ -7,6 +7,7 @@ refused access changes nothing and carries an SDO abort code.
 """
 
 from collections import Counter
+import re
 from typing import NamedTuple
 
 from drive_can_bridge.core.configuration import DriveConfiguration
@@ -19,6 +20,9 @@ from drive_can_bridge.protocols.canopen_pkw.pkw import (
 from drive_can_bridge.simulation.canopen.sdo import Refused
 from drive_can_bridge.simulation.registers import Refusal, Registers
 
+_RAW_NAME = re.compile(
+    r'p(?P<register>[0-9]{1,5})|x(?P<index>[0-9a-fA-F]{1,4})\.(?P<subindex>[0-9a-fA-F]{1,2})',
+    re.ASCII)
 _CODES = {
     Refusal.READ_ONLY: abort_codes.WRITE_OF_READ_ONLY,
     Refusal.OUT_OF_RANGE: abort_codes.VALUE_OUT_OF_RANGE,
@@ -39,7 +43,7 @@ class RegisterTable:
 
     def __init__(self, configuration: DriveConfiguration, registers: Registers) -> None:
         self._registers = registers
-        self._high_first: bool = configuration.family_options['word_order'] == 'high_first'
+        self._word_order: str = configuration.family_options['word_order']
         self._cells: dict[Address, Cell] = {}
         parameters = list(registers.parameters.values())
         # what the profile says goes before what follows from the table of the vendor
@@ -97,24 +101,17 @@ class RegisterTable:
 
     def highest_subindex(self, index: int) -> int | None:
         """Return the highest sub-index of an object; None: there is no such object."""
-        found = [address.subindex for address in self._cells
-                 if address.subindex is not None and address.word == index]
-        return max(found, default=None)
+        return max((address.subindex for address in self._cells
+                    if address.subindex is not None and address.word == index), default=None)
 
     def name_of(self, raw_name: str) -> str | None:
         """Return the profile's name for ``p455`` or ``x2004.6``; None: there is none."""
-        kind, rest = raw_name[:1], raw_name[1:]
-        first, dot, second = rest.partition('.')
-        try:
-            if kind == 'p' and not dot:
-                address = Address(int(first))
-            elif kind == 'x' and dot:
-                address = Address(int(first, 16), int(second, 16))
-            else:
-                return None
-        except ValueError:
+        match = _RAW_NAME.fullmatch(raw_name)
+        if match is None:
             return None
-        return self.name_at(address)
+        if match['register']:
+            return self.name_at(Address(int(match['register'])))
+        return self.name_at(Address(int(match['index'], 16), int(match['subindex'], 16)))
 
     def name_at(self, address: Address) -> str | None:
         """Return the name of the parameter that a register belongs to; None: there is none."""
@@ -159,9 +156,7 @@ class RegisterTable:
         return value_from_words((word, second) if cell.place == 0 else (first, word), high_first)
 
     def _is_high_first(self, parameter: Parameter) -> bool:
-        if parameter.word_order is None:
-            return self._high_first
-        return parameter.word_order == 'high_first'
+        return (parameter.word_order or self._word_order) == 'high_first'
 
 
 def _object(parameter: Parameter) -> tuple[int, int] | None:

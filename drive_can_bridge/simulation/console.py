@@ -45,23 +45,18 @@ class Console:
         if words == ['help']:
             for text in help_lines():
                 self._say(text)
-        elif words == ['list']:
+        elif words in (['list'], ['status']):
             for drive in self._drives.values():
-                self._say(describe(drive))
-        elif words == ['status']:
-            for drive in self._drives.values():
-                self._tell(drive)
+                for text in describe(drive)[:1 if words == ['list'] else 2]:
+                    self._say(text)
         elif words[0] not in self._drives:
             self._complain(f"no drive '{words[0]}'; drives: {', '.join(self._drives)}; "
                            f"also: status, list, help")
         elif len(words) == 1:
-            self._tell(self._drives[words[0]])
+            for text in describe(self._drives[words[0]]):
+                self._say(text)
         else:
             self._play(self._drives[words[0]], words[1:])
-
-    def _tell(self, drive: PlayedDrive) -> None:
-        for text in (describe(drive), *wear_lines(drive)):
-            self._say(text)
 
     def _play(self, drive: PlayedDrive, texts: list[str]) -> None:
         try:
@@ -116,18 +111,14 @@ class LineReader:
         return [line.decode('utf-8', 'replace') for line in lines]
 
 
-def describe(drive: PlayedDrive) -> str:
-    """Return one line about a drive."""
+def describe(drive: PlayedDrive) -> list[str]:
+    """Return a line about a drive, and one about the EEPROM cells that it has written, if any."""
     configuration = drive.drive.configuration
-    return (f'{drive.name}: {configuration.protocol} station {configuration.station} '
+    worn = ', '.join(f'{name} {count}' for name, count in sorted(drive.wear.items()))
+    line = (f'{drive.name}: {configuration.protocol} station {configuration.station} '
             f'on bus {configuration.bus}, {drive.requests} requests, {drive.answers} answers, '
             f'{drive.eeprom_writes} EEPROM writes, faults: {drive.faults_text}')
-
-
-def wear_lines(drive: PlayedDrive) -> list[str]:
-    """Return a line about the EEPROM cells that a drive has written, if there are any."""
-    worn = ', '.join(f'{name} {count}' for name, count in sorted(drive.wear.items()))
-    return [f'{drive.name}: EEPROM writes: {worn}'] if worn else []
+    return [line, f'{drive.name}: EEPROM writes: {worn}'] if worn else [line]
 
 
 def help_lines() -> list[str]:

@@ -20,6 +20,8 @@ from drive_can_bridge.simulation.drive import ALONE, SimulatedDrive, Surrounding
 class SimulatedDataModelStandardDrive(SimulatedDrive):
     """One DataModel drive with 11-bit identifiers. See the base class."""
 
+    table: DataModelTable
+
     def __init__(self, configuration: DriveConfiguration,
                  surroundings: Surroundings = ALONE) -> None:
         super().__init__(configuration, surroundings)
@@ -37,10 +39,6 @@ class SimulatedDataModelStandardDrive(SimulatedDrive):
     def own_parameters(self) -> Mapping[str, Parameter]:
         """Return the entries of the maps, which have no effect here."""
         return map_parameters(self.configuration)
-
-    def raw_name(self, name: str) -> str | None:
-        """Understand ``p30``."""
-        return self.table.name_of(name)
 
     def power_lost(self, back_at: float, *, forget: bool) -> None:
         """Keep the maps, unless they are to be forgotten."""

@@ -20,6 +20,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 import heapq
 import math
+from typing import Protocol
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import ValueRefused
@@ -32,11 +33,11 @@ from drive_can_bridge.simulation.registers import Registers
 
 #: the manual's least time between two EEPROM writes
 EEPROM_TIME = 0.020
-#: s that a drive is deaf after power came back, or was lost, where a fault does not say
+#: s that a drive is deaf after power came back
 BOOT_TIME = 0.5
-POWER_CUT_TIME = 5.0
-
-_MARKS = (FaultKind.STUCK, FaultKind.REFUSE)
+#: s without power, where a fault does not say
+_POWER_CUTS = {FaultKind.RESTART: BOOT_TIME, FaultKind.FORGET: BOOT_TIME,
+               FaultKind.POWER_CUT: 5.0, FaultKind.OFF: math.inf}
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +61,13 @@ class Surroundings:
 ALONE = Surroundings()
 
 
+class Table(Protocol):
+    """What can be addressed."""
+
+    def name_of(self, raw_name: str) -> str | None:
+        """Return the name of a register for a raw name of the family; None: there is none."""
+
+
 class SimulatedDrive(ABC):
     """
     One simulated drive.
@@ -67,7 +75,10 @@ class SimulatedDrive(ABC):
     :ivar requests: requests understood.
     :ivar answers: answers given, before scripted faults took theirs.
     :ivar violations: how often the other side broke a rule of the protocol, by rule.
+    :ivar table: what can be addressed, by the protocol's addresses.
     """
+
+    table: Table
 
     def __init__(self, configuration: DriveConfiguration,
                  surroundings: Surroundings = ALONE) -> None:
@@ -89,6 +100,8 @@ class SimulatedDrive(ABC):
         self._late_count = 0
         self._powered = True
         self._deaf_until = -math.inf
+        self._marked = {FaultKind.STUCK: self.registers.stuck,
+                        FaultKind.REFUSE: self.registers.refused}
         self._marks: dict[tuple[FaultKind, str], Fault] = {}
         self._answer_faults = AnswerFaults(self.foreign_frames)
 
@@ -160,21 +173,17 @@ class SimulatedDrive(ABC):
         kind = fault.kind
         if kind in AnswerFaults.KINDS:
             self._answer_faults.add(fault)
-        elif kind in _MARKS:
+        elif kind in self._marked:
             name = self._known(str(fault.argument))
+            self._marked[kind].add(name)
             self._marks[kind, name] = fault
-            (self.registers.stuck if kind is FaultKind.STUCK else self.registers.refused).add(name)
-        elif kind is FaultKind.TRIP:
-            if self._powered:
-                self.plant.trip(fault.number or 0.0)
-        elif kind is FaultKind.OFF:
-            self._lose_power(now, math.inf)
-        elif kind is not FaultKind.OK:
-            default = POWER_CUT_TIME if kind is FaultKind.POWER_CUT else BOOT_TIME
-            seconds = default if fault.number is None else fault.number
+        elif kind in _POWER_CUTS:
+            seconds = _POWER_CUTS[kind] if fault.number is None else fault.number
             self._lose_power(now, now + seconds, forget=kind is FaultKind.FORGET)
-        else:
+        elif kind is FaultKind.OK:
             self._repair(now)
+        elif self._powered:
+            self.plant.trip(fault.number or 0.0)
         self._notices.append(f'{self.name}: fault {fault}' if kind is not FaultKind.OK
                              else f'{self.name}: no fault any more')
 
@@ -221,17 +230,13 @@ class SimulatedDrive(ABC):
     def foreign_frames(self, answer: Frame) -> list[Frame]:
         """Make frames that look like this answer and are none of anybody."""
 
-    def raw_name(self, name: str) -> str | None:
-        """Return the name of a register for a raw name of the family; None: there is none."""
-        return None
-
     def _known(self, name: str) -> str:
         """
         Return the name under which a register is kept.
 
         :raises ValueRefused: there is no such register.
         """
-        known = name if name in self.registers.parameters else self.raw_name(name)
+        known = name if name in self.registers.parameters else self.table.name_of(name)
         if known is None:
             raise ValueRefused(f"{self.name} has no parameter '{name}'")
         return known
@@ -275,8 +280,6 @@ class SimulatedDrive(ABC):
         self.power_lost(back_at, forget=forget)
         self._advance(now)
 
-    # -- inside -----------------------------------------------------------------------------------
-
     def _advance(self, now: float) -> None:
         """Let the motor move up to now; power may have come back on the way."""
         if not self._powered and now >= self._deaf_until:
@@ -288,8 +291,8 @@ class SimulatedDrive(ABC):
     def _repair(self, now: float) -> None:
         self._answer_faults.clear()
         self._marks.clear()
-        self.registers.stuck.clear()
-        self.registers.refused.clear()
+        for names in self._marked.values():
+            names.clear()
         self.plant.operation.repair()
         if self._deaf_until == math.inf:
             self._lose_power(now, now + BOOT_TIME)

@@ -15,34 +15,7 @@ import math
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.frame import Frame
 
-
-class FaultKind(Enum):
-    """What can be wrong with a drive."""
-
-    SILENT = 'silent'
-    LATE = 'late'
-    DROP = 'drop'
-    LENGTH = 'length'
-    FOREIGN = 'foreign'
-    DUPLICATE = 'duplicate'
-    STUCK = 'stuck'
-    REFUSE = 'refuse'
-    TRIP = 'trip'
-    RESTART = 'restart'
-    POWER_CUT = 'power_cut'
-    FORGET = 'forget'
-    OFF = 'off'
-    OK = 'ok'
-
-
-@dataclass(frozen=True)
-class _Rule:
-    """How a fault is written, what it does, and which argument it takes."""
-
-    usage: str
-    meaning: str
-    required: bool = False
-    convert: Callable[[str], float | int | str] | None = None
+Argument = float | int | str
 
 
 def _seconds(text: str) -> float:
@@ -52,59 +25,61 @@ def _seconds(text: str) -> float:
     return value
 
 
-def _count(text: str) -> int:
-    value = int(text)
-    if value < 1:
-        raise ValueError
-    return value
+def _integer(low: int, high: int | None) -> Callable[[str], int]:
+    def convert(text: str) -> int:
+        value = int(text)
+        if value < low or high is not None and value > high:
+            raise ValueError
+        return value
+    return convert
 
 
-def _bytes(text: str) -> int:
-    value = int(text)
-    if not 0 <= value <= 8:
-        raise ValueError
-    return value
+class FaultKind(Enum):
+    """What can be wrong with a drive: how it is written, what it does, its argument."""
+
+    SILENT = 'silent', 'obeys, but answers nothing'
+    LATE = 'late=SECONDS', 'answers that much later (0 to 3600)', _seconds
+    DROP = 'drop=N', 'every Nth answer is lost (1: all)', _integer(1, None)
+    LENGTH = 'length=BYTES', 'answers have 0 to 8 data bytes', _integer(0, 8)
+    FOREIGN = 'foreign', 'frames nobody should send accompany the answers'
+    DUPLICATE = 'duplicate', 'each answer is sent twice'
+    STUCK = 'stuck=PARAMETER', 'writes to the parameter have no effect', str
+    REFUSE = 'refuse=PARAMETER', 'writes to the parameter are refused, as the protocol can', str
+    TRIP = ('trip[=SECONDS]', 'fault of the drive itself; cannot be reset before the seconds are '
+            'over', _seconds)
+    RESTART = ('restart[=SECONDS]', 'power is lost and back; deaf for 0.5 s, or as long as it '
+               'says', _seconds)
+    POWER_CUT = 'power_cut[=SECONDS]', 'the same for 5 s, or as long as it says', _seconds
+    FORGET = 'forget[=SECONDS]', 'restart with empty maps', _seconds
+    OFF = 'off', 'no power, until ok or restart'
+    OK = 'ok', 'all faults end'
+
+    def __init__(self, usage: str, meaning: str,
+                 convert: Callable[[str], Argument] | None = None) -> None:
+        self.usage, self.meaning, self.convert = usage, meaning, convert
+        self.word = usage.partition('=')[0].rstrip('[')
+        self.required = convert is not None and '[' not in usage
 
 
-_RULES = {
-    FaultKind.SILENT: _Rule('silent', 'obeys, but answers nothing'),
-    FaultKind.LATE: _Rule('late=SECONDS', 'answers that much later (0 to 3600)', True, _seconds),
-    FaultKind.DROP: _Rule('drop=N', 'every Nth answer is lost (1: all)', True, _count),
-    FaultKind.LENGTH: _Rule('length=BYTES', 'answers have 0 to 8 data bytes', True, _bytes),
-    FaultKind.FOREIGN: _Rule('foreign', 'frames nobody should send accompany the answers'),
-    FaultKind.DUPLICATE: _Rule('duplicate', 'each answer is sent twice'),
-    FaultKind.STUCK: _Rule('stuck=PARAMETER', 'writes to the parameter have no effect', True, str),
-    FaultKind.REFUSE: _Rule('refuse=PARAMETER', 'writes to the parameter are refused (as far as '
-                            'the protocol can)', True, str),
-    FaultKind.TRIP: _Rule('trip[=SECONDS]', 'fault of the drive itself; cannot be reset before '
-                          'the seconds are over', False, _seconds),
-    FaultKind.RESTART: _Rule('restart[=SECONDS]', 'power is lost and back; deaf for 0.5 s, or as '
-                             'long as it says', False, _seconds),
-    FaultKind.POWER_CUT: _Rule('power_cut[=SECONDS]', 'the same for 5 s, or as long as it says',
-                               False, _seconds),
-    FaultKind.FORGET: _Rule('forget[=SECONDS]', 'restart with empty maps', False, _seconds),
-    FaultKind.OFF: _Rule('off', 'no power, until ok or restart'),
-    FaultKind.OK: _Rule('ok', 'all faults end'),
-}
-_BY_NAME = {kind.value: kind for kind in FaultKind}
-USAGE = tuple((rule.usage, rule.meaning) for rule in _RULES.values())
+_BY_WORD = {kind.word: kind for kind in FaultKind}
+USAGE = tuple((kind.usage, kind.meaning) for kind in FaultKind)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Fault:
     """A fault to be played, with its argument where it has one."""
 
     kind: FaultKind
-    argument: float | int | str | None = None
+    argument: Argument | None = None
 
     def __str__(self) -> str:
         """Write the fault as it is read."""
-        return self.kind.value if self.argument is None else f'{self.kind.value}={self.argument}'
+        return self.kind.word if self.argument is None else f'{self.kind.word}={self.argument}'
 
     @property
     def number(self) -> float | None:
         """The argument of a fault that takes seconds or a count."""
-        return None if self.argument is None or isinstance(self.argument, str) else self.argument
+        return None if isinstance(self.argument, str) else self.argument
 
 
 def parse_fault(text: str) -> Fault:
@@ -113,24 +88,22 @@ def parse_fault(text: str) -> Fault:
 
     :raises ValueRefused: unknown, or its argument is missing or wrong; says what is allowed.
     """
-    name, equals, argument = text.strip().partition('=')
-    name, argument = name.strip(), argument.strip()
-    kind = _BY_NAME.get(name)
+    word, equals, argument = (part.strip() for part in text.partition('='))
+    kind = _BY_WORD.get(word)
     if kind is None:
-        near = difflib.get_close_matches(name, _BY_NAME, 1)
+        near = difflib.get_close_matches(word, _BY_WORD, 1)
         hint = f' (nearest: {near[0]})' if near else ''
-        raise ValueRefused(f"unknown fault '{name}'{hint}; allowed: "
+        raise ValueRefused(f"unknown fault '{word}'{hint}; allowed: "
                            f"{', '.join(usage for usage, _ in USAGE)}")
-    rule = _RULES[kind]
-    if not equals and not rule.required:
+    if not equals and not kind.required:
         return Fault(kind)
-    if rule.convert is None or not argument:
-        raise ValueRefused(f"'{text.strip()}' is not a fault, write {rule.usage}")
+    if kind.convert is None or not argument:
+        raise ValueRefused(f"'{text.strip()}' is not a fault, write {kind.usage}")
     try:
-        return Fault(kind, rule.convert(argument))
+        return Fault(kind, kind.convert(argument))
     except ValueError:
-        raise ValueRefused(f"'{argument}' is not possible, write {rule.usage}: "
-                           f'{rule.meaning}') from None
+        raise ValueRefused(f"'{argument}' is not possible, write {kind.usage}: "
+                           f'{kind.meaning}') from None
 
 
 class AnswerFaults:

@@ -102,18 +102,18 @@ class MotorPlant:
         if quantity is Quantity.FAULT_CODE:
             return lambda: FAULT_CODE if self.operation.faulted else 0
         full = scales.rating(parameter, quantity)
-        if quantity is Quantity.VOLTAGE:
-            if {'motor', 'output'} & set(parameter.name.split('_')):
-                return lambda: full * 0.7 * abs(motor.share_of_rated_speed)
-            return lambda: full * (1.0 - 0.02 * motor.current + MAINS_SWING * math.sin(
-                MAINS_RATE * (self.now or 0.0)))
-        if quantity is Quantity.TORQUE:
-            return lambda: full * motor.torque
-        if quantity is Quantity.POWER:
-            return lambda: full * motor.torque * motor.share_of_rated_speed
-        if quantity is Quantity.LOAD:
-            return lambda: full * abs(motor.torque)
-        return lambda: full * motor.current
+        shares: dict[Quantity, Callable[[], float]] = {
+            Quantity.TORQUE: lambda: motor.torque,
+            Quantity.POWER: lambda: motor.torque * motor.share_of_rated_speed,
+            Quantity.LOAD: lambda: abs(motor.torque),
+            Quantity.CURRENT: lambda: motor.current,
+            Quantity.VOLTAGE: lambda: 1.0 - 0.02 * motor.current + MAINS_SWING * math.sin(
+                MAINS_RATE * (self.now or 0.0)),
+        }
+        share = shares[quantity]
+        if quantity is Quantity.VOLTAGE and names.words_of(parameter) & {'motor', 'output'}:
+            share = lambda: 0.7 * abs(motor.share_of_rated_speed)  # noqa: E731
+        return lambda: full * share()
 
     def allows(self, parameter: Parameter, raw: int) -> bool:
         """Accept any value within the limits."""

@@ -16,44 +16,33 @@ from drive_can_bridge.core.parameters import Parameter
 
 
 class Quantity(Enum):
-    """What a parameter measures."""
+    """What a parameter measures, and the words that say so."""
 
-    SPEED = 'speed'
-    POSITION = 'position'
-    TORQUE = 'torque'
-    TEMPERATURE = 'temperature'
-    VOLTAGE = 'voltage'
-    POWER = 'power'
-    LOAD = 'load'
-    CURRENT = 'current'
-    FAULT_CODE = 'fault code'
+    # in this order: a "current_position" is a position, a "torque_current" follows the torque
+    SPEED = 'speed', 'velocity', 'frequency', 'rpm'
+    POSITION = 'position', 'angle'
+    TORQUE = 'torque', 'force'
+    TEMPERATURE = 'temperature',
+    VOLTAGE = 'voltage',
+    POWER = 'power',
+    LOAD = 'load', 'utilisation', 'utilization'
+    CURRENT = 'current',
+    FAULT_CODE = ()
 
 
-# In this order: a "current_position" is a position, a "torque_current" follows the torque.
-_QUANTITY_WORDS: tuple[tuple[Quantity, frozenset[str]], ...] = (
-    (Quantity.SPEED, frozenset(('speed', 'velocity', 'frequency', 'rpm'))),
-    (Quantity.POSITION, frozenset(('position', 'angle'))),
-    (Quantity.TORQUE, frozenset(('torque', 'force'))),
-    (Quantity.TEMPERATURE, frozenset(('temperature',))),
-    (Quantity.VOLTAGE, frozenset(('voltage',))),
-    (Quantity.POWER, frozenset(('power',))),
-    (Quantity.LOAD, frozenset(('load', 'utilisation', 'utilization'))),
-    (Quantity.CURRENT, frozenset(('current',))),
-)
-# A "nominal_current" or "speed_limit" is a setting, even where it is read-only.
-_SETTING_WORDS = frozenset(('limit', 'maximum', 'minimum', 'max', 'min', 'nominal', 'rated',
-                            'reference', 'threshold', 'setpoint', 'target', 'command'))
-_LIMIT_WORDS = frozenset(('limit', 'maximum', 'minimum', 'max', 'min'))
-_QUANTITIES_BY_UNIT = {
+_MOVING = (Quantity.SPEED, Quantity.POSITION)
+_UNITS = {
     **dict.fromkeys(('rpm', '1/min', 'min-1', 'rev/s', 'rad/s', 'deg/s', 'mm/s', 'm/s'),
                     Quantity.SPEED),
     **dict.fromkeys(('rev', 'rad', 'deg', '°', 'mm', 'm'), Quantity.POSITION),
 }
-_FAULT_WORDS = frozenset(('fault', 'error', 'alarm'))
-_CODE_WORDS = frozenset(('code', 'number'))
-
+_LIMIT_WORDS = frozenset(('limit', 'maximum', 'minimum', 'max', 'min'))
+# A "nominal_current" or "speed_limit" is a setting, even where it is read-only.
+_SETTING_WORDS = _LIMIT_WORDS | {'nominal', 'rated', 'reference', 'threshold', 'setpoint',
+                                 'target', 'command'}
 _SETPOINT = re.compile(
     r'(?:setpoint|target|reference)_(?P<after>.+)|(?P<before>.+)_(?:setpoint|reference|command)')
+_ACTUALS = ('actual_{}', '{}_actual', 'actual_value_{}', 'motor_{}', '{}_feedback')
 
 
 class Pair(NamedTuple):
@@ -61,13 +50,6 @@ class Pair(NamedTuple):
 
     setpoint: Parameter
     actual: Parameter
-
-
-class RampKind(Enum):
-    """What a ramp parameter says: seconds from 0 to the rated speed, or a rate."""
-
-    TIME = 'time'
-    RATE = 'rate'
 
 
 class RampUse(Enum):
@@ -80,34 +62,35 @@ class RampUse(Enum):
 
 
 class RampParameter(NamedTuple):
-    """A parameter that sets a ramp."""
+    """
+    A parameter that sets a ramp.
+
+    :param is_time: seconds from 0 to the rated speed; False: a rate.
+    """
 
     parameter: Parameter
-    kind: RampKind
+    is_time: bool
     use: RampUse
 
 
 def quantity_of(parameter: Parameter) -> Quantity | None:
     """Tell what a parameter measures, or None."""
-    words = _words(parameter)
-    if words & _FAULT_WORDS and words & _CODE_WORDS:
+    words = words_of(parameter)
+    if words & {'fault', 'error', 'alarm'} and words & {'code', 'number'}:
         return Quantity.FAULT_CODE
-    for quantity, names in _QUANTITY_WORDS:
-        if words & names:
-            return quantity
-    return None
-
-
-def measured(parameter: Parameter) -> Quantity | None:
-    """Tell what a read-only parameter shows of the motor; None for settings and the rest."""
-    if parameter.writable or _words(parameter) & _SETTING_WORDS:
-        return None
-    return quantity_of(parameter)
+    return next((quantity for quantity in Quantity if words.intersection(quantity.value)), None)
 
 
 def quantity_by_unit(parameter: Parameter) -> Quantity | None:
     """Tell what a parameter that is exchanged cyclically means, if its name does not."""
-    return _QUANTITIES_BY_UNIT.get(parameter.unit)
+    return _UNITS.get(parameter.unit)
+
+
+def measured(parameter: Parameter) -> Quantity | None:
+    """Tell what a read-only parameter shows of the motor; None for settings and the rest."""
+    if parameter.writable or words_of(parameter) & _SETTING_WORDS:
+        return None
+    return quantity_of(parameter)
 
 
 def mover(candidates: Sequence[Parameter], cyclic: Sequence[Parameter], control: str | None,
@@ -121,33 +104,13 @@ def mover(candidates: Sequence[Parameter], cyclic: Sequence[Parameter], control:
     :param control: name of the control parameter.
     :return: the setpoint, and whether it is a speed or a position.
     """
-    kinds = (Quantity.SPEED, Quantity.POSITION)
-    requested = [p for p in cyclic if p.name != control and not _words(p) & _LIMIT_WORDS]
-    for parameter in requested:
+    for parameter in cyclic:
         quantity = quantity_of(parameter) or quantity_by_unit(parameter)
-        if quantity in kinds:
+        if (quantity in _MOVING and parameter.name != control
+                and not words_of(parameter) & _LIMIT_WORDS):
             return parameter, quantity
-    for kind in kinds:
-        for parameter in candidates:
-            if quantity_of(parameter) is kind:
-                return parameter, kind
-    return None, None
-
-
-def crossings(parameters: Mapping[str, Parameter]) -> dict[str, list[tuple[str, str]]]:
-    """
-    Find settings of which one must not exceed the other: ``minimum_speed``, ``maximum_speed``.
-
-    :return: names of the lower and the upper end, by the name of either.
-    """
-    found: dict[str, list[tuple[str, str]]] = {}
-    for low in parameters.values():
-        high = parameters.get(re.sub('min(imum)?(?=_|$)', r'max\1', low.name, count=1)
-                              if _words(low) & {'minimum', 'min'} else '')
-        if high is not None and low.writable and high.writable and low.unit == high.unit:
-            for end in (low, high):
-                found.setdefault(end.name, []).append((low.name, high.name))
-    return found
+    return next(((parameter, kind) for kind in _MOVING for parameter in candidates
+                 if quantity_of(parameter) is kind), (None, None))
 
 
 def pairs(parameters: Mapping[str, Parameter], *, without: str | None = None) -> list[Pair]:
@@ -166,7 +129,7 @@ def pairs(parameters: Mapping[str, Parameter], *, without: str | None = None) ->
             continue
         match = _SETPOINT.fullmatch(parameter.name)
         subject = parameter.name if match is None else match['after'] or match['before']
-        for pattern in ('actual_{}', '{}_actual', 'actual_value_{}', 'motor_{}', '{}_feedback'):
+        for pattern in _ACTUALS:
             actual = parameters.get(pattern.format(subject))
             if actual is not None and not actual.writable:
                 found.append(Pair(parameter, actual))
@@ -186,23 +149,38 @@ def ramp_parameters(parameters: Mapping[str, Parameter]) -> list[RampParameter]:
     """Find ``ramp_time``, ``acceleration_time``, ``ramp_down_time``, ``deceleration`` …."""
     found = []
     for parameter in parameters.values():
-        words = _words(parameter)
-        ramp = 'ramp' in words
+        words = words_of(parameter)
+        rate = bool(words & {'acceleration', 'deceleration'})
+        if not parameter.writable or words & _SETTING_WORDS or not (rate or 'ramp' in words):
+            continue
         rising = bool(words & {'acceleration', 'up', 'rising', 'start'})
         falling = bool(words & {'deceleration', 'down', 'falling', 'stop', 'braking', 'brake'})
-        rate = bool(words & {'acceleration', 'deceleration'})
-        if not parameter.writable or words & _SETTING_WORDS or not (ramp or rate):
-            continue
         use = RampUse.BOTH
         if 'quick' in words:
             use = RampUse.QUICK_STOP
         elif rising is not falling:
             use = RampUse.RISING if rising else RampUse.FALLING
-        seconds = 'time' in words or parameter.unit in ('s', 'ms')
-        found.append(RampParameter(parameter,
-                                   RampKind.TIME if seconds or not rate else RampKind.RATE, use))
+        is_time = 'time' in words or parameter.unit in ('s', 'ms') or not rate
+        found.append(RampParameter(parameter, is_time, use))
     return found
 
 
-def _words(parameter: Parameter) -> frozenset[str]:
+def crossings(parameters: Mapping[str, Parameter]) -> dict[str, list[tuple[str, str]]]:
+    """
+    Find settings of which one must not exceed the other: ``minimum_speed``, ``maximum_speed``.
+
+    :return: names of the lower and the upper end, by the name of either.
+    """
+    found: dict[str, list[tuple[str, str]]] = {}
+    for low in parameters.values():
+        name = re.sub('(^|_)min(imum)?(?=_|$)', r'\1max\2', low.name, count=1)
+        high = parameters.get(name) if name != low.name else None
+        if high is not None and low.writable and high.writable and low.unit == high.unit:
+            for end in (low, high):
+                found.setdefault(end.name, []).append((low.name, high.name))
+    return found
+
+
+def words_of(parameter: Parameter) -> frozenset[str]:
+    """Return the words between the underscores of a name."""
     return frozenset(parameter.name.split('_'))

@@ -11,7 +11,7 @@ import math
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.simulation.names import Quantity
 
-#: revolutions per second at a speed of 1 in the unit; one pole pair
+#: revolutions per second at a speed of 1 in the unit; one pole pair, 10 mm per revolution
 _REVOLUTIONS = {
     'rpm': 1.0 / 60.0, '1/min': 1.0 / 60.0, 'min-1': 1.0 / 60.0,
     'Hz': 1.0, 'rev/s': 1.0, '1/s': 1.0,
@@ -48,6 +48,11 @@ def rated_speed(setpoint: Parameter) -> float:
     return highest(setpoint)
 
 
+def travel_speed(setpoint: Parameter) -> float:
+    """Return how fast a position moves, per s: over all its range, or 25 revolutions."""
+    return min(highest(setpoint), _RATED_REVOLUTIONS * per_revolution(setpoint))
+
+
 def revolutions_per_unit(speed: Parameter, rated: float) -> float:
     """Return revolutions per second at a speed of one unit."""
     return _REVOLUTIONS.get(speed.unit, _RATED_REVOLUTIONS / rated)
@@ -63,7 +68,7 @@ def speed_value(parameter: Parameter, revolutions: float, share: float) -> float
 
 def position_value(parameter: Parameter, revolutions: float) -> float:
     """Express a position; it wraps where the parameter ends, as counters do."""
-    value = revolutions * _per_revolution(parameter)
+    value = revolutions * per_revolution(parameter)
     low, high = sorted(raw * parameter.scale + parameter.offset
                        for raw in parameter.type.raw_range)
     if parameter.minimum is not None and parameter.maximum is not None:
@@ -72,23 +77,17 @@ def position_value(parameter: Parameter, revolutions: float) -> float:
     return low + math.fmod(math.fmod(value - low, span) + span, span)
 
 
-def revolutions_per_position(parameter: Parameter) -> float:
-    """Return the revolutions that a change of position by one unit stands for."""
-    return 1.0 / _per_revolution(parameter)
-
-
-def travel_speed(setpoint: Parameter) -> float:
-    """Return how fast a position moves, per s: over all its range, or 25 revolutions."""
-    return min(highest(setpoint), _RATED_REVOLUTIONS * _per_revolution(setpoint))
+def per_revolution(parameter: Parameter) -> float:
+    """Return by how much a position changes in one revolution."""
+    return _PER_REVOLUTION.get(
+        parameter.unit, 1.0 if parameter.scaled else _INCREMENTS_PER_REVOLUTION)
 
 
 def temperature_value(parameter: Parameter, celsius: float) -> float:
     """Express a temperature."""
     if parameter.unit == 'K':
         return celsius + 273.15
-    if parameter.unit in ('°F', 'degF', 'F'):
-        return celsius * 1.8 + 32.0
-    return celsius
+    return celsius * 1.8 + 32.0 if parameter.unit in ('°F', 'degF', 'F') else celsius
 
 
 def rating(parameter: Parameter, quantity: Quantity) -> float:
@@ -97,11 +96,6 @@ def rating(parameter: Parameter, quantity: Quantity) -> float:
     # a voltage hardly exceeds its rating, everything else may double
     headroom = 1.2 if quantity is Quantity.VOLTAGE else 2.0
     return min(wanted, highest(parameter) / headroom)
-
-
-def _per_revolution(parameter: Parameter) -> float:
-    return _PER_REVOLUTION.get(
-        parameter.unit, 1.0 if parameter.scaled else _INCREMENTS_PER_REVOLUTION)
 
 
 class RawRange:
@@ -116,17 +110,14 @@ class RawRange:
         self.low, self.high = parameter.type.raw_range
         if not limits or parameter.type is ParameterType.BOOL:
             return
-        ends = [(limit - parameter.offset) / parameter.scale
-                for limit in (parameter.minimum, parameter.maximum) if limit is not None]
-        lower, upper = parameter.minimum, parameter.maximum
-        if parameter.scale < 0.0:
-            lower, upper = upper, lower
-            ends.reverse()
+        ends = [None if limit is None else (limit - parameter.offset) / parameter.scale
+                for limit in (parameter.minimum, parameter.maximum)]
+        lower, upper = ends if parameter.scale > 0.0 else ends[::-1]
         # rounded to the inside, except where the limit is a raw step but for float noise
         if upper is not None:
-            self.high = max(self.low, min(self.high, math.floor(ends[-1] + 1e-6)))
+            self.high = max(self.low, min(self.high, math.floor(upper + 1e-6)))
         if lower is not None:
-            self.low = min(self.high, max(self.low, math.ceil(ends[0] - 1e-6)))
+            self.low = min(self.high, max(self.low, math.ceil(lower - 1e-6)))
 
     def clamp(self, raw: int) -> int:
         """Return the allowed raw integer nearest to another one."""

@@ -39,29 +39,17 @@ class PlayedDrive:
         self._touch = player.touch
 
     def fault(self, fault: str | Fault) -> None:
-        """
-        Play a fault, ``late=0.15``; ``ok`` ends all.
-
-        :raises ValueRefused: there is no such fault, or it does not suit this drive.
-        """
+        """Play a fault, ``late=0.15``; ``ok`` ends all. See :meth:`.SimulatedDrive.fault`."""
         with self._touch() as now:
             self.drive.fault(fault, now)
 
     def value(self, name: str) -> Value:
-        """
-        Return a register as a physical value.
-
-        :raises ValueRefused: there is no such register.
-        """
+        """Return a register as a physical value. See :meth:`.SimulatedDrive.value`."""
         with self._touch() as now:
             return self.drive.value(name, now)
 
     def set_value(self, name: str, value: Value) -> None:
-        """
-        Set a register, read-only ones included; an actual value is held there.
-
-        :raises ValueRefused: there is no such register, or the value does not fit.
-        """
+        """Set a register, read-only ones included. See :meth:`.SimulatedDrive.set_value`."""
         with self._touch() as now:
             self.drive.set_value(name, value, now)
 
@@ -131,7 +119,7 @@ class Simulation:
         self._players = {
             bus.name: BusPlayer(
                 bus, [drive for drive in drives.values() if drive.configuration.bus == bus.name],
-                open_bus=open_bus or open_port, say=say or _drop,
+                open_bus=open_bus or open_port, say=say or (lambda line: None),
                 complain=complain or _to_standard_error, show_frame=show_frame)
             for bus in configuration.buses.values()}
         self.drives = {
@@ -169,10 +157,6 @@ class Simulation:
     def __exit__(self, *_: Any) -> None:
         """Stop."""
         self.stop()
-
-
-def _drop(line: str) -> None:
-    """Ignore a line."""
 
 
 def _to_standard_error(line: str) -> None:

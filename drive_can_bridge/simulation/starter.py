@@ -114,6 +114,11 @@ class Starter:
         return self._on_for is not None and self._on_for < START_TIME
 
     @property
+    def alarm(self) -> bool:
+        """The motor is close to a trip."""
+        return self.thermal >= ALARM_LEVEL
+
+    @property
     def time_to_trip(self) -> float:
         """Time in s until this current would trip; infinity: never."""
         final = self._final_level

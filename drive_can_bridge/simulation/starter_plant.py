@@ -19,7 +19,7 @@ from drive_can_bridge.simulation.plant import Mechanics
 from drive_can_bridge.simulation.registers import Registers
 from drive_can_bridge.simulation.scales import RawRange
 from drive_can_bridge.simulation.starter import (
-    ALARM_LEVEL, Starter, StarterOperation, TEST_TRIP, THERMAL_OVERLOAD,
+    Starter, StarterOperation, TEST_TRIP, THERMAL_OVERLOAD,
 )
 from drive_can_bridge.simulation.status import State, StatusWord
 
@@ -171,44 +171,34 @@ class StarterPlant:
     def _figures(self) -> dict[int | None, Callable[[], float]]:
         """Return what gives the contents of registers."""
         starter = self.starter
-        return {
-            450: lambda: math.ceil(self._wait_time()),
+        found: dict[int | None, Callable[[], float]] = {
+            450: lambda: math.ceil(starter.time_to_reset) if self.operation.faulted else 0,
             451: lambda: self.trip_code,
             452: lambda: _bit_of(self.trip_code),
-            453: lambda: 0,
-            456: lambda: 0,
-            457: lambda: 0,
             458: self._outputs,
             459: self._outputs,
-            460: lambda: THERMAL_OVERLOAD if self._alarm() else 0,
-            461: lambda: _bit_of(THERMAL_OVERLOAD) if self._alarm() else 0,
-            462: lambda: 0,
-            463: lambda: 0,
+            460: lambda: THERMAL_OVERLOAD if starter.alarm else 0,
+            461: lambda: _bit_of(THERMAL_OVERLOAD) if starter.alarm else 0,
             465: lambda: starter.thermal,
-            466: lambda: 100.0 * starter.ratio,
-            467: lambda: 101.0 * starter.ratio,
-            468: lambda: 99.0 * starter.ratio,
-            469: lambda: 100.0 * starter.ratio,
-            470: lambda: 0,
             471: lambda: 1 if starter.current else 0,
             472: lambda: 32.0 + 0.1 * starter.thermal,
             474: lambda: 100.0 * MAINS_FREQUENCY,
             475: lambda: 10.0 * (100.0 + 0.8 * starter.thermal),
-            476: self._voltage,
-            477: lambda: 0.998 * self._voltage(),
-            478: lambda: 1.002 * self._voltage(),
-            479: self._voltage,
             481: lambda: 100.0 * POWER_FACTOR if starter.current else 0,
             482: lambda: self._power(POWER_FACTOR),
             483: lambda: self._power(math.sqrt(1.0 - POWER_FACTOR ** 2)),
-            500: lambda: 100.0 * starter.current,
-            502: lambda: 101.0 * starter.current,
-            504: lambda: 99.0 * starter.current,
-            506: lambda: 100.0 * starter.current,
-            508: lambda: 0,
             511: lambda: min(starter.time_to_trip, NEVER),
             NODE_ADDRESS: lambda: self._node,
         }
+        # no trips and alarms of these groups, no inputs, nothing to ground
+        found.update(dict.fromkeys((453, 456, 457, 462, 463, 470, 508), lambda: 0))
+        # the average and the three phases, in % of the full load current, in 0.01 A, in V
+        for place, share in enumerate((1.0, 1.01, 0.99, 1.0)):
+            found[466 + place] = _scaled(100.0 * share, lambda: starter.ratio)
+            found[500 + 2 * place] = _scaled(100.0 * share, lambda: starter.current)
+        for place, share in enumerate((1.0, 0.998, 1.002, 1.0)):
+            found[476 + place] = _scaled(share, self._voltage)
+        return found
 
     def _state(self) -> State:
         operation = self.operation
@@ -222,7 +212,7 @@ class StarterPlant:
             not operation.faulted,
             operation.enabled,
             operation.faulted,
-            self._alarm(),
+            self.starter.alarm,
             operation.faulted,
             operation.faulted and operation.reset_allowed(self._now or 0.0),
             True,
@@ -233,16 +223,7 @@ class StarterPlant:
         return word | (1 << 15 if self.starter.starting else 0)
 
     def _outputs(self) -> int:
-        operation = self.operation
-        if not operation.enabled:
-            return 0
-        return 1 << 1 if operation.reverse else 1 << 0
-
-    def _alarm(self) -> bool:
-        return self.starter.thermal >= ALARM_LEVEL
-
-    def _wait_time(self) -> float:
-        return self.starter.time_to_reset if self.operation.faulted else 0.0
+        return (1 << self.operation.reverse) if self.operation.enabled else 0
 
     def _voltage(self) -> float:
         return MAINS_VOLTAGE * (1.0 + MAINS_SWING * math.sin(MAINS_RATE * (self._now or 0.0)))
@@ -259,6 +240,10 @@ def register_number(parameter: Parameter) -> int | None:
     if parameter.index is None:
         return None
     return register_of(parameter.index, parameter.subindex or 0)
+
+
+def _scaled(factor: float, figure: Callable[[], float]) -> Callable[[], float]:
+    return lambda: factor * figure()
 
 
 def _bit_of(code: int) -> int:

@@ -17,7 +17,7 @@ from drive_can_bridge.core.profile import StatusPattern
 from drive_can_bridge.simulation import names, scales
 from drive_can_bridge.simulation.datamodel_extended import SimulatedDataModelDrive
 from drive_can_bridge.simulation.motor import AMBIENT_TEMPERATURE, Motor, Ramp, Rates
-from drive_can_bridge.simulation.names import Quantity, RampKind, RampUse
+from drive_can_bridge.simulation.names import Quantity, RampUse
 
 RATES = Rates(rising=10.0, falling=20.0)
 
@@ -117,17 +117,17 @@ class TestNames:
         assert (pair.setpoint.name, pair.actual.name) == (setpoint, actual)
         assert names.pairs(table, without=setpoint) == []
 
-    @pytest.mark.parametrize(('name', 'unit', 'kind', 'use'), [
-        ('ramp_time', 's', RampKind.TIME, RampUse.BOTH),
-        ('acceleration_time', 'ms', RampKind.TIME, RampUse.RISING),
-        ('ramp_down_time', 's', RampKind.TIME, RampUse.FALLING),
-        ('deceleration', 'rpm/s', RampKind.RATE, RampUse.FALLING),
-        ('acceleration', '', RampKind.RATE, RampUse.RISING),
-        ('quick_stop_ramp', 's', RampKind.TIME, RampUse.QUICK_STOP),
+    @pytest.mark.parametrize(('name', 'unit', 'is_time', 'use'), [
+        ('ramp_time', 's', True, RampUse.BOTH),
+        ('acceleration_time', 'ms', True, RampUse.RISING),
+        ('ramp_down_time', 's', True, RampUse.FALLING),
+        ('deceleration', 'rpm/s', False, RampUse.FALLING),
+        ('acceleration', '', False, RampUse.RISING),
+        ('quick_stop_ramp', 's', True, RampUse.QUICK_STOP),
     ])
-    def test_ramps(self, name: str, unit: str, kind: RampKind, use: RampUse) -> None:
+    def test_ramps(self, name: str, unit: str, is_time: bool, use: RampUse) -> None:
         made = parameter(name, 1, unit=unit)
-        assert names.ramp_parameters({name: made}) == [(made, kind, use)]
+        assert names.ramp_parameters({name: made}) == [(made, is_time, use)]
 
     def test_what_is_no_ramp(self) -> None:
         for made in (parameter('ramp_time', 1, access=RO), parameter('ramp_limit', 1),

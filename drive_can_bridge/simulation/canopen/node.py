@@ -1,44 +1,48 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-A simulated CANopen node: NMT, heartbeat, emergencies, SDO server, and what every node has.
+A simulated CANopen node: NMT, heartbeat, emergencies, SDO server, and the objects of every node.
 
-A drive composes one of these and keeps its PDOs to itself.
+A drive composes one of these and keeps its PDOs to itself (CiA 301).
 """
 
 import math
 
 from drive_can_bridge.core.frame import Frame, Route, STANDARD_IDENTIFIER_MAX
 from drive_can_bridge.protocols.canopen_pkw import abort_codes, network
-from drive_can_bridge.protocols.canopen_pkw.network import Emergency, NmtCommand
-from drive_can_bridge.simulation.canopen.nmt import NmtNode
+from drive_can_bridge.protocols.canopen_pkw.network import Emergency, NmtCommand, NmtState
 from drive_can_bridge.simulation.canopen.sdo import checked_length, Objects, Refused, SdoServer
 
 SDO_REQUEST_BASE = 0x600
 SDO_RESPONSE_BASE = 0x580
 HEARTBEAT_TIME = (0x1017, 0)
 
-_RESETS = (NmtCommand.RESET_NODE, NmtCommand.RESET_COMMUNICATION)
+_NO_ERROR = Emergency(network.NO_ERROR)
+_STATES = {NmtCommand.START: NmtState.OPERATIONAL, NmtCommand.STOP: NmtState.STOPPED,
+           NmtCommand.ENTER_PRE_OPERATIONAL: NmtState.PRE_OPERATIONAL}
 
 
-class CanopenNode(Objects):
+class CanopenNode:
     """
     One node.
 
     :param heartbeat: ms between heartbeats after power came on; 0: none.
     :param name: object 1008h.
     :param objects: all objects that are not in here.
-    :ivar nmt: its state.
-    :ivar error: the emergency last told; that of code 0: none.
+    :ivar state: boot-up: without power, or still starting.
     """
 
     def __init__(self, number: int, *, heartbeat: int, name: bytes, objects: Objects) -> None:
         self.number = number
-        self.nmt = NmtNode(number, heartbeat)
-        self.error = Emergency(network.NO_ERROR)
+        self.state = NmtState.BOOT_UP
         self.request_identifier = SDO_REQUEST_BASE + number
+        self._default_heartbeat = self._heartbeat = heartbeat
         self._name = name
         self._objects = objects
         self._server = SdoServer(self)
+        self._error = _NO_ERROR
+        #: when the boot-up frame is due; -infinity: as soon as somebody looks
+        self._boots_at = -math.inf
+        self._beats_at = math.inf
         self._now = -math.inf
 
     @staticmethod
@@ -49,6 +53,19 @@ class CanopenNode(Objects):
         return [Route(identifier, STANDARD_IDENTIFIER_MAX, False) for identifier in (
             network.NMT_IDENTIFIER, *(base + number for base in own))]
 
+    @property
+    def communicates(self) -> bool:
+        """Takes and sends SDOs and emergencies."""
+        return self.state in (NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL)
+
+    def start(self, ready_at: float) -> None:
+        """Begin anew; the boot-up frame leaves when the node is ready, at infinity: never."""
+        self.state = NmtState.BOOT_UP
+        self._heartbeat = self._default_heartbeat
+        self._boots_at, self._beats_at = ready_at, math.inf
+        self._server.reset()
+        self._error = _NO_ERROR
+
     def obey(self, data: bytes) -> NmtCommand | None:
         """
         Obey an NMT command, if it is for this node.
@@ -57,61 +74,77 @@ class CanopenNode(Objects):
         :raises RemoteProtocolError: not two bytes.
         """
         command, number = network.decode_nmt(data)
-        if number not in (0, self.number):
-            return None
-        if command in _RESETS:
-            return NmtCommand(command)
-        self.nmt.command(command)
+        if number in (0, self.number):
+            if command in (NmtCommand.RESET_NODE, NmtCommand.RESET_COMMUNICATION):
+                return NmtCommand(command)
+            if self.state is not NmtState.BOOT_UP and command in list(NmtCommand):
+                self.state = _STATES[NmtCommand(command)]
         return None
 
     def serve(self, data: bytes, now: float) -> list[Frame]:
         """Answer an SDO request."""
         self._now = now
         response = self._server.answer(data)
-        if response is None:
-            return []
-        return [Frame(SDO_RESPONSE_BASE + self.number, response, False)]
+        return [] if response is None else [
+            Frame(SDO_RESPONSE_BASE + self.number, response, False)]
 
     def tell(self, error: Emergency) -> list[Frame]:
         """Return the emergency message, unless that is what was told last."""
-        if not self.nmt.communicates or error.code == self.error.code:
+        if not self.communicates or error.code == self._error.code:
             return []
-        self.error = error
+        self._error = error
         return [network.encode_emergency(self.number, error)]
 
-    def start(self, ready_at: float) -> None:
-        """Begin anew: power came on, or communication was reset."""
-        self.nmt.start(ready_at)
-        self._server.reset()
-        self.error = Emergency(network.NO_ERROR)
+    # -- time -------------------------------------------------------------------------------------
+
+    def next_timer(self) -> float:
+        """Return when :meth:`handle_timer` has something to do."""
+        return min(self._boots_at, self._beats_at)
+
+    def handle_timer(self, now: float) -> list[Frame]:
+        """Return the boot-up frame or the heartbeat that is due."""
+        if self._boots_at <= now:
+            self._boots_at = math.inf
+            self.state = NmtState.PRE_OPERATIONAL
+            self._plan_heartbeat(now)
+            return [network.encode_heartbeat(self.number, NmtState.BOOT_UP)]
+        if self._beats_at <= now:
+            # late ones are left out, the beat is kept
+            period = self._heartbeat / 1000.0
+            self._beats_at += period * (math.floor((now - self._beats_at) / period) + 1)
+            return [network.encode_heartbeat(self.number, self.state)]
+        return []
+
+    def _plan_heartbeat(self, now: float) -> None:
+        self._beats_at = now + self._heartbeat / 1000.0 if self._heartbeat else math.inf
 
     # -- the object dictionary --------------------------------------------------------------------
 
     def read(self, index: int, subindex: int) -> bytes:
-        """Return the content of an object. See the base class."""
-        found = self._own().get((index, subindex))
-        if found is not None:
-            return found
-        self._check_subindex(index)
-        return self._objects.read(index, subindex)
+        """Return the content of an object. See :class:`.Objects`."""
+        own = self._own()
+        return own[index, subindex] if (index, subindex) in own else (
+            self._beyond(index).read(index, subindex))
 
     def write(self, index: int, subindex: int, data: bytes) -> None:
-        """Write an object. See the base class."""
+        """Write an object. See :class:`.Objects`."""
         if (index, subindex) == HEARTBEAT_TIME:
-            self.nmt.set_heartbeat(int.from_bytes(checked_length(data, 2), 'little'), self._now)
-            return
-        if (index, subindex) in self._own():
+            self._heartbeat = int.from_bytes(checked_length(data, 2), 'little')
+            self._plan_heartbeat(self._now)
+        elif (index, subindex) in self._own():
             raise Refused(abort_codes.WRITE_OF_READ_ONLY)
-        self._check_subindex(index)
-        self._objects.write(index, subindex, data)
+        else:
+            self._beyond(index).write(index, subindex, data)
 
-    def _check_subindex(self, index: int) -> None:
+    def _beyond(self, index: int) -> Objects:
+        """Return the objects of the device, where an index is none of this node's."""
         if any(place == index for place, _ in self._own()):
             raise Refused(abort_codes.NO_SUCH_SUBINDEX)
+        return self._objects
 
     def _own(self) -> dict[tuple[int, int], bytes]:
         """Return the objects that every node has: device type, errors, name, identity …."""
-        code, register, _ = self.error
+        code, register, _ = self._error
         return {
             (0x1000, 0): bytes(4),
             (0x1001, 0): bytes((register,)),
@@ -119,7 +152,7 @@ class CanopenNode(Objects):
             (0x1003, 1): code.to_bytes(4, 'little'),
             (0x1008, 0): self._name,
             (0x1014, 0): (network.EMERGENCY_BASE + self.number).to_bytes(4, 'little'),
-            HEARTBEAT_TIME: self.nmt.heartbeat.to_bytes(2, 'little'),
+            HEARTBEAT_TIME: self._heartbeat.to_bytes(2, 'little'),
             (0x1018, 0): bytes((1,)),
             (0x1018, 1): bytes(4),
         }

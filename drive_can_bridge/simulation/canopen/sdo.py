@@ -6,7 +6,7 @@ Block transfer is refused, and so are segmented writes: no object here is longer
 and may be written.
 """
 
-from abc import ABC, abstractmethod
+from typing import Protocol
 
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.protocols.canopen_pkw import abort_codes
@@ -35,24 +35,14 @@ class Refused(DriveCanError):
         self.code = code
 
 
-class Objects(ABC):
-    """The object dictionary behind a server."""
+class Objects(Protocol):
+    """An object dictionary. Both raise :class:`Refused`."""
 
-    @abstractmethod
     def read(self, index: int, subindex: int) -> bytes:
-        """
-        Return the content of an object.
+        """Return the content of an object."""
 
-        :raises Refused: there is none, or it cannot be read.
-        """
-
-    @abstractmethod
     def write(self, index: int, subindex: int, data: bytes) -> None:
-        """
-        Write an object.
-
-        :raises Refused: there is none, or it does not take the data.
-        """
+        """Write an object."""
 
 
 class SdoServer:
@@ -61,43 +51,41 @@ class SdoServer:
     def __init__(self, objects: Objects) -> None:
         self._objects = objects
         self._address = b'\0\0\0'
-        self._rest: bytes | None = None
+        self._rest = b''
         self._toggle = 0
 
     def reset(self) -> None:
         """Forget a transfer under way."""
-        self._rest = None
+        self._rest = b''
 
     def answer(self, request: bytes) -> bytes | None:
         """Return the response to a request; None: there is none."""
         if len(request) != LENGTH:
             return None
         command = request[0] >> 5
-        if command == ABORT:
+        if command != UPLOAD_SEGMENT:
             self.reset()
+        if command == ABORT:
             return None
         if command != UPLOAD_SEGMENT:
             self._address = request[1:4]
-            self.reset()
+        place = int.from_bytes(self._address[:2], 'little'), self._address[2]
         try:
             if command == UPLOAD:
-                return self._upload()
+                return self._upload(self._objects.read(*place))
             if command == UPLOAD_SEGMENT:
                 return self._upload_segment(request[0])
             if command == DOWNLOAD and request[0] & EXPEDITED:
-                return self._download(request)
+                unused = request[0] >> 2 & 0x03 if request[0] & SIZE_GIVEN else 0
+                self._objects.write(*place, request[4:LENGTH - unused])
+                return bytes((RESPONSE_DOWNLOAD,)) + self._address + bytes(4)
             raise Refused(abort_codes.UNKNOWN_COMMAND)
         except Refused as error:
             self.reset()
             return (bytes((RESPONSE_ABORT,)) + self._address
                     + error.code.to_bytes(4, 'little'))
 
-    @property
-    def _place(self) -> tuple[int, int]:
-        return int.from_bytes(self._address[:2], 'little'), self._address[2]
-
-    def _upload(self) -> bytes:
-        data = self._objects.read(*self._place)
+    def _upload(self, data: bytes) -> bytes:
         if len(data) <= EXPEDITED_MAX:
             unused = EXPEDITED_MAX - len(data)
             head = RESPONSE_UPLOAD | unused << 2 | EXPEDITED | SIZE_GIVEN
@@ -107,22 +95,15 @@ class SdoServer:
                 + len(data).to_bytes(4, 'little'))
 
     def _upload_segment(self, head: int) -> bytes:
-        if self._rest is None:
+        if not self._rest:
             raise Refused(abort_codes.UNKNOWN_COMMAND)
         if head & TOGGLE != self._toggle:
             raise Refused(abort_codes.TOGGLE_NOT_ALTERNATED)
-        segment, rest = self._rest[:SEGMENT_MAX], self._rest[SEGMENT_MAX:]
+        segment, self._rest = self._rest[:SEGMENT_MAX], self._rest[SEGMENT_MAX:]
         unused = SEGMENT_MAX - len(segment)
-        response = bytes((self._toggle | unused << 1 | (not rest),)) + segment + bytes(unused)
-        self._rest, self._toggle = rest or None, self._toggle ^ TOGGLE
-        return response
-
-    def _download(self, request: bytes) -> bytes:
-        size = EXPEDITED_MAX
-        if request[0] & SIZE_GIVEN:
-            size -= request[0] >> 2 & 0x03
-        self._objects.write(*self._place, request[4:4 + size])
-        return bytes((RESPONSE_DOWNLOAD,)) + self._address + bytes(4)
+        response = bytes((self._toggle | unused << 1 | (not self._rest),))
+        self._toggle ^= TOGGLE
+        return response + segment + bytes(unused)
 
 
 def checked_length(data: bytes, length: int) -> bytes:
@@ -131,8 +112,6 @@ def checked_length(data: bytes, length: int) -> bytes:
 
     :raises Refused: too long or too short.
     """
-    if len(data) > length:
-        raise Refused(TYPE_TOO_LONG)
-    if len(data) < length:
-        raise Refused(TYPE_TOO_SHORT)
+    if len(data) != length:
+        raise Refused(TYPE_TOO_LONG if len(data) > length else TYPE_TOO_SHORT)
     return data
