@@ -15,8 +15,6 @@ from drive_can_bridge.protocols.datamodel.extended import SLOTS
 from drive_can_bridge.protocols.datamodel.mapping import effective, padded
 from drive_can_bridge.simulation.registers import Registers
 
-#: what unused bytes of a response hold, since the manual calls them undetermined
-JUNK = bytes([0xA5]) * 8
 # Times are compared with this much tolerance: 1.02 - 1.0 is less than 0.02.
 _CLOCK_TOLERANCE = 1e-6
 

@@ -7,8 +7,7 @@ from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.errors import ConfigurationError
 from drive_can_bridge.simulation.cannord import SimulatedCannordInverter
 from drive_can_bridge.simulation.canopen_pkw import SimulatedPkwDrive
-from drive_can_bridge.simulation.datamodel_extended import SimulatedDataModelDrive
-from drive_can_bridge.simulation.datamodel_standard import SimulatedDataModelStandardDrive
+from drive_can_bridge.simulation.datamodel import SimulatedDataModelDrive
 from drive_can_bridge.simulation.drive import EEPROM_TIME, SimulatedDrive, Surroundings
 from drive_can_bridge.simulation.plant import Mechanics, PlantFactory
 
@@ -16,7 +15,7 @@ SIMULATED_DRIVES: Mapping[str, type[SimulatedDrive]] = {
     'cannord': SimulatedCannordInverter,
     'canopen_pkw': SimulatedPkwDrive,
     'datamodel_extended': SimulatedDataModelDrive,
-    'datamodel_standard': SimulatedDataModelStandardDrive,
+    'datamodel_standard': SimulatedDataModelDrive,
 }
 
 

@@ -74,7 +74,9 @@ class StarterPlant:
         self._control = configuration.profile.control
         self._cause = 0
         self._now: float | None = None
-        self._by_register = {register_number(p): p.name for p in registers.parameters.values()}
+        # of several names for a register the first counts, as everywhere
+        self._by_register = {register_number(p): p.name
+                             for p in reversed(list(registers.parameters.values()))}
 
     # -- what the registers accept ----------------------------------------------------------------
 

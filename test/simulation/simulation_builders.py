@@ -12,7 +12,7 @@ from drive_can_bridge.core.configuration import (
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Access, Parameter, ParameterType, Storage
 from drive_can_bridge.core.profile import ControlTable, StatusPattern
-from drive_can_bridge.simulation.datamodel_extended import SimulatedDataModelDrive
+from drive_can_bridge.simulation.datamodel import SimulatedDataModelDrive
 from drive_can_bridge.simulation.drive import Surroundings
 from drive_can_bridge.simulation.plant import Mechanics
 

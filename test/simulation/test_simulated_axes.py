@@ -9,7 +9,7 @@ from simulation_builders import (
 
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import ParameterType
-from drive_can_bridge.simulation.datamodel_extended import SimulatedDataModelDrive
+from drive_can_bridge.simulation.datamodel import SimulatedDataModelDrive
 from drive_can_bridge.simulation.motor import Travel
 from drive_can_bridge.simulation.plant import Mechanics
 

@@ -22,7 +22,7 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import LocalProtocolError, ValueRefused
 from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.simulation.datamodel_standard import SimulatedDataModelStandardDrive
+from drive_can_bridge.simulation.datamodel import SimulatedDataModelDrive
 from drive_can_bridge.simulation.drive import Surroundings
 from drive_can_bridge.simulation.drives import make_drives
 
@@ -43,9 +43,9 @@ def standard(parameters: Iterable[Parameter] = EXAMPLE, **options: Any) -> Drive
 
 
 def drive(parameters: Iterable[Parameter] = EXAMPLE, *, neighbours: Iterable[Route] = (),
-          **options: Any) -> SimulatedDataModelStandardDrive:
+          **options: Any) -> SimulatedDataModelDrive:
     """Make an 11-bit drive."""
-    return SimulatedDataModelStandardDrive(
+    return SimulatedDataModelDrive(
         standard(parameters, **options), Surroundings(neighbours=tuple(neighbours)))
 
 
@@ -71,7 +71,7 @@ def register_name(number: int) -> str:
     return f'p{number}' if 122 <= number <= 129 else f'reg_{number}'
 
 
-def plain_drive(row: dict[str, Any]) -> SimulatedDataModelStandardDrive:
+def plain_drive(row: dict[str, Any]) -> SimulatedDataModelDrive:
     """Make a drive whose parameters are plain registers, with the addresses of the vector."""
     fields = row['fields']
     address = fields.get('address', 1)
@@ -437,7 +437,7 @@ def test_spoilt_answers(fault: str, answers: list[str]) -> None:
     assert ask(made, READ_RAMP, 1.0) == answers
 
 
-def foreign(made: SimulatedDataModelStandardDrive, question: str) -> list[str]:
+def foreign(made: SimulatedDataModelDrive, question: str) -> list[str]:
     """Return the foreign frames that come with three answers."""
     made.fault('foreign', 0.0)
     found = [ask(made, question, 1.0) for _ in range(3)]
@@ -479,7 +479,7 @@ def test_drives_of_a_bus_know_each_other() -> None:
     second = standard(name='second', station=9)
     third = configuration(name='third', station=1)
     drives = make_drives(bridge(first, second, third))
-    assert isinstance(drives['first'], SimulatedDataModelStandardDrive)
+    assert isinstance(drives['first'], SimulatedDataModelDrive)
     assert Route(0x7F9, 0x7FF, False) in drives['first'].surroundings.neighbours
     assert Route(0x3F9, 0x7FF, False) in drives['first'].surroundings.neighbours
     assert any(route.extended for route in drives['first'].surroundings.neighbours)

@@ -389,7 +389,7 @@ class TestConfigurationMode:
 
     def made(self) -> Ltmr:
         """Return a controller whose profile has register 601."""
-        parameters = {**LTMR.parameters, 'configuration': Parameter(
+        parameters = {**PLAIN.parameters, 'configuration': Parameter(
             'configuration', number=601, storage=Storage.EEPROM)}
         return Ltmr(replace(LTMR, parameters=parameters))
 

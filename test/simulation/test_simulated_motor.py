@@ -15,7 +15,7 @@ from simulation_builders import (
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.core.profile import StatusPattern
 from drive_can_bridge.simulation import names, scales
-from drive_can_bridge.simulation.datamodel_extended import SimulatedDataModelDrive
+from drive_can_bridge.simulation.datamodel import SimulatedDataModelDrive
 from drive_can_bridge.simulation.motor import AMBIENT_TEMPERATURE, Motor, Ramp, Rates
 from drive_can_bridge.simulation.names import Quantity, RampUse
 

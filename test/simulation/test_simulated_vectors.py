@@ -14,7 +14,7 @@ import pytest
 from simulation_builders import drive, parameter, RAM
 
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.simulation.datamodel_extended import SimulatedDataModelDrive
+from drive_can_bridge.simulation.datamodel import SimulatedDataModelDrive
 
 VECTORS = json.loads((Path(__file__).parents[1] / 'vectors' / 'datamodel.json').read_text(
     encoding='utf-8'))['vectors']
