@@ -130,7 +130,8 @@ class StandardWire(Wire):
         if turn == 2:
             others = [answer.identifier ^ bit for bit in (8, 4, 2, 1)]
             return [Frame(other, FOREIGN, False) for other in others if other != self._request]
-        return [] if self._request == 0x701 else [Frame(0x701, b'\x05', False)]
+        own = (self._request, self._response)
+        return [] if 0x701 in own else [Frame(0x701, b'\x05', False)]
 
 
 def wire_of(configuration: DriveConfiguration) -> Wire:
