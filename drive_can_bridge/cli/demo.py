@@ -26,7 +26,8 @@ PARAMETER_FILE = 'demo.yaml'
 
 def add_parser(subparsers: Any) -> None:
     """Add the subcommand to the parser of ``drive_can``."""
-    faults = '\n'.join(f'  {usage:17}  {meaning}' for usage, meaning in USAGE)
+    width = max(len(usage) for usage, _ in USAGE)
+    faults = '\n'.join(f'  {usage:{width}}  {meaning}' for usage, meaning in USAGE)
     parser = subparsers.add_parser(
         'demo', help='run a bridge, simulated drives and the live view of them',
         description='Run simulated drives, a bridge for them and the view of drive_can monitor, '

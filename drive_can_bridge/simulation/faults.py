@@ -44,7 +44,7 @@ class FaultKind(Enum):
     FOREIGN = 'foreign', 'frames nobody should send accompany the answers'
     DUPLICATE = 'duplicate', 'each answer is sent twice'
     STUCK = 'stuck=PARAMETER', 'writes to the parameter have no effect', str
-    REFUSE = 'refuse=PARAMETER', 'writes to the parameter are refused, as the protocol can', str
+    REFUSE = 'refuse=PARAMETER', 'writes to it are refused, as far as the protocol can', str
     TRIP = ('trip[=SECONDS]', 'fault of the drive itself; cannot be reset before the seconds are '
             'over', _seconds)
     RESTART = ('restart[=SECONDS]', 'power is lost and back; deaf for 0.5 s, or as long as it '

@@ -8,6 +8,7 @@ within :meth:`BusPlayer.touch`.
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+import math
 import threading
 
 from drive_can_bridge.core.configuration import BusConfiguration
@@ -105,10 +106,11 @@ class BusPlayer:
                             drive.handle_timer(now)
                     notices = self._pump(self._drives)
                     self._wake_at = min(
-                        (drive.next_timer() for drive in self._drives), default=now + 1.0)
+                        (drive.next_timer() for drive in self._drives), default=math.inf)
                 for notice in notices:
                     self._say(notice)
-                self._alarm.wait(min(max(self._wake_at - steady_now(), 0.0), 1.0))
+                self._alarm.wait(None if self._wake_at == math.inf else
+                                 max(self._wake_at - steady_now(), 0.0))
                 self._alarm.clear()
         except Exception as error:  # noqa: BLE001  the outermost loop: end with a line of text
             self.link_failed(f'{type(error).__name__}: {error}')

@@ -60,6 +60,16 @@ class TestTravel:
         travel.go(1.0, -100.0, 10.0, 10.0)
         assert (travel.position, travel.speed) == (10.0, 0.0)
 
+    def test_a_target_within_its_braking_distance_is_passed_and_reached_from_behind(self) -> None:
+        travel = Travel()
+        travel.go(1.0, 100.0, 10.0, 10.0)
+        assert (travel.position, travel.speed) == (5.0, 10.0)
+        # 7 lies ahead, but it cannot stand before 10
+        travel.go(1.0, 7.0, 10.0, 10.0)
+        assert (travel.position, travel.speed) == (10.0, 0.0)
+        travel.go(10.0, 7.0, 10.0, 10.0)
+        assert (travel.position, travel.speed) == (7.0, 0.0)
+
     @given(st.lists(st.tuples(st.floats(0.0, 3.0), st.floats(-50.0, 50.0)), max_size=20))
     def test_it_does_not_matter_how_often_time_passes(
             self, steps: list[tuple[float, float]]) -> None:

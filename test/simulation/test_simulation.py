@@ -119,6 +119,13 @@ def test_late_answers_come_by_themselves(scripted: Scripted) -> None:
     assert time.monotonic() - begin >= 0.2
 
 
+def test_what_a_fault_makes_a_drive_send_is_sent_at_once() -> None:
+    made = Scripted(configuration((), protocol='cannord', station=100, request=(), response=()))
+    with made.simulation:
+        made.simulation.drives['conveyor'].fault('trip')
+        wait_for(lambda: made.ports[0].sent == [frame('0C9#380B0000')], 'telegram')
+
+
 def test_values_by_name(scripted: Scripted) -> None:
     conveyor = scripted.simulation.drives['conveyor']
     conveyor.set_value('speed_setpoint', 30.0)
