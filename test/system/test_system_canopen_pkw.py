@@ -7,6 +7,7 @@ from typing import Any
 from parameter_files import bridge_file
 from processes import Client, Process, Processes, Simulator
 from slcan_peer import Peer
+from waiting import wait_for
 
 PUMP: dict[str, Any] = {
     'bus': 'main', 'protocol': 'canopen_pkw', 'station': 5, 'profile': 'tesys_t_ltmr',
