@@ -6,7 +6,7 @@ from dataclasses import replace
 from builders import Conversation
 from pkw_builders import (
     ANSWER_0, ANSWER_1, CONTROL, DISABLE_0, DISABLE_1, DISABLED_0, DISABLED_1, ENABLE_0, ENABLE_1,
-    ENABLED_0, ENABLED_1, IDLE, IDLE_ANSWER, READ_0, READ_1, ready, running, RUNS_0, RUNS_1, START,
+    ENABLED_1, IDLE, IDLE_ANSWER, READ_0, READ_1, ready, running, RUNS_0, RUNS_1, START,
     started, TABLE, TRIPPED_0, WORD,
 )
 import pytest
