@@ -4,8 +4,13 @@ A session under anything that may happen, in any order: what is the same for eve
 
 A family adds its drive (what it does with a frame, and says) and an observer, who sees nothing but
 frames and knows the protocol's bytes and the contract, nothing of the session's inside.
+
+Where the bus may refuse frames (``AnyOrder.bus_may_refuse``), the observer keeps books of those
+that left by :meth:`Observer.tells`; whenever an exchange has ended, whatever was told to run must
+have been told to stop, or a warning has said that it may still be running.
 """
 
+from collections import deque
 from collections.abc import Sequence
 import math
 from typing import Any, ClassVar
@@ -13,8 +18,8 @@ from typing import Any, ClassVar
 from hypothesis import settings, strategies as st
 from hypothesis.stateful import invariant, precondition, rule, RuleBasedStateMachine
 
-from drive_can_bridge.core.control import ControlAction
-from drive_can_bridge.core.events import RequestCompleted
+from drive_can_bridge.core.control import ControlAction, ControlCompleted
+from drive_can_bridge.core.events import Noted, RequestCompleted
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.requests import BUSY, Failure, ReadRequest, WriteRequest
@@ -34,16 +39,43 @@ class Observer:
 
     :param timeout: command_timeout in s.
     :param immediate: whether any command arms.
+    :param control: whether commands count only while the drive is enabled.
     """
 
-    def __init__(self, *, timeout: float = 0.0, immediate: bool = False) -> None:
+    def __init__(self, *, timeout: float = 0.0, immediate: bool = False,
+                 control: bool = False) -> None:
         self.timeout = timeout
         self.immediate = immediate
+        self.control = control
+        #: ``enable`` is the last word that left, and the drive may have said that it is enabled
+        self.enabled = False
+        #: the drive has said that it has a fault
+        self.faulted = False
         self.active = self.bus = self.online = False
         self.asked: Any = None      # what the session waits for an answer to
         self.raws = [0, 0]
         self.since = [-math.inf, -math.inf]
         self.armed = [False, False]
+        #: what the drive was told to run by, by frames that left, and not told to stop since
+        self.running: set[object] = set()
+        #: a warning has said since that it may still be running
+        self.warned = False
+
+    def tells(self, what: object, *, runs: bool) -> None:
+        """
+        Take note of what a frame that has left tells the drive.
+
+        :param what: which of the things that travel separately.
+        :param runs: anything but neutral and ``disable``.
+        """
+        if runs:
+            self.running.add(what)
+            self.warned = False
+        else:
+            self.running.discard(what)
+
+    def refused(self, sent: Frame, now: float) -> None:
+        """Take note of a frame that the bus did not take."""
 
     def sees(self, sent: Frame, now: float) -> None:
         """Check a frame that the session sends."""
@@ -52,6 +84,10 @@ class Observer:
     def disarm(self) -> None:
         """Take note that no command counts any more, nor the drive's being there."""
         self.online = False
+        self.disable()
+
+    def disable(self) -> None:
+        """Take note that no command counts, although the drive may be there."""
         self.armed = [False, False]
         self.raws = [0, 0]
 
@@ -77,11 +113,25 @@ class Observer:
     def time_was_lost(self, session: Any) -> None:
         """Take note that the session is about to be told that time was lost."""
 
-    def commanded(self, index: int, raw: int, outcome: CommandOutcome, now: float) -> None:
+    def commanded(self, index: int, raw: int, outcome: CommandOutcome, now: float, *,
+                  neutral: bool | None = None) -> None:
+        """
+        Check what became of a command.
+
+        :param neutral: whether it arms; None: 0 and one raw step do.
+        """
         if not self.online or not self.active:
-            assert outcome is CommandOutcome.NOT_ARMED
+            assert outcome is CommandOutcome.NOT_ARMED or (
+                outcome is CommandOutcome.DISABLED and not self.active)
             return
-        if not self.armed[index] and not self.immediate and abs(raw) > 1:
+        if self.control:
+            if outcome is CommandOutcome.DISABLED or (
+                    outcome is CommandOutcome.NOT_ARMED and self.faulted):
+                self.disable()
+                return
+            assert self.enabled, 'commands count while it is enabled by our word, and only then'
+        neutral = abs(raw) <= 1 if neutral is None else neutral
+        if not self.armed[index] and not self.immediate and not neutral:
             assert outcome is CommandOutcome.NOT_ARMED
             return
         assert outcome is (CommandOutcome.ACCEPTED if self.armed[index] else CommandOutcome.ARMED)
@@ -103,6 +153,8 @@ class AnyOrder(RuleBasedStateMachine):
     writable: ClassVar[Sequence[Parameter]]
     #: s after which a session that was told to stop has stopped
     stop_takes: ClassVar[float] = 1.0
+    #: the bus refuses a frame now and then
+    bus_may_refuse: ClassVar[bool] = False
 
     session: Any = None
     observer: Any
@@ -115,6 +167,8 @@ class AnyOrder(RuleBasedStateMachine):
         self.open: list[ReadRequest | WriteRequest] = []
         self.tickets: list[object] = []
         self.unanswered: list[Frame] = []
+        self.fates: deque[bool] = deque()   # of the next frames: whether the bus takes them
+        self.refusals = 0
 
     # -- what a family says -----------------------------------------------------------------------
 
@@ -137,6 +191,27 @@ class AnyOrder(RuleBasedStateMachine):
 
     def look(self, *, silent: bool = False) -> None:
         """Fetch and check everything that the session gives out."""
+        any_sent = False
+        while True:
+            self.look_at_events()
+            sent = self.session.take_frames()
+            if not sent:
+                break
+            assert not silent
+            refused = [place for place in range(len(sent))
+                       if self.fates and not self.fates.popleft()]
+            for place, entry in enumerate(sent):
+                if place in refused:
+                    self.observer.refused(entry, self.now)
+                else:
+                    any_sent = True
+                    self.observer.sees(entry, self.now)
+                    self.apply(entry)
+            self.refusals += len(refused)
+            self.session.frames_left(self.now, refused)
+        self.looked(any_sent)
+
+    def look_at_events(self) -> None:
         for event in self.session.take_events():
             if isinstance(event, RequestCompleted):
                 assert event.request in self.open, 'one answer per request'
@@ -144,16 +219,17 @@ class AnyOrder(RuleBasedStateMachine):
                 assert len(event.outcomes) == len(event.request)
                 self.completed(event)
             else:
+                if isinstance(event, Noted) and event.warning and (
+                        'may still be running' in event.text):
+                    self.observer.warned = True
                 self.happened(event)
         for outcome in self.session.take_control_outcomes():
             assert outcome.ticket in self.tickets, 'one answer per control request'
             self.tickets.remove(outcome.ticket)
-        sent = self.session.take_frames()
-        assert not (silent and sent)
-        for entry in sent:
-            self.observer.sees(entry, self.now)
-            self.apply(entry)
-        self.looked(bool(sent))
+            self.answered(outcome)
+
+    def answered(self, outcome: ControlCompleted) -> None:
+        """Take note of the end of a control request."""
 
     def looked(self, sent: bool) -> None:
         """Check what is to be checked after each look; ``sent``: whether there were frames."""
@@ -239,12 +315,46 @@ class AnyOrder(RuleBasedStateMachine):
     def wanted(self, action: ControlAction) -> None:
         """Take note of something that the session agreed to try."""
 
+    # -- a bus that refuses -----------------------------------------------------------------------
+
+    @precondition(lambda self: self.bus_may_refuse)
+    @rule(fates=st.lists(st.booleans(), min_size=1, max_size=6))
+    def bus_refuses_some(self, fates: list[bool]) -> None:
+        self.fates.extend(fates)
+
+    @precondition(lambda self: self.bus_may_refuse)
+    @rule(count=st.integers(1, 40))
+    def bus_refuses_all(self, count: int) -> None:
+        self.fates.extend([False] * count)
+
+    @precondition(lambda self: self.fates)
+    @rule()
+    def bus_takes_all(self) -> None:
+        self.fates.clear()
+
     # -- the life of a session --------------------------------------------------------------------
 
     @rule(kind=st.integers(0, 5))
     def upset(self, kind: int) -> None:
         (self.bus_goes_up, self.bus_goes_down, self.activate, self.deactivate,
          self.deactivate_to_the_end, self.time_is_lost)[kind]()
+
+    @precondition(lambda self: self.bus_may_refuse)
+    @rule(kind=st.sampled_from([4, 1, 3, 0, 2, 5, 4]), steps=st.integers(0, 4),
+          answering=st.booleans(), refused=st.sampled_from([0, 400, 1, 3, 10, 400]))
+    def ends_while_it_runs(self, kind: int, steps: int, answering: bool, refused: int) -> None:
+        """Chance alone would hardly ever end the exchange with a drive that runs."""
+        self.fates.clear()
+        if not self.session.online or not self.observer.active:
+            self.all_is_well()
+        self.have_it_run()
+        self.fates.extend([False] * refused)
+        self.time_passes_in_time(steps, answering)
+        self.upset(kind)
+
+    def have_it_run(self) -> None:
+        """Enable the drive and command it, as users do."""
+        raise NotImplementedError
 
     @precondition(lambda self: not self.session.online)
     @rule()
@@ -267,6 +377,8 @@ class AnyOrder(RuleBasedStateMachine):
         self.look()
 
     def bus_goes_down(self) -> None:
+        if self.observer.active:
+            self.observer.warned = False
         self.session.bus_down(self.now, 'unplugged')
         self.observer.bus_went_down()
         self.observer.bus = False
@@ -278,11 +390,14 @@ class AnyOrder(RuleBasedStateMachine):
 
     def activate(self) -> None:
         self.observer.active = True
+        self.observer.running.clear()   # what this activation has told is what counts
         self.observer.activated()
         self.session.activate(self.now)
         self.look()
 
     def deactivate(self) -> None:
+        if self.observer.active:
+            self.observer.warned = False
         self.observer.active = False
         self.observer.deactivated(self.session)
         self.session.deactivate(self.now)
@@ -290,11 +405,16 @@ class AnyOrder(RuleBasedStateMachine):
         assert not self.open
 
     def deactivate_to_the_end(self) -> None:
+        refusals = self.refusals
         self.deactivate()
         end = self.now + self.stop_takes
         while self.session.next_timer() <= end:
             self.now = max(self.now, self.session.next_timer())
             self.timer()
+        if not self.session.stopped:
+            assert self.refusals > refusals, 'an unblocked bus is enough to stop'
+            self.session.give_up(self.now)
+            self.look(silent=True)
         assert self.session.stopped
         assert self.session.next_timer() == math.inf
         assert not self.tickets
@@ -314,3 +434,8 @@ class AnyOrder(RuleBasedStateMachine):
         assert not self.session.take_frames()
         if not self.session.online:
             assert not any(item.armed for item in self.session.setpoints.items)
+
+    @invariant()
+    def whatever_was_told_to_run_is_told_to_stop(self) -> None:
+        if self.session is not None and self.session.stopped:
+            assert not self.observer.running or self.observer.warned, 'an exchange has ended'

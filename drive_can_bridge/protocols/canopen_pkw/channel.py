@@ -117,8 +117,14 @@ class Channel:
         return len(self._queues[Lane.USERS].waiting)
 
     def cancel(self, lane: Lane) -> None:
-        """Forget the procedures of a lane; a request under way is still waited for."""
+        """
+        Forget the procedures of a lane.
+
+        A request under way is still waited for; one for which function 00h goes first is not sent.
+        """
         self._queues[lane].clear()
+        if self._serving is lane:
+            self.mailbox.abandon(math.inf)
 
     def clear(self) -> None:
         """Forget everything under way. Nobody is told: that is the caller's business."""

@@ -116,6 +116,8 @@ class Mailbox:
         self._deadline = math.inf
         self._abandoned = False
         self._refused_at: float | None = None   # the bus did not take the request
+        self._late = False                      # at first
+        self._patience = 0.0                    # s that an answer has if it did at once
 
     @property
     def busy(self) -> bool:
@@ -125,7 +127,7 @@ class Mailbox:
     @property
     def deadline(self) -> float:
         """When ``handle_timer`` has something to do; infinity: never."""
-        if self._refused_at is None:
+        if self._refused_at is None or not self._waits_for_nobody:
             return self._deadline
         return min(self._deadline, self._refused_at + REFUSED_PAUSE)
 
@@ -205,25 +207,33 @@ class Mailbox:
         self._step = None
         self._request = None
         self._deadline = math.inf
-        self._abandoned = False
+        self._abandoned = self._late = False
         self._refused_at = None
 
     def _left(self, sent: bool, now: float) -> None:
-        """Take note of a write that the bus refused; a read ends when its time is over."""
-        if sent or self._request is None or not isinstance(self._step, Write):
+        """Take note of a request that the bus refused; or took, if late, after all."""
+        if self._request is None:
+            return
+        if sent:
+            if self._late:
+                self._deadline = max(self._deadline, now + 0.5 * self._patience)
             return
         self._refused_at = now
         if self._request.code != Function.NONE:
             self._toggle = not self._toggle     # the device has not seen this one
 
+    @property
+    def _waits_for_nobody(self) -> bool:
+        return isinstance(self._step, Write) and self._step.blind
+
     def _try_again(self, step: Step, refused_at: float, now: float) -> Reply | None:
-        """Go on with a write that the bus has refused: it is no write."""
-        if not (isinstance(step, Write) and step.blind) or self._abandoned or (
-                now >= self._deadline):
+        """Go on after a refusal: a read ends when its time is over, a write at once."""
+        again = self._waits_for_nobody
+        if now >= self._deadline or self._abandoned or isinstance(step, Write) and not again:
             self._end()     # what the device's last function byte is, is as known as before
             return Silence(sent=False, refused=True)
-        if now >= refused_at + REFUSED_PAUSE:
-            deadline, self._refused_at = self._deadline, None
+        if again and now >= refused_at + REFUSED_PAUSE:
+            deadline, self._refused_at, self._late = self._deadline, None, True
             self._send_step(step, now)
             self._deadline = deadline
         return None
@@ -237,5 +247,6 @@ class Mailbox:
         else:
             self._request = pkw.write_request(step.address, step.words, self._toggle)
             timeout = timeout if step.timeout is None else step.timeout
+        self._patience = timeout
         self._deadline = now + timeout
         self._send(self._request, self._left)

@@ -18,7 +18,7 @@ from hypothesis import given, strategies as st
 from hypothesis.stateful import initialize, precondition, rule
 import pytest
 
-from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.control import ControlAction, ControlCompleted
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.events import (
     ProcessDataReceived, RequestCompleted, StationFound, StationLost,
@@ -39,13 +39,15 @@ class CannordObserver(Observer):
     """Checks every frame that the session sends."""
 
     def __init__(self, *, period: float, timeout: float, immediate: bool, extra: bool) -> None:
-        super().__init__(timeout=timeout, immediate=immediate)
+        super().__init__(timeout=timeout, immediate=immediate, control=True)
         self.period = period
         self.extra = extra
         self.farewell = 0
         self.cycled_at = -math.inf
         self.extra_due = False
         self.may_run = False
+        self.word = 0x047E          # the last one that left
+        self.main_left = True       # of this cycle
         self.written: set[bytes] = set()
         self.acknowledged: set[int] = set()
 
@@ -75,18 +77,45 @@ class CannordObserver(Observer):
             return
         assert not self.extra_due
         self.extra_due = self.extra
+        self.main_left = True
         assert len(data) == 8
-        assert now >= self.cycled_at + 0.5 * min(self.period, 0.1) - SLACK, 'a burst'
-        self.cycled_at = now
         words = [int.from_bytes(data[place:place + 2], 'little') for place in (0, 2, 4, 6)]
-        assert words[1:] == [*self.expected(now), 0]
         assert words[0] in (0x047E, 0x047F, 0x047A, 0x04FE)
+        stops = words in ([0x047E, 0, 0, 0], [0x047A, 0, 0, 0])
+        spacing = 0.005 if stops else 0.5 * min(self.period, 0.1)
+        assert now >= self.cycled_at + min(spacing, 0.5 * self.period) - SLACK, 'a burst'
+        self.cycled_at = now
+        if words[0] != 0x047F:
+            self.disable()
+        if words[0] != self.word:
+            self.enabled = False
+        self.word = words[0]
+        assert words[1:] == [*self.expected(now), 0]
+        self.tells('cycle', runs=words != [0x047E, 0, 0, 0])
         if words[0] == 0x047F:
             assert self.may_run, 'nothing but ~/enable starts a drive'
         if not self.active:
             assert self.farewell > 0, 'nothing after the stop'
             self.farewell -= 1
             assert words == [0x047E, 0, 0, 0]
+
+    def refused(self, sent: Frame, now: float) -> None:
+        if sent.identifier != 0x002:
+            return
+        if len(sent.data) == 5:
+            assert self.extra_due
+            self.extra_due = False
+            if not self.active and self.main_left:
+                self.farewell += 1      # half a cycle is none
+        else:
+            assert not self.extra_due
+            self.extra_due = self.extra
+            self.main_left = False
+
+    def hears_status(self, word: int) -> None:
+        self.faulted = bool(word & 8)
+        if self.word == 0x047F and word & 0x7F == 0x37:
+            self.enabled = True
 
     def sees_task(self, data: bytes, now: float) -> None:
         assert self.active
@@ -128,6 +157,7 @@ class CannordObserver(Observer):
 class SessionMachine(AnyOrder):
     """Everything that may happen to a session."""
 
+    bus_may_refuse = True
     readable = (*PARAMETERS, RAW, ACTUAL, FREQUENCY)
     writable = (ACCELERATION, ACCELERATION_2, OFFSET, COUNTER, RAW, ACTUAL)
 
@@ -146,6 +176,8 @@ class SessionMachine(AnyOrder):
         self.start(session, CannordObserver(
             period=period, timeout=timeout, immediate=immediate, extra=extra))
         self.status = 0x0B31
+        self.obeys = False          # it enables and disables operation as it is told
+        self.succeeded: list[ControlAction] = []
         self.next_value = 1
         self.heard: set[int] = set()
 
@@ -187,6 +219,8 @@ class SessionMachine(AnyOrder):
         if identifier == 0x002 and len(data) == 5:
             self.hears(Frame(0x003, b'\x01\x00\x02\x00\xA5', False))
         elif identifier == 0x002:
+            if self.obeys:
+                self.status = 0x0B37 if data[:2] == b'\x7f\x04' else 0x0B31
             self.hears(Frame(0x003, self.status.to_bytes(2, 'little') + data[2:], False))
         else:
             task = data[1] >> 4
@@ -198,10 +232,27 @@ class SessionMachine(AnyOrder):
 
     @rule(status=st.sampled_from(STATUS))
     def drive_changes(self, status: int) -> None:
+        self.obeys = False
         self.status = status
+
+    def have_it_run(self) -> None:
+        self.unanswered.clear()
+        self.obeys = True
+        self.time_passes_in_time(12, True)
+        self.succeeded.clear()
+        self.control(ControlAction.ENABLE)
+        self.time_passes_in_time(12, True)
+        if ControlAction.ENABLE not in self.succeeded or not self.observer.enabled:
+            return      # a stop was under way, or an answer was late
+        self.command(0, 0.0)
+        assert self.observer.armed[0]
+        self.command(0, 12.5)
+        self.time_passes_in_time(3, True)
+        assert self.observer.running or not self.observer.armed[0]
 
     @rule()
     def drive_faults(self) -> None:
+        self.obeys = False
         self.status = 0x0B38
         self.hears(Frame(0x003, bytes.fromhex('380B000000000000'), False))
 
@@ -218,6 +269,7 @@ class SessionMachine(AnyOrder):
         if heard.identifier == 0x003 and not heard.extended and len(heard.data) in (4, 8):
             word = int.from_bytes(heard.data[:2], 'little')
             self.heard.add(word)
+            self.observer.hears_status(word)
             if word & 8 and self.observer.online:
                 self.observer.may_run = False
         if heard.identifier == 0x203 and not heard.extended:
@@ -250,6 +302,10 @@ class SessionMachine(AnyOrder):
         self.next_value += 1    # each value is written once: so repetitions are seen
         return self.next_value & 0x7FFF
 
+    def answered(self, outcome: ControlCompleted) -> None:
+        if outcome.success:
+            self.succeeded.append(outcome.ticket.action)
+
     def wanted(self, action: ControlAction) -> None:
         if action is ControlAction.ENABLE:
             self.observer.may_run = True
@@ -257,6 +313,7 @@ class SessionMachine(AnyOrder):
             self.observer.may_run = False
 
     def drive_is_well(self) -> None:
+        self.fates.clear()
         self.status = 0x0B31
         super().drive_is_well()
 

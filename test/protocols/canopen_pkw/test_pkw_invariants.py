@@ -20,11 +20,12 @@ from pkw_builders import (
 )
 import pytest
 
-from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.control import ControlAction, ControlCompleted
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.events import RequestCompleted, StationFound, StationLost
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.requests import WriteRequest, Written
+from drive_can_bridge.core.session import DriveState
 from drive_can_bridge.protocols.families import FAMILIES
 
 FAMILY = FAMILIES['canopen_pkw']
@@ -33,6 +34,8 @@ READS = {0x25, 0x26}
 WRITES = {0x2A, 0x2B}
 SETPOINTS = {710: 0, 712: 1}
 WORD = 704
+#: numbers of what makes it stand still, as bytes
+STOPS = (b'\xC0\x02', b'\xC6\x02', b'\xC8\x02')
 
 
 class Device:
@@ -43,6 +46,7 @@ class Device:
             (455, 456, 465, 500, 501, 606, 652, 653, 704, 710, 712, 720, 721, 730), 0)
         self.registers[455] = 1
         self.operational = False
+        self.obeys = False      # it runs and stands still as register 704 says
         self.function = 0
         self.executed: list[tuple[int, tuple[int, ...]]] = []
 
@@ -66,6 +70,8 @@ class Device:
             words = tuple(data[4 + 2 * place] | data[5 + 2 * place] << 8
                           for place in range(count))
             self.registers.update(zip(numbers, words))
+            if number == WORD and self.obeys:
+                self.registers[455] = 0x81 if words == (1,) else 0x01
             self.executed.append((number, words))
             return [Frame(0x485, data[:4] + bytes(4), False)]
         found = [self.registers[entry] for entry in numbers] + [0xA5A5]
@@ -80,9 +86,10 @@ class Device:
 class PkwObserver(Observer):
     """Checks every frame that the session sends."""
 
-    def __init__(self, *, nmt_start: bool) -> None:
-        super().__init__()
+    def __init__(self, *, nmt_start: bool, control: bool) -> None:
+        super().__init__(control=control)
         self.nmt_start = nmt_start
+        self.word = 0       # the last one that left
         self.stopping = False
         self.blocked_until = -math.inf      # a heartbeat has said: not operational
         self.toggle: int | None = None
@@ -97,12 +104,12 @@ class PkwObserver(Observer):
 
     def activated(self) -> None:
         self.stopping = False
+        self.asked = None
         self.disarm()
 
     def deactivated(self, session: Any) -> None:
         self.stopping = True
         self.disarm()
-        self.asked = None
 
     def time_was_lost(self, session: Any) -> None:
         if self.active:
@@ -120,12 +127,15 @@ class PkwObserver(Observer):
         assert identifier == 0x505
         assert len(data) == 8
         assert self.active or self.stopping, 'silence after the stop'
-        assert now >= self.blocked_until - 1e-9, 'no PDO to a node that is not operational'
         code, toggle = data[3] & 0x7F, data[3] >> 7
+        stops = code == 0x2A and data[:2] in STOPS and data[4:6] == bytes(2)
+        assert stops or now >= self.blocked_until - 1e-9, (
+            'nothing but a stop to a node that is not operational')
         assert data[2] == 0
-        if self.asked is not None and not self.stopping:
+        if self.asked is not None:
             wait = TIMEOUT if self.asked[0][3] & 0x7F else min(TIMEOUT, 0.1)
-            assert now >= self.asked[1] + min(wait, 0.04) - 1e-7, 'one request at a time'
+            wait = min(wait, 0.02 if stops else 0.04)   # a stop that the bus took late
+            assert now >= self.asked[1] + wait - 1e-7, 'one request at a time'
         self.asked = data, now
         if code == 0:
             assert data == bytes(8)
@@ -145,11 +155,20 @@ class PkwObserver(Observer):
         if number == WORD:
             assert code == 0x2A
             assert word in (0, 1, 8)
+            self.word = word
+            self.enabled = word == 1
+            self.tells('word', runs=word != 0)
             if not self.online:
                 assert word == 0, 'only disable to a drive that is not online'
         elif number in SETPOINTS:
             index = SETPOINTS[number]
-            assert word == (self.raws[index] if self.armed[index] else 0)
+            meant = self.raws[index] if self.armed[index] else 0
+            if not self.control:
+                assert word == meant
+            else:   # neutral goes out when another word is chosen, before anybody can see that
+                assert word in (meant, 0)
+                assert word == 0 or self.word == 1, 'only while it is enabled'
+            self.tells(index, runs=word != 0)
         else:
             assert self.active, 'nothing but what makes it stand still'
 
@@ -157,6 +176,7 @@ class PkwObserver(Observer):
 class SessionMachine(AnyOrder):
     """Everything that may happen to a session."""
 
+    bus_may_refuse = True
     readable = (STATUS, LEVEL, CURRENT, FLC, FLC_2, CLASS, POSITION)
     writable = (FLC, FLC_2, CLASS, POSITION)
     stop_takes = 3.01
@@ -171,7 +191,8 @@ class SessionMachine(AnyOrder):
             request=(SPEED, TORQUE), response=(STATUS, STATUS_2, LEVEL), command_timeout=0.0,
             refresh_interval=refresh, heartbeat_timeout=heartbeat_timeout,
             parameter_timeout=TIMEOUT))
-        self.start(session, PkwObserver(nmt_start=nmt_start))
+        self.start(session, PkwObserver(nmt_start=nmt_start, control=control))
+        self.succeeded: list[ControlAction] = []
         self.device = Device()
         self.device.operational = not nmt_start
         self.key_values = 0
@@ -244,7 +265,22 @@ class SessionMachine(AnyOrder):
 
     @rule(number=st.sampled_from([455, 465, 652]), word=st.sampled_from([0, 1, 0x81, 4]))
     def device_changes(self, number: int, word: int) -> None:
+        self.device.obeys = False
         self.device.registers[number] = word
+
+    def have_it_run(self) -> None:
+        self.device.operational = self.device.obeys = True
+        self.device.registers[455] = 0x81 if self.device.registers[WORD] == 1 else 0x01
+        if self.session.control is not None:
+            self.time_passes_in_time(8, True)
+            self.succeeded.clear()
+            self.control(ControlAction.ENABLE)
+            self.time_passes_in_time(12, True)
+            if ControlAction.ENABLE not in self.succeeded:
+                return      # a stop was under way, or an answer was late
+        self.command(0, 0)
+        self.command(0, 5)
+        self.time_passes_in_time(8, True)
 
     @precondition(lambda self: self.observer.bus)
     @rule()
@@ -274,7 +310,7 @@ class SessionMachine(AnyOrder):
         """Hear something that makes the drive offline, before anything else is sent."""
         self.session.receive_frame(heard, self.now)
         self.look()
-        assert not self.session.online
+        assert not self.session.online or not self.observer.active
 
     @precondition(lambda self: self.observer.bus)
     @rule(code=st.sampled_from([0, 0x2310, 0x8130]))
@@ -298,12 +334,10 @@ class SessionMachine(AnyOrder):
 
     @rule(index=st.integers(0, 1), raw=st.sampled_from([0, 0, 1, 5, 7]))
     def command(self, index: int, raw: int) -> None:
-        observer = self.observer
-        value = raw * 0.1 if index == 0 else raw
-        was_online = self.session.online and observer.active
-        self.session.command(index, value, self.now)
-        if was_online and (observer.armed[index] or raw <= 1):
-            observer.armed[index], observer.raws[index] = True, raw
+        self.observer.faulted = self.session.state is DriveState.FAULT
+        outcome = self.session.command(index, raw * 0.1 if index == 0 else raw, self.now)
+        # a double has one raw step
+        self.observer.commanded(index, raw, outcome, self.now, neutral=raw <= 1 - index)
         self.look()
 
     @rule(value=st.sampled_from([math.nan, -1.0, 1e9, True]))
@@ -318,7 +352,12 @@ class SessionMachine(AnyOrder):
 
     # -- the life of a session --------------------------------------------------------------------
 
+    def answered(self, outcome: ControlCompleted) -> None:
+        if outcome.success:
+            self.succeeded.append(outcome.ticket.action)
+
     def drive_is_well(self) -> None:
+        self.fates.clear()
         self.heartbeat(5)
         end = self.now + 2.0
         while not self.session.online and self.now < end:
@@ -330,6 +369,7 @@ class SessionMachine(AnyOrder):
     @rule()
     def device_ends_up_as_told(self) -> None:
         """However many frames were lost before: in peace, it soon has what the session means."""
+        self.fates.clear()
         end = self.now + 1.0
         while self.now < end:
             if self.observer.bus:

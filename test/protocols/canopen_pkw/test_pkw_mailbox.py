@@ -232,7 +232,9 @@ def test_read_that_the_bus_refuses_ends_when_its_time_is_over(box: Box) -> None:
     box.begin(READ, 1.0)
     box.left(False, 1.0)
     assert box.box.handle_timer(1.499) is None
-    assert box.box.handle_timer(1.5) == Silence(sent=True)
+    assert box.box.deadline == 1.5
+    assert box.box.handle_timer(1.5) == Silence(sent=False, refused=True)
+    assert box.begin(READ, 2.0) == ['C7 01 00 25 00 00 00 00']
 
 
 def test_short_time_out_counts_for_function_zero_too() -> None:

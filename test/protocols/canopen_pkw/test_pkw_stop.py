@@ -313,6 +313,21 @@ def test_disable_goes_before_setpoints_and_neutral_right_behind() -> None:
     assert talk.hears('485#C60200AA00000000', 10.118) == []
 
 
+# -- nothing stale --------------------------------------------------------------------------------
+
+
+def test_setpoint_that_waits_for_function_zero_is_forgotten_with_the_rest() -> None:
+    """The mailbox was being synchronised for a setpoint when everything began anew."""
+    talk = online(request=(SPEED,), command_timeout=0.0, parameter_timeout=0.05)
+    assert talk.until(10.0701) == [(10.07, READ_1)]
+    talk.commands(0, 0.0, 10.075)
+    talk.commands(0, 10.0, 10.075)
+    assert talk.until(10.1201) == [(10.12, IDLE)], 'before 710 = 100'
+    assert talk.activate(10.125) == [START]
+    assert talk.hears(IDLE_ANSWER, 10.13) == []
+    assert talk.until(10.1751) == [(10.175, READ_0)]
+
+
 # -- nothing starts by itself ---------------------------------------------------------------------
 
 
