@@ -19,23 +19,30 @@ from hypothesis import given, strategies as st
 from hypothesis.stateful import initialize, precondition, rule
 import pytest
 
+from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.events import StationFound, StationLost
 from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.setpoints import CommandOutcome
 from drive_can_bridge.protocols.families import FAMILIES
 
 CYCLIC = 0x003FFFF0
 RAW = parameter('p600', 600, listed=False)
 WRITABLE = (GAIN, DAMPING, FLAG, RAMP, MAXIMUM, ORDER, RAW)
+#: what stops the drive by number: setpoints and control word
+STOPPED_BY = (50, 51, 52)
 EEPROMS = {30, 31, 44, 600, *range(122, 130)}
 
 
 class ExtendedObserver(Observer):
     """Checks every frame that the session sends."""
 
-    def __init__(self, *, mapping: str, period: float, timeout: float, immediate: bool) -> None:
+    def __init__(self, *, mapping: str, period: float, timeout: float, immediate: bool,
+                 controlled: bool) -> None:
         super().__init__(timeout=timeout, immediate=immediate)
         self.mapping = mapping
+        self.controlled = controlled
+        self.neutral: set[int] = set()  # setpoints that were written neutral by number
         self.period = period
         self.verified = False
         self.request_map_read = False
@@ -71,7 +78,7 @@ class ExtendedObserver(Observer):
         if identifier & 0x100000:
             self.sees_write(number, count, data, now)
         else:
-            assert self.active
+            assert self.active or number in STOPPED_BY and count == 1, 'only stops are confirmed'
             assert data == bytes(8)
             assert now >= self.eeprom_at + 0.02 - SLACK, 'reads wait for the EEPROM'
             if self.asked is not None:
@@ -79,7 +86,8 @@ class ExtendedObserver(Observer):
             self.asked = number, count, now
 
     def sees_cycle(self, data: bytes, now: float) -> None:
-        assert now >= self.cycled_at + 0.5 * min(self.period, 0.1) - SLACK, 'a burst'
+        # a stop brings a cycle forward, not under 5 ms after the last one
+        assert now >= self.cycled_at + min(0.005, 0.5 * self.period) - SLACK, 'a burst'
         self.cycled_at = now
         if not self.active:
             assert self.farewell > 0, 'nothing cyclic after the stop'
@@ -88,12 +96,29 @@ class ExtendedObserver(Observer):
             assert self.farewell > 0, 'no cyclic frame before the maps were read'
             self.farewell -= 1
         words = [int.from_bytes(data[place:place + 2], 'big') for place in (0, 2)]
+        if self.controlled and not any(words):
+            self.armed, self.raws = [False, False], [0, 0]  # it may have been disabled meanwhile
         assert words == self.expected(now)
         assert data[4:] == bytes(4)
+        self.neutral.clear()
+        self.tells('cycle', runs=any(words))
+
+    def commanded(self, index: int, raw: int, outcome: CommandOutcome, now: float) -> None:
+        if not self.controlled or not self.online or not self.active:
+            super().commanded(index, raw, outcome, now)
+        elif outcome in (CommandOutcome.ARMED, CommandOutcome.ACCEPTED):
+            assert outcome is CommandOutcome.ACCEPTED or self.immediate or abs(raw) <= 1
+            self.armed[index], self.raws[index], self.since[index] = True, raw, now
+        else:
+            self.armed[index], self.raws[index] = False, 0
 
     def sees_write(self, number: int, count: int, data: bytes, now: float) -> None:
         numbers = set(range(number, number + count))
-        assert not numbers & {50, 51}, 'setpoints are never written'
+        if numbers & {50, 51}:
+            assert count == 1 and data == bytes(8), 'setpoints are written to stop only'
+            self.neutral.add(number)
+            if self.neutral >= {50, 51}:
+                self.tells('cycle', runs=False)
         if numbers & set(range(122, 130)):
             assert self.mapping == 'configure'
             assert count == 1
@@ -103,8 +128,9 @@ class ExtendedObserver(Observer):
             assert count == 1
             if not self.active:
                 assert data == bytes(8), 'only disable goes with a stop'
+            self.tells('word', runs=any(data))
         else:
-            assert self.active
+            assert self.active or number in STOPPED_BY
         if numbers & EEPROMS:
             assert now >= self.eeprom_at + 0.02 - SLACK, 'EEPROM writes are paced'
             self.eeprom_at = now
@@ -116,6 +142,8 @@ class SessionMachine(AnyOrder):
 
     readable = (GAIN, DAMPING, FLAG, RAMP, MAXIMUM, STATUS, RAW)
     writable = WRITABLE
+    stop_takes = 2.0
+    bus_may_refuse = True
 
     @initialize(mapping=st.sampled_from(['verify', 'configure', 'assume']),
                 period=st.sampled_from([0.02, 0.005, 0.3]),
@@ -129,8 +157,9 @@ class SessionMachine(AnyOrder):
             control=CONTROL if control else None, table=table, response=(STATUS,),
             length_policy='strict' if strict else 'lenient'))
         self.start(session, ExtendedObserver(
-            mapping=mapping, period=period, timeout=timeout, immediate=immediate))
-        self.registers = dict.fromkeys((30, 31, 40, 41, 42, 43, 44, 52, 211, 600), 0)
+            mapping=mapping, period=period, timeout=timeout, immediate=immediate,
+            controlled=control))
+        self.registers = dict.fromkeys((30, 31, 40, 41, 42, 43, 44, 50, 51, 52, 211, 600), 0)
         self.registers.update(zip(range(122, 130), (50, 51, 0, 0, 211, 0, 0, 0)))
         self.registers[211] = 1
 
@@ -140,6 +169,8 @@ class SessionMachine(AnyOrder):
             if 'no cyclic response' in event.reason and self.observer.mapping != 'assume':
                 self.observer.verified = self.observer.request_map_read = False
                 self.observer.farewell = 3
+            elif 'response map' in event.reason and 'request map' not in event.reason:
+                self.observer.farewell = 3  # the request map was just read as right
         elif isinstance(event, StationFound):
             self.observer.online = True
 
@@ -181,7 +212,7 @@ class SessionMachine(AnyOrder):
         observer, asked = self.observer, self.observer.asked
         identifier, data, is_extended = heard
         strict = self.session.drive.options.length_policy == 'strict'
-        if (asked is None or not is_extended or not observer.active or not observer.bus
+        if (asked is None or not is_extended or not observer.bus
                 or identifier != (0x10200000 | asked[0] << 4 | asked[1])
                 or len(data) < (8 if strict else 2 * asked[1])
                 or self.now >= asked[2] + 0.1 + SLACK):
@@ -228,6 +259,17 @@ class SessionMachine(AnyOrder):
         self.observer.expected(self.now)
         self.observer.commanded(index, round(10 * value), outcome, self.now)
         self.look()
+
+    def have_it_run(self) -> None:
+        if self.observer.controlled:
+            self.registers[211] = 1
+            self.control(ControlAction.ENABLE)
+            self.time_passes_in_time(8, True)
+            self.registers[211] = 3
+            self.time_passes_in_time(8, True)
+        self.command(0, 0.0)
+        self.command(0, 5.0)
+        self.time_passes_in_time(2, True)
 
     def drive_is_well(self) -> None:
         self.map_is_repaired()
