@@ -5,7 +5,7 @@ What all tests share: where they run, how long they look, and which of them run 
 Puts this directory on the path: every test may import ``builders``.
 
 *Domains.* Nothing leaves this machine, and two test processes on it never meet: each takes ROS
-domains of its own, before anything of ROS is imported. Those of ``ros/`` are in another one than
+domains of its own, before anything of ROS is imported. The tests of ``ros/`` have another one than
 all others, because they look at who is in the graph, and a process that was killed stays there for
 a while. The locks end with the process.
 
@@ -23,6 +23,7 @@ signals, and what is started here would inherit that.
 
 from collections.abc import Iterator
 import fcntl
+from functools import cache
 import gc
 import os
 from pathlib import Path
@@ -66,31 +67,33 @@ def _own_domain() -> tuple[str, int]:
     return str(DOMAINS.start + os.getpid() % len(DOMAINS)), -1
 
 
-_OWN, _ROS = _own_domain(), _own_domain()
-os.environ['ROS_DOMAIN_ID'] = _OWN[0]
+@cache
+def _domain(in_process: bool) -> str:
+    """Return the domain of the tests in ``ros/``, or of all others, for this process's life."""
+    domain, _ = _own_domain()
+    return domain
+
+
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
-HERE = Path(__file__).parent
 #: directories and modules whose tests wait for processes of their own: each test by itself
 SPREAD = ('test/system/', 'test/demo/', 'test/monitor/test_monitor_attach',
           'test/simulation/test_simulate_command', 'test/process/')
 #: what comes first, because it takes longest
-FIRST = ('test/system/test_soak', 'test/system/', 'test/demo/', 'test/ros/', 'test/')
-#: processes for each core: most of the time they wait
+FIRST = ('test/system/test_soak', 'test/system/', 'test/monitor/test_monitor_attach',
+         'test/demo/', 'test/ros/', 'test/')
+#: processes for each core that has nothing else to do: most of the time they wait
 WORKERS_PER_CORE = 3
-
-
-def _directory(item: pytest.Item) -> str:
-    return item.path.relative_to(HERE).parts[0]
 
 
 # -- signals and domains --------------------------------------------------------------------------
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Let what is started here begin with the signals of a terminal's foreground."""
+    """Take a domain; let what is started here begin with the signals of a foreground job."""
     if config.getoption('dist', 'no') != 'no':
         return  # only starts those who run the tests
+    os.environ['ROS_DOMAIN_ID'] = _domain(False)
     for number in (signal.SIGHUP, signal.SIGINT, signal.SIGQUIT, signal.SIGTERM):
         if signal.getsignal(number) is signal.SIG_IGN:
             # ignored as before, but nobody inherits a handler
@@ -100,7 +103,7 @@ def pytest_configure(config: pytest.Config) -> None:
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> None:
     """Choose the domain of a test."""
-    os.environ['ROS_DOMAIN_ID'] = (_ROS if _directory(item) == 'ros' else _OWN)[0]
+    os.environ['ROS_DOMAIN_ID'] = _domain(item.nodeid.startswith('test/ros/'))
 
 
 # -- beside each other ----------------------------------------------------------------------------
@@ -110,7 +113,10 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
 def pytest_xdist_auto_num_workers() -> int:
     """Return how many processes ``-n auto`` means."""
     wanted = os.environ.get('PYTEST_XDIST_AUTO_NUM_WORKERS')
-    return int(wanted) if wanted else WORKERS_PER_CORE * len(os.sched_getaffinity(0))
+    if wanted:
+        return int(wanted)
+    cores = len(os.sched_getaffinity(0))
+    return max(cores, WORKERS_PER_CORE * cores - round(os.getloadavg()[0]))
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -8,15 +8,10 @@ the tests of a module share is stopped after the last of them, or before one tha
 
 from collections.abc import Iterator
 import importlib.util
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-
-# Before rclpy is imported: nothing leaves this machine, and others on it are left alone.
-os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-os.environ.setdefault('ROS_DOMAIN_ID', str(10 + os.getpid() % 80))
 
 MISSING = importlib.util.find_spec('rclpy') is None
 if TYPE_CHECKING or not MISSING:

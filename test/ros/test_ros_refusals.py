@@ -14,6 +14,7 @@ import sys
 from typing import Any
 
 from bridges import CONVEYOR, parameters
+from clients import wait_until
 import pytest
 import yaml
 
@@ -35,9 +36,16 @@ def _run(capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> 
 
     def run(*arguments: str) -> tuple[int, list[str]]:
         code = main(['drive_can_bridge', *arguments])
-        out, err = capfd.readouterr()
-        assert out == ''
-        return code, err.splitlines()
+        told = ''
+
+        def look() -> bool:
+            nonlocal told
+            out, err = capfd.readouterr()
+            assert out == ''
+            told += err
+            return told.endswith('\n')
+        wait_until(look, what='a line on standard error')  # it is written by a thread
+        return code, told.splitlines()
     return run
 
 

@@ -16,10 +16,6 @@ from processes import Client, Processes
 import pytest
 from waiting import DEADLINE
 
-# Before the first process starts: nothing leaves this machine, and others on it are left alone.
-os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
-
 _COUNTER = itertools.count(1)
 _PROCESSES = pytest.StashKey[Processes]()
 
