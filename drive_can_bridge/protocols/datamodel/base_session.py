@@ -135,6 +135,7 @@ class DataModelSession(Session):
             if now >= self._by_hand.look_at:
                 self._by_hand.look(now)
             if now >= self._by_hand.retry_at:
+                self._by_hand.retry_at = math.inf
                 self._see_to_control_word(now)
         if now >= self.control.next_timer():
             self.control.handle_timer(now)

@@ -105,11 +105,12 @@ class Asked(NamedTuple):
 class StandardObserver(Observer):
     """Checks every frame that the session sends."""
 
-    def __init__(self, *, period: float, timeout: float, immediate: bool, strict: bool) -> None:
+    def __init__(self, *, period: float, timeout: float, immediate: bool, strict: bool,
+                 controlled: bool) -> None:
         super().__init__(timeout=timeout, immediate=immediate)
+        self.controlled = controlled
         self.period = period
         self.strict = strict
-        self.farewell = 0          # setpoints that a drive may still get which is not online
         self.quiet_until = -math.inf
         self.eeprom_at = -math.inf
         self.enabling = False
@@ -132,14 +133,7 @@ class StandardObserver(Observer):
     def doubt(self) -> None:
         """Wait for the event: until then, the drive is there."""
 
-    def lost(self) -> None:
-        self.disarm()
-        # three times each, and what was due when it happened
-        self.farewell = 4 * 3
-
     def deactivated(self, session: Any) -> None:
-        if session.online or self.farewell:
-            self.lost()  # what it was being told already begins anew
         self.disarm()
         self.online = session.online  # until the event says otherwise
         self.before = self.possible()
@@ -150,16 +144,21 @@ class StandardObserver(Observer):
         self.online = session.online  # until the event says otherwise
 
     def commanded(self, index: int, raw: int, outcome: CommandOutcome, now: float) -> None:
+        if outcome is CommandOutcome.DISABLED:
+            assert self.controlled
+            self.armed[index], self.raws[index] = False, 0
+            return
         if outcome is CommandOutcome.NOT_ARMED:
-            assert not (self.online and self.active and self.immediate)
+            assert self.controlled or not (self.online and self.active and self.immediate)
             if self.timeout and now - self.since[index] > self.timeout:
                 self.armed[index] = False
-            assert not self.armed[index], 'a command in time has to count'
+            assert self.controlled or not self.armed[index], 'a command in time has to count'
+            self.armed[index] = False
             return
         assert self.online, 'only a drive that answers is armed'
         assert self.active
         if outcome is CommandOutcome.ACCEPTED:
-            assert self.armed[index]
+            assert self.controlled or self.armed[index]
         else:
             assert self.immediate or abs(raw) <= 1, 'armed by something that is not neutral'
         self.armed[index], self.raws[index], self.since[index] = True, raw, now
@@ -180,7 +179,7 @@ class StandardObserver(Observer):
             self.sees_write(number, data[3] + 256 * data[4], now)
 
     def sees_read(self, number: int, count: int, now: float) -> None:
-        assert self.active, 'nothing is asked after the stop'
+        assert self.active or count == 1 and number in (*SETPOINTS, CONTROL_WORD), 'after the stop'
         assert 1 <= count <= 4
         assert number + count <= 0x10000
         assert self.asked is None or now >= self.asked.at + TIMEOUT - SLACK, 'one read at a time'
@@ -190,11 +189,12 @@ class StandardObserver(Observer):
         self.quiet_until = now + TIMEOUT + QUARANTINE
 
     def sees_write(self, number: int, word: int, now: float) -> None:
+        self.timer_ran(now)     # whoever sends something has looked at the time, too
         if number in SETPOINTS or number == CONTROL_WORD:
             index = (*SETPOINTS, CONTROL_WORD).index(number)
             if not self.online:
-                self.farewell -= 1
-                assert self.farewell >= 0, 'a drive that does not answer is left alone'
+                assert word == 0, 'a drive that does not answer is stopped, and nothing else'
+            self.tells(number, runs=word != 0)
             allowed = self.before[index] | self.possible()[index] | {0}
             assert word in allowed, f'{number} := {word}, possible {allowed}'
             if number != CONTROL_WORD and word and self.timeout:
@@ -205,6 +205,11 @@ class StandardObserver(Observer):
         if number in EEPROMS:
             assert now >= self.eeprom_at + GAP - SLACK, 'EEPROM writes are paced'
             self.eeprom_at = now
+
+    def refused(self, sent: Frame, now: float) -> None:
+        if sent.data[0] == 3:   # an answer is waited for all the same
+            self.asked = Asked(sent.data[1] + 256 * sent.data[2], sent.data[3], now)
+            self.quiet_until = now + TIMEOUT + QUARANTINE
 
     def timer_ran(self, now: float) -> None:
         """Take note that the session had the chance to see a time-out."""
@@ -229,6 +234,7 @@ class SessionMachine(AnyOrder):
     readable = (GAIN, DAMPING, FLAG, RAMP, MAXIMUM, STATUS, FAR, RAW)
     writable = WRITABLE
     stop_takes = 2.0
+    bus_may_refuse = True
 
     @initialize(period=st.sampled_from([0.02, 0.02, 0.3]), timeout=st.sampled_from([0.0, 0.05]),
                 immediate=st.booleans(), control=st.sampled_from(['', 'listed', 'by hand']),
@@ -244,7 +250,8 @@ class SessionMachine(AnyOrder):
             quarantine=QUARANTINE, refresh_interval=refresh,
             length_policy='strict' if strict else 'lenient'))
         self.start(session, StandardObserver(
-            period=period, timeout=timeout, immediate=immediate, strict=strict))
+            period=period, timeout=timeout, immediate=immediate, strict=strict,
+            controlled=bool(control)))
         self.registers = dict.fromkeys(REGISTERS, 0)
         self.registers[211] = 1
         self.samples = 0
@@ -253,7 +260,8 @@ class SessionMachine(AnyOrder):
         observer = self.observer
         if isinstance(event, StationLost):
             assert observer.online, 'lost, but it was not there'
-            observer.lost()
+            observer.disarm()
+            observer.online = False
         elif isinstance(event, StationFound):
             assert not observer.online
             assert observer.active
@@ -266,8 +274,6 @@ class SessionMachine(AnyOrder):
             self.samples += 1
 
     def looked(self, sent: bool) -> None:
-        if sent:
-            self.session.frames_left(self.now)
         self.observer.call_begins()
 
     def apply(self, sent: Frame) -> None:
@@ -339,6 +345,17 @@ class SessionMachine(AnyOrder):
         self.command(index, 0.0)
         self.command(index, value)
         self.time_passes_in_time(40, True)
+
+    def have_it_run(self) -> None:
+        if self.observer.controlled:
+            self.registers[211] = 1
+            self.control(ControlAction.ENABLE)
+            self.time_passes_in_time(20, True)
+            self.registers[211] = 3
+            self.time_passes_in_time(20, True)
+        self.command(0, 0.0)
+        self.command(0, 5.0)
+        self.time_passes_in_time(6, True)
 
     def wanted(self, action: ControlAction) -> None:
         if action is ControlAction.ENABLE:
