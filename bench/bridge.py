@@ -3,9 +3,11 @@
 The bridge as the executable runs it, with a way to ask what it cost.
 
 Started with a parameter file, and the word "ordinary" where no thread is to get real-time
-priority. Prints how long it took from rclpy.init to the first exchange of every drive.
+priority, or "stuck" where nobody reads standard error. Prints how long it took from rclpy.init to
+the first exchange of every drive.
 """
 
+import os
 import queue
 import sys
 import threading
@@ -18,6 +20,7 @@ import topics  # noqa: F401  sets the environment of rclpy
 from unix_bus import register
 
 from drive_can_bridge.process.scheduling import be_punctual
+from drive_can_bridge.process.standard_error import StandardError
 from drive_can_bridge.ros import bridge_node
 from drive_can_bridge.ros.bridge_node import BridgeNode
 from drive_can_bridge.ros.executor_thread import ExecutorThread
@@ -102,13 +105,30 @@ def _complain(text: str) -> None:
     print(text, file=sys.stderr)
 
 
+def be_stuck() -> None:
+    """Make standard error a pipe that is full, and that nobody reads."""
+    _, write = os.pipe()
+    os.set_blocking(write, False)
+    try:
+        while True:
+            os.write(write, bytes(1))
+    except BlockingIOError:
+        os.set_blocking(write, True)
+    os.dup2(write, 2)
+
+
 def main() -> None:
     """Obey."""
     register()
     be_punctual()
     if 'ordinary' in sys.argv[2:]:
         bridge_node.raise_priority = lambda: 'no real-time priority: so asked for'
-    rclpy.init(args=['bench', '--ros-args', '--log-level', 'error', '--params-file', sys.argv[1]])
+    level = 'error'
+    if 'stuck' in sys.argv[2:]:
+        be_stuck()
+        StandardError().__enter__()     # to the end, as in the executable
+        level = 'info'
+    rclpy.init(args=['bench', '--ros-args', '--log-level', level, '--params-file', sys.argv[1]])
     begun = time.monotonic()
     measured = Measured()
     waited_until = begun + ONLINE_TIMEOUT

@@ -3,7 +3,8 @@
 A process that calls parameter services.
 
 ``ping N`` calls the bridge's drive and a bare node in turn, one call at a time; ``flood N`` keeps
-N calls to each drive under way until ``calm``.
+N calls to each drive under way until ``calm``; ``pester N`` the same to the first drive only, and
+eight calls for a thousand names each that nobody knows.
 """
 
 import sys
@@ -29,6 +30,7 @@ class Caller:
         self._drives = [self._client(node, f'drive{number}') for number in range(drives)]
         self._bare = self._client(node, 'bare_drive0')
         self._request = GetParameters.Request(names=['ramp_time'])
+        self._nonsense = GetParameters.Request(names=[f'name_{each}' for each in range(1000)])
         self._flooding = False
         self._answered = 0
 
@@ -66,17 +68,29 @@ class Caller:
                 self._call_on(client)
         return True
 
+    def pester(self, under_way: float) -> bool:
+        """Keep so many calls to the first drive under way, and eight for unknown names."""
+        self._flooding, self._answered = True, 0
+        client = self._drives[0]
+        if not client.wait_for_service(DISCOVERY_TIMEOUT):
+            raise SystemExit('no service')
+        for _ in range(int(under_way)):
+            self._call_on(client)
+        for _ in range(8):
+            self._call_on(client, self._nonsense)
+        return True
+
     def calm(self) -> int:
         """End the flood; return how many calls were answered."""
         self._flooding = False
         return self._answered
 
-    def _call_on(self, client: Any) -> None:
+    def _call_on(self, client: Any, request: Any = None) -> None:
         def answered(_: Any) -> None:
             self._answered += 1
             if self._flooding:
-                self._call_on(client)
-        client.call_async(self._request).add_done_callback(answered)
+                self._call_on(client, request)
+        client.call_async(request or self._request).add_done_callback(answered)
 
 
 def main() -> None:
@@ -87,7 +101,8 @@ def main() -> None:
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     threading.Thread(target=executor.spin, daemon=True).start()
-    serve({'ping': caller.ping, 'flood': caller.flood, 'calm': caller.calm})
+    serve({'ping': caller.ping, 'flood': caller.flood, 'calm': caller.calm,
+           'pester': caller.pester})
 
 
 if __name__ == '__main__':

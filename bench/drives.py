@@ -34,10 +34,12 @@ class Drives:
         self._last = [0.0] * STATIONS
         self._distances = array('d')
         self._values = 0
+        self._enabled: set[int] = set()
+        self._stops = array('d')
 
     def answer(self, frame: bytes) -> bytes | None:
         """Return the answer to a frame, or None."""
-        identifier, _, _ = CAN_FRAME.unpack(frame)
+        identifier, _, request = CAN_FRAME.unpack(frame)
         if identifier & CYCLIC == CYCLIC:
             now = time.monotonic()
             station = identifier >> 21 & 127
@@ -45,7 +47,13 @@ class Drives:
             if last:
                 self._distances.append(now - last)
             self._values = self._values + 1 & 0x7FFF
-            data = struct.pack('>4H', self._values, 1, 2, 3)
+            enabled = request[7] & 1
+            if enabled:
+                self._enabled.add(station)
+            elif station in self._enabled:
+                self._enabled.discard(station)
+                self._stops.append(now)
+            data = struct.pack('>4H', self._values, 1, 2, 1 | enabled << 1)
         elif identifier & 0x00100000:
             return None
         else:
@@ -58,11 +66,16 @@ class Drives:
         """Begin to note anew."""
         self._last = [0.0] * STATIONS
         self._distances = array('d')
+        self._stops = array('d')
         return True
 
     def distances(self) -> list[float]:
         """Return the times between two requests to the same drive in s."""
         return list(self._distances)
+
+    def stops(self) -> list[float]:
+        """Return when a drive got the first word that was not ``enable`` any more."""
+        return list(self._stops)
 
     def run(self, server: socket.socket) -> None:
         """Serve one client after the other."""
@@ -92,7 +105,7 @@ def main() -> None:
     server.listen()
     drives = Drives()
     threading.Thread(target=drives.run, args=(server,), daemon=True).start()
-    serve({'clear': drives.clear, 'distances': drives.distances})
+    serve({'clear': drives.clear, 'distances': drives.distances, 'stops': drives.stops})
 
 
 if __name__ == '__main__':

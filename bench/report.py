@@ -110,6 +110,21 @@ def monitor_figures(found: dict[str, Any]) -> list[Figure]:
     ]
 
 
+def stop_figures(found: dict[str, Any]) -> list[Figure]:
+    """From the call of a stop to its frame."""
+    figures = []
+    for name, how in (('quiet', 'in quiet'), ('load', f'under load ({found["calls"]} calls '
+                                                      f'answered)')):
+        samples = found[name]['latencies']
+        failed = f', {len(found[name]["failures"])} failed' if found[name]['failures'] else ''
+        figures.append(Figure(
+            f'call of a stop to its frame, p99, {how}',
+            f'{1e3 * p99(samples):.1f} ms (median {1e3 * median(samples):.1f}, worst '
+            f'{1e3 * max(samples, default=float("nan")):.1f} ms of {len(samples)}{failed})',
+            f'sleeping {1e3 * p99(found[name]["sleeper"]):.3f} ms', p99(samples), 0.05))
+    return figures
+
+
 def drives_figures(found: dict[str, dict[str, Any]]) -> list[Figure]:
     """Cost by number of drives."""
     costs = {int(number): sum(each['bridge']['cpu'][name] for name in ('timer', 'reader'))
@@ -180,8 +195,9 @@ FIGURES: dict[str, Callable[[Any], list[Figure]]] = {
     'unsubscribed': lambda found: exchange_figures(found, 'nobody subscribed', 1.0),
     'ordinary': lambda found: exchange_figures(found, 'all of it at ordinary priority', 1.5),
     'diy': diy_figures, 'latency': latency_figures, 'service': service_figures,
-    'flood': flood_figures, 'monitor': monitor_figures, 'drives': drives_figures,
-    'decode': decode_figures, 'flight': flight_figures, 'start': start_figures,
+    'flood': flood_figures, 'stop': stop_figures, 'monitor': monitor_figures,
+    'drives': drives_figures, 'decode': decode_figures, 'flight': flight_figures,
+    'start': start_figures,
 }
 
 

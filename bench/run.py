@@ -34,6 +34,8 @@ def plan(options: argparse.Namespace) -> dict[str, Callable[[], Any]]:
         'service': lambda: scenarios.service(Load(1, 0.02, subscribed=False), 300),
         'flood': lambda: scenarios.flood(Load(8, 0.01, subscribed=False), duration, 10000.0),
         'monitor': lambda: scenarios.monitor(Load(drives, period, subscribed=False), duration),
+        'stop': lambda: scenarios.stop(
+            Load(8, 0.01, subscribed=False, control=True, stuck=True), 200, 10000.0, 64),
         'drives': lambda: {number: scenarios.exchange(
             Load(number, period, subscribed=False), duration, floor=False)
             for number in sorted({1, 4, 8, drives})},

@@ -39,6 +39,8 @@ class Load:
     :param commands: setpoints per second and drive.
     :param real_time: the exchange may have the priority that it asks for.
     :param trace: s that the flight recorder keeps; 0: it is off.
+    :param control: the drives have a control word.
+    :param stuck: nobody reads the bridge's standard error.
     """
 
     drives: int
@@ -47,11 +49,13 @@ class Load:
     commands: float = 0.0
     real_time: bool = True
     trace: float = 0.0
+    control: bool = False
+    stuck: bool = False
 
     @property
     def how(self) -> tuple[str, ...]:
         """What the process of the bridge is told."""
-        return () if self.real_time else ('ordinary',)
+        return (*(() if self.real_time else ('ordinary',)), *(('stuck',) if self.stuck else ()))
 
 
 class Bus:
@@ -65,12 +69,17 @@ class Bus:
                  f'        interface: {INTERFACE}', f'        channel: {self.channel}',
                  '        bitrate: 1000000', f'        trace_seconds: {load.trace}',
                  f'        trace_directory: {folder}', '    drives:']
+        profile, requests, responses = HERE / 'profile.yaml', REQUESTS, RESPONSES
+        if load.control:
+            profile = HERE / 'profile_control.yaml'
+            requests = requests.replace('digital_outputs', 'control_word')
+            responses = responses.replace('digital_inputs', 'status_word')
         for number in range(load.drives):
             lines += [f'      drive{number}:', '        bus: main',
                       '        protocol: datamodel_extended', f'        station: {number + 1}',
-                      f'        profile: {HERE / "profile.yaml"}', '        rearm: immediate',
-                      f'        period: {load.period}', f'        cyclic_request: [{REQUESTS}]',
-                      f'        cyclic_response: [{RESPONSES}]']
+                      f'        profile: {profile}', '        rearm: immediate',
+                      f'        period: {load.period}', f'        cyclic_request: [{requests}]',
+                      f'        cyclic_response: [{responses}]']
         self.file.write_text('\n'.join(lines) + '\n', encoding='utf-8')
         self.drives = stack.enter_context(child('drives.py', self.channel))
 
@@ -189,6 +198,31 @@ def monitor(load: Load, duration: float, rounds: int = 4) -> dict[str, Any]:
                     for key in ('missed', 'elapsed'):
                         found[name][key] += result[key]
                     found[name]['cpu'] += result['process_cpu']
+
+
+def stop(load: Load, calls: int, commands: float, under_way: int) -> dict[str, Any]:
+    """Measure from the call of a stop to its frame at the drive, in quiet and under load."""
+    found: dict[str, Any] = {}
+    with ExitStack() as stack:
+        bus = Bus(stack, load)
+        with (bridge_under(load, bus), child('stopper.py') as stopper,
+              child('caller.py', load.drives) as caller,
+              child('sleeper.py', load.period) as sleeper):
+            for name in ('quiet', 'load'):
+                if name == 'load':
+                    stack.enter_context(
+                        child('publisher.py', 'commands', load.drives, commands / load.drives))
+                    caller.ask(f'pester {under_way}')
+                    time.sleep(SETTLE)
+                sleeper.ask('clear')
+                bus.drives.ask('clear')
+                answer = stopper.ask(f'stop {calls}')
+                stops = bus.drives.ask('stops')
+                found[name] = {
+                    'latencies': [min((at - called for at in stops if at > called),
+                                      default=float('inf')) for called in answer['called']],
+                    'failures': answer['failures'], 'sleeper': sleeper.ask('errors')}
+            found['calls'] = caller.ask('calm')
     return found
 
 

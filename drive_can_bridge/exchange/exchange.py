@@ -214,11 +214,9 @@ class BusExchange:
     def _give_up(self) -> None:
         """End stops that do not come to an end: nobody knows what the drives do."""
         with self.lock:
-            now = self._clock()
             for member in self._members:
                 if not member.session.stopped:
-                    member.session.give_up(now)
-                    self._pump(member)
+                    self._stop_one(member, lambda session: session.give_up(self._clock()))
 
     def _pass_to_stop(self) -> None:
         """Serve the stops, without the timer thread and without commands."""

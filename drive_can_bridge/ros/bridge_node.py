@@ -223,6 +223,7 @@ class BridgeNode(LifecycleNode):
                     partial(self._node_parameters.announce, identity_name(drive.name)))
                 self.drives[drive.name] = node
                 exchange.attach(session, node)
+                node.serve()
 
     def _open(self, configuration: BridgeConfiguration) -> None:
         for exchange in self.exchanges.values():

@@ -32,14 +32,18 @@ class ControlServices:
         self._tickets: dict[ControlTicket, Callable[[bool, str], None]] = {}
         self._calls = 0     # that wait for their answer
         self._lock = threading.Lock()
-        self._services: list[Service] = []
+        self._services: dict[Service, Callable[[Any, Answer], None]] = {}
         for kind, name, action in (
                 (SetBool, 'enable', None), (Trigger, 'reset_fault', ControlAction.RESET_FAULT),
                 (Trigger, 'quick_stop', ControlAction.QUICK_STOP)):
             service = node.create_service(kind, f'~/{name}', _never, callback_group=PolledGroup(),
                                           qos_profile=qos_profile_parameters)
-            self._services.append(service)
-            thread.serve(service, self._callback(kind, action), lambda: self._count(-1))
+            self._services[service] = self._callback(kind, action)
+
+    def serve(self) -> None:
+        """Begin to serve: the session can be asked from now on."""
+        for service, callback in self._services.items():
+            self._thread.serve(service, callback, lambda: self._count(-1))
 
     def completed(self, outcome: ControlCompleted) -> None:
         """Answer whoever asked for an action. From any thread."""
@@ -55,7 +59,7 @@ class ControlServices:
 
     def destroy(self) -> None:
         """Let go of the services. Before the node is destroyed."""
-        self._thread.forget(self._services)
+        self._thread.forget(list(self._services))
 
     def _callback(self, kind: Any, action: ControlAction | None) -> Callable[[Any, Answer], None]:
         def callback(request: Any, answer: Answer) -> None:
@@ -64,7 +68,11 @@ class ControlServices:
             def say(success: bool, message: str) -> None:
                 answer(kind.Response(success=success, message=message))
             self._count(1)
-            refusal = self._ask(wanted, lambda ticket: self._tickets.update({ticket: say}))
+            try:
+                refusal = self._ask(wanted, lambda ticket: self._tickets.update({ticket: say}))
+            except BaseException:
+                self._count(-1)
+                raise
             if refusal:
                 say(False, refusal)
         return callback

@@ -97,7 +97,12 @@ class DriveNode:
         except BaseException:
             self.node.destroy_node()
             raise
-        executor.add_node(self.node)
+
+    def serve(self) -> None:
+        """Begin to serve: the exchange knows of the drive from now on."""
+        self._executor.add_node(self.node)
+        if self._control is not None:
+            self._control.serve()
 
     def _populate(self, clock: Clock, family: Family, control_thread: ServiceThread) -> None:
         """Make the topics and services."""

@@ -63,6 +63,21 @@ def test_setpoints_as_the_drive_got_them(family: str) -> None:
     assert told(partner) == {**word, 'speed_setpoint': 0}
 
 
+def test_what_the_bus_refused_was_not_sent(family: str) -> None:
+    partner = started(family)
+    session = partner.talk.session
+    partner.enable()
+    session.setpoints.items[0].armed = True
+    session.command(0, -150.0, partner.now)
+    partner.talk.refusing = lambda text: bool(partner.setpoints(text))
+    partner.live(0.03)     # no longer than the drive may be missed
+    assert told(partner)['speed_setpoint'] == 0
+    partner.talk.refusing = lambda text: False
+    session.command(0, -150.0, partner.now)
+    partner.live(1.1)
+    assert told(partner)['speed_setpoint'] == -1500
+
+
 @pytest.mark.parametrize('request_, order', [
     ((SPEED, LIMIT), ['speed_setpoint', 'torque_limit', 'control_word']),
     ((WORD, SPEED), ['control_word', 'speed_setpoint'])])

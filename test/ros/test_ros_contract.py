@@ -284,8 +284,9 @@ def test_what_was_last_sent(start: Start, client: Client, facts: Facts) -> None:
 
     def sent(message: ParameterEvent) -> dict[str, Any]:
         return {entry.name: from_value(entry.value) for entry in message.changed_parameters}
-    # once a second without a change
-    first, second = topic.wait(), topic.wait()
+    # once a second without a change, as soon as all of it was sent
+    first = topic.wait(lambda message: len(message.changed_parameters) == 4)
+    second = topic.wait()
     neutral = {'speed_setpoint': 0.0, 'mode': 0, 'brake': False}
     word = sent(first)['control_word']
     assert sent(first) == sent(second) == {**neutral, 'control_word': word}

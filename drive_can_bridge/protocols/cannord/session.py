@@ -98,6 +98,7 @@ class CannordSession(Session):
         self._stopping = False
         self._cycles_left = 0               # before a stop is complete
         self._payloads: list[bytes] = []    # of the frames of a cycle, main frame first
+        self._payloads_words: tuple[int, ...] | None = None     # in them, until they have left
         self._payloads_run = False          # they hold anything but neutral and disable
         self._frames_out = 0                # of this cycle, of which nobody has said what became
         self._whole = True                  # the bus has taken all frames of this cycle so far
@@ -239,6 +240,9 @@ class CannordSession(Session):
     def _cycle_left(self, now: float) -> None:
         """Take note of a cycle of which the bus has taken every frame: only then it counts."""
         self.told.note(CYCLE, runs=self._payloads_run)
+        if self._payloads_words is not None:    # the first time that they left
+            self.sent.take(self._payloads_words)
+            self._payloads_words = None
         if self._machine.word == self._sent_word:   # nobody was lost meanwhile
             fresh = self._machine.word_due
             self._machine.word_sent(now)
@@ -267,7 +271,7 @@ class CannordSession(Session):
         words = [setpoint.parameter.word_from_raw(setpoint.raw)
                  for setpoint in self.setpoints.items]
         self.setpoints.changed = False
-        self.sent.take((self._sent_word, *words))
+        self._payloads_words = (self._sent_word, *words)
         payloads = [encode_main(self._sent_word, words[:MAIN_VALUES], length=self._length,
                                 swap=self._swap)]
         if self._extra:

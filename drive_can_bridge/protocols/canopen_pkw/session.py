@@ -355,15 +355,23 @@ class PkwSession(Session):
     # -- frames -----------------------------------------------------------------------------------
 
     def _send(self, message: Message, left: Left) -> None:
-        meaning = message.meaning
-        if meaning is not None and meaning.writes:
-            place = self._request_places.get(Span(message.address, meaning.count))
-            if place is not None:
-                self.sent.take((addresses.raw_from_words(
-                    self.sent.parameters[place], message.words[:meaning.count],
-                    self._word_order),), place)
+        def told(sent: bool, now: float) -> None:
+            if sent:
+                self._note_write(message)
+            left(sent, now)
         self._outbox.put(Frame(self._identifiers.request, pkw.encode(message, self._layout),
-                               False), left)
+                               False), told)
+
+    def _note_write(self, message: Message) -> None:
+        """Take note of what the device was told, if that is what it is told by us."""
+        meaning = message.meaning
+        if meaning is None or not meaning.writes:
+            return
+        place = self._request_places.get(Span(message.address, meaning.count))
+        if place is not None:
+            self.sent.take((addresses.raw_from_words(
+                self.sent.parameters[place], message.words[:meaning.count],
+                self._word_order),), place)
 
     def frames_left(self, now: float, refused: Collection[int] = ()) -> None:
         super().frames_left(now, refused)

@@ -14,7 +14,9 @@ from drive_can_bridge.core.session import DriveState, Session
 from drive_can_bridge.core.told import MAY_RUN
 from drive_can_bridge.protocols.datamodel import procedures
 from drive_can_bridge.protocols.datamodel.acyclic_control import control_by_hand, CONTROL_WORD
-from drive_can_bridge.protocols.datamodel.channel import AcyclicChannel, Lane, Polling, Words
+from drive_can_bridge.protocols.datamodel.channel import (
+    AcyclicChannel, Lane, Polling, Words, Write,
+)
 from drive_can_bridge.protocols.datamodel.extended import SLOTS
 from drive_can_bridge.protocols.datamodel.process_words import slot_of
 from drive_can_bridge.protocols.datamodel.safe_stop import SafeStop, StopWrite
@@ -46,9 +48,9 @@ class DataModelSession(Session):
         self._sent_by_number = {
             (parameter.number or 0) + self._offset: place
             for place, parameter in enumerate(self.sent.parameters)}
-        self._encode_write = encode_write
         self._channel = AcyclicChannel(
-            encode_read=encode_read, encode_write=self._write, send=self._outbox.put,
+            encode_read=encode_read, encode_write=encode_write, send=self._outbox.put,
+            wrote=self._note_write,
             timeout=drive.parameter_timeout, attempts=drive.parameter_retries + 1,
             eeprom_gap=options.eeprom_write_gap, polling=polling)
         self._together = together
@@ -64,12 +66,11 @@ class DataModelSession(Session):
         self._owed = False  # there was something to be stopped when the stop began
         self._stops_all = False  # setpoints, too
 
-    def _write(self, number: int, words: Words) -> Frame:
-        """Make the frame of a write that leaves now."""
-        for place, word in enumerate(words, number):
-            if place in self._sent_by_number:
-                self.sent.take((word,), self._sent_by_number[place])
-        return self._encode_write(number, words)
+    def _note_write(self, write: Write) -> None:
+        """Take note of a write that left."""
+        for number, word in enumerate(write.words, write.number):
+            if number in self._sent_by_number:
+                self.sent.take((word,), self._sent_by_number[number])
 
     def facts(self) -> dict[str, str]:
         return {'short_frames': str(self.statistics.short)}

@@ -164,6 +164,7 @@ class AcyclicChannel:
     :param attempts: how often a read is sent before it counts as unanswered.
     :param eeprom_gap: s after an EEPROM write.
     :param send: takes frames that are to leave now, and who is told whether they did.
+    :param wrote: takes every write that left.
     :param polling: given where the exchange itself goes through the channel. Writes that go first
         then do not wait for the answer of a read: nobody answers writes.
     :ivar now: ``now`` of the call being served, for whoever is called back.
@@ -173,7 +174,9 @@ class AcyclicChannel:
     def __init__(self, *, encode_read: Callable[[int, int], Frame],
                  encode_write: Callable[[int, Words], Frame], send: Send,
                  timeout: float, attempts: int, eeprom_gap: float,
+                 wrote: Callable[[Write], None] = lambda _: None,
                  polling: Polling | None = None) -> None:
+        self._wrote = wrote
         self._encode_read = encode_read
         self._encode_write = encode_write
         self._emit = send
@@ -486,13 +489,13 @@ class AcyclicChannel:
 
     def _send_write(self, write: Write, told: Left, now: float) -> None:
         self._not_before = now + SPACING
-        if not write.eeprom:
-            self._emit(self._encode_write(write.number, write.words), told)
-            return
-        self._eeprom_free_at = now + self._eeprom_gap
+        if write.eeprom:
+            self._eeprom_free_at = now + self._eeprom_gap
 
         def left(sent: bool, then: float) -> None:
-            # the pause begins when the frame is on its way
-            self._eeprom_free_at = max(self._eeprom_free_at, then + self._eeprom_gap)
+            if write.eeprom:    # the pause begins when the frame is on its way
+                self._eeprom_free_at = max(self._eeprom_free_at, then + self._eeprom_gap)
+            if sent:
+                self._wrote(write)
             told(sent, then)
         self._emit(self._encode_write(write.number, write.words), left)

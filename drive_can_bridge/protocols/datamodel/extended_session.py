@@ -90,6 +90,7 @@ class ExtendedSession(DataModelSession):
         self._stopping = False
         self._differs = False  # what the last look at the maps found
         self._frame: Frame | None = None
+        self._frame_raws: list[int] | None = None  # in it, until it has left
         self._frame_runs = False  # it holds anything but neutral and disable
         self._sent_word: int | None = None
         self._awaiting = False
@@ -252,6 +253,9 @@ class ExtendedSession(DataModelSession):
         if not sent:
             return
         self.told.note(CYCLE, runs=self._frame_runs)
+        if self._frame_raws is not None:    # the first time that it left
+            self.sent.take(self._frame_raws)
+            self._frame_raws = None
         control = self.control
         if (control is not None and self._control_slot is not None
                 and control.word == self._sent_word):  # else it has changed since
@@ -294,7 +298,7 @@ class ExtendedSession(DataModelSession):
                 raws.insert(self._control_slot, self._sent_word)
                 self._frame_runs = self._frame_runs or not self.control.at_rest
         self.setpoints.changed = False
-        self.sent.take(raws)
+        self._frame_raws = raws
         return Frame(self._request_identifier, self._pack(*raws) + self._padding, True)
 
     def _miss(self, now: float) -> None:
