@@ -84,3 +84,24 @@ def test_stop_while_the_adapter_takes_nothing(processes: Processes, client: Clie
     peer.stop_reading()
     bridge.error('the adapter takes no more data')
     assert bridge.end() == 0
+
+
+def test_stop_of_a_drive_that_moves_while_the_adapter_takes_nothing(
+        processes: Processes, client: Client, namespace: str, tmp_path: Path, peer: Peer) -> None:
+    # every stop frame is refused: who reads the log has to know what nobody could tell the drive
+    file = bridge_file(tmp_path, bus={'bitrate': 1_000_000, 'reconnect_period': 0.01}, drives={
+        # nobody tells it neutral while there is still room
+        'conveyor': {**CONVEYOR, 'mapping': 'assume', 'period': 0.005, 'missed_limit': 10_000,
+                     'command_timeout': 60.0}})
+    bridge = processes.bridge(file, namespace)
+    drive = f'/{namespace}/conveyor'
+    client.online(drive)
+    client.publish(f'{drive}/command/speed_setpoint', 0.0)
+    client.diagnostics(f'{namespace}/drive_can_bridge: drive conveyor',
+                       message='not armed: publish 0 to [^ ]*/torque_limit$')
+    client.publish(f'{drive}/command/speed_setpoint', 150.0)
+    peer.wait_for(f'{CYCLIC_REQUEST}05DC')
+    peer.stop_reading()
+    bridge.error('the adapter takes no more data')
+    assert bridge.end() == 0
+    bridge.error('conveyor: .*may still be running')
