@@ -31,7 +31,7 @@ def test_be_punctual(monkeypatch: pytest.MonkeyPatch, allowed: bool) -> None:
         sys.setswitchinterval(before)
 
 
-@pytest.mark.parametrize('path', ['ros/main.py', 'ros/demo/application.py'])
+@pytest.mark.parametrize('path', ['ros/main.py'])
 def test_whoever_runs_a_bridge_asks_for_it(path: str) -> None:
     assert '    be_punctual()\n' in (SOURCES / path).read_text(encoding='utf-8')
 

@@ -13,7 +13,7 @@ import pytest
 
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.frame import EXTENDED_IDENTIFIER_MAX, Frame, Route
-from drive_can_bridge.core.parameters import Access, Parameter, ParameterType, Storage
+from drive_can_bridge.core.parameters import Access, Parameter, ParameterType
 from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.simulation.canopen_pkw import SimulatedPkwDrive
 from drive_can_bridge.simulation.drive import Surroundings
@@ -388,10 +388,8 @@ class TestMailbox:
 class TestConfigurationMode:
 
     def made(self) -> Ltmr:
-        """Return a controller whose profile has register 601."""
-        parameters = {**PLAIN.parameters, 'configuration': Parameter(
-            'configuration', number=601, storage=Storage.EEPROM)}
-        return Ltmr(replace(LTMR, parameters=parameters))
+        """Return a controller; its profile has register 601."""
+        return Ltmr(LTMR)
 
     def test_settings_are_taken_in_configuration_mode_only(self) -> None:
         made = self.made()
