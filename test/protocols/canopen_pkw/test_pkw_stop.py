@@ -349,15 +349,15 @@ def test_restart_that_nobody_saw() -> None:
 
 
 def test_restart_in_the_middle_of_a_refresh() -> None:
-    """Nobody knows whether the word arrived: not even that is a reason to look only there."""
-    talk = running(request=(WORD,), refresh_interval=0.05, parameter_timeout=0.05)
+    """Nobody knows whether the word arrived: the status is read before even that is looked at."""
+    talk = running(request=(WORD,), refresh_interval=0.05, parameter_timeout=0.01)
     assert talk.until(10.1101) == [(10.11, READ_0)]
     assert talk.hears(RUNS_0, 10.111) == []
     assert talk.until(10.1301) == [(10.13, READ_1)]
     assert talk.hears(RUNS_1, 10.131) == [ENABLE_0], 'the refresh: it was seen running'
-    assert talk.until(10.19) == [(10.181, IDLE)]    # no answer; the device has restarted
-    assert talk.hears(IDLE_ANSWER, 10.191) == [READ_1], 'no read-back that would find nothing'
-    assert talk.hears(ANSWER_1, 10.192) == [DISABLE_0]
+    assert talk.until(10.1501) == [(10.15, IDLE)], 'no answer; the device has restarted'
+    assert talk.hears(IDLE_ANSWER, 10.151) == [READ_1], 'no read-back that would find nothing'
+    assert talk.hears(ANSWER_1, 10.152) == [DISABLE_0]
 
 
 def test_refresh_goes_on_while_the_drive_is_seen_running() -> None:
