@@ -8,8 +8,8 @@ function for the other. One that looks for the function elsewhere may repeat a r
 nothing there; it never refuses in the place that was asked. ``abort_code_order``: only one order
 of the refusal's words is a code. ``word_order``: values of 32 bits of which one half is 0.
 
-Before anything is sent to the mailbox, 1603h is read by SDO: where the receive PDO4 is known to map
-something else than 3000h, a read of the mailbox would be process data, and nothing is asked.
+Before anything is sent to the mailbox, 1603h is read by SDO: where the receive PDO4 is known to
+map something else than 3000h, a read of the mailbox would be process data, and nothing is asked.
 """
 
 from collections.abc import Generator, Iterator
@@ -34,8 +34,8 @@ _MAILBOX = 0x3000
 _WIDE_MAX = 12
 #: values that have to agree where no limits help
 _AGREEING = 2
-_SILENT = ('no answer: a node that is not operational answers no PKW (--nmt-start starts it); check '
-           'station, bit rate, request_cob_id and response_cob_id')
+_SILENT = ('no answer: a node that is not operational answers no PKW (--nmt-start starts it); '
+           'check station, bit rate, request_cob_id and response_cob_id')
 
 
 @dataclass
