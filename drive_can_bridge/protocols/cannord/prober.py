@@ -155,7 +155,7 @@ class CannordProber(Prober):
         return _Answer(frame.data)
 
     def _twice(self, task: Task, number: int, ind: int = 0) -> _Asking:
-        """Ask twice: a stale answer does not come again. A value may change, a refusal does not."""
+        """Ask twice: a stale answer comes once; values may change, refusals do not."""
         first = yield from self._ask(task, number, ind)
         second = yield from self._ask(task, number, ind)
         if first is None or second is None or first.response != second.response:
