@@ -34,6 +34,8 @@ SUBCOMMANDS: dict[str, tuple[str, str]] = {
     'profile': ('drive_can_bridge.cli.profile',
                 'list, show, check and import parameter tables'),
     'scan': ('drive_can_bridge.cli.scan', 'find the drives on a bus'),
+    'probe': ('drive_can_bridge.cli.probe',
+              'settle by reads which keys a drive needs'),
     'record': ('drive_can_bridge.cli.record',
                'write everything on the buses of a parameter file to a trace'),
     'decode': ('drive_can_bridge.cli.decode',

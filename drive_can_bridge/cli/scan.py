@@ -110,12 +110,12 @@ def _ask(args: Namespace, survey: Survey) -> None:
         if not survey.master and survey.scouts[name].unmistakable:
             survey.ask(family.name)
     for name in args.protocols:
+        if not survey.master and not survey.nodes:
+            survey.ask(name)
         if survey.nodes:
             complain(f'{name} is not asked: there is a CANopen node '
                      f'({", ".join(map(str, survey.nodes))}), which might take its reads for '
                      'process data')
-        elif not survey.master:
-            survey.ask(name)
     if survey.master:
         complain(f'there is another master ({survey.master}): only listening')
 

@@ -67,6 +67,10 @@ class Survey:
         """All drives found."""
         return list(all_sightings(list(self.scouts.values())))
 
+    def forbidden(self, scout: Scout) -> bool:
+        """Tell whether somebody is there who might obey what a scout asks."""
+        return not scout.unmistakable and bool(self.nodes)
+
     def listen(self, seconds: float) -> None:
         """
         Hear what is said.
@@ -81,7 +85,8 @@ class Survey:
         """
         Ask all stations of a family, and what their answers make worth asking.
 
-        Ends at once when a master is heard, or the bus takes nothing.
+        Ends at once when a master is heard, or the bus takes nothing, or when a CANopen node turns
+        up that might take the questions for process data.
 
         :raises BusUnavailable: the bus is lost.
         """
@@ -90,7 +95,8 @@ class Survey:
         due = self._clock()
         quiet_at = 0.0
         refused = 0
-        while not self.master and not self.trouble:
+        # a node that was asleep may boot meanwhile
+        while not self.master and not self.trouble and not self.forbidden(scout):
             now = self._clock()
             if now < due:
                 self._hear(min(_PATIENCE, due - now))

@@ -18,6 +18,7 @@ from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.observer import DriveObserver, Emit
 from drive_can_bridge.protocols.options import FamilyOptions, make_options, options_schema
+from drive_can_bridge.protocols.prober import Prober
 from drive_can_bridge.protocols.scout import Scout
 
 
@@ -156,3 +157,7 @@ class Family(ABC):
     @abstractmethod
     def make_scout(self) -> Scout:
         """Make what looks for drives of this family on a bus that nobody has described."""
+
+    @abstractmethod
+    def make_prober(self, drive: DriveConfiguration) -> Prober:
+        """Make what settles the open keys of a drive by harmless reads."""

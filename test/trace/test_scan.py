@@ -156,6 +156,46 @@ def test_a_bus_that_takes_nothing() -> None:
     assert survey.trouble == 'send: transmit queue full: no other node acknowledges'
 
 
+@pytest.mark.parametrize('protocol', NAMED)
+def test_a_canopen_node_that_boots_ends_asking_by_name(protocol: str) -> None:
+    bench = Bench()
+    survey = bench.survey()
+    bench.answers.append(Frame(0x704, b'\x00', False))
+    survey.ask(protocol)
+    assert survey.nodes == {4: 'heartbeat boot-up'}
+    assert len(bench.sent) <= 1
+    sent = len(bench.sent)
+    survey.ask(protocol)
+    assert len(bench.sent) == sent
+
+
+@pytest.mark.parametrize(('mapped', 'identifier', 'read'), [
+    ('20010030', '05050000', True),     # 30000120h at 505h: a mailbox
+    ('10004060', '05050000', False),    # 60400010h: a control word
+    ('20010030', '05020000', False),    # another identifier, which may be somebody else's
+    ('20010030', '05050080', False),    # a PDO that does not exist
+    ('20010030', '05050020', False),    # 29 bits
+])
+def test_mailboxes_alone_are_read(mapped: str, identifier: str, read: bool) -> None:
+    objects = {'001000': '00000000', '031601': mapped, '031401': identifier}
+
+    def answers(frame: Frame) -> Frame | None:
+        if frame.identifier == 0x605 and frame.data[1:4].hex() in objects:
+            content = bytes.fromhex(objects[frame.data[1:4].hex()])
+            return Frame(0x585, b'\x43' + frame.data[1:4] + content, False)
+        if frame.data[:3] == bytes.fromhex('C70100'):
+            return Frame(0x485, frame.data[:4] + bytes.fromhex('83200000'), False)
+        return None
+
+    bench = Bench(Device('node 5', lambda frame: False, answers))
+    survey = bench.survey()
+    survey.ask('canopen_pkw')
+    sent = [frame.data.hex() for _, frame in bench.sent if frame.identifier == 0x505]
+    assert sent == (['c701002500000000', 'c70100a500000000'] if read else [])
+    assert ('PKW answers' in survey.nodes[5]) is read
+    assert not survey.master
+
+
 def drive_can(*arguments: object) -> int:
     return front_end.main([str(argument) for argument in arguments])
 

@@ -19,6 +19,7 @@ from drive_can_bridge.protocols.cannord.process_data import (
 from drive_can_bridge.protocols.cannord.states import STATUS_WORD
 from drive_can_bridge.protocols.family import Claim, Complaint, Family
 from drive_can_bridge.protocols.observer import DriveObserver, Emit
+from drive_can_bridge.protocols.prober import Prober
 from drive_can_bridge.protocols.scout import Scout
 
 #: s that an inverter takes at most to answer process data (BU 0060 page 50)
@@ -144,6 +145,11 @@ class Cannord(Family):
         """Make what looks for drives of this family."""
         from drive_can_bridge.protocols.cannord.scout import CannordScout
         return CannordScout()
+
+    def make_prober(self, drive: DriveConfiguration) -> Prober:
+        """Make what settles the open keys of a drive."""
+        from drive_can_bridge.protocols.cannord.prober import CannordProber
+        return CannordProber(drive)
 
     # -- parts ------------------------------------------------------------------------------------
 

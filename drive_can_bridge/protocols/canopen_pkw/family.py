@@ -15,6 +15,7 @@ from drive_can_bridge.protocols.canopen_pkw.options import PkwOptions
 from drive_can_bridge.protocols.family import Claim, Complaint, Family
 from drive_can_bridge.protocols.observer import DriveObserver, Emit
 from drive_can_bridge.protocols.polling import round_time
+from drive_can_bridge.protocols.prober import Prober
 from drive_can_bridge.protocols.scout import Scout
 
 #: worst-case stuffing, eight bytes, 11-bit identifier, with the interframe space
@@ -120,6 +121,11 @@ class CanopenPkw(Family):
         """Make what looks for drives of this family."""
         from drive_can_bridge.protocols.canopen_pkw.scout import CanopenScout
         return CanopenScout()
+
+    def make_prober(self, drive: DriveConfiguration) -> Prober:
+        """Make what settles the open keys of a drive."""
+        from drive_can_bridge.protocols.canopen_pkw.prober import PkwProber
+        return PkwProber(drive)
 
     # -- parts ------------------------------------------------------------------------------------
 

@@ -5,18 +5,26 @@ from typing import Any
 
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.protocols.canopen_pkw import network, sdo
+from drive_can_bridge.protocols.canopen_pkw import network, pkw, sdo
 from drive_can_bridge.protocols.scout import Certainty, Scout
 
 #: the object of the mailbox, in the upper half of a mapping entry
 _MAILBOX = 0x3000
+#: the register that is read through the mailbox: system status
+_STATUS = pkw.Address(455)
+#: bits of a PDO's identifier entry: it does not exist; 29 bits; and the identifier itself
+_PDO_IDENTIFIER = 0xA00007FF
+#: all bits of address and function that answers repeat, but for the toggle, wherever it stands
+_REPEATED = 0xFF7F7F7F
 
 
 class CanopenScout(Scout):
     """
-    Recognises heartbeats, boot-up and emergency messages, mailbox traffic and SDO answers.
+    Recognises heartbeats, boot-up messages, mailbox traffic and SDO answers.
 
-    Reads objects that every node has or refuses. 600h to 67Fh mean nothing to other families.
+    Reads objects that every node has or refuses. 600h to 67Fh mean nothing to other families. The
+    mailbox itself is read only where the node's own receive PDO4 is known to be one, at 500h +
+    node: elsewhere it would be process data. That read is no write in any layout.
     """
 
     protocol = 'canopen_pkw'
@@ -31,6 +39,10 @@ class CanopenScout(Scout):
     def begin(self) -> None:
         for node in range(1, network.NODE_MAX + 1):
             self._questions.append(sdo.encode_upload(node, sdo.DEVICE_TYPE, 0))
+
+    def _hear_request(self, frame: Frame, now: float) -> None:
+        if frame.identifier & 0x780 == network.REQUEST_BASE:
+            self._request(frame.identifier & 0x7F, frame.data, now)
 
     def hear(self, frame: Frame, now: float) -> None:
         if frame.extended:
@@ -51,8 +63,7 @@ class CanopenScout(Scout):
             elif base == network.REQUEST_BASE and len(frame.data) == 8:
                 self._request(node, frame.data, now)
             elif base == network.RESPONSE_BASE and len(frame.data) == 8:
-                # every layout repeats the four bytes of address and function, refusals aside
-                if self._answers(node, now, lambda request: request[:4] == frame.data[:4]):
+                if self._answers(node, now, lambda request: _repeats(request, frame.data)):
                     self._pair(node, 'PKW answers')
                     if node in self.sightings:
                         self._fact(node, 'PKW', 'answers')
@@ -74,6 +85,13 @@ class CanopenScout(Scout):
             if value >> 16 == _MAILBOX:
                 self._mailboxes.add(node)
                 self._fact(node, 'mailbox', 'yes')
+                self._questions.append(sdo.encode_upload(node, sdo.RPDO4, 1))
+        elif (index, subindex) == (sdo.RPDO4, 1) and node in self._mailboxes:
+            if value & _PDO_IDENTIFIER == network.REQUEST_BASE + node:
+                # a device that got the function of the first one last, does not answer that one
+                self._questions += [Frame(network.REQUEST_BASE + node, pkw.encode(
+                    pkw.read_request(_STATUS, 1, toggle), pkw.Layout.WORD_LE), False)
+                    for toggle in (False, True)]
 
     def _fact(self, node: int, name: str, text: str) -> None:
         facts = self._facts.setdefault(node, {})
@@ -87,3 +105,9 @@ class CanopenScout(Scout):
 
     def settings(self, station: int) -> dict[str, Any]:
         return {}
+
+
+def _repeats(request: bytes, answer: bytes) -> bool:
+    """Tell whether address and function are the same, as in every layout, refusals aside."""
+    different = int.from_bytes(request[:4], 'big') ^ int.from_bytes(answer[:4], 'big')
+    return not different & _REPEATED

@@ -14,6 +14,7 @@ from drive_can_bridge.protocols.datamodel.extended import (
 from drive_can_bridge.protocols.datamodel.options import ExtendedOptions, NUMBER_MAX
 from drive_can_bridge.protocols.family import Claim, Complaint
 from drive_can_bridge.protocols.observer import DriveObserver, Emit
+from drive_can_bridge.protocols.prober import Prober
 from drive_can_bridge.protocols.scout import Scout
 
 #: worst-case stuffing, eight bytes, 29-bit identifier, with the interframe space
@@ -57,6 +58,11 @@ class DataModelExtended(DataModelFamily):
         """Make what looks for drives of this family."""
         from drive_can_bridge.protocols.datamodel.scout import ExtendedScout
         return ExtendedScout()
+
+    def make_prober(self, drive: DriveConfiguration) -> Prober:
+        """Make what settles the open keys of a drive."""
+        from drive_can_bridge.protocols.datamodel.prober import ExtendedProber
+        return ExtendedProber(drive)
 
     # -- parts of the check -----------------------------------------------------------------------
 

@@ -11,6 +11,7 @@ from drive_can_bridge.protocols.datamodel.common_family import DataModelFamily
 from drive_can_bridge.protocols.datamodel.options import StandardOptions
 from drive_can_bridge.protocols.family import Claim, Complaint
 from drive_can_bridge.protocols.observer import DriveObserver, Emit
+from drive_can_bridge.protocols.prober import Prober
 from drive_can_bridge.protocols.scout import Scout
 
 
@@ -53,6 +54,11 @@ class DataModelStandard(DataModelFamily):
         """Make what looks for drives of this family."""
         from drive_can_bridge.protocols.datamodel.scout import StandardScout
         return StandardScout()
+
+    def make_prober(self, drive: DriveConfiguration) -> Prober:
+        """Make what settles the open keys of a drive."""
+        from drive_can_bridge.protocols.datamodel.prober import StandardProber
+        return StandardProber(drive)
 
     # -- parts of the check -----------------------------------------------------------------------
 

@@ -1,0 +1,166 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""``drive_can probe``: which keys a drive needs that its manual leaves open."""
+
+from argparse import ArgumentParser, Namespace
+from collections.abc import Iterator, Sequence
+from fnmatch import fnmatchcase
+import json
+import sys
+from typing import Any
+
+from drive_can_bridge.cli.asking import Asker, LISTEN
+from drive_can_bridge.cli.listening import add_params_file, complain, load
+from drive_can_bridge.cli.tables import print_json, print_table
+from drive_can_bridge.core.configuration import BridgeConfiguration, DriveConfiguration
+from drive_can_bridge.protocols.families import FAMILIES
+from drive_can_bridge.protocols.prober import Finding, Prober
+from drive_can_bridge.transport.port import open_port
+
+FAILED = 1
+WRONG_USAGE = 2
+UNDECIDED = 'undecided'
+
+
+class _WrongUsage(Exception):
+    """The command line cannot be obeyed."""
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add the subcommand to the parser of ``drive_can``."""
+    parser: ArgumentParser = subparsers.add_parser(
+        'probe', help='settle by reads which keys a drive needs',
+        description='Find out by harmless reads what the manuals leave open: value_order and '
+                    'index_byte (cannord), layout, word_order and abort_code_order (canopen_pkw), '
+                    'parameter_offset and maps (DataModel). Sends reads only. Listens for 1.2 s '
+                    'before, and ends when another master talks to a drive of the file.',
+        epilog='Exit code 0: the drive answered, whether or not everything could be decided. 1: '
+               'it did not, or there is another master, or the bus cannot be used. 2: wrong '
+               'usage.')
+    parser.add_argument('drive', metavar='DRIVE', nargs='?',
+                        help='name in the file, or a shell pattern; may be left out where there '
+                             'is only one')
+    add_params_file(parser, 'parameter file of the bridge, which must not run')
+    parser.add_argument('--nmt-start', action='store_true',
+                        help='start CANopen nodes first: others answer no PKW')
+    parser.add_argument('--yes', action='store_true', help='answer every question with yes')
+    parser.add_argument('--json', action='store_true',
+                        help='a document for each key: drive, key, value (null: undecided), '
+                             'configured, reason')
+    parser.set_defaults(run=run)
+
+
+def run(args: Namespace) -> int:
+    """
+    Probe.
+
+    :return: 0 the drives answered, 1 one of them did not, 2 wrong usage.
+    :raises DriveCanError: the file is wrong, there is another master, the bus cannot be used.
+    """
+    configuration = load(args)
+    try:
+        drives = _chosen(configuration, args.drive)
+        probers = [FAMILIES[drive.protocol].make_prober(drive) for drive in drives]
+        for prober in probers:      # before anything is sent
+            _confirm(args, prober)
+    except _WrongUsage as error:
+        complain(f'drive_can probe: {error}')
+        return WRONG_USAGE
+    results: list[tuple[Prober, list[Finding]]] = []
+    for bus in dict.fromkeys(drive.bus for drive in drives):
+        together = [prober for prober in probers if prober.drive.bus == bus]
+        results += _probe_bus(configuration, bus, together, args.nmt_start)
+    for prober, _ in results:
+        for note in prober.notes:
+            complain(f'warning: {prober.drive.name}: {note}')
+    _show(args, results)
+    return 0 if all(prober.answered for prober in probers) else FAILED
+
+
+def _probe_bus(configuration: BridgeConfiguration, name: str, probers: Sequence[Prober],
+               nmt_start: bool) -> Iterator[tuple[Prober, list[Finding]]]:
+    bus = configuration.buses[name]
+    port = open_port(bus)
+    try:
+        asker = Asker(bus, port, [drive for drive in configuration.drives.values()
+                                  if drive.bus == name])
+        asker.listen(LISTEN)
+        for prober in probers:
+            start = prober.start_frame()
+            if nmt_start and start is not None:
+                asker.tell(start)
+            yield prober, asker.probe(prober)
+    finally:
+        port.close()
+
+
+def _chosen(configuration: BridgeConfiguration, word: str | None) -> list[DriveConfiguration]:
+    """
+    Return the drives that are meant.
+
+    :raises _WrongUsage: none of them, or it is not clear which.
+    """
+    names = list(configuration.drives)
+    if word is None:
+        if len(names) != 1:
+            raise _WrongUsage(f'which drive? There are: {", ".join(names) or "none"}')
+        word = names[0]
+    found = [drive for drive in configuration.drives.values() if fnmatchcase(drive.name, word)]
+    if not found:
+        raise _WrongUsage(f'no drive {word!r}; there are: {", ".join(names) or "none"}')
+    return found
+
+
+def _confirm(args: Namespace, prober: Prober) -> None:
+    """
+    Have it confirmed that a drive is asked in a way that may move others.
+
+    :raises _WrongUsage: nobody can be asked, or says no.
+    """
+    if not prober.hazard:
+        return
+    complain(f'{prober.drive.name}: {prober.hazard}')
+    if args.yes:
+        return
+    if not sys.stdin.isatty():
+        raise _WrongUsage(f'{prober.drive.name} needs --yes where nobody can be asked')
+    sys.stderr.write('Ask all the same? [y/N] ')
+    sys.stderr.flush()
+    if sys.stdin.readline().strip().lower() not in ('y', 'yes'):
+        raise _WrongUsage('nothing was sent')
+
+
+def _show(args: Namespace, results: Sequence[tuple[Prober, list[Finding]]]) -> None:
+    rows = []
+    to_set: dict[str, list[str]] = {}
+    for prober, findings in results:
+        drive = prober.drive
+        for finding in findings:
+            configured = _configured(drive, finding.key)
+            if args.json:
+                print_json({'drive': drive.name, 'key': finding.key, 'value': finding.value,
+                            'configured': configured, 'reason': finding.reason})
+                continue
+            value = UNDECIDED if finding.value is None else _written(finding.value)
+            rows.append((drive.name, finding.key, value, _written(configured), finding.reason))
+            if finding.value is not None and configured not in (finding.value, 'auto'):
+                to_set.setdefault(drive.name, []).append(f'{finding.key}: {value}')
+    if args.json:
+        return
+    print_table(('drive', 'key', 'found', 'in the file', 'rests on'), rows)
+    if to_set:
+        print('\nTo be set in the file:')
+        for name, lines in to_set.items():
+            print('\n'.join((f'  {name}:', *(f'    {line}' for line in lines))))
+
+
+def _configured(drive: DriveConfiguration, key: str) -> Any:
+    if key.startswith('cyclic_'):
+        return [each.name for each in getattr(drive, key)]
+    return getattr(drive.options, key)
+
+
+def _written(value: Any) -> str:
+    """Write a value as it stands in a parameter file."""
+    if isinstance(value, list):
+        return f'[{", ".join(value)}]'
+    return value if isinstance(value, str) else json.dumps(value)

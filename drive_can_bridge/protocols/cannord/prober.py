@@ -1,0 +1,196 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+Finding out how a NORD inverter orders its parameter frames, by reads that it has to refuse.
+
+``value_order``: an array read of a parameter that is no array is refused with error 4, and error
+numbers are in PWE2, the low word (BU 0060 page 54). ``index_byte``: an array read with a sub-index
+that does not exist is refused with error 3; in the other byte FFh means nothing, and element 0
+answers. The error number stands out in either order, so that neither key needs the other.
+"""
+
+from collections.abc import Generator, Iterator
+from typing import NamedTuple
+
+from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.frame import Frame, Route
+from drive_can_bridge.protocols.cannord.identifiers import (
+    all_identifier, group_identifier, identifier, MessageObject, route,
+)
+from drive_can_bridge.protocols.cannord.parameter_frame import (
+    error_text, ERRORS, LENGTH, NUMBER_MAX, ParameterLayout, Response, RESPONSES, Task,
+)
+from drive_can_bridge.protocols.prober import Conversation, Finding, Prober, Question, spaced
+
+#: what to ask where the profile names no parameter of that kind
+SIMPLE = (514, 513)
+ARRAYS = (102, 700)
+TELEGRAM_TIMEOUT = 513
+_NOT_AN_ARRAY = 4
+_WRONG_SUBINDEX = 3
+_TRIES = 4
+#: sub-index that no array reaches, in byte 2 or in byte 3
+_BEYOND = 0xFF
+_NUMBER_AND_TASK = slice(0, 2)
+
+
+class _Answer(NamedTuple):
+    data: bytes
+
+    @property
+    def response(self) -> int:
+        return self.data[1] >> 4
+
+    @property
+    def words(self) -> tuple[int, int]:
+        return int.from_bytes(self.data[4:6], 'little'), int.from_bytes(self.data[6:8], 'little')
+
+    @property
+    def alone(self) -> tuple[int, str] | None:
+        """The only word that is not 0, and the order in which it is the low one."""
+        first, second = self.words
+        if bool(first) == bool(second):
+            return None
+        return (second, 'high_first') if second else (first, 'low_first')
+
+    @property
+    def error(self) -> int | None:
+        """The error number of a refusal, whatever the order; None: it is none, or unknown."""
+        alone = self.alone
+        refused = self.response == Response.REFUSED
+        return alone[0] if refused and alone and alone[0] in ERRORS else None
+
+
+_Asking = Generator[Question, Frame | None, _Answer | None]
+
+
+class CannordProber(Prober):
+    """Asks one inverter."""
+
+    def __init__(self, drive: DriveConfiguration) -> None:
+        super().__init__(drive)
+        self._extended: bool = drive.options.extended_identifiers
+        self._task = self._identifier(MessageObject.PARAMETER_TASK)
+        self._response = self._identifier(MessageObject.PARAMETER_RESPONSE)
+
+    def _identifier(self, kind: MessageObject) -> int:
+        return identifier(kind, self.drive.station, extended=self._extended)
+
+    @property
+    def requests(self) -> list[Route]:
+        own = (self._task, self._identifier(MessageObject.PROCESS_REQUEST),
+               group_identifier(self.drive.station, extended=self._extended),
+               all_identifier(extended=self._extended))
+        return [route(each, extended=self._extended) for each in own]
+
+    def converse(self) -> Conversation:
+        timeout = yield from self._ask(Task.READ, TELEGRAM_TIMEOUT)
+        if timeout is not None and timeout.response == Response.WORD and any(timeout.words):
+            self.notes.append('P513 is not 0: the inverter supervises telegrams once it has got '
+                              'one, and trips when they end')
+        findings = [(yield from self._value_order()), (yield from self._index_byte())]
+        if not self.answered:
+            return [Finding(key, None, 'no answer to parameter tasks: check station, bit rate and '
+                                       'extended_identifiers')
+                    for key, _, _ in findings]
+        return findings
+
+    def _value_order(self) -> Generator[Question, Frame | None, Finding]:
+        votes: dict[str, list[str]] = {}
+        for number in self._simple():
+            refusal = yield from self._twice(Task.READ_ARRAY, number)
+            if refusal is None or refusal.error is None or refusal.alone is None:
+                continue
+            votes.setdefault(refusal.alone[1], []).append(
+                f'array read of P{number}: {error_text(refusal.error)}, in bytes '
+                f'{"6, 7" if refusal.alone[1] == "high_first" else "4, 5"} '
+                f'({spaced(refusal.data)})')
+            value = yield from self._ask(Task.READ, number)
+            if value is not None and value.response == Response.WORD and value.alone is not None:
+                votes.setdefault(value.alone[1], []).append(
+                    f'read of P{number}: {value.alone[0]} ({spaced(value.data)})')
+            if refusal.error == _NOT_AN_ARRAY:
+                break
+        told = '; '.join(text for texts in votes.values() for text in texts)
+        if len(votes) == 1:
+            return Finding('value_order', next(iter(votes)), told)
+        return Finding('value_order', None, f'answers contradict each other: {told}' if votes else
+                       'no array read was refused with an error number')
+
+    def _index_byte(self) -> Generator[Question, Frame | None, Finding]:
+        told = 'no parameter is an array'
+        for number in self._arrays():
+            results = {}
+            for key, ind in (('low', _BEYOND), ('high', _BEYOND << 8)):
+                results[key] = yield from self._twice(Task.READ_ARRAY, number, ind)
+            if any(each is not None and each.error == _NOT_AN_ARRAY for each in results.values()):
+                continue
+            told = f'array read of P{number}: ' + '; '.join(
+                f'sub-index {_BEYOND} in byte {place}: {_told(results[key])}'
+                for key, place in (('low', 2), ('high', 3)))
+            wrong = [key for key, each in results.items()
+                     if each is not None and each.error == _WRONG_SUBINDEX]
+            served = [key for key, each in results.items()
+                      if each is not None and each.response in RESPONSES[Task.READ_ARRAY]]
+            if len(wrong) == len(served) == 1:
+                return Finding('index_byte', wrong[0], told)
+        return Finding('index_byte', None, told)
+
+    # -- asking -----------------------------------------------------------------------------------
+
+    def _ask(self, task: Task, number: int, ind: int = 0) -> _Asking:
+        data = ParameterLayout().encode(task, number)
+        data = data[:2] + ind.to_bytes(2, 'little') + data[4:]
+        expected = {*RESPONSES[task], Response.REFUSED}
+
+        def answers(frame: Frame) -> bool:
+            return (frame.identifier == self._response and frame.extended is self._extended
+                    and len(frame.data) == LENGTH
+                    and int.from_bytes(frame.data[_NUMBER_AND_TASK], 'little') & 0xFFF == number
+                    and frame.data[1] >> 4 in expected)
+
+        frame = yield Question(Frame(self._task, data, self._extended), answers)
+        if frame is None:
+            return None
+        self.answered = True
+        return _Answer(frame.data)
+
+    def _twice(self, task: Task, number: int, ind: int = 0) -> _Asking:
+        """Ask twice: a stale answer comes once; values may change, refusals do not."""
+        first = yield from self._ask(task, number, ind)
+        second = yield from self._ask(task, number, ind)
+        if first is None or second is None or first.response != second.response:
+            return None
+        if first.response == Response.REFUSED and first.words != second.words:
+            return None
+        return second
+
+    def _simple(self) -> list[int]:
+        """Return the numbers of parameters that are no arrays, as far as the profile knows."""
+        return _some((number for number, indices in self._numbers().items() if indices == {None}),
+                     SIMPLE)
+
+    def _arrays(self) -> list[int]:
+        return _some((number for number, indices in self._numbers().items() if indices != {None}),
+                     ARRAYS)
+
+    def _numbers(self) -> dict[int, set[int | None]]:
+        """Return the sub-indices of all numbers that can be read."""
+        found: dict[int, set[int | None]] = {}
+        for parameter in self.drive.profile.parameters.values():
+            number = parameter.number
+            if number is not None and number <= NUMBER_MAX and parameter.readable:
+                found.setdefault(number, set()).add(parameter.subindex)
+        return found
+
+
+def _some(numbers: Iterator[int], others: tuple[int, ...]) -> list[int]:
+    return list(dict.fromkeys((*list(numbers)[:_TRIES], *others)))
+
+
+def _told(answer: _Answer | None) -> str:
+    if answer is None:
+        return 'no answer, or not twice the same'
+    if answer.response == Response.REFUSED:
+        error = 'an error' if answer.error is None else error_text(answer.error)
+        return f'{error} ({spaced(answer.data)})'
+    return f'a value ({spaced(answer.data)})'

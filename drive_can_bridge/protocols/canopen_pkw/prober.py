@@ -1,0 +1,249 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+Finding out how a PKW mailbox lays out its bytes, by reads that are no writes in any layout.
+
+``layout``: register 455 is read in each layout, then a register that does not exist. A device that
+understands repeats toggle, function and register of the one, and puts 4Eh in the place of the
+function for the other. One that looks for the function elsewhere may repeat a request that starts
+nothing there; it never refuses in the place that was asked. ``abort_code_order``: only one order
+of the refusal's words is a code. ``word_order``: values of 32 bits of which one half is 0.
+
+Before anything is sent to the mailbox, 1603h is read by SDO: where the receive PDO4 is known to
+map something else than 3000h, a read of the mailbox would be process data, and nothing is asked.
+"""
+
+from collections.abc import Generator, Iterator
+from dataclasses import dataclass, field
+
+from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.errors import RemoteProtocolError
+from drive_can_bridge.core.frame import Frame, Route, STANDARD_IDENTIFIER_MAX
+from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.protocols.canopen_pkw import network, pkw, sdo
+from drive_can_bridge.protocols.canopen_pkw.abort_codes import describe, TEXTS
+from drive_can_bridge.protocols.canopen_pkw.identifiers import Identifiers
+from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Layout, Message
+from drive_can_bridge.protocols.prober import Conversation, Finding, Prober, Question, spaced
+
+STATUS = Address(455)
+#: registers that no device should have; their bytes are no function that writes, in any layout
+MISSING = (Address(9999), Address(65000))
+KEYS = ('layout', 'word_order', 'abort_code_order')
+ORDERS = ('high_first', 'low_first')
+_MAILBOX = 0x3000
+_WIDE_MAX = 12
+#: values that have to agree where no limits help
+_AGREEING = 2
+_SILENT = ('no answer: a node that is not operational answers no PKW (--nmt-start starts it); '
+           'check station, bit rate, request_cob_id and response_cob_id')
+
+
+@dataclass
+class _Evidence:
+    """What came back in one layout."""
+
+    read: list[bytes] = field(default_factory=list)
+    words: pkw.Words = pkw.NO_WORDS
+    refusals: list[tuple[Address, bytes, pkw.Words]] = field(default_factory=list)
+
+    @property
+    def understood(self) -> bool:
+        """Both toggles were answered."""
+        return len(self.read) == 2
+
+
+_Asking = Generator[Question, Frame | None, tuple[bytes, Message] | None]
+
+
+class PkwProber(Prober):
+    """Asks one node."""
+
+    def __init__(self, drive: DriveConfiguration) -> None:
+        super().__init__(drive)
+        self._identifiers = Identifiers.of(drive)
+        self._toggle = False
+
+    @property
+    def requests(self) -> list[Route]:
+        return [Route(each, STANDARD_IDENTIFIER_MAX, False) for each in (
+            self._identifiers.request, sdo.REQUEST_BASE + self.drive.station,
+            network.NMT_IDENTIFIER)]
+
+    def start_frame(self) -> Frame | None:
+        return network.encode_nmt(network.NmtCommand.START, self.drive.station)
+
+    def converse(self) -> Conversation:
+        mapped = yield from self._mapped()
+        if mapped not in (None, _MAILBOX):
+            why = f'receive PDO4 (1603h) maps {mapped:04X}h, no mailbox (3000h): nothing was asked'
+            return [Finding(key, None, why) for key in KEYS]
+        seen = {}
+        for layout in Layout:
+            seen[layout] = yield from self._try(layout)
+        layout_found, reason = _conclude(seen)
+        findings = [Finding('layout', layout_found and layout_found.value, reason)]
+        if layout_found is None:
+            why = 'the layout comes first'
+            findings += [Finding(key, None, why) for key in KEYS[1:]]
+        else:
+            findings.append((yield from self._word_order(layout_found)))
+            findings.append(_abort_code_order(seen[layout_found]))
+        yield self._idle()      # whoever comes next may begin with any function
+        if not self.answered:
+            return [finding._replace(reason=_SILENT) for finding in findings]
+        return findings
+
+    def _mapped(self) -> Generator[Question, Frame | None, int | None]:
+        """Return the object that the receive PDO4 maps; None: the node does not tell."""
+        node = self.drive.station
+        if self._identifiers.request != network.REQUEST_BASE + node:
+            return None     # some other PDO
+        answer = yield Question(
+            sdo.encode_upload(node, sdo.RPDO4_MAPPING, 1),
+            lambda frame: (frame.identifier == sdo.RESPONSE_BASE + node and not frame.extended
+                           and _uploaded(frame.data) is not None))
+        uploaded = None if answer is None else _uploaded(answer.data)
+        return None if uploaded is None or uploaded.value is None else uploaded.value >> 16
+
+    def _try(self, layout: Layout) -> Generator[Question, Frame | None, _Evidence]:
+        evidence = _Evidence()
+        yield self._idle()
+        self._toggle = False
+        for _ in range(2):
+            answer = yield from self._ask(STATUS, 1, layout)
+            if answer is not None and answer[1].code != pkw.Function.ERROR:
+                evidence.read.append(answer[0])
+                evidence.words = answer[1].words
+        if evidence.read:
+            for address in MISSING:
+                answer = yield from self._ask(address, 1, layout)
+                if answer is not None and answer[1].code == pkw.Function.ERROR:
+                    evidence.refusals.append((address, answer[0], answer[1].words))
+        return evidence
+
+    def _word_order(self, layout: Layout) -> Generator[Question, Frame | None, Finding]:
+        votes: dict[str, list[str]] = {}
+        certain = False
+        for parameter in self._wide():
+            answer = yield from self._ask(self._address(parameter), 2, layout)
+            if answer is None or answer[1].code == pkw.Function.ERROR:
+                continue
+            order, by_limits = _order_of(parameter, answer[1].words)
+            if order:
+                certain = certain or by_limits
+                values = [f'{pkw.value_from_words(answer[1].words, each == ORDERS[0])}'
+                          for each in sorted(ORDERS, key=lambda each: each != order)]
+                votes.setdefault(order, []).append(
+                    f'{parameter.name} reads {spaced(answer[0][4:])}: {" and not ".join(values)}')
+                if certain or len(votes[order]) > _AGREEING:
+                    break
+        told = '; '.join(text for texts in votes.values() for text in texts)
+        if len(votes) == 1 and (certain or len(next(iter(votes.values()))) >= _AGREEING):
+            return Finding('word_order', next(iter(votes)), told)
+        if len(votes) > 1:
+            return Finding('word_order', None, f'values contradict each other: {told}')
+        return Finding('word_order', None, (
+            f'one value is not enough: {told}' if told else
+            'no value of 32 bits has one half that is 0 and one that is not')
+            + '; try again while the motor runs')
+
+    # -- asking -----------------------------------------------------------------------------------
+
+    def _idle(self) -> Question:
+        """Return what starts nothing in any layout, so that any function may follow."""
+        return Question(Frame(self._identifiers.request, bytes(pkw.PAYLOAD), False), self._comes)
+
+    def _comes(self, frame: Frame) -> bool:
+        return (frame.identifier == self._identifiers.response and not frame.extended
+                and len(frame.data) == pkw.PAYLOAD)
+
+    def _ask(self, address: Address, count: int, layout: Layout) -> _Asking:
+        request = pkw.read_request(address, count, self._toggle)
+        self._toggle = not self._toggle
+        data = pkw.encode(request, layout)
+        if not harmless(data):
+            return None
+        frame = yield Question(
+            Frame(self._identifiers.request, data, False),
+            lambda frame: self._comes(frame) and pkw.answers(pkw.decode(frame.data, layout),
+                                                             request))
+        if frame is None:
+            return None
+        self.answered = True
+        return frame.data, pkw.decode(frame.data, layout)
+
+    def _wide(self) -> list[Parameter]:
+        found: Iterator[Parameter] = (
+            each for each in self.drive.profile.parameters.values()
+            if each.type.bits == 32 and each.readable and not each.bits
+            and each.word_order is None)
+        return list(found)[:_WIDE_MAX]
+
+    def _address(self, parameter: Parameter) -> Address:
+        by_object = self.drive.options.addressing == 'canopen' or parameter.number is None
+        if by_object and parameter.index is not None:
+            return Address(parameter.index, parameter.subindex or 0)
+        return Address(parameter.number or 0)
+
+
+def harmless(data: bytes) -> bool:
+    """Tell whether a request writes nothing, whatever the layout of who gets it."""
+    meanings = [pkw.decode(data, layout).meaning for layout in Layout]
+    return not any(meaning is not None and meaning.writes for meaning in meanings)
+
+
+def _uploaded(data: bytes) -> sdo.Uploaded | None:
+    """Return the answer to the upload of the mapping; None: it is none."""
+    try:
+        found = sdo.decode_upload(data)
+    except RemoteProtocolError:
+        return None
+    return found if found.object == (sdo.RPDO4_MAPPING, 1) else None
+
+
+def _conclude(seen: dict[Layout, _Evidence]) -> tuple[Layout | None, str]:
+    """Return the layout, and what that rests on."""
+    understood = [layout for layout, each in seen.items() if each.understood]
+    proven = [layout for layout in understood if seen[layout].refusals]
+    told = '; '.join(f'{layout.value}: ' + (
+        f'{STATUS} answered by {spaced(each.read[-1])}' if each.read else 'no answer') + (
+        f', {each.refusals[0][0]} refused by {spaced(each.refusals[0][1])}'
+        if each.refusals else '') for layout, each in seen.items())
+    if len(proven) == 1:
+        return proven[0], told
+    if len(understood) == 1 and not proven and any(seen[understood[0]].words):
+        return understood[0], told
+    return None, told
+
+
+def _abort_code_order(evidence: _Evidence) -> Finding:
+    key = 'abort_code_order'
+    votes = {}
+    for address, data, words in evidence.refusals:
+        codes = {order: pkw.value_from_words(words, order == ORDERS[0]) for order in ORDERS}
+        known = [order for order in ORDERS if codes[order] in TEXTS]
+        if len(known) == 1:
+            votes[known[0]] = (f'{address} refused by {spaced(data)}: '
+                               f'{describe(codes[known[0]])}')
+    if len(votes) == 1:
+        return Finding(key, *next(iter(votes.items())))
+    if not evidence.refusals:
+        return Finding(key, None, 'nothing was refused')
+    return Finding(key, None, 'refused without a code that is known in one order only: '
+                   + '; '.join(spaced(data) for _, data, _ in evidence.refusals))
+
+
+def _order_of(parameter: Parameter, words: pkw.Words) -> tuple[str, bool]:
+    """Return the order that makes a value likely ('': either may), and whether limits say so."""
+    if words[0] == words[1]:
+        return '', False
+    low = -float('inf') if parameter.minimum is None else parameter.minimum
+    high = float('inf') if parameter.maximum is None else parameter.maximum
+    fits = [order for order in ORDERS
+            if low <= parameter.value_from_raw(parameter.raw_from_word(
+                pkw.value_from_words(words, order == ORDERS[0]))) <= high]
+    if len(fits) == 1:
+        return fits[0], True
+    if bool(words[0]) == bool(words[1]):
+        return '', False
+    return (ORDERS[0] if words[1] else ORDERS[1]), False

@@ -1,0 +1,78 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+Settling by harmless reads what the manuals leave open: what a family asks, and what follows.
+
+A *prober* is a conversation as a generator: it yields questions and is sent the answer, or None
+where there was none. Who drives it keeps the time and the bus.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Generator
+from typing import Any, NamedTuple
+
+from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.frame import Frame, Route
+
+
+class Question(NamedTuple):
+    """
+    A read.
+
+    :param answers: tells whether a frame from the bus is an answer to it.
+    :param quiet: s of silence that follow when there is no answer.
+    """
+
+    frame: Frame
+    answers: Callable[[Frame], bool]
+    quiet: float = 0.0
+
+
+class Finding(NamedTuple):
+    """
+    A key of the drive that was looked at.
+
+    :param value: what it should be; None: undecided.
+    :param reason: which bytes that rests on, or what is missing.
+    """
+
+    key: str
+    value: Any
+    reason: str
+
+
+Conversation = Generator[Question, Frame | None, list[Finding]]
+
+
+class Prober(ABC):
+    """
+    Asks one drive.
+
+    :ivar hazard: what its questions would mean to devices that the file does not name, or ''.
+    :ivar notes: what else was seen.
+    :ivar answered: there was an answer to some question.
+    """
+
+    hazard = ''
+
+    def __init__(self, drive: DriveConfiguration) -> None:
+        self.drive = drive
+        self.notes: list[str] = []
+        self.answered = False
+
+    @property
+    @abstractmethod
+    def requests(self) -> list[Route]:
+        """Return what only a master of the drive sends."""
+
+    def start_frame(self) -> Frame | None:
+        """Return what makes the drive answer at all, sent only when asked for; None: nothing."""
+        return None
+
+    @abstractmethod
+    def converse(self) -> Conversation:
+        """Ask; every question may be asked again where there is no answer."""
+
+
+def spaced(data: bytes) -> str:
+    """Write bytes as the manuals do: ``66 70 00 00``."""
+    return data.hex(' ').upper()

@@ -1,0 +1,505 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Settling open keys: what is concluded from which bytes, and that nothing is guessed."""
+
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+import json
+from pathlib import Path
+from typing import Any
+
+from foreign_devices import cannord, canopen, datamodel_extended, datamodel_standard
+import pytest
+
+from drive_can_bridge.cli import main as front_end
+from drive_can_bridge.cli.asking import AnotherMaster, Asker
+from drive_can_bridge.configuration.load import configuration_from_file
+from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration
+from drive_can_bridge.core.errors import TransportError
+from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.protocols.families import FAMILIES
+from drive_can_bridge.protocols.prober import Finding
+from drive_can_bridge.resources import config_file
+from drive_can_bridge.simulation.drive import SimulatedDrive
+from drive_can_bridge.simulation.drives import SIMULATED_DRIVES
+from drive_can_bridge.simulation.simulation import Simulation
+from drive_can_bridge.transport.end_point import EndPoint
+
+Device = Callable[[Frame], list[Frame]]
+
+
+class Bench(EndPoint):
+    """A bus with one device, and a clock of its own."""
+
+    def __init__(self, device: Device) -> None:
+        super().__init__()
+        self._device = device
+        self.now = 0.0
+        self.sent: list[Frame] = []
+        self.arriving: deque[Frame] = deque()
+
+    def clock(self) -> float:
+        return self.now
+
+    def receive(self, timeout: float) -> Frame | None:
+        if self.arriving:
+            self.now += 0.001
+            return self.arriving.popleft()
+        self.now += max(timeout, 1e-4)
+        return None
+
+    def send(self, frame: Frame, timeout: float) -> None:
+        self.sent.append(frame)
+        self.arriving.extend(self._device(frame))
+
+    def close(self) -> None:
+        pass
+
+    def probe(self, drive: DriveConfiguration) -> dict[str, Finding]:
+        asker = Asker(BusConfiguration('main', 'virtual', 'x'), self, [drive], self.clock)
+        return {finding.key: finding
+                for finding in asker.probe(FAMILIES[drive.protocol].make_prober(drive))}
+
+
+def configured(file: str, name: str, **options: Any) -> DriveConfiguration:
+    drive = configuration_from_file(config_file(file)).drives[name]
+    return replace(drive, parameter_timeout=0.1, parameter_retries=1,
+                   options=replace(drive.options, **options))
+
+
+INVERTER = configured('cannord.yaml', 'conveyor')
+STARTER = configured('tesys.yaml', 'pump')
+LIFT = configured('datamodel_standard.yaml', 'lift')
+ELEVEN = configured('datamodel_standard.yaml', 'conveyor')
+
+
+def scripted(answers: Mapping[str, str], request: int, response: int) -> Device:
+    """Answer requests by their bytes; others get nothing."""
+    table = {bytes.fromhex(key): bytes.fromhex(value) for key, value in answers.items()}
+
+    def device(frame: Frame) -> list[Frame]:
+        if frame.identifier == SDO:
+            return []
+        assert frame.identifier == request
+        data = table.get(frame.data)
+        return [] if data is None else [Frame(response, data, frame.extended)]
+    return device
+
+
+SDO = 0x605     # of node 5; not every device answers it
+
+
+def values(findings: Mapping[str, Finding]) -> dict[str, Any]:
+    return {key: finding.value for key, finding in findings.items()}
+
+
+# -- bytes of the manuals -------------------------------------------------------------------------
+
+# P514 stands in no profile as an array; P102 is set dependent. BU 0060 page 54
+CANNORD = {
+    '0262000000000000': '0272000000000400',     # P514, array read: error 4 in PWE2
+    '0212000000000000': '0212000000000400',
+    '66600000FF000000': '',                     # not sent: byte 2 comes first
+    '6660FF0000000000': '6670FF0000000300',     # P102, sub-index 255 in byte 2: error 3
+    '666000FF00000000': '664000FF00006700',     # in byte 3: nothing, element 0 answers
+}
+
+
+def bare(drive: DriveConfiguration) -> DriveConfiguration:
+    """Return a drive whose profile says nothing."""
+    return replace(drive, profile=replace(drive.profile, parameters={}))
+
+
+def test_cannord_by_the_bytes_of_the_manual() -> None:
+    bench = Bench(scripted(CANNORD, 0x264, 0x265))
+    found = bench.probe(bare(INVERTER))
+    assert values(found) == {'value_order': 'high_first', 'index_byte': 'low'}
+    assert found['value_order'].reason == (
+        'array read of P514: error 4: not an array, in bytes 6, 7 (02 72 00 00 00 00 04 00); '
+        'read of P514: 4 (02 12 00 00 00 00 04 00)')
+    assert '66 70 FF 00 00 00 03 00' in found['index_byte'].reason
+
+
+def test_cannord_the_other_way_round() -> None:
+    bench = Bench(scripted({
+        '0262000000000000': '0272000004000000',
+        '6660FF0000000000': '6640FF0067000000',
+        '666000FF00000000': '667000FF03000000'}, 0x264, 0x265))
+    found = bench.probe(bare(INVERTER))
+    assert values(found) == {'value_order': 'low_first', 'index_byte': 'high'}
+    assert 'in bytes 4, 5' in found['value_order'].reason
+
+
+@pytest.mark.parametrize(('answers', 'reason'), [
+    ({}, 'no answer to parameter tasks'),
+    # error 0, an unknown number: no byte tells anything
+    ({'0262000000000000': '0272000000000000'}, 'no array read was refused with an error number'),
+    # error 4 in the low word, and a value in the high one
+    ({'0262000000000000': '0272000000000400', '0212000000000000': '0212000004000000'},
+     'answers contradict each other'),
+    # what is no error number of the manual is not taken for one
+    ({'0262000000000000': '0272000000003412'}, 'no array read was refused'),
+])
+def test_cannord_undecided_order(answers: dict[str, str], reason: str) -> None:
+    found = Bench(scripted(answers, 0x264, 0x265)).probe(bare(INVERTER))
+    assert found['value_order'].value is None
+    assert found['value_order'].reason.startswith(reason)
+
+
+@pytest.mark.parametrize('answers', [
+    {'6660FF0000000000': '6670FF0000000300', '666000FF00000000': '667000FF00000300'},
+    {'6660FF0000000000': '6640FF0000006700', '666000FF00000000': '664000FF00006700'},
+    {'6660FF0000000000': '6670FF0000000300'},
+    {'6660FF0000000000': '6670FF0000000400', '666000FF00000000': '667000FF00000400'},
+])
+def test_cannord_undecided_index(answers: dict[str, str]) -> None:
+    found = Bench(scripted(answers, 0x264, 0x265)).probe(bare(INVERTER))
+    assert found['index_byte'].value is None
+
+
+# reads of 455 and refusals of 9999 as the protocol notes write them down, for node 5
+READS = {
+    'word_le': {
+        'C701002500000000': 'C701002583200000', 'C70100A500000000': 'C70100A583200000',
+        '0F27002500000000': '0F27004E00000206'},
+    'dword_swapped': {
+        '0025C70100000000': '0025C70100008320', '00A5C70100000000': '00A5C70100008320',
+        '00250F2700000000': '004E0F2702060000'},
+    'word_be': {
+        '01C7250000000000': '01C7250020830000', '01C7A50000000000': '01C7A50020830000',
+        '270F250000000000': '270F4E0000000602'},
+}
+
+
+@pytest.mark.parametrize('layout', list(READS))
+def test_pkw_by_the_bytes_of_the_notes(layout: str) -> None:
+    found = Bench(scripted(READS[layout], 0x505, 0x485)).probe(STARTER)
+    assert values(found) == {
+        'layout': layout, 'word_order': None, 'abort_code_order': 'low_first'}
+    assert '06020000h' in found['abort_code_order'].reason
+
+
+def test_pkw_abort_code_the_other_way_round() -> None:
+    answers = {**READS['word_le'], '0F27002500000000': '0F27004E02060000'}
+    found = Bench(scripted(answers, 0x505, 0x485)).probe(STARTER)
+    assert found['abort_code_order'].value == 'high_first'
+
+
+@pytest.mark.parametrize(('refusal', 'reason'), [
+    (None, 'nothing was refused'),
+    ('0F27004E03000000', 'refused without a code'),     # a PROFIBUS device's number
+    ('0F27004E00000000', 'refused without a code'),
+])
+def test_pkw_undecided_abort_code(refusal: str | None, reason: str) -> None:
+    answers = {**READS['word_le'], '0F27002500000000': refusal}
+    found = Bench(scripted({key: value for key, value in answers.items() if value}, 0x505, 0x485),
+                  ).probe(STARTER)
+    assert found['layout'].value == 'word_le'
+    assert found['abort_code_order'].value is None
+    assert found['abort_code_order'].reason.startswith(reason)
+
+
+def test_pkw_an_echo_is_no_proof() -> None:
+    # a device of another layout may repeat what starts nothing there
+    found = Bench(lambda frame: [Frame(0x485, frame.data, False)] if frame.identifier == 0x505
+                  else []).probe(STARTER)
+    assert values(found) == {'layout': None, 'word_order': None, 'abort_code_order': None}
+    found = Bench(scripted({
+        'C701002500000000': 'C701002500000000', 'C70100A500000000': 'C70100A500000000'},
+        0x505, 0x485)).probe(STARTER)
+    assert found['layout'].value is None
+
+
+def test_pkw_a_frame_of_another_request_is_no_answer() -> None:
+    found = Bench(lambda frame: [Frame(0x485, bytes.fromhex('C8010025FFFF0000'), False)],
+                  ).probe(STARTER)
+    assert found['layout'].value is None
+    assert '--nmt-start' in found['layout'].reason
+
+
+def test_pkw_is_not_asked_where_the_receive_pdo_is_no_mailbox() -> None:
+    def node(frame: Frame) -> list[Frame]:
+        assert frame == Frame(0x605, bytes.fromhex('4003160100000000'), False)
+        return [Frame(0x585, bytes.fromhex('4303160110004060'), False)]     # 6040h, control word
+    found = Bench(node).probe(STARTER)
+    assert values(found) == {'layout': None, 'word_order': None, 'abort_code_order': None}
+    assert found['layout'].reason.startswith('receive PDO4 (1603h) maps 6040h')
+
+
+@pytest.mark.parametrize(('currents', 'order'), [
+    (('00008403', '00008503'), 'high_first'),   # 9.00 A, section 8 of the notes
+    (('84030000', '85030000'), 'low_first'),
+    (('00008403', '84030000'), None),
+    (('00008403', '00000000'), None),           # one value might be chance
+    (('84038503', '84038503'), None),
+])
+def test_pkw_word_order(currents: tuple[str, str], order: str | None) -> None:
+    numbers = [each.number for each in STARTER.profile.parameters.values()
+               if each.type.bits == 32][:2]
+    answers = {}
+    for number, current in zip(numbers, currents, strict=True):
+        for function in '26', 'A6':
+            head = f'{(number or 0).to_bytes(2, "little").hex()}00{function}'
+            answers[f'{head}00000000'] = f'{head}{current}'
+    found = Bench(scripted({**READS['word_le'], **answers}, 0x505, 0x485)).probe(STARTER)
+    assert found['word_order'].value == order
+
+
+# the maps of the seed's examples, 29 bits, station 1: Reg.122 = 50, Reg.126 = 209, 210
+def maps(request: str, response: str, moved: int = 0) -> Device:
+    answers = {0x002007A4 + 16 * moved: (0x102007A4 + 16 * moved, request),
+               0x002007E4 + 16 * moved: (0x102007E4 + 16 * moved, response)}
+
+    def device(frame: Frame) -> list[Frame]:
+        assert frame.data == bytes(8)
+        identifier, data = answers.get(frame.identifier, (0, ''))
+        return [Frame(identifier, bytes.fromhex(data), True)] if data else []
+    return device
+
+
+def test_datamodel_maps_by_the_bytes_of_the_manual() -> None:
+    found = Bench(maps('0032003300000000', '00D100D200D30000')).probe(LIFT)
+    assert values(found) == {
+        'parameter_offset': 0, 'cyclic_request': ['speed_setpoint', 'torque_limit'],
+        'cyclic_response': ['actual_speed', 'motor_current', 'status_word']}
+    assert found['parameter_offset'].reason == (
+        'the maps of the file are there, 122 and 126 on: 50 51 0 0 | 209 210 211 0')
+
+
+@pytest.mark.parametrize(('request_map', 'response_map', 'moved'), [
+    ('0031003200000000', '00D000D100D20000', -1), ('0033003400000000', '00D200D300D40000', 1)])
+def test_datamodel_moved(request_map: str, response_map: str, moved: int) -> None:
+    found = Bench(maps(request_map, response_map, moved)).probe(LIFT)
+    assert found['parameter_offset'].value == moved
+    assert found['cyclic_request'].value == ['speed_setpoint', 'torque_limit']
+
+
+def test_datamodel_other_maps_where_nothing_else_answers() -> None:
+    found = Bench(maps('0032000000000000', '00D1006400000000')).probe(LIFT)
+    assert found['parameter_offset'].value == 0
+    assert found['cyclic_request'].value == ['speed_setpoint']
+    assert found['cyclic_response'].value is None       # what is P100?
+    assert 'the profile lacks P100' in found['cyclic_response'].reason
+
+
+def test_datamodel_undecided() -> None:
+    def everything(frame: Frame) -> list[Frame]:
+        return [Frame(frame.identifier | 0x10000000, bytes.fromhex('0001000200030004'), True)]
+    found = Bench(everything).probe(LIFT)
+    assert values(found) == dict.fromkeys(
+        ('parameter_offset', 'cyclic_request', 'cyclic_response'))
+    assert 'more than eight numbers answer' in found['parameter_offset'].reason
+    found = Bench(lambda frame: []).probe(LIFT)
+    assert set(values(found).values()) == {None}
+    assert found['parameter_offset'].reason == 'no answer: check station and bit rate'
+
+
+# -- simulated drives, set to each variant --------------------------------------------------------
+
+def simulated(drive: DriveConfiguration,
+              prepare: Callable[[SimulatedDrive], None] = lambda _: None) -> Device:
+    """Return a simulated drive as a device."""
+    made = SIMULATED_DRIVES[drive.protocol](drive)
+    prepare(made)
+    times = iter(range(10**9))
+
+    def device(frame: Frame) -> list[Frame]:
+        now = next(times) * 0.001
+        made.receive_frame(frame, now)
+        return made.take_frames()
+    if drive.protocol == 'canopen_pkw':
+        device(Frame(0, bytes((1, drive.station)), False))
+    return device
+
+
+ORDERS = ('high_first', 'low_first')
+
+
+@pytest.mark.parametrize('told', [INVERTER, configured(
+    'cannord.yaml', 'conveyor', value_order='low_first', index_byte='high')])
+@pytest.mark.parametrize('index_byte', ['low', 'high'])
+@pytest.mark.parametrize('value_order', ORDERS)
+def test_simulated_inverter(value_order: str, index_byte: str, told: DriveConfiguration) -> None:
+    options = {'value_order': value_order, 'index_byte': index_byte}
+    bench = Bench(simulated(configured('cannord.yaml', 'conveyor', **options)))
+    assert values(bench.probe(told)) == options
+
+
+@pytest.mark.parametrize('abort_code_order', ORDERS)
+@pytest.mark.parametrize('word_order', ORDERS)
+@pytest.mark.parametrize('layout', list(READS))
+def test_simulated_starter(layout: str, word_order: str, abort_code_order: str) -> None:
+    options = {'layout': layout, 'word_order': word_order, 'abort_code_order': abort_code_order}
+
+    def used(drive: SimulatedDrive) -> None:
+        for name in ('motor_starts', 'operating_time'):
+            drive.set_value(name, 1234)
+
+    device = configured('tesys.yaml', 'pump', **options)
+    assert values(Bench(simulated(device, used)).probe(STARTER)) == options
+
+    def new(drive: SimulatedDrive) -> None:
+        for parameter in STARTER.profile.parameters.values():
+            if parameter.type.bits == 32:
+                drive.set_value(parameter.name, 0, 0.0)
+
+    assert values(Bench(simulated(device, new)).probe(STARTER)) == {**options, 'word_order': None}
+
+
+@pytest.mark.parametrize('drive', [LIFT, ELEVEN])
+@pytest.mark.parametrize('offset', [-1, 0, 1])
+@pytest.mark.parametrize('told', [-1, 0, 1])
+def test_simulated_datamodel(drive: DriveConfiguration, offset: int, told: int) -> None:
+    def moved(by: int) -> DriveConfiguration:
+        return replace(drive, options=replace(drive.options, parameter_offset=by))
+
+    found = Bench(simulated(moved(offset))).probe(moved(told))
+    assert found.pop('parameter_offset').value == offset
+    if drive is LIFT:
+        assert found['cyclic_request'].value == [each.name for each in drive.cyclic_request]
+        assert found['cyclic_response'].value == [each.name for each in drive.cyclic_response]
+    else:
+        assert not found
+
+
+# -- nobody is moved ------------------------------------------------------------------------------
+
+CROWD = (
+    *(datamodel_extended(station) for station in range(128)),
+    *(datamodel_standard(station) for station in range(16)),
+    *(cannord(address) for address in range(256)),
+    *(canopen(node) for node in range(1, 128)),
+)
+
+
+@pytest.mark.parametrize('drive', [LIFT, ELEVEN, STARTER, INVERTER],
+                         ids=lambda each: each.protocol)
+@pytest.mark.parametrize('answering', [True, False])
+def test_nobody_obeys_what_is_asked(drive: DriveConfiguration, answering: bool) -> None:
+    bench = Bench(simulated(drive) if answering else lambda _: [])
+    bench.probe(drive)
+    assert bench.sent
+    # a parameter task for inverter 50 is 264h: receive PDO1 of node 100, which is not there; and
+    # node 5 is the one that is asked, whose functions that write are 2Ah, 2Bh, 3Ah and 3Bh
+    others = [device for device in CROWD if device.name != 'canopen 5' and not (
+        drive is INVERTER and device.name.startswith('canopen'))]
+    if drive is STARTER:
+        assert not [frame for frame in bench.sent
+                    if {byte & 0x7F for byte in frame.data[1:4]} & {0x2A, 0x2B, 0x3A, 0x3B}
+                    and frame.identifier == 0x505]
+        assert {frame.data[0] for frame in bench.sent if frame.identifier == 0x605} == {0x40}
+        assert {frame.identifier for frame in bench.sent} == {0x505, 0x605}
+    for device in others:
+        device.obeyed.clear()
+        for frame in bench.sent:
+            device.hear(frame)
+    assert not [device.name for device in others if device.obeyed]
+
+
+def test_maps_of_an_even_station_need_a_word(tmp_path: Path,
+                                             capsys: pytest.CaptureFixture[str],
+                                             monkeypatch: pytest.MonkeyPatch) -> None:
+    text = Path(config_file('datamodel_standard.yaml')).read_text(encoding='utf-8')
+    file = tmp_path / 'even.yaml'
+    file.write_text(text.replace('socketcan', 'virtual').replace(
+        'station: 1 ', 'station: 2 ', 1), encoding='utf-8')
+    monkeypatch.setattr('sys.stdin', open('/dev/null'))
+    assert drive_can('probe', 'conveyor', '--params-file', file) == 2
+    assert 'is a write of a parameter in EEPROM to a CANnord inverter' in capsys.readouterr().err
+
+
+# -- other masters, and the command line ----------------------------------------------------------
+
+@pytest.mark.parametrize(('drive', 'request_frame'), [
+    (LIFT, Frame(0x003FFFF0, bytes(8), True)), (LIFT, Frame(0x002001E2, bytes(8), True)),
+    (ELEVEN, Frame(0x3F1, bytes.fromhex('031E000100000000'), False)),
+    (INVERTER, Frame(0x064, bytes.fromhex('7E040000'), False)),
+    (INVERTER, Frame(0x264, bytes.fromhex('BC12000000000000'), False)),
+    (INVERTER, Frame(0x401, bytes.fromhex('7E040000'), False)),
+    (STARTER, Frame(0x505, bytes(8), False)), (STARTER, Frame(0x000, b'\x01\x05', False)),
+    (STARTER, Frame(0x605, bytes.fromhex('4000100000000000'), False)),
+])
+def test_another_master_ends_it(drive: DriveConfiguration, request_frame: Frame) -> None:
+    bench = Bench(lambda _: [])
+    asker = Asker(BusConfiguration('main', 'virtual', 'x'), bench, [drive], bench.clock)
+    asker.listen(1.2)
+    assert bench.now >= 1.2
+    bench.arriving.append(request_frame)
+    with pytest.raises(AnotherMaster, match=f'another master talks to drive {drive.name}'):
+        asker.listen(1.2)
+    bench.arriving.append(request_frame)
+    with pytest.raises(AnotherMaster):
+        asker.probe(FAMILIES[drive.protocol].make_prober(drive))
+    assert not bench.sent
+
+
+def test_a_bus_that_takes_nothing() -> None:
+    def full(frame: Frame) -> list[Frame]:
+        raise TransportError('send: transmit queue full')
+    with pytest.raises(TransportError, match='no other node acknowledges'):
+        Bench(full).probe(LIFT)
+
+
+def test_a_telegram_time_out_is_told() -> None:
+    answers = {'0112000000000000': '0112000000003200'}      # P513 = 0.5 s
+    prober = FAMILIES['cannord'].make_prober(INVERTER)
+    bench = Bench(scripted(answers, 0x264, 0x265))
+    Asker(BusConfiguration('main', 'virtual', 'x'), bench, [INVERTER], bench.clock).probe(prober)
+    assert prober.notes == ['P513 is not 0: the inverter supervises telegrams once it has got '
+                            'one, and trips when they end']
+
+
+def drive_can(*arguments: object) -> int:
+    return front_end.main([str(argument) for argument in arguments])
+
+
+def file_with(tmp_path: Path, name: str, options: str) -> Path:
+    """Write a file with one inverter on a bus inside this process."""
+    path = tmp_path / name
+    path.write_text(f"""\
+/**/drive_can_bridge:
+  ros__parameters:
+    buses: {{main: {{interface: virtual, channel: probe, bitrate: 500000}}}}
+    drives:
+      conveyor:
+        {{bus: main, protocol: cannord, station: 50, profile: nord_sk500e,
+         cyclic_request: [frequency_setpoint], cyclic_response: [actual_frequency]{options}}}
+""", encoding='utf-8')
+    return path
+
+
+def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = file_with(tmp_path, 'file.yaml', '')
+    other = file_with(tmp_path, 'other.yaml', ', value_order: low_first, index_byte: high')
+    with Simulation(configuration_from_file(other)) as simulation:
+        assert drive_can('probe', '--params-file', file, 'conv*') == 0
+        out, err = capsys.readouterr()
+        assert out.splitlines()[0].split() == ['drive', 'key', 'found', 'in', 'the', 'file',
+                                               'rests', 'on']
+        assert out.endswith('\nTo be set in the file:\n  conveyor:\n    value_order: low_first\n'
+                            '    index_byte: high\n')
+        assert not err
+        assert drive_can('probe', '--params-file', other, '--json') == 0
+        documents = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+        assert [(each['drive'], each['key'], each['value'], each['configured'])
+                for each in documents] == [
+            ('conveyor', 'value_order', 'low_first', 'low_first'),
+            ('conveyor', 'index_byte', 'high', 'high')]
+        drive = simulation.drives['conveyor']
+        assert not [rule for rule in drive.violations if 'sub-index' not in rule]
+    assert drive_can('probe', '--params-file', file) == 1
+    out = capsys.readouterr().out
+    assert 'undecided' in out and 'no answer to parameter tasks' in out
+    assert 'To be set' not in out
+
+
+@pytest.mark.parametrize(('words', 'told'), [
+    (['lift'], "no drive 'lift'; there are: conveyor"), ([], '')])
+def test_which_drive(words: list[str], told: str, tmp_path: Path,
+                     capsys: pytest.CaptureFixture[str]) -> None:
+    if words:
+        assert drive_can('probe', *words, '--params-file', file_with(tmp_path, 'x.yaml', '')) == 2
+        assert told in capsys.readouterr().err
+        return
+    assert drive_can('probe', '--params-file', config_file('all_families.yaml')) == 2
+    assert 'which drive? There are: ' in capsys.readouterr().err
