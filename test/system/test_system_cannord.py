@@ -50,6 +50,14 @@ def enable(client: Client, drive: str) -> None:
     assert success, message
 
 
+def runs(client: Client, namespace: str, drive: str) -> None:
+    """Have a drive, or the group that it leads, run: enabled, armed, commanded."""
+    enable(client, drive)
+    client.publish(f'{drive}/command/frequency_setpoint', 0.0)
+    client.diagnostics(f'{namespace}/drive_can_bridge: drive conveyor', state='^online$')
+    client.publish(f'{drive}/command/frequency_setpoint', 25.0)
+
+
 def test_broadcast(processes: Processes, client: Client, namespace: str,
                    tmp_path: Path) -> None:
     file = inverters(tmp_path, {'broadcast': 'group'}, {'broadcast': 'group'})
@@ -58,10 +66,7 @@ def test_broadcast(processes: Processes, client: Client, namespace: str,
     conveyor, lift = f'/{namespace}/conveyor', f'/{namespace}/lift'
     client.online(conveyor)
     client.online(lift)
-    client.publish(f'{conveyor}/command/frequency_setpoint', 0.0)
-    client.diagnostics(f'{namespace}/drive_can_bridge: drive conveyor', state='^online$')
-    enable(client, conveyor)
-    client.publish(f'{conveyor}/command/frequency_setpoint', 25.0)
+    runs(client, namespace, conveyor)
     client.value(f'{conveyor}/actual_frequency', 24.99, 25.01)
     client.value(f'{lift}/actual_frequency', 24.99, 25.01)
     simulator.frame('^403#7F040020 R')
@@ -89,7 +94,7 @@ def test_broadcast(processes: Processes, client: Client, namespace: str,
     client.value(f'{conveyor}/actual_frequency', 0.0, 0.0)
     client.value(f'{lift}/actual_frequency', 0.0, 0.0)
     # a fault of one stops all
-    enable(client, conveyor)
+    runs(client, namespace, conveyor)
     client.value(f'{lift}/actual_frequency', 24.99, 25.01)
     simulator.write('lift trip')
     client.bit(f'{lift}/status_word/fault', True)
@@ -118,10 +123,7 @@ def test_unasked_fault_frame_and_bytes_of_the_examples(
     bridge = processes.bridge(inverters(tmp_path), namespace)
     drive = f'/{namespace}/conveyor'
     client.online(drive)
-    client.publish(f'{drive}/command/frequency_setpoint', 0.0)
-    client.diagnostics(f'{namespace}/drive_can_bridge: drive conveyor', state='^online$')
-    enable(client, drive)
-    client.publish(f'{drive}/command/frequency_setpoint', 25.0)
+    runs(client, namespace, drive)
     client.value(f'{drive}/actual_frequency', 24.99, 25.01)
     assert client.get(drive, 'acceleration_time') == [pytest.approx(1.03)]
     assert client.set(drive, acceleration_time=99.99) == [

@@ -51,7 +51,7 @@ def test_restart_of_the_device(processes: Processes, client: Client, namespace: 
     boot = simulator.frame('^705#00 T', since=frames)
     assert boot == ['705#00 T']
     client.online(drive)
-    client.diagnostics(status_of(namespace), state='^online$', nmt_state='^operational$')
+    client.diagnostics(status_of(namespace), state='^disabled$', nmt_state='^operational$')
     # it was started anew before anything else, and the motor is off
     later = simulator.frames(since=frames)
     after = later[later.index('705#00 T'):]

@@ -62,9 +62,9 @@ FAMILIES = [
         ('^3F1#063300E803000000 R$', '^3F1#063200DC05000000 R$'),
         ('actual_speed', 149.9, 150.1),
         ('ramp_time', 7.25, '^3F1#061E00D502000000 R$', '^7F1#D502A5A5A5A5A5A5 T$'),
-        ('ramp_time', 61.0, '0.01 to 60 s'), ('^3F1#063200', '0000000000 R', 3)),
+        ('ramp_time', 61.0, '0.01 to 60 s'), ('^3F1#063200', '0000000000 R', 1)),
     Facts(
-        INVERTER, {'frequency_setpoint': 25.0}, '^0C8#7E040000 R$',
+        INVERTER, {'frequency_setpoint': 25.0}, '^0C8#7F040000 R$',
         ('^0C8#7F040020 R$', '^0C9#370B0020 T$'), ('actual_frequency', 24.99, 25.01),
         ('acceleration_time', 99.99, '^2C8#6620000000000F27 R$', '^2C9#6610000000000F27 T$'),
         ('acceleration_time', 321.0, '320'), ('^0C8#', '7E040000 R', 3),
@@ -91,6 +91,11 @@ def test_run_write_and_stop(processes: Processes, client: Client, namespace: str
     drive = f'/{namespace}/one'
     client.online(drive)
 
+    assert not simulator.frames(facts.moving[0])
+    if facts.enable:
+        client.diagnostics(status_of(drive), state='^disabled$', level='^0$')
+        success, message = client.control(f'{drive}/enable', True)
+        assert success, message
     # a setpoint that nobody armed has no effect, and says so
     for name, value in facts.commands.items():
         client.publish(f'{drive}/command/{name}', value)
@@ -98,13 +103,10 @@ def test_run_write_and_stop(processes: Processes, client: Client, namespace: str
     if facts.commands:
         simulator.frame(facts.neutral, len(simulator.frames()), count=3)
         assert client.diagnostics(status_of(drive), state='^not armed$')['level'] == '1'
-    assert not simulator.frames(facts.moving[0])
+        assert not simulator.frames(facts.moving[0])
     for name in facts.commands:
         client.publish(f'{drive}/command/{name}', 0.0)
     client.diagnostics(status_of(drive), state='^online$', level='^0$')
-    if facts.enable:
-        success, message = client.control(f'{drive}/enable', True)
-        assert success, message
     for name, value in facts.commands.items():
         client.publish(f'{drive}/command/{name}', value)
     for pattern in facts.moving:
