@@ -91,6 +91,20 @@ def test_run_write_and_stop(processes: Processes, client: Client, namespace: str
     drive = f'/{namespace}/one'
     client.online(drive)
 
+    # some take settings only while they stand still
+    name, value, request, response = facts.parameter
+    assert client.set(drive, **{name: value}) == [(True, '')]
+    simulator.frame(request)
+    simulator.frame(response)
+    assert client.get(drive, name) == [pytest.approx(value)]
+    wrong, value, words = facts.refused
+    before = client.get(drive, wrong)
+    (success, reason), = client.set(drive, **{wrong: value})
+    assert not success
+    assert words in reason
+    assert client.get(drive, wrong, 'nonsense') == [*before, None]
+    bridge.error('one: read nonsense')
+
     assert not simulator.frames(facts.moving[0])
     if facts.enable:
         client.diagnostics(status_of(drive), state='^disabled$', level='^0$')
@@ -111,21 +125,6 @@ def test_run_write_and_stop(processes: Processes, client: Client, namespace: str
         client.publish(f'{drive}/command/{name}', value)
     for pattern in facts.moving:
         simulator.frame(pattern)
-    client.value(f'{drive}/{facts.actual[0]}', *facts.actual[1:])
-
-    name, value, request, response = facts.parameter
-    assert client.set(drive, **{name: value}) == [(True, '')]
-    simulator.frame(request)
-    simulator.frame(response)
-    assert client.get(drive, name) == [pytest.approx(value)]
-    wrong, value, words = facts.refused
-    before = client.get(drive, wrong)
-    (success, reason), = client.set(drive, **{wrong: value})
-    assert not success
-    assert words in reason
-    assert client.get(drive, wrong, 'nonsense') == [*before, None]
-    bridge.error('one: read nonsense')
-
     client.value(f'{drive}/{facts.actual[0]}', *facts.actual[1:])
     assert not [line for line in simulator.lines if 'violation' in line]
     assert bridge.end() == 0
