@@ -12,9 +12,10 @@ import math
 from typing import Any
 
 from builders import (
-    ACTUAL, Conversation, CURRENT, DAMPING, drive, GAIN, LIMIT, ORDER, RAMP, read, SPEED, STATUS,
-    text_of, write,
+    ACTUAL, Conversation, CURRENT, DAMPING, drive, frame, GAIN, LIMIT, ORDER, RAMP, read, SPEED,
+    STATUS, text_of, write,
 )
+from literal_drives import ExtendedDrive, PkwNode, StandardDrive
 import pytest
 
 from drive_can_bridge.core.configuration import DriveConfiguration
@@ -46,6 +47,8 @@ class Partner(ABC):
     unknown = 'no answer'
     idle = DriveState.NOT_ARMED
 
+    device: ExtendedDrive | StandardDrive | PkwNode
+
     def __init__(self, **options: Any) -> None:
         self.configuration = self.configure(**options)
         self.talk = Conversation(self.configuration)
@@ -60,9 +63,9 @@ class Partner(ABC):
     def configure(self, **options: Any) -> DriveConfiguration:
         """Make a configuration with ``speed_setpoint`` as its only setpoint."""
 
-    @abstractmethod
     def answers(self, sent: str) -> list[str]:
         """Do what the drive does with a frame; return what it answers."""
+        return [str(answer) for answer in self.device.takes(frame(sent))]
 
     @abstractmethod
     def setpoints(self, sent: str) -> list[int]:
@@ -115,28 +118,11 @@ class ExtendedPartner(Partner):
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
         self.registers.update(zip(range(122, 130), (50, 0, 0, 0, 209, 210, 211, 0)))
+        self.device = ExtendedDrive(self.registers)
 
     def configure(self, **options: Any) -> DriveConfiguration:
         options.setdefault('request', (SPEED,))
         return drive('datamodel_extended', response=(ACTUAL, CURRENT, STATUS), **options)
-
-    def answers(self, sent: str) -> list[str]:
-        identifier, data = int(sent[:8], 16), bytes.fromhex(sent[9:])
-        number, count = identifier >> 4 & 0xFFFF, identifier & 0xF
-        if sent.startswith('003FFFF0'):
-            self.registers[50] = int.from_bytes(data[:2], 'big')
-            words = [self.registers[209], self.registers[210], self.registers[211]]
-        elif identifier & 0x100000:
-            for place in range(count):
-                self.registers[number + place] = int.from_bytes(
-                    data[2 * place:2 * place + 2], 'big')
-            return []
-        elif any(number + place not in self.registers for place in range(count)):
-            return []
-        else:
-            words = [self.registers[number + place] for place in range(count)]
-        text = ''.join(f'{word:04X}' for word in words)
-        return [f'{identifier | 0x10000000:08X}#{text:0<16}']
 
     def setpoints(self, sent: str) -> list[int]:
         return [int(sent[9:13], 16)] if sent.startswith('003FFFF0') else []
@@ -145,23 +131,13 @@ class ExtendedPartner(Partner):
 class StandardPartner(Partner):
     """DataModel with 11-bit identifiers."""
 
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
+        self.device = StandardDrive(self.registers)
+
     def configure(self, **options: Any) -> DriveConfiguration:
         options.setdefault('request', (SPEED,))
         return drive('datamodel_standard', response=(ACTUAL, CURRENT, STATUS), **options)
-
-    def answers(self, sent: str) -> list[str]:
-        identifier, _, text = sent.partition('#')
-        data = bytes.fromhex(text)
-        assert identifier == '3F1'
-        number = int.from_bytes(data[1:3], 'little')
-        if data[0] == 6:
-            self.registers[number] = int.from_bytes(data[3:5], 'little')
-            return []
-        numbers = range(number, number + data[3])
-        if any(entry not in self.registers for entry in numbers):
-            return []
-        words = ''.join(self.registers[entry].to_bytes(2, 'little').hex() for entry in numbers)
-        return [f'7F1#{words:0<16}'.upper()]
 
     def setpoints(self, sent: str) -> list[int]:
         if not sent.startswith('3F1#063200'):
@@ -216,38 +192,11 @@ class PkwPartner(Partner):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
-        self.function = 0
+        self.device = PkwNode(1, self.registers)
 
     def configure(self, **options: Any) -> DriveConfiguration:
         options.setdefault('request', (SPEED,))
         return drive('canopen_pkw', response=(ACTUAL, CURRENT, STATUS), **options)
-
-    def answers(self, sent: str) -> list[str]:
-        identifier, _, text = sent.partition('#')
-        if identifier == '000':
-            assert text == '0101'
-            return []
-        assert identifier == '501'
-        data = bytes.fromhex(text)
-        if data[3] == self.function:
-            return []
-        self.function = data[3]
-        code = data[3] & 0x7F
-        if not code:
-            return [f'481#{text}']
-        assert code in (0x25, 0x26, 0x2A, 0x2B)
-        count = 2 if code in (0x26, 0x2B) else 1
-        number = int.from_bytes(data[:2], 'little')
-        numbers = range(number, number + count)
-        if any(entry not in self.registers for entry in numbers):
-            return [f'481#{text[:6]}{data[3] & 0x80 | 0x4E:02X}00000206']
-        if code in (0x2A, 0x2B):
-            for place, entry in enumerate(numbers):
-                self.registers[entry] = int.from_bytes(
-                    data[4 + 2 * place:6 + 2 * place], 'little')
-            return [f'481#{text[:8]}00000000']
-        words = ''.join(self.registers[entry].to_bytes(2, 'little').hex() for entry in numbers)
-        return [f'481#{text[:8]}{words:0<8}']
 
     def setpoints(self, sent: str) -> list[int]:
         if not sent.startswith(('501#3200002A', '501#320000AA')):

@@ -14,6 +14,7 @@ from any_order import AnyOrder, Observer, PATIENCE, SETTINGS
 from builders import frame, read
 from hypothesis import given, strategies as st
 from hypothesis.stateful import initialize, invariant, precondition, rule
+from literal_drives import PkwNode
 from pkw_builders import (
     CLASS, configuration, CONTROL, CURRENT, FLC, FLC_2, KEY, LEVEL, POSITION, SPEED, STATUS,
     STATUS_2, TORQUE,
@@ -34,53 +35,20 @@ READS = {0x25, 0x26}
 WRITES = {0x2A, 0x2B}
 SETPOINTS = {710: 0, 712: 1}
 WORD = 704
+REGISTERS = (456, 465, 500, 501, 606, 652, 653, 704, 710, 712, 720, 721, 730)
 #: numbers of what makes it stand still, as bytes
 STOPS = (b'\xC0\x02', b'\xC6\x02', b'\xC8\x02')
 
 
-class Device:
-    """Node 5: NMT, and the mailbox."""
+class Device(PkwNode):
+    """Node 5."""
 
-    def __init__(self) -> None:
-        self.registers = dict.fromkeys(
-            (455, 456, 465, 500, 501, 606, 652, 653, 704, 710, 712, 720, 721, 730), 0)
-        self.registers[455] = 1
-        self.operational = False
-        self.obeys = False      # it runs and stands still as register 704 says
-        self.function = 0
-        self.executed: list[tuple[int, tuple[int, ...]]] = []
+    obeys = False       # it runs and stands still as register 704 says
 
-    def takes(self, sent: Frame) -> list[Frame]:
-        """Do what the device does with a frame; return its answers."""
-        data = sent.data
-        if sent.identifier == 0:
-            self.operational = True
-            return []
-        if not self.operational or data[3] == self.function:
-            return []
-        self.function = data[3]
-        code, number = data[3] & 0x7F, data[0] | data[1] << 8
-        count = 2 if code in (0x26, 0x2B) else 1
-        numbers = range(number, number + count)
-        if code == 0:
-            return [Frame(0x485, data, False)]
-        if any(entry not in self.registers for entry in numbers):
-            return [Frame(0x485, data[:3] + bytes((data[3] & 0x80 | 0x4E, 0, 0, 2, 6)), False)]
-        if code in WRITES:
-            words = tuple(data[4 + 2 * place] | data[5 + 2 * place] << 8
-                          for place in range(count))
-            self.registers.update(zip(numbers, words))
-            if number == WORD and self.obeys:
-                self.registers[455] = 0x81 if words == (1,) else 0x01
-            self.executed.append((number, words))
-            return [Frame(0x485, data[:4] + bytes(4), False)]
-        found = [self.registers[entry] for entry in numbers] + [0xA5A5]
-        return [Frame(0x485, data[:4] + b''.join(
-            word.to_bytes(2, 'little') for word in found[:2]), False)]
-
-    def restarts(self) -> None:
-        self.operational = False
-        self.function = 0
+    def written(self, number: int, words: tuple[int, ...]) -> None:
+        super().written(number, words)
+        if number == WORD and self.obeys:
+            self.registers[455] = 0x81 if words == (1,) else 0x01
 
 
 class PkwObserver(Observer):
@@ -193,7 +161,7 @@ class SessionMachine(AnyOrder):
             parameter_timeout=TIMEOUT))
         self.start(session, PkwObserver(nmt_start=nmt_start, control=control))
         self.succeeded: list[ControlAction] = []
-        self.device = Device()
+        self.device = Device(5, {**dict.fromkeys(REGISTERS, 0), 455: 1})
         self.device.operational = not nmt_start
         self.key_values = 0
         self.lossy = False

@@ -17,6 +17,7 @@ from builders import (
 )
 from hypothesis import given, strategies as st
 from hypothesis.stateful import initialize, precondition, rule
+from literal_drives import ExtendedDrive
 import pytest
 
 from drive_can_bridge.core.control import ControlAction
@@ -162,6 +163,7 @@ class SessionMachine(AnyOrder):
         self.registers = dict.fromkeys((30, 31, 40, 41, 42, 43, 44, 50, 51, 52, 211, 600), 0)
         self.registers.update(zip(range(122, 130), (50, 51, 0, 0, 211, 0, 0, 0)))
         self.registers[211] = 1
+        self.device = ExtendedDrive(self.registers)
 
     def happened(self, event: Any) -> None:
         if isinstance(event, StationLost):
@@ -175,12 +177,8 @@ class SessionMachine(AnyOrder):
             self.observer.online = True
 
     def apply(self, sent: Frame) -> None:
-        identifier, data, _ = sent
-        number, count = identifier >> 4 & 0xFFFF, identifier & 0xF
-        if identifier != CYCLIC and identifier & 0x100000:
-            for place in range(count):
-                self.registers[number + place] = int.from_bytes(
-                    data[2 * place:2 * place + 2], 'big')
+        if sent.identifier != CYCLIC and sent.identifier & 0x100000:
+            self.device.takes(sent)
         else:
             self.unanswered.append(sent)
             del self.unanswered[:-3]
@@ -191,16 +189,8 @@ class SessionMachine(AnyOrder):
     @rule(choice=st.integers(0, 2))
     def drive_answers(self, choice: int) -> None:
         asked = self.unanswered.pop(min(choice, len(self.unanswered) - 1))
-        identifier = asked.identifier
-        number, count = identifier >> 4 & 0xFFFF, identifier & 0xF
-        if identifier == CYCLIC:
-            words = [self.registers[211]]
-        elif any(number + place not in self.registers for place in range(count)):
-            return
-        else:
-            words = [self.registers[number + place] for place in range(count)]
-        data = b''.join(word.to_bytes(2, 'big') for word in words)
-        self.hears(Frame(identifier | 0x10000000, data.ljust(8, b'\xA5'), True))
+        for answer in self.device.takes(asked):
+            self.hears(answer)
 
     def hears(self, heard: Frame) -> None:
         self.keep_books(heard)

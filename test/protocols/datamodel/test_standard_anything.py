@@ -16,6 +16,7 @@ from builders import (
 )
 from hypothesis import example, given, strategies as st
 from hypothesis.stateful import initialize, invariant, precondition, rule
+from literal_drives import StandardDrive
 import pytest
 from standard_builders import ANSWER
 
@@ -252,8 +253,8 @@ class SessionMachine(AnyOrder):
         self.start(session, StandardObserver(
             period=period, timeout=timeout, immediate=immediate, strict=strict,
             controlled=bool(control)))
-        self.registers = dict.fromkeys(REGISTERS, 0)
-        self.registers[211] = 1
+        self.registers = {**dict.fromkeys(REGISTERS, 0), 211: 1}
+        self.device = StandardDrive(self.registers)
         self.samples = 0
 
     def happened(self, event: Any) -> None:
@@ -277,9 +278,8 @@ class SessionMachine(AnyOrder):
         self.observer.call_begins()
 
     def apply(self, sent: Frame) -> None:
-        number = sent.data[1] + 256 * sent.data[2]
         if sent.data[0] == 6:
-            self.registers[number] = sent.data[3] + 256 * sent.data[4]
+            self.device.takes(sent)
         else:
             self.unanswered.append(sent)
             del self.unanswered[:-3]
@@ -301,11 +301,8 @@ class SessionMachine(AnyOrder):
     @rule(choice=st.integers(0, 2), length=st.sampled_from([8, 7, 6, 2, 1]))
     def drive_answers(self, choice: int, length: int = 8) -> None:
         asked = self.unanswered.pop(min(choice, len(self.unanswered) - 1))
-        number = asked.data[1] + 256 * asked.data[2]
-        numbers = range(number, number + asked.data[3])
-        if all(entry in self.registers for entry in numbers):
-            data = b''.join(self.registers[entry].to_bytes(2, 'little') for entry in numbers)
-            self.hears(Frame(0x7F1, data.ljust(8, b'\xA5')[:length], False))
+        for answer in self.device.takes(asked):
+            self.hears(answer._replace(data=answer.data[:length]))
 
     def hears(self, heard: Frame) -> None:
         self.observer.hears(heard, self.now)
