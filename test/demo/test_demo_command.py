@@ -63,6 +63,7 @@ def test_it_prints_a_line_per_drive_and_stops_them_neutral(start: Start, tmp_pat
                          for data in requests(log).get('005FFFF0', [])), 'speed for lift')
     wait_for(lambda: any(data[:4] != '0000' for data in requests(log)['003FFFF0']),
              'speed for conveyor')
+    wait_for(lambda: len(demo.lines) >= 6, 'two rounds of lines')
     assert demo.end(signum) == 0
     for identifier, sent in requests(log).items():
         assert {data.strip('0') for data in sent[-3:]} == {''}, identifier
