@@ -116,7 +116,7 @@ def pytest_xdist_auto_num_workers() -> int:
     if wanted:
         return int(wanted)
     cores = len(os.sched_getaffinity(0))
-    return max(cores, WORKERS_PER_CORE * cores - round(os.getloadavg()[0]))
+    return max(cores + 1, WORKERS_PER_CORE * cores - round(os.getloadavg()[0]))
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -66,6 +66,9 @@ def test_refusals_say_why(value: float, text: str) -> None:
     (Parameter('energy', ParameterType.UINT32, 1), 4294967296,
      '4294967296 is not representable: uint32 carries 0 to 4294967295'),
     (GAIN, 70000, '70000 is not representable: uint16 carries 0 to 65535'),
+    # the nearest that do not fit
+    (GAIN, 65536, '65536 is not representable: uint16 carries 0 to 65535'),
+    (GAIN, -1, '-1 is not representable: uint16 carries 0 to 65535'),
     (GAIN, 0.5, '0.5 is not an integer'),
     (parameter('free', 1, scale=0.1, unit='V'), -1.0,
      '-1 is not representable: uint16 carries 0 to 6553.5 V'),

@@ -332,3 +332,16 @@ def test_what_is_no_data_frame_is_counted(bus: FakeBus) -> None:
     assert [port.receive(0.0), port.receive(0.0)] == [None, None]
     assert port.rejected_frames == 2
     assert port.error_frames == 0
+
+
+def test_only_malformed_frames_in_a_row_lose_the_bus(bus: FakeBus) -> None:
+    port = Port(bus)
+    bad = can.Message(arbitration_id=0x800, is_extended_id=False)
+    good = can.Message(arbitration_id=0x003FFFF0, data=bytes(8))
+    few = [bad] * (port_module._MALFORMED_MAX - 1)
+    bus.coming += [*few, good, *few, bad]
+    received = [port.receive(0.0) for _ in range(2 * len(few) + 1)]
+    assert [frame for frame in received if frame is not None] == [FRAME]
+    assert port.rejected_frames == 2 * len(few)
+    with pytest.raises(BusUnavailable, match='malformed frames in a row'):
+        port.receive(0.0)
