@@ -60,6 +60,12 @@ class Quarantine:
         self._until[key] = now + CATCHING_UP, False
         return True
 
+    def time_lost(self, now: float) -> None:
+        """Listen on where nobody did at the end of a quarantine."""
+        for key, (until, unheard) in self._until.items():
+            if unheard:
+                self._until[key] = max(until, now + CATCHING_UP), unheard
+
     def _forget(self, now: float) -> None:
         """Forget quarantines that have ended long ago, or else the oldest."""
         over = [key for key, (until, _) in self._until.items() if until < now - 1.0]

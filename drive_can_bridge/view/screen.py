@@ -15,7 +15,7 @@ import time
 from types import FrameType
 from typing import Any
 
-from rich.console import Console, RenderableType
+from rich.console import Console, ConsoleDimensions, RenderableType
 from rich.live import Live
 
 from drive_can_bridge.view.keys import Key, keys_in
@@ -47,8 +47,13 @@ class Screen:
     @property
     def size(self) -> tuple[int, int]:
         """Columns and lines, at this moment."""
-        width, height = self._console.size
-        return max(10, width), max(3, height)
+        try:
+            width, height = os.get_terminal_size(self._out)
+        except OSError:  # it has gone
+            width = height = 0
+        # not what COLUMNS and LINES said once
+        self._console.size = ConsoleDimensions(max(10, width or 80), max(3, height or 24))
+        return self._console.size
 
     def __enter__(self) -> 'Screen':
         self._enter()

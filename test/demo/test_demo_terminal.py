@@ -74,8 +74,6 @@ def test_without_its_view_the_bridge_runs_on_and_it_is_said(demo: Running,
     assert all_gone(children)
 
 
-# Beside other tests the view goes on to hear a bridge of that name: not understood yet.
-@pytest.mark.skipif('PYTEST_XDIST_WORKER' in os.environ, reason='passes alone only: -n 0')
 def test_without_its_bridge_every_drive_is_offline_in_words(demo: Running,
                                                             terminal: Terminal) -> None:
     # what the view has not seen yet, it never will

@@ -230,9 +230,11 @@ class AcyclicChannel:
         """
         Write what stops a drive: after nothing but other such writes, whatever is under way.
 
-        Such a write that waits with :meth:`write_first` is outdated: it is not sent any more.
+        What waits with :meth:`write_first`, or to be written to the same parameter, is outdated: it
+        is not sent any more.
         """
         self._first = None
+        self._urgent = deque(each for each in self._urgent if each[0].number != write.number)
         self._urgent.append((write, left))
         self._stop_wait_until = now + STOP_EEPROM_WAIT
         self._busy = True
@@ -258,6 +260,15 @@ class AcyclicChannel:
         self._outstanding = False
         self._deadline = math.inf
         self._held_until = -math.inf
+
+    def time_lost(self, now: float) -> None:
+        """Take note that nobody listened until now: an answer may lie in some buffer."""
+        self.now = now
+        self._quarantine.time_lost(now)
+        if self._outstanding and self._polled:
+            self._time_out(now)
+        elif self._outstanding:  # its answer will say what it answers
+            self._deadline = max(self._deadline, now)
 
     @property
     def waiting_users(self) -> int:
@@ -325,13 +336,8 @@ class AcyclicChannel:
         if self._outstanding:
             if now < self._deadline:
                 return self._polled and self._advance_first(now)
-            self._be_quiet(now)
-            if self._serving.attempts_left <= 0:
-                self._finish(None)
-                return True
-            self._outstanding = False
-            self._serving.repeated = True
-            self._change_turns()
+            self._time_out(now)
+            return True
         if self._first is not None:
             return self._advance_first(now)
         queue = self._choose()
@@ -344,6 +350,16 @@ class AcyclicChannel:
             return False
         self._send(queue, now)
         return True
+
+    def _time_out(self, now: float) -> None:
+        """Give up the read that waits for its answer, or have it repeated."""
+        self._be_quiet(now)
+        if self._serving.attempts_left <= 0:
+            self._finish(None)
+        else:
+            self._outstanding = False
+            self._serving.repeated = True
+            self._change_turns()
 
     def _be_quiet(self, since: float) -> None:
         """Do not ask again what an answer after ``since`` could be mistaken for."""

@@ -131,6 +131,7 @@ class ExtendedSession(DataModelSession):
         return super().longest_stop + ATTEMPTS * ANSWER_TIME
 
     def time_lost(self, now: float) -> None:
+        self._channel.time_lost(now)
         if self._phase is Phase.IDLE or self._stopping:
             return
         self._lose('the bridge stood still', now)

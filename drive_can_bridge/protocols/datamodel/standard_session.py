@@ -104,9 +104,11 @@ class StandardSession(DataModelSession):
         return ATTEMPTS * (ANSWER_TIME + float(self.drive.options.quarantine))
 
     def time_lost(self, now: float) -> None:
+        self._expected = self._expected or self._channel.outstanding is not None
+        self._void = self._in_round
+        self._channel.time_lost(now)
         if self._phase is Phase.POLLING:
             self._lose('the bridge stood still', now)
-            self._void = self._in_round
             self._beat.start(now)
 
     def _begin(self, now: float) -> None:

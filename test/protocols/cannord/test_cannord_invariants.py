@@ -26,6 +26,7 @@ from drive_can_bridge.core.events import (
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.core.requests import Failure, ReadRequest, ReadValue, Written
+from drive_can_bridge.core.session import DriveState
 from drive_can_bridge.protocols.families import FAMILIES
 
 TIMEOUT = 0.1
@@ -113,7 +114,6 @@ class CannordObserver(Observer):
             self.main_left = False
 
     def hears_status(self, word: int) -> None:
-        self.faulted = bool(word & 8)
         if self.word == 0x047F and word & 0x7F == 0x37:
             self.enabled = True
 
@@ -288,6 +288,8 @@ class SessionMachine(AnyOrder):
     @rule(index=st.integers(0, 1), value=st.sampled_from(
         [0.0, 0.003, 12.5, 25.0, 25, math.nan, 1e6, True]))
     def command(self, index: int, value: float) -> None:
+        # the status in an answer that nobody asked for does not count
+        self.observer.faulted = self.session.state is DriveState.FAULT
         try:
             outcome = self.session.command(index, value, self.now)
         except ValueRefused:

@@ -173,6 +173,19 @@ def test_what_stops_a_drive_makes_a_word_that_waits_outdated() -> None:
     assert line.answer(0, 1.01) == []
 
 
+def test_what_stops_a_drive_makes_a_stop_of_the_same_parameter_outdated() -> None:
+    line = Line()
+    for word in (9, 2, 0):
+        line.channel.write_now(Write(52, (word,), False), nobody, 1.0)
+    line.channel.write_now(Write(50, (0,), False), nobody, 1.0)
+    left = []
+    for now in (1.0, 1.001, 1.002, 1.003):
+        line.channel.advance(now)
+        left += [(frame.identifier, frame.data[0]) for frame in line.outbox.take()]
+        line.outbox.left(now)
+    assert left == [(52, 9), (52, 0), (50, 0)]
+
+
 def test_the_confirmation_of_a_stop_goes_before_everything_and_is_not_held() -> None:
     line = Line()
     line.channel.hold(5.0)

@@ -295,6 +295,10 @@ class SessionMachine(AnyOrder):
                 return
         raise AssertionError('the timer spins')
 
+    def time_is_lost(self) -> None:
+        self.observer.timer_ran(self.now + 1.0)     # nobody listened: what was asked is given up
+        super().time_is_lost()
+
     # -- the drive --------------------------------------------------------------------------------
 
     @precondition(lambda self: self.unanswered)

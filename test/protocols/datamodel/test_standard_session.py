@@ -545,6 +545,17 @@ def test_a_stop_while_the_stop_after_a_stall_is_under_way() -> None:
         (12.001, SPEED_ZERO), (12.002, LIMIT_ZERO), (12.003, ASK_SPEED)]
 
 
+def test_silence_before_a_stop_is_confirmed_after_a_stall() -> None:
+    """The answer to the read before the stall must not be taken for what the stop wrote."""
+    talk = moving()
+    asked = talk.until(10.0415)[-1]
+    assert asked[1] == ASK
+    assert talk.time_lost(12.0) == [SPEED_ZERO]
+    assert talk.deactivate(12.0005) == []
+    sent = talk.until(12.101)
+    assert sent == [(12.001, SPEED_ZERO), (12.002, LIMIT_ZERO), (12.1, ASK_SPEED)]
+
+
 def test_a_setpoint_that_the_bus_refused_is_written_again() -> None:
     talk = moving(refresh_interval=0.0, command_timeout=0.0)
     talk.refusing = lambda text: text == SPEED_ZERO
