@@ -187,6 +187,10 @@ class MemberSession(GroupSession):
         return (f'sent cyclically by the broadcast group: publish '
                 f'{self._leader.drive.name}/command/{parameter.name}')
 
+    @property
+    def how_to_enable(self) -> str:
+        return f'call ~/enable of {self._leader.drive.name}, which leads the broadcast group'
+
     def facts(self) -> dict[str, str]:
         return {'broadcast': f'led by {self._leader.drive.name}'}
 

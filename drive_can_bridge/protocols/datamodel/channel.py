@@ -230,8 +230,8 @@ class AcyclicChannel:
         """
         Write what stops a drive: after nothing but other such writes, whatever is under way.
 
-        What waits with :meth:`write_first`, or to be written to the same parameter, is outdated: it
-        is not sent any more.
+        What waits with :meth:`write_first`, or to be written to the same parameter, is outdated:
+        it is not sent any more.
         """
         self._first = None
         self._urgent = deque(each for each in self._urgent if each[0].number != write.number)
