@@ -7,6 +7,7 @@ deleted are made here, which needs root.
 """
 
 from collections.abc import Iterator
+import json
 import os
 from pathlib import Path
 import re
@@ -18,7 +19,7 @@ import subprocess
 
 from kernel_adapter import ip
 from parameter_files import bridge_file, CONVEYOR
-from processes import Client, Processes
+from processes import Client, command_line, Processes
 import pytest
 from repeating import again_and_again
 from test_system_reconnection import rearm_and_move, start_moving
@@ -104,6 +105,48 @@ def test_candump_sees_the_right_frames(processes: Processes, client: Client, nam
     answers = sum(text.startswith('103FFFF0#') for text in texts)
     assert abs(answers - len(cyclic)) <= 1
     assert candump.running
+
+
+@pytest.mark.skipif(shutil.which('candump') is None, reason='candump is not installed')
+def test_what_candump_recorded_reads_as_what_was_heard_live(
+        processes: Processes, client: Client, namespace: str, tmp_path: Path) -> None:
+    file = bridge_file(tmp_path, interface='socketcan', channel=CHANNEL, drives=DRIVES)
+    decode = [*command_line('drive_can'), 'decode', '--params-file', str(file), '--json']
+    live = processes.start([*decode, '--live'], 'live')
+    candump = processes.start(['stdbuf', '-oL', 'candump', '-L', CHANNEL], 'candump')
+    # both listen as soon as both have heard somebody
+    with stranger(CHANNEL) as raw, again_and_again(
+            lambda: raw.send(packed(0x7A0, '0102030405060708'))):
+        live.line('7A0')
+        candump.line('7A0')
+    processes.simulator(file, link=False)
+    bridge = processes.bridge(file, namespace)
+    drive = f'/{namespace}/conveyor'
+    start_moving(client, drive)
+    assert client.set(drive, ramp_time=7.25) == [(True, '')]
+    assert client.get(drive, 'p9999') == [None]
+    assert bridge.end() == 0
+    with stranger(CHANNEL) as raw:
+        raw.send(packed(0x7A1, '0807060504030201'))
+    live.line('7A1')
+    candump.line('7A1')
+    assert live.end(signal.SIGINT) == 0
+    trace = tmp_path / 'candump.log'
+    trace.write_text(''.join(f'{line}\n' for line in candump.lines), encoding='ascii')
+    read = processes.start([*decode, str(trace)], 'read')
+    assert read.wait() == 0
+
+    def telegrams(lines: list[str]) -> list[dict[str, object]]:
+        """Leave out what listeners may differ in: when they began, and microseconds."""
+        entries = [json.loads(line) for line in lines]
+        return [{key: value for key, value in entry.items() if key not in ('time', 'latency_ms')}
+                for entry in entries if '7A0' not in str(entry)]
+    heard = telegrams(live.lines)
+    assert heard == telegrams(read.lines)
+    # each request of a cycle, and its answer
+    assert sum(entry['kind'] == 'cyclic' for entry in heard) > 20
+    assert {'speed_setpoint', 'ramp_time'} <= {
+        name for entry in heard for name in entry.get('values') or {}}
 
 
 def test_interface_taken_down_and_up(processes: Processes, client: Client, namespace: str,
