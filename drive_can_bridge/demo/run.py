@@ -18,10 +18,11 @@ import tempfile
 import termios
 import time
 
+from drive_can_bridge.configuration.writing import write_parameter_file
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.demo.child import Child
-from drive_can_bridge.demo.parameter_file import on_terminals, write
+from drive_can_bridge.demo.terminals import on_terminals
 from drive_can_bridge.process.signals import SignalWatcher
 
 TITLE = 'drive_can demo'
@@ -90,7 +91,7 @@ class Demo:
                                  '--quit-code', str(ENOUGH), view=True)
         configuration = on_terminals(options.configuration, directory)
         file = directory / 'demo.yaml'
-        write(configuration, file)
+        write_parameter_file(configuration, file)
         arguments = ['--params-file', str(file), '--pty-link', str(directory)]
         for fault in options.faults:
             arguments += ['--fault', fault]

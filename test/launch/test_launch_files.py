@@ -12,14 +12,15 @@ import pytest
 LAUNCH = Path(__file__).parents[2] / 'launch'
 ARGUMENTS = {
     'bridge.launch.py': ['params_file', 'namespace', 'name', 'log_level'],
+    'bridge_per_bus.launch.py': ['params_file', 'namespace', 'log_level'],
     'demo.launch.py': ['params_file', 'drive', 'fault', 'log_frames'],
     'managed.launch.py': ['params_file', 'namespace', 'name', 'log_level', 'activate'],
     'two_bridges.launch.py': ['first_params_file', 'second_params_file', 'first_namespace',
                               'second_namespace', 'log_level'],
 }
 #: arguments without a default: launch refuses to start without them
-REQUIRED = {'bridge.launch.py': ['params_file'], 'demo.launch.py': [],
-            'managed.launch.py': ['params_file'],
+REQUIRED = {'bridge.launch.py': ['params_file'], 'bridge_per_bus.launch.py': ['params_file'],
+            'demo.launch.py': [], 'managed.launch.py': ['params_file'],
             'two_bridges.launch.py': ['first_params_file', 'second_params_file']}
 #: files whose work is done by others
 INCLUDED = {'two_bridges.launch.py': ['bridge.launch.py']}
@@ -90,6 +91,20 @@ GIVEN = {'namespace': 'cell', 'log_level': 'debug', 'drive': 'true', 'fault': 'a
          'activate': 'true'}
 
 
+TWO_BUSES = """
+/**/drive_can_bridge:
+  ros__parameters:
+    buses:
+      left: {interface: virtual, channel: left}
+      right: {interface: virtual, channel: right}
+    drives:
+      conveyor: {bus: left, protocol: datamodel_extended, station: 1, profile: datamodel_example,
+                 cyclic_request: [speed_setpoint], cyclic_response: [actual_speed]}
+      lift: {bus: right, protocol: datamodel_extended, station: 1, profile: datamodel_example,
+             cyclic_request: [speed_setpoint], cyclic_response: [actual_speed]}
+"""
+
+
 class Launched:
     """A launch file, loaded and performed as far as it goes without starting anything."""
 
@@ -107,6 +122,7 @@ class Launched:
         self.context = launch.LaunchContext()
         self.context.extend_locals({'current_launch_file_directory': str(LAUNCH)})
         self.params_file = str(directory / 'bridge.yaml')
+        Path(self.params_file).write_text(TWO_BUSES, encoding='utf-8')
         self.context.launch_configurations.update({
             name: value for name, value in
             {**GIVEN, 'params_file': self.params_file, 'first_params_file': '/1.yaml',
@@ -166,6 +182,14 @@ def test_two_bridges_have_a_file_and_a_namespace_each(tmp_path: Path) -> None:
             for process in launched.processes] == [('/1.yaml', 'cell1'), ('/2.yaml', 'cell2')]
     for process in launched.processes:
         assert process.words[:3] == ['--ros-args', '--log-level', 'debug']
+
+
+def test_each_bus_has_a_bridge_of_its_own(tmp_path: Path) -> None:
+    launched = Launched(LAUNCH / 'bridge_per_bus.launch.py', tmp_path)
+    assert [process.words[:3] for process in launched.processes] == [
+        ['--ros-args', '--log-level', 'debug']] * 2
+    assert [process._Node__node_name for process in launched.processes] == [
+        'drive_can_bridge_left', 'drive_can_bridge_right']
 
 
 @pytest.mark.parametrize('activate', ['true', 'false'])

@@ -1,13 +1,9 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""The parameter file of the demo: any bridge's, with other buses."""
+"""The configuration of the demo: any bridge's, with other buses."""
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
-import yaml
-
-from drive_can_bridge.configuration.load import declared_parameters
 from drive_can_bridge.core.configuration import BridgeConfiguration
 
 #: bit/s that SLCAN adapters know; any other is replaced by the next one above
@@ -28,20 +24,3 @@ def on_terminals(configuration: BridgeConfiguration, directory: Path) -> BridgeC
              for name, bus in configuration.buses.items()}
     period = min(configuration.diagnostics_period, _DIAGNOSTICS_PERIOD_MAX)
     return replace(configuration, buses=buses, autostart=True, diagnostics_period=period)
-
-
-def write(configuration: BridgeConfiguration, path: Path) -> None:
-    """
-    Write a configuration as a parameter file of a bridge.
-
-    :raises OSError: it cannot be written.
-    """
-    tree: dict[str, Any] = {}
-    for name, value, *_ in declared_parameters(configuration):
-        *above, key = name.split('.')
-        place = tree
-        for part in above:
-            place = place.setdefault(part, {})
-        place[key] = value
-    path.write_text(yaml.safe_dump(
-        {'/**/drive_can_bridge': {'ros__parameters': tree}}, sort_keys=False), encoding='utf-8')

@@ -1,0 +1,46 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Configurations that are written are read as what they were."""
+
+from pathlib import Path
+
+import pytest
+
+from drive_can_bridge.configuration.load import configuration_from_file
+from drive_can_bridge.configuration.writing import of_one_bus, write_parameter_file
+from drive_can_bridge.resources import config_file
+
+TWO_BUSES = """
+/**/drive_can_bridge:
+  ros__parameters:
+    buses:
+      left: {interface: virtual, channel: left, bitrate: 250000}
+      right: {interface: virtual, channel: right}
+    drives:
+      conveyor: {bus: left, protocol: datamodel_extended, station: 1, profile: datamodel_example,
+                 cyclic_request: [speed_setpoint], cyclic_response: [actual_speed]}
+      lift: {bus: right, protocol: datamodel_standard, station: 1, profile: datamodel_example,
+             cyclic_request: [speed_setpoint], cyclic_response: [actual_speed]}
+"""
+
+
+@pytest.mark.parametrize('name', ['all_families', 'demo', 'example', 'tesys', 'cannord'])
+def test_what_is_written_is_read_again(name: str, tmp_path: Path) -> None:
+    configuration = configuration_from_file(config_file(f'{name}.yaml'))
+    write_parameter_file(configuration, tmp_path / 'written.yaml')
+    again = configuration_from_file(tmp_path / 'written.yaml')
+    assert (again.buses, again.drives) == (configuration.buses, configuration.drives)
+
+
+def test_each_bus_by_itself(tmp_path: Path) -> None:
+    file = tmp_path / 'both.yaml'
+    file.write_text(TWO_BUSES, encoding='utf-8')
+    both = configuration_from_file(file)
+    found = {}
+    for bus in both.buses:
+        written = tmp_path / f'{bus}.yaml'
+        write_parameter_file(of_one_bus(both, bus), written, f'drive_can_bridge_{bus}')
+        assert f'/**/drive_can_bridge_{bus}:' in written.read_text(encoding='utf-8')
+        one = configuration_from_file(written)
+        assert one.buses == {bus: both.buses[bus]}
+        found.update(one.drives)
+    assert found == both.drives
