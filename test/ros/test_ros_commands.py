@@ -2,6 +2,7 @@
 """Setpoints from topics to the wire: arming, ageing, refusals."""
 
 import math
+import time
 from typing import Any
 
 from bridges import Bridge, CONVEYOR, HASTY, parameters, Recorder, StartBridge
@@ -127,6 +128,25 @@ def test_refused_commands_do_not_refresh_the_age(bridge: StartBridge, client: Cl
             client.publish(SPEED, Float64(data=math.nan))
             return recorder.words()[0] == 0
         wait_until(neutral)
+
+
+def test_commands_that_wait_for_a_late_exchange_are_thrown_away_and_counted(
+        bridge: StartBridge, client: Client) -> None:
+    one = bridge(parameters(conveyor=CONVEYOR))
+    one.online()
+    with one.record() as recorder:
+        arm(client, recorder)
+        exchange, = one.node.exchanges.values()
+        with exchange.lock:     # as long as the exchange is late, and the process does not stand
+            until = time.monotonic() + 0.5
+            client.publish(SPEED, Float64(data=200.0))
+            while time.monotonic() < until:
+                time.sleep(0.01)
+        wait_until(lambda: refused(one))
+        client.wait_logged('commands thrown away: the exchange was 0')
+        cycles_pass(one)
+        assert refused(one) == 1
+        assert recorder.words()[0] == 1000
 
 
 PROFILE = """
