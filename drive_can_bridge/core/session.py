@@ -45,7 +45,7 @@ from drive_can_bridge.core.told import MAY_RUN, Told
 WAITING_REQUESTS_MAX = 64
 #: cyclic frames with neutral setpoints that are sent before a drive is left alone
 STOP_CYCLES = 3
-#: s of pause between them at most, however long the period is
+#: s of pause between them at most, however long the period is; and between those of a pulse
 STOP_SPACING_MAX = 0.1
 #: s that a cycle may be away when a stop is wanted; else it is brought forward
 STOP_WAIT_MAX = 0.025
@@ -442,7 +442,7 @@ class Session(ABC):
 
     @property
     def _stop_spacing(self) -> float:
-        """Return how many s lie between two neutral cycles of a stop."""
+        """Return how many s lie between two cycles of a stop, or of a pulse."""
         return min(self.drive.period, STOP_SPACING_MAX)
 
     def _be_offline(self, reason: str) -> None:

@@ -246,8 +246,11 @@ class CannordSession(Session):
         if self._machine.word == self._sent_word:   # nobody was lost meanwhile
             fresh = self._machine.word_due
             self._machine.word_sent(now)
-            if fresh:
+            if fresh or self._machine.word != self._sent_word:
                 self._control_changed(now)
+            if self._machine.pulsing and self._next_cycle > now + self._stop_spacing:
+                self._in_pace = False
+                self._next_cycle = now + self._stop_spacing
         if self._stopping:
             self._cycles_left -= 1
             if self._cycles_left == 0:

@@ -73,7 +73,7 @@ class PkwSession(Session):
         table = drive.profile.control
         control: ControlMachine | None = None
         if table is not None:
-            control = ControlMachine(table, timeout=drive.control_timeout)
+            control = ControlMachine(table, timeout=drive.control_timeout, pulse=1)
         super().__init__(drive, control)
         options = drive.options
         self._identifiers = Identifiers.of(drive)

@@ -61,7 +61,7 @@ class DataModelSession(Session):
         self._by_hand = control_by_hand(
             drive, self._channel, self.control, self._control_changed, self.told,
             word=self._control_name if self._control_slot is None else '',
-            status=status_name if self._status_slot is None else '')
+            status=status_name if self._status_slot is None else '', spacing=self._stop_spacing)
         self._safe_stop = SafeStop(self._channel, self._safe_stop_ended)
         self._owed = False  # there was something to be stopped when the stop began
         self._stops_all = False  # setpoints, too

@@ -262,8 +262,11 @@ class ExtendedSession(DataModelSession):
                 and control.word == self._sent_word):  # else it has changed since
             fresh = control.word_due
             control.word_sent(now)
-            if fresh:
+            if fresh or control.word != self._sent_word:
                 self._control_changed(now)
+            if control.pulsing and self._next_cycle > now + self._stop_spacing:
+                self._in_pace = False
+                self._next_cycle = now + self._stop_spacing
         if self._cycles_left > 0:  # the last cycles before silence
             self._cycles_left -= 1
             if self._cycles_left == 0 and (self._stopping or self._differs):

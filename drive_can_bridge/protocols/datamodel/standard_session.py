@@ -67,6 +67,7 @@ class StandardSession(DataModelSession):
         self._round_began = -math.inf
         self._status_asked_at = -math.inf
         self._word_written_at = -math.inf
+        self._pulse_at = math.inf  # when the control word is due again, whatever it was
         self._received_at = -math.inf
         self._expected = False  # the answer of a read that nobody wants any more may come
         self._missed_in_row = 0
@@ -146,13 +147,18 @@ class StandardSession(DataModelSession):
     def handle_timer(self, now: float) -> None:
         if now >= self._beat.due:
             self._tick(now)
+        if now >= self._pulse_at and self._control_slot is not None:
+            self._pulse_at = math.inf
+            self._writes.failed(self._control_slot)
+            self._see_to_control_word(now)
         self._write_setpoint(now)
         self._serve_control(now)
         if now >= self._channel.next_timer():
             self._channel.advance(now)
 
     def next_timer(self) -> float:
-        soonest = min(self._beat.due, self._channel.next_timer(), self._control_timer())
+        soonest = min(self._beat.due, self._pulse_at, self._channel.next_timer(),
+                      self._control_timer())
         return min(soonest, self._channel.free_at) if self._writes.waiting else soonest
 
     def _tick(self, now: float) -> None:
@@ -221,6 +227,8 @@ class StandardSession(DataModelSession):
         self._word_written_at = now
         if raw == control.word:
             control.word_sent(now)
+            if control.pulsing:
+                self._pulse_at = now + self._stop_spacing
             self._control_changed(now)
 
     def _see_to_control_word(self, now: float) -> None:
