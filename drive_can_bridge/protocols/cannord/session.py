@@ -46,6 +46,7 @@ from drive_can_bridge.protocols.cannord.process_data import (
     decode_extra, decode_main, encode_extra, encode_main, EXTRA_LENGTH, main_length, MAIN_VALUES,
 )
 from drive_can_bridge.protocols.cannord.states import is_faulted, STATUS_BITS, STATUS_WORD
+from drive_can_bridge.protocols.channel import Lane
 
 NO_ANSWER = 'no answer to process data'
 #: what the inverter is told, for the books of what it was told
@@ -148,6 +149,7 @@ class CannordSession(Session):
         return not self._cycling
 
     def time_lost(self, now: float) -> None:
+        self._channel.time_lost(now)
         if not self._cycling or self._stopping:
             return
         self._lose('the bridge stood still', now)
@@ -455,7 +457,8 @@ class CannordSession(Session):
                 self._ask_timeout_at = -math.inf    # now it is known to answer
                 self._look_at_timeout(self._channel.now)
 
-        self._channel.run(procedures.of_request(request, self._conditions), done, now)
+        self._channel.run(
+            procedures.of_request(request, self._conditions), done, now, Lane.USERS)
 
     def _waiting_requests(self) -> int:
         return self._channel.waiting_users
@@ -481,7 +484,7 @@ class CannordSession(Session):
                     parameter_timeout: float | None = None) -> None:
         super().reconfigure(command_timeout=command_timeout, rearm_immediate=rearm_immediate,
                             parameter_timeout=parameter_timeout)
-        self._channel.timeout = self.drive.parameter_timeout
+        self._channel.courier.timeout = self.drive.parameter_timeout
         self._conditions = self._make_conditions()
 
     # -- the inverter's own time-out --------------------------------------------------------------
@@ -505,8 +508,7 @@ class CannordSession(Session):
                 self._events.append(Noted(f'telegram time-out ({parameter.address}) unknown: '
                                           f'{outcome.reason}'))
 
-        self._channel.run(procedures.read_parameter(parameter, self._conditions), done, now,
-                          own=True)
+        self._channel.run(procedures.read_parameter(parameter, self._conditions), done, now)
 
     # -- timer ------------------------------------------------------------------------------------
 
@@ -519,7 +521,7 @@ class CannordSession(Session):
             self._machine.handle_timer(now)
             self._control_changed(now)
         if now >= self._channel.next_timer():
-            self._channel.handle_timer(now)
+            self._channel.advance(now)
 
     def next_timer(self) -> float:
         return min(self._next_cycle, self._answer_due, self._machine.next_timer(),

@@ -2,7 +2,7 @@
 """
 What takes more than one request: parameters of users, the round of reads, the safe stop.
 
-Every function here is a generator for :class:`.channel.Channel`.
+Every function here is a generator for :class:`.mailbox.MailboxChannel`.
 """
 
 from collections.abc import Callable, Generator, Sequence
@@ -15,9 +15,8 @@ from drive_can_bridge.core.requests import (
 )
 from drive_can_bridge.protocols.canopen_pkw import addresses
 from drive_can_bridge.protocols.canopen_pkw.addresses import Span
-from drive_can_bridge.protocols.canopen_pkw.channel import Procedure
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
-    Answered, Read, Refused, Reply, Silence, Step, Write,
+    Answered, Procedure, Read, Refused, Reply, Silence, Step, Write,
 )
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address
 from drive_can_bridge.protocols.patience import Patience
@@ -64,11 +63,7 @@ def read_parameters(parameters: Sequence[Parameter], conditions: Conditions,
     pending = addresses.plan(spans)
     while pending:
         span = pending.pop(0)
-        reply: Reply = Silence()
-        for _ in range(conditions.attempts):
-            reply = yield Read(span.address, span.count)
-            if not isinstance(reply, Silence):
-                break
+        reply = yield Read(span.address, span.count)
         if isinstance(reply, Answered):
             words.update(zip(span.addresses, reply.words))
             continue
@@ -181,7 +176,7 @@ def read_round(spans: Sequence[Span], answered: Callable[[Span, tuple[int, ...]]
     pending = list(spans)
     while pending:
         span = pending.pop(0)
-        reply = yield Read(span.address, span.count)
+        reply = yield Read(span.address, span.count, attempts=1)
         if isinstance(reply, Silence):
             return None
         if isinstance(reply, Refused):

@@ -12,11 +12,10 @@ from drive_can_bridge.core.requests import Request
 from drive_can_bridge.core.roles import Cells
 from drive_can_bridge.core.session import DriveState, Session
 from drive_can_bridge.core.told import MAY_RUN
+from drive_can_bridge.protocols.channel import Lane
 from drive_can_bridge.protocols.datamodel import procedures
 from drive_can_bridge.protocols.datamodel.acyclic_control import control_by_hand, CONTROL_WORD
-from drive_can_bridge.protocols.datamodel.channel import (
-    AcyclicChannel, Lane, Polling, Words, Write,
-)
+from drive_can_bridge.protocols.datamodel.channel import AcyclicChannel, Polling, Words, Write
 from drive_can_bridge.protocols.datamodel.extended import SLOTS
 from drive_can_bridge.protocols.datamodel.process_words import slot_of
 from drive_can_bridge.protocols.datamodel.safe_stop import SafeStop, StopWrite
@@ -92,6 +91,7 @@ class DataModelSession(Session):
     def _clear_channel(self) -> None:
         """Forget everything acyclic, and whatever waits for its outcome."""
         self._channel.clear()
+        self._channel.hold(-math.inf)
         self._safe_stop.forget()
         if self._by_hand is not None:
             self._by_hand.stop()
@@ -101,7 +101,7 @@ class DataModelSession(Session):
                     parameter_timeout: float | None = None) -> None:
         super().reconfigure(command_timeout=command_timeout, rearm_immediate=rearm_immediate,
                             parameter_timeout=parameter_timeout)
-        self._channel.timeout = self.drive.parameter_timeout
+        self._channel.courier.timeout = self.drive.parameter_timeout
         self._conditions = self._make_conditions()
 
     def _make_conditions(self) -> procedures.Conditions:

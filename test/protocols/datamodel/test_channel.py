@@ -7,8 +7,9 @@ import pytest
 
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.outbox import Outbox
+from drive_can_bridge.protocols.channel import Lane
 from drive_can_bridge.protocols.datamodel.channel import (
-    AcyclicChannel, Lane, Polling, Procedure, Read, Words, Write,
+    AcyclicChannel, Polling, Procedure, Read, Words, Write,
 )
 
 
