@@ -188,21 +188,24 @@ def read_round(spans: Sequence[Span], answered: Callable[[Span, tuple[int, ...]]
     return words
 
 
-def write_until_answered(writes: Sequence[LastWrite], attempts: int, timeout: float) -> Farewell:
+def write_until_answered(writes: Sequence[LastWrite], attempts: int, timeout: float,
+                         last: float) -> Farewell:
     """
     Tell a drive to stand still, each thing until it is answered or was tried ``attempts`` times.
 
     It may be executed twice: that does no harm. As the toggle is inverted with every attempt, not
     even an unknown function byte of the device keeps it from taking notice.
 
-    :param timeout: s for each attempt.
+    :param timeout: s for each attempt but the last.
+    :param last: s for that.
     :return: what failed, in words.
     """
     failed = []
     for name, span, words in writes:
         reply: Reply = Silence()
-        for _ in range(attempts):
-            reply = yield Write(span.address, words, blind=True, timeout=timeout)
+        for attempt in range(1, attempts + 1):
+            reply = yield Write(span.address, words, blind=True,
+                                timeout=last if attempt == attempts else timeout)
             if not isinstance(reply, Silence):
                 break
         if isinstance(reply, Refused):

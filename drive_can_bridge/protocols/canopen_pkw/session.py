@@ -134,8 +134,13 @@ class PkwSession(Session):
         self._phase = Phase.STOPPING
         self._stop_now(self._stop_time, now)
 
-    def _stop_now(self, time: float, now: float) -> None:
-        """Tell the drive to stand still, within so many s."""
+    def _stop_now(self, time: float, now: float, *, in_the_end: float = 0.0) -> None:
+        """
+        Tell the drive to stand still, within so many s.
+
+        :param in_the_end: s that the answer to the last attempt is waited for at least: a device
+            may be slow, and nobody waits for the end of this stop.
+        """
         writes = [] if self._control_writer is None else [self._control_writer.disable_write()]
         writes += self._setpoint_writer.neutral_writes()
         self._owed = self.told.owed
@@ -143,8 +148,9 @@ class PkwSession(Session):
         self._channel.make_room(now)
         timeout = min(self.drive.parameter_timeout, time / (STOP_ATTEMPTS * max(1, len(writes))))
         self._channel.run(
-            procedures.write_until_answered(writes, STOP_ATTEMPTS, timeout), self._stop_ended, now,
-            Lane.STOP)
+            procedures.write_until_answered(
+                writes, STOP_ATTEMPTS, timeout, max(timeout, in_the_end)),
+            self._stop_ended, now, Lane.STOP)
 
     def _stop_ended(self, failed: list[str]) -> None:
         if not failed:
@@ -233,7 +239,7 @@ class PkwSession(Session):
 
     def _stop_if_owed(self, now: float) -> None:
         if self.told.owed:
-            self._stop_now(STOP_TIME_SILENT, now)
+            self._stop_now(STOP_TIME_SILENT, now, in_the_end=self.drive.parameter_timeout)
 
     def _leave_alone(self, reason: str, now: float) -> None:
         """Handle a drive that is silent, but may be listening: it has to stand still."""
@@ -242,7 +248,7 @@ class PkwSession(Session):
         self._node.offline(now)
         self._send_nmt()
         if was_online:
-            self._stop_now(STOP_TIME_SILENT, now)
+            self._stop_now(STOP_TIME_SILENT, now, in_the_end=self.drive.parameter_timeout)
 
     def _cut_off(self, reason: str, answer: str, now: float) -> None:
         """
