@@ -13,13 +13,14 @@ answered is left alone until a late response must have come: its value may be ol
 between, and look like the response to that write.
 """
 
-from collections.abc import Callable, Generator, Hashable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.outbox import Left
+from drive_can_bridge.core.retry import RetryPolicy
 from drive_can_bridge.protocols.cannord.parameter_frame import (
     ParameterFrame, ParameterLayout, Response, RESPONSES, Task,
 )
@@ -59,7 +60,6 @@ class Reply(NamedTuple):
     sent: bool = True
 
 
-Procedure = Generator[Ask, Reply, Any]
 
 
 class TaskCourier(Courier[Ask, Reply]):
@@ -68,31 +68,29 @@ class TaskCourier(Courier[Ask, Reply]):
 
     :param layout: where the fields of a frame are.
     :param send: takes the payload of a task, and who is told whether it left.
-    :param timeout: s to wait for a response.
-    :param attempts: how often a read is sent before it counts as unanswered.
+    :param retry: how long and how often the inverter is asked.
     """
 
     busy = False
     deadline = math.inf
 
-    def __init__(self, layout: ParameterLayout, send: Callable[[bytes, Left], None], *,
-                 timeout: float, attempts: int) -> None:
-        self.timeout = timeout
+    def __init__(self, layout: ParameterLayout, send: Callable[[bytes, Left], None],
+                 retry: RetryPolicy) -> None:
+        self._retry = retry
         self._layout = layout
         self._send = send
-        self._reads = attempts
         self._task: Ask | None = None
         self._contrary: ParameterFrame | None = None
         self._refused = False   # the bus did not take it
 
     @property
     def silence(self) -> float:
-        return self.timeout
+        return self._retry.timeout
 
     def begin(self, step: Ask, now: float) -> None:
         self._task, self._contrary, self._refused = step, None, False
         self.busy = True
-        self.deadline = now + self.timeout
+        self.deadline = now + self._retry.timeout
 
         def left(sent: bool, then: float) -> None:
             # a read that the bus refused is repeated when its time is over
@@ -136,7 +134,7 @@ class TaskCourier(Courier[Ask, Reply]):
         self.deadline = math.inf
 
     def attempts(self, step: Ask) -> int:
-        return self._reads if step.task in READS else 1
+        return self._retry.attempts if step.task in READS else 1
 
     def unanswered(self, step: Ask, reply: Reply) -> bool:
         return reply.response is None and reply.sent
@@ -148,9 +146,9 @@ class TaskCourier(Courier[Ask, Reply]):
 class TaskChannel(Channel[Ask, Reply]):
     """Runs procedures, one task at a time. See :class:`TaskCourier` for the parameters."""
 
-    def __init__(self, layout: ParameterLayout, send: Callable[[bytes, Left], None], *,
-                 timeout: float, attempts: int) -> None:
-        self.courier = TaskCourier(layout, send, timeout=timeout, attempts=attempts)
+    def __init__(self, layout: ParameterLayout, send: Callable[[bytes, Left], None],
+                 retry: RetryPolicy) -> None:
+        self.courier = TaskCourier(layout, send, retry)
         super().__init__(self.courier)
 
     def receive(self, data: bytes, now: float) -> None:

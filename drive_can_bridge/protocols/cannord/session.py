@@ -27,8 +27,7 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.parameters import Access, Parameter
 from drive_can_bridge.core.requests import (
-    BRIDGE_INACTIVE, Failure, Outcome, ReadValue, Request, WriteRequest,
-    Written,
+    BRIDGE_INACTIVE, Failure, Outcome, ReadRequest, ReadValue, Request, WriteRequest, Written,
 )
 from drive_can_bridge.core.roles import Cells
 from drive_can_bridge.core.session import (
@@ -93,8 +92,9 @@ class CannordSession(Session):
         self._extra_response = drive.cyclic_response[MAIN_VALUES:]
         self._channel = TaskChannel(
             ParameterLayout(options.value_order, options.index_byte), self._send_task,
-            timeout=drive.parameter_timeout, attempts=drive.parameter_retries + 1)
-        self._conditions = self._make_conditions()
+            self.retry)
+        self._access = procedures.TaskAccess(
+            self.retry, last_value=self._last_value, persist=options.persist_writes)
         self._cycling = False
         self._stopping = False
         self._cycles_left = 0               # before a stop is complete
@@ -434,13 +434,6 @@ class CannordSession(Session):
     def _send_task(self, payload: bytes, left: Left) -> None:
         self._outbox.put(Frame(self._task_identifier, payload, self._extended), left)
 
-    def _make_conditions(self) -> procedures.Conditions:
-        drive = self.drive
-        return procedures.Conditions(
-            offline=lambda: not self.online, last_value=self._last_value,
-            timeout=drive.parameter_timeout, attempts=drive.parameter_retries + 1,
-            persist=drive.options.persist_writes)
-
     def _last_value(self, name: str) -> int | None:
         """Return the raw integer of a parameter that was received last."""
         for parameter, raw in zip(self.sample_parameters, self._last_sample):
@@ -458,7 +451,7 @@ class CannordSession(Session):
                 self._look_at_timeout(self._channel.now)
 
         self._channel.run(
-            procedures.of_request(request, self._conditions), done, now, Lane.USERS)
+            self._access.serve(request), done, now, Lane.USERS)
 
     def _waiting_requests(self) -> int:
         return self._channel.waiting_users
@@ -479,14 +472,6 @@ class CannordSession(Session):
             return procedures.PROCESS_DATA_ONLY
         return refusal
 
-    def reconfigure(self, *, command_timeout: float | None = None,
-                    rearm_immediate: bool | None = None,
-                    parameter_timeout: float | None = None) -> None:
-        super().reconfigure(command_timeout=command_timeout, rearm_immediate=rearm_immediate,
-                            parameter_timeout=parameter_timeout)
-        self._channel.courier.timeout = self.drive.parameter_timeout
-        self._conditions = self._make_conditions()
-
     # -- the inverter's own time-out --------------------------------------------------------------
 
     def _look_at_timeout(self, now: float) -> None:
@@ -496,7 +481,8 @@ class CannordSession(Session):
             return
         self._asking_timeout = True
 
-        def done(outcome: Outcome) -> None:
+        def done(outcomes: tuple[Outcome, ...]) -> None:
+            outcome, = outcomes
             self._asking_timeout = False
             if isinstance(outcome, ReadValue):
                 self._timeout_warning = timeout_warning(
@@ -508,7 +494,7 @@ class CannordSession(Session):
                 self._events.append(Noted(f'telegram time-out ({parameter.address}) unknown: '
                                           f'{outcome.reason}'))
 
-        self._channel.run(procedures.read_parameter(parameter, self._conditions), done, now)
+        self._channel.run(self._access.serve(ReadRequest((parameter,))), done, now)
 
     # -- timer ------------------------------------------------------------------------------------
 

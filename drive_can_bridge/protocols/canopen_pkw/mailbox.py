@@ -27,6 +27,7 @@ import math
 from typing import Any, NamedTuple, Union
 
 from drive_can_bridge.core.outbox import Left
+from drive_can_bridge.core.retry import RetryPolicy
 from drive_can_bridge.protocols.canopen_pkw import abort_codes, pkw
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Function, Message
 from drive_can_bridge.protocols.channel import Channel
@@ -109,14 +110,12 @@ class Mailbox(Courier[Step, Reply]):
 
     :param send: takes a request that leaves now, and who is told whether it did.
     :param order: of the halves of abort codes: ``auto``, ``low_first``, ``high_first``.
-    :param timeout: s to wait for an answer.
-    :param attempts: how often a read is sent before it counts as unanswered.
+    :param retry: how long and how often the device is asked.
     """
 
     def __init__(self, send: Callable[[Message, Left], None], *, order: str,
-                 timeout: float, attempts: int = 1) -> None:
-        self.timeout = timeout
-        self._reads = attempts
+                 retry: RetryPolicy) -> None:
+        self._retry = retry
         self._send = send
         self._order = order
         self._synchronised = False
@@ -141,7 +140,7 @@ class Mailbox(Courier[Step, Reply]):
 
     def attempts(self, step: Step) -> int:
         # What takes more than one write tells what may be executed twice, and what may not.
-        return (step.attempts or self._reads) if isinstance(step, Read) else 1
+        return (step.attempts or self._retry.attempts) if isinstance(step, Read) else 1
 
     def unanswered(self, step: Step, reply: Reply) -> bool:
         return isinstance(reply, Silence) and isinstance(step, Read)
@@ -154,7 +153,7 @@ class Mailbox(Courier[Step, Reply]):
             self._send_step(step, now)
             return
         self._request = pkw.idle_request()
-        self._deadline = now + min(self.timeout, SYNCHRONISATION_TIMEOUT)
+        self._deadline = now + min(self._retry.timeout, SYNCHRONISATION_TIMEOUT)
         self._send(self._request, self._left)
 
     def abandon(self, until: float) -> None:
@@ -254,7 +253,7 @@ class Mailbox(Courier[Step, Reply]):
     def _send_step(self, step: Step, now: float) -> None:
         # inverted after function 00h, too: a late answer to the request before never fits
         self._toggle = not self._toggle
-        timeout = self.timeout
+        timeout = self._retry.timeout
         if isinstance(step, Read):
             self._request = pkw.read_request(step.address, step.count, self._toggle)
         else:

@@ -84,9 +84,9 @@ class PkwSession(Session):
         self._node = Node(drive.station, nmt_start=options.nmt_start,
                           heartbeat_timeout=options.heartbeat_timeout)
         self._channel = MailboxChannel(Mailbox(
-            self._send, order=options.abort_code_order, timeout=drive.parameter_timeout,
-            attempts=drive.parameter_retries + 1))
-        self._conditions = self._make_conditions()
+            self._send, order=options.abort_code_order, retry=self.retry))
+        self._access = procedures.RegisterAccess(
+            self.retry, addressing=self._addressing, word_order=self._word_order)
         self._setpoint_writer = SetpointWriter(
             self._channel, self.setpoints, self._warn, self.told, addressing=self._addressing,
             word_order=self._word_order, refresh=options.refresh_interval)
@@ -490,8 +490,8 @@ class PkwSession(Session):
 
     def _enqueue(self, request: Request, now: float) -> None:
         self._channel.run(
-            procedures.of_request(request, self._conditions),
-            lambda outcomes: self._answer(request, outcomes), now, Lane.USERS)
+            self._access.serve(request), lambda outcomes: self._answer(request, outcomes), now,
+            Lane.USERS)
 
     def _fail_requests(self, reason: str) -> None:
         self._channel.cancel(Lane.USERS)
@@ -513,21 +513,6 @@ class PkwSession(Session):
                 return (f'one half of {other.name}: set that' if other.writable
                         else f'read-only: one half of {other.name}')
         return ''
-
-    def reconfigure(self, *, command_timeout: float | None = None,
-                    rearm_immediate: bool | None = None,
-                    parameter_timeout: float | None = None) -> None:
-        super().reconfigure(command_timeout=command_timeout, rearm_immediate=rearm_immediate,
-                            parameter_timeout=parameter_timeout)
-        self._channel.mailbox.timeout = self.drive.parameter_timeout
-        self._conditions = self._make_conditions()
-
-    def _make_conditions(self) -> procedures.Conditions:
-        drive = self.drive
-        return procedures.Conditions(
-            offline=lambda: not self.online, timeout=drive.parameter_timeout,
-            attempts=drive.parameter_retries + 1, addressing=self._addressing,
-            word_order=self._word_order)
 
     # -- state ------------------------------------------------------------------------------------
 

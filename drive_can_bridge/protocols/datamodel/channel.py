@@ -30,6 +30,7 @@ from typing import Any, Union
 
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.outbox import Left
+from drive_can_bridge.core.retry import RetryPolicy
 from drive_can_bridge.protocols.channel import Channel
 from drive_can_bridge.protocols.courier import ANYTHING, Courier
 
@@ -109,10 +110,9 @@ class ParameterCourier(Courier[Step, Reply]):
 
     def __init__(self, encode_read: Callable[[int, int], Frame],
                  encode_write: Callable[[int, Words], Frame], send: Send, *,
-                 timeout: float, attempts: int, eeprom_gap: float,
+                 retry: RetryPolicy, eeprom_gap: float,
                  wrote: Callable[[Write], None], polling: Polling | None) -> None:
-        self.timeout = timeout
-        self.reads = attempts
+        self.retry = retry
         self.outstanding: Read | None = None
         self.asked_at = -math.inf
         self.free_at = -math.inf
@@ -132,7 +132,7 @@ class ParameterCourier(Courier[Step, Reply]):
 
     @property
     def silence(self) -> float:
-        return self.timeout if self._polling is None else self._polling.quarantine
+        return self.retry.timeout if self._polling is None else self._polling.quarantine
 
     # -- one exchange -----------------------------------------------------------------------------
 
@@ -142,7 +142,7 @@ class ParameterCourier(Courier[Step, Reply]):
             self._emit(self._encode_read(step.number, step.count), None)
             self.outstanding = step
             self.asked_at = now
-            self.deadline = now + (self.timeout if step.timeout is None else step.timeout)
+            self.deadline = now + (self.retry.timeout if step.timeout is None else step.timeout)
             return
         self._writing, self._left = step, None
         self.deadline = math.inf
@@ -188,7 +188,7 @@ class ParameterCourier(Courier[Step, Reply]):
 
     def attempts(self, step: Step) -> int:
         # A write is never repeated: it may be a command.
-        return (step.attempts or self.reads) if isinstance(step, Read) else 1
+        return (step.attempts or self.retry.attempts) if isinstance(step, Read) else 1
 
     def unanswered(self, step: Step, reply: Reply) -> bool:
         return reply is None and isinstance(step, Read)
@@ -265,8 +265,7 @@ class AcyclicChannel(Channel[Step, Reply]):
 
     :param encode_read: (number, count) -> frame.
     :param encode_write: (number, words) -> frame.
-    :param timeout: s to wait for an answer.
-    :param attempts: how often a read is sent before it counts as unanswered.
+    :param retry: how long and how often the drive is asked.
     :param eeprom_gap: s after an EEPROM write.
     :param send: takes frames that are to leave now, and who is told whether they did.
     :param wrote: takes every write that left.
@@ -276,11 +275,11 @@ class AcyclicChannel(Channel[Step, Reply]):
 
     def __init__(self, *, encode_read: Callable[[int, int], Frame],
                  encode_write: Callable[[int, Words], Frame], send: Send,
-                 timeout: float, attempts: int, eeprom_gap: float,
+                 retry: RetryPolicy, eeprom_gap: float,
                  wrote: Callable[[Write], None] = lambda _: None,
                  polling: Polling | None = None) -> None:
         self.courier = ParameterCourier(
-            encode_read, encode_write, send, timeout=timeout, attempts=attempts,
+            encode_read, encode_write, send, retry=retry,
             eeprom_gap=eeprom_gap, wrote=wrote, polling=polling)
         super().__init__(self.courier, own_to_end=polling is not None)
 

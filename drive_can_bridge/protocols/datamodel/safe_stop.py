@@ -62,7 +62,7 @@ class SafeStop:
         self.running = True
         for each in writes:
             self._channel.write_now(each.write, lambda sent, then: None, now)
-        timeout = min(self._channel.courier.timeout, ANSWER_TIME)
+        timeout = min(self._channel.courier.retry.timeout, ANSWER_TIME)
         self._channel.run(_confirm(writes, timeout), self._done, now, Lane.STOP)
 
     def forget(self) -> None:

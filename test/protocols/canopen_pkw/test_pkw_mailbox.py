@@ -4,6 +4,7 @@
 import pytest
 
 from drive_can_bridge.core.outbox import Left
+from drive_can_bridge.core.retry import RetryPolicy
 from drive_can_bridge.protocols.canopen_pkw import pkw
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
     Answered, Mailbox, Read, Refused, Reply, Silence, Write,
@@ -18,10 +19,9 @@ READ = Read(REGISTER)
 class Box:
     """A mailbox, spoken to in hex."""
 
-    def __init__(self, **options: object) -> None:
+    def __init__(self, order: str = 'auto', timeout: float = 0.5) -> None:
         self.sent: list[str] = []
-        settings = {'order': 'auto', 'timeout': 0.5, **options}
-        self.box = Mailbox(self.send, **settings)  # type: ignore[arg-type]
+        self.box = Mailbox(self.send, order=order, retry=RetryPolicy(timeout, attempts=1))
         self.left: Left = lambda sent, now: None
 
     def send(self, message: pkw.Message, left: Left) -> None:
