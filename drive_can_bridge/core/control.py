@@ -15,7 +15,8 @@ of each request to whoever asked. What a request does:
     DISABLE      disable                          not enabled: success
     QUICK_STOP   quick_stop                       not enabled: success, disable
     RESET_FAULT  disable (sent once: a new edge)  fault: goes on; no fault: success
-                 reset_fault                      no fault: success, disable
+                 reset_fault, a pulse             goes on when it has left often enough
+                 disable                          no fault: success
 
 Every other end of a request (time-out, fault, withdrawal, replacement) is a failure and leaves
 ``disable``. So ``enable`` is on the bus only for the sake of an ENABLE that nothing has ended
@@ -47,6 +48,11 @@ is all the confirmation there is, and the answer says so. A quick stop then keep
 whole time-out, although it is answered at once: ``disable`` right after it would end the braking
 before it began. A drive that does not report faults gets the reset pulse in any case.
 
+*The pulse.* What nobody acknowledges may get lost, and a drive may look at its control word
+seldom: so the word leaves :data:`RESET_CYCLES` times, and whoever sends it lets little time pass
+between them (:attr:`~ControlMachine.pulsing`). Where a write is acknowledged, one is enough. The
+pulse is the same whether or not the fault goes meanwhile; what counts is the status after it.
+
 *A drive that takes no notice.* A word that is written when it changes may get lost on the way.
 :attr:`~ControlMachine.unconfirmed` tells the session that the drive, by what it reports since,
 does not do as the word says: then the word is written again. A drive that goes on running under
@@ -73,6 +79,8 @@ class ControlAction(Enum):
 
 #: s that a drive may go on running under ``disable`` at least until that is told
 RUNNING_ON_MAX = 1.0
+#: how often the reset word leaves where nobody acknowledges it
+RESET_CYCLES = 3
 
 _STOPS = (ControlAction.DISABLE, ControlAction.QUICK_STOP)
 
@@ -104,6 +112,7 @@ class _Operation:
     action: ControlAction
     deadline: float
     tickets: list[ControlTicket] = field(default_factory=list)
+    pulsed: bool = False    # the reset word has left as often as it has to
 
 
 class ControlMachine:
@@ -114,12 +123,16 @@ class ControlMachine:
     call, look at :attr:`word`, :meth:`take_completed`, :meth:`take_notes`, :meth:`next_timer`.
 
     :param timeout: seconds until an unconfirmed request fails.
+    :param pulse: how often the reset word leaves.
     :ivar table: the words and conditions.
     """
 
-    def __init__(self, table: ControlTable, *, timeout: float) -> None:
+    def __init__(self, table: ControlTable, *, timeout: float,
+                 pulse: int = RESET_CYCLES) -> None:
         self.table = self._table = table
         self._timeout = timeout
+        self._pulse = pulse
+        self._pulses_left = 0
         self._words = {
             ControlAction.DISABLE: table.disable,
             ControlAction.ENABLE: table.enable,
@@ -157,6 +170,11 @@ class ControlMachine:
     def stopping(self) -> bool:
         """The current word is there to stop a drive: it waits for nobody."""
         return self._sending in _STOPS
+
+    @property
+    def pulsing(self) -> bool:
+        """The current word is a pulse: it has to leave again soon."""
+        return self._sending is ControlAction.RESET_FAULT
 
     @property
     def operating(self) -> bool:
@@ -208,10 +226,8 @@ class ControlMachine:
             return False
         if self._sending is ControlAction.DISABLE:
             return self._still_on()
-        # what the drive does not report at all, it cannot confirm
-        telling = (self._table.fault if self._sending is ControlAction.RESET_FAULT
-                   else self._table.enabled)
-        return self.pending and telling is not None
+        # what the drive does not report at all, it cannot confirm; and a pulse has its own end
+        return self.pending and not self.pulsing and self._table.enabled is not None
 
     @property
     def disregard(self) -> str:
@@ -272,6 +288,8 @@ class ControlMachine:
         more does not count.
         """
         self._sent = True           # before the timer, which may change the word
+        if self.pulsing:
+            self._pulses_left -= 1
         self.handle_timer(now)
         self._advance()
 
@@ -364,14 +382,20 @@ class ControlMachine:
                     self._send(ControlAction.ENABLE)
             elif self._confirmed(table.enabled, True):
                 self._reached = True
-                self._end(True, self._success_text(table.enabled, 'its state'))
+                self._end(True, self._success_text())
         elif under_way.action is ControlAction.RESET_FAULT:
-            if self._sending is ControlAction.DISABLE and self._confirmed_resettable():
+            if self.pulsing:
+                if self._pulses_left <= 0:
+                    under_way.pulsed = True
+                    self._send(ControlAction.DISABLE)
+            elif not under_way.pulsed and self._confirmed_resettable():
+                self._pulses_left = self._pulse
                 self._send(ControlAction.RESET_FAULT)
             elif self._confirmed(table.fault, False):
-                self._end(True, self._success_text(table.fault, 'faults'))
+                self._end(True, self.state if table.fault is not None else
+                          'reset_fault sent; the drive does not report faults')
         elif self._confirmed_off():
-            message = self._success_text(table.enabled, 'its state')
+            message = self._success_text()
             if table.enabled is None and self._sending is ControlAction.QUICK_STOP:
                 self._answer_tickets(under_way, True, message)      # keeps braking
             else:
@@ -485,15 +509,16 @@ class ControlMachine:
     def _status_text(self) -> str:
         return 'no status word' if self._raw is None else f'status word {self._raw:04X}h'
 
-    def _success_text(self, pattern: StatusPattern | None, what: str) -> str:
+    def _success_text(self) -> str:
         """Name the state reached, or say that nobody knows."""
-        if pattern is None:
-            return f'{self._sending.value} sent; the drive does not report {what}'
+        if self._table.enabled is None:
+            return f'{self._sending.value} sent; the drive does not report its state'
         return self.state
 
     def _overdue_text(self) -> str:
         """Say where the drive is stuck."""
-        if self._sending is ControlAction.RESET_FAULT and self._answer is not None:
+        under_way = self._operation
+        if under_way is not None and under_way.pulsed and self._answer is not None:
             return f'fault still present after {self._timeout:g} s ({self._status_text})'
         text = (f'no confirmation in {self._timeout:g} s: '
                 f'stuck in state {self.state} ({self._status_text})')

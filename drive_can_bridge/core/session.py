@@ -36,6 +36,7 @@ from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.requests import (
     BRIDGE_INACTIVE, BUS_DOWN, BUSY, Failure, Outcome, Request,
 )
+from drive_can_bridge.core.retry import RetryPolicy
 from drive_can_bridge.core.roles import Cells, Role, Roles
 from drive_can_bridge.core.setpoints import CommandOutcome, Setpoints
 from drive_can_bridge.core.statistics import DriveStatistics
@@ -45,7 +46,7 @@ from drive_can_bridge.core.told import MAY_RUN, Told
 WAITING_REQUESTS_MAX = 64
 #: cyclic frames with neutral setpoints that are sent before a drive is left alone
 STOP_CYCLES = 3
-#: s of pause between them at most, however long the period is
+#: s of pause between them at most, however long the period is; and between those of a pulse
 STOP_SPACING_MAX = 0.1
 #: s that a cycle may be away when a stop is wanted; else it is brought forward
 STOP_WAIT_MAX = 0.025
@@ -73,6 +74,7 @@ class Session(ABC):
     :ivar drive: the configuration.
     :ivar setpoints: every ``cyclic_request`` parameter but the control word, in slot order.
     :ivar control: the control and status word machine, or None.
+    :ivar retry: how long and how often the drive is asked.
     :ivar sent: what the drive was told last.
     :ivar roles: what users may not write.
     :ivar online: the drive exchanges process data.
@@ -98,6 +100,9 @@ class Session(ABC):
             self.cells, control=drive.profile.parameters.get(self._control_name),
             cyclic=drive.cyclic_request, maps=self.map_cells)
         self.statistics = DriveStatistics()
+        self.retry = RetryPolicy(
+            timeout=drive.parameter_timeout, attempts=drive.parameter_retries + 1,
+            offline=lambda: self.state is DriveState.OFFLINE)
         self.online = False
         self.ever_online = False
         self.active = False
@@ -361,6 +366,7 @@ class Session(ABC):
             self.setpoints.rearm_immediate = rearm_immediate
         if parameter_timeout is not None:
             self.drive = replace(self.drive, parameter_timeout=parameter_timeout)
+            self.retry.timeout = parameter_timeout
 
     # -- control ----------------------------------------------------------------------------------
 
@@ -442,7 +448,7 @@ class Session(ABC):
 
     @property
     def _stop_spacing(self) -> float:
-        """Return how many s lie between two neutral cycles of a stop."""
+        """Return how many s lie between two cycles of a stop, or of a pulse."""
         return min(self.drive.period, STOP_SPACING_MAX)
 
     def _be_offline(self, reason: str) -> None:

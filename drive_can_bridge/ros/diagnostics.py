@@ -26,8 +26,6 @@ LOAD_WARNING = 70.0
 #: s for which a command that changed nothing is worth a warning
 COMMANDS_RECENT = 1.5
 
-_NAMES = {DiagnosticStatus.OK: 'OK', DiagnosticStatus.WARN: 'WARN',
-          DiagnosticStatus.ERROR: 'ERROR', DiagnosticStatus.STALE: 'STALE'}
 
 
 @dataclass
@@ -38,11 +36,6 @@ class Report:
     level: bytes
     message: str
     facts: dict[str, str] = field(default_factory=dict)
-
-    @property
-    def level_name(self) -> str:
-        """OK, WARN, ERROR or STALE."""
-        return _NAMES[self.level]
 
 
 class BusReporter:

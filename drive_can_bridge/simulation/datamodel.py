@@ -74,8 +74,8 @@ class ExtendedWire(Wire):
 
     def answer(self, request: Frame, words: Sequence[int]) -> Frame:
         used = 2 * len(words)
-        data = extended.pack_words(words)[:used] + JUNK[used:]
-        return Frame(request.identifier | extended.DIR, data, True)
+        answer = extended.encode_answer(request.identifier, words)
+        return Frame(answer.identifier, answer.data[:used] + JUNK[used:], True)
 
     def foreign(self, answer: Frame, turn: int) -> list[Frame]:
         """Return answers of absent stations, an 11-bit twin, a write echo."""

@@ -11,7 +11,7 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Access, ParameterType, ValueKind
 from drive_can_bridge.protocols.datamodel.extended import (
-    encode_cyclic_request, encode_read_request, encode_write,
+    encode_read_request, encode_write,
 )
 from drive_can_bridge.protocols.datamodel.extended_family import DataModelExtended
 
@@ -30,12 +30,12 @@ def with_options(drive: DriveConfiguration, **options: object) -> DriveConfigura
 def test_claims_are_all_frames_of_the_station(drive: DriveConfiguration) -> None:
     (claim,) = FAMILY.claims(drive)
     assert claim.route == (0x00200000, 0x0FE00000, True)
-    frames = [encode_cyclic_request(1, [5]), encode_read_request(1, 122, 4),
+    frames = [Frame(0x003FFFF0, bytes(8), True), encode_read_request(1, 122, 4),
               encode_write(1, 0x1234, [5])]
     for frame in frames:
         assert claim.route.matches(frame)
         assert claim.route.matches(Frame(frame.identifier | 0x10000000, frame.data, True))
-    assert not claim.route.matches(encode_cyclic_request(2, [5]))
+    assert not claim.route.matches(Frame(0x005FFFF0, bytes(8), True))
     assert not claim.route.matches(Frame(0x200, b'', False))
 
 

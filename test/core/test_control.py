@@ -130,12 +130,11 @@ def test_a_drive_that_has_not_answered_since_is_not_unconfirmed() -> None:
 
 
 @pytest.mark.parametrize(('action', 'word', 'raw', 'done'), [
-    (ENABLE, RUN, READY, ENABLED), (QUICK_STOP, STOP, ENABLED, READY),
-    (RESET_FAULT, RESET, FAULT, READY)])
+    (ENABLE, RUN, READY, ENABLED), (QUICK_STOP, STOP, ENABLED, READY)])
 def test_a_word_is_unconfirmed_until_the_drive_follows(action: ControlAction, word: int, raw: int,
                                                        done: int) -> None:
-    control = {ENABLE: machine, QUICK_STOP: enabled, RESET_FAULT: faulted}[action]()
-    cycle(control, {ENABLE: READY, QUICK_STOP: ENABLED, RESET_FAULT: FAULT}[action], 0.9)
+    control = {ENABLE: machine, QUICK_STOP: enabled}[action]()
+    cycle(control, {ENABLE: READY, QUICK_STOP: ENABLED}[action], 0.9)
     control.request(action, 1.0)
     assert control.word == word
     assert not control.unconfirmed
@@ -872,28 +871,41 @@ def test_fault_reset_with_nothing_to_reset_does_not_disturb_a_stop() -> None:
 
 # -- fault reset ----------------------------------------------------------------------------------
 
-def test_reset_pulses_until_the_fault_is_gone_then_disables() -> None:
+def test_reset_pulses_then_disables_and_waits_for_the_status() -> None:
     control = faulted()
     control.request(RESET_FAULT, 0.01)
     assert control.word == RESET
-    assert cycle(control, FAULT, 0.02) == RESET
-    assert cycle(control, FAULT, 0.04) == RESET
+    assert [cycle(control, FAULT, 0.02 * n) for n in range(1, 4)] == [RESET] * 3
+    assert not control.pulsing
+    assert [cycle(control, FAULT, 0.02 * n) for n in range(4, 7)] == [OFF] * 3
     assert control.take_completed() == []
-    assert cycle(control, READY, 0.06) == RESET
+    cycle(control, READY, 0.14)
     assert outcomes(control) == [(RESET_FAULT, True, 'ready')]
     assert control.take_notes() == ['fault gone (status word 0001h)']
     assert (control.word, control.pending) == (OFF, False)
-    cycle(control, READY, 0.08)
-    control.request(ENABLE, 0.09)
+    control.request(ENABLE, 0.15)
     assert control.word == RUN
 
 
-def test_fault_gone_before_the_pulse_left_confirms_nothing_yet() -> None:
+def test_pulse_is_one_word_where_that_is_acknowledged() -> None:
+    control = ControlMachine(FULL, timeout=2.0, pulse=1)
+    cycle(control, FAULT, 0.0)
+    control.request(RESET_FAULT, 0.01)
+    assert [cycle(control, FAULT, 0.02), cycle(control, READY, 0.04)] == [RESET, OFF]
+    assert outcomes(control) == [(RESET_FAULT, True, 'ready')]
+
+
+@pytest.mark.parametrize('gone', [0, 1, 2])
+def test_pulse_is_the_same_when_the_fault_goes_meanwhile(gone: int) -> None:
+    """What counts is a status that came after the pulse was over."""
     control = faulted()
     control.request(RESET_FAULT, 0.01)
-    control.status_received(READY, 0.02)
-    assert (control.word, control.take_completed()) == (RESET, [])
-    cycle(control, READY, 0.03)
+    if gone == 0:
+        control.status_received(READY, 0.02)
+    assert [cycle(control, READY if n >= gone else FAULT, 0.02 + 0.02 * n)
+            for n in range(3)] == [RESET] * 3
+    assert (control.word, control.take_completed()) == (OFF, [])
+    cycle(control, READY, 0.09)
     assert outcomes(control) == [(RESET_FAULT, True, 'ready')]
 
 
@@ -911,7 +923,7 @@ def test_reset_without_a_fault_succeeds_and_changes_nothing(
 def test_reset_that_does_not_help_fails_and_disables() -> None:
     control = faulted()
     control.request(RESET_FAULT, 0.0)
-    cycle(control, FAULT, 0.02)
+    assert [cycle(control, FAULT, 0.1 * n) for n in range(1, 5)] == [RESET] * 3 + [OFF]
     control.handle_timer(2.0)
     assert outcomes(control) == [
         (RESET_FAULT, False, 'fault still present after 2 s (status word 0008h)')]
@@ -969,8 +981,9 @@ def test_reset_of_a_drive_that_reports_no_faults_is_one_pulse(table: ControlTabl
     control = machine(table)
     control.request(RESET_FAULT, 0.0)
     assert cycle(control, READY, 0.0) == OFF
+    assert [cycle(control, READY, 0.02 * n) for n in range(1, 4)] == [RESET] * 3
     assert control.take_completed() == []
-    assert cycle(control, READY, 0.02) == RESET
+    assert cycle(control, READY, 0.08) == OFF
     message = 'reset_fault sent; the drive does not report faults'
     assert outcomes(control) == [(RESET_FAULT, True, message)]
     assert (control.word, control.pending) == (OFF, False)
@@ -979,7 +992,8 @@ def test_reset_of_a_drive_that_reports_no_faults_is_one_pulse(table: ControlTabl
 def test_reset_of_an_enabled_drive_that_reports_no_faults_disables_it() -> None:
     control = enabled(NO_FAULT)
     control.request(RESET_FAULT, 1.0)
-    assert [cycle(control, READY, 1.0 + n) for n in range(3)] == [OFF, RESET, OFF]
+    assert [cycle(control, READY, 1.0 + 0.1 * n) for n in range(5)] == [
+        OFF, RESET, RESET, RESET, OFF]
 
 
 def test_reset_replaces_an_enable() -> None:

@@ -35,8 +35,6 @@ EXTRA_VALUES = 2
 SHORT_LENGTH = 4
 LONG_LENGTH = 8
 EXTRA_LENGTH = 5
-#: the word that means 100 %
-FULL_SCALE = 0x4000
 
 _SHORT = struct.Struct('<HH')
 _LONG = struct.Struct('<HHHH')

@@ -27,8 +27,7 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.parameters import Access, Parameter
 from drive_can_bridge.core.requests import (
-    BRIDGE_INACTIVE, Failure, Outcome, ReadValue, Request, WriteRequest,
-    Written,
+    BRIDGE_INACTIVE, Failure, Outcome, ReadRequest, ReadValue, Request, WriteRequest, Written,
 )
 from drive_can_bridge.core.roles import Cells
 from drive_can_bridge.core.session import (
@@ -46,6 +45,7 @@ from drive_can_bridge.protocols.cannord.process_data import (
     decode_extra, decode_main, encode_extra, encode_main, EXTRA_LENGTH, main_length, MAIN_VALUES,
 )
 from drive_can_bridge.protocols.cannord.states import is_faulted, STATUS_BITS, STATUS_WORD
+from drive_can_bridge.protocols.channel import Lane
 
 NO_ANSWER = 'no answer to process data'
 #: what the inverter is told, for the books of what it was told
@@ -92,8 +92,9 @@ class CannordSession(Session):
         self._extra_response = drive.cyclic_response[MAIN_VALUES:]
         self._channel = TaskChannel(
             ParameterLayout(options.value_order, options.index_byte), self._send_task,
-            timeout=drive.parameter_timeout, attempts=drive.parameter_retries + 1)
-        self._conditions = self._make_conditions()
+            self.retry)
+        self._access = procedures.TaskAccess(
+            self.retry, last_value=self._last_value, persist=options.persist_writes)
         self._cycling = False
         self._stopping = False
         self._cycles_left = 0               # before a stop is complete
@@ -148,6 +149,7 @@ class CannordSession(Session):
         return not self._cycling
 
     def time_lost(self, now: float) -> None:
+        self._channel.time_lost(now)
         if not self._cycling or self._stopping:
             return
         self._lose('the bridge stood still', now)
@@ -246,8 +248,11 @@ class CannordSession(Session):
         if self._machine.word == self._sent_word:   # nobody was lost meanwhile
             fresh = self._machine.word_due
             self._machine.word_sent(now)
-            if fresh:
+            if fresh or self._machine.word != self._sent_word:
                 self._control_changed(now)
+            if self._machine.pulsing and self._next_cycle > now + self._stop_spacing:
+                self._in_pace = False
+                self._next_cycle = now + self._stop_spacing
         if self._stopping:
             self._cycles_left -= 1
             if self._cycles_left == 0:
@@ -429,13 +434,6 @@ class CannordSession(Session):
     def _send_task(self, payload: bytes, left: Left) -> None:
         self._outbox.put(Frame(self._task_identifier, payload, self._extended), left)
 
-    def _make_conditions(self) -> procedures.Conditions:
-        drive = self.drive
-        return procedures.Conditions(
-            offline=lambda: not self.online, last_value=self._last_value,
-            timeout=drive.parameter_timeout, attempts=drive.parameter_retries + 1,
-            persist=drive.options.persist_writes)
-
     def _last_value(self, name: str) -> int | None:
         """Return the raw integer of a parameter that was received last."""
         for parameter, raw in zip(self.sample_parameters, self._last_sample):
@@ -452,7 +450,8 @@ class CannordSession(Session):
                 self._ask_timeout_at = -math.inf    # now it is known to answer
                 self._look_at_timeout(self._channel.now)
 
-        self._channel.run(procedures.of_request(request, self._conditions), done, now)
+        self._channel.run(
+            self._access.serve(request), done, now, Lane.USERS)
 
     def _waiting_requests(self) -> int:
         return self._channel.waiting_users
@@ -473,14 +472,6 @@ class CannordSession(Session):
             return procedures.PROCESS_DATA_ONLY
         return refusal
 
-    def reconfigure(self, *, command_timeout: float | None = None,
-                    rearm_immediate: bool | None = None,
-                    parameter_timeout: float | None = None) -> None:
-        super().reconfigure(command_timeout=command_timeout, rearm_immediate=rearm_immediate,
-                            parameter_timeout=parameter_timeout)
-        self._channel.timeout = self.drive.parameter_timeout
-        self._conditions = self._make_conditions()
-
     # -- the inverter's own time-out --------------------------------------------------------------
 
     def _look_at_timeout(self, now: float) -> None:
@@ -490,7 +481,8 @@ class CannordSession(Session):
             return
         self._asking_timeout = True
 
-        def done(outcome: Outcome) -> None:
+        def done(outcomes: tuple[Outcome, ...]) -> None:
+            outcome, = outcomes
             self._asking_timeout = False
             if isinstance(outcome, ReadValue):
                 self._timeout_warning = timeout_warning(
@@ -502,8 +494,7 @@ class CannordSession(Session):
                 self._events.append(Noted(f'telegram time-out ({parameter.address}) unknown: '
                                           f'{outcome.reason}'))
 
-        self._channel.run(procedures.read_parameter(parameter, self._conditions), done, now,
-                          own=True)
+        self._channel.run(self._access.serve(ReadRequest((parameter,))), done, now)
 
     # -- timer ------------------------------------------------------------------------------------
 
@@ -516,7 +507,7 @@ class CannordSession(Session):
             self._machine.handle_timer(now)
             self._control_changed(now)
         if now >= self._channel.next_timer():
-            self._channel.handle_timer(now)
+            self._channel.advance(now)
 
     def next_timer(self) -> float:
         return min(self._next_cycle, self._answer_due, self._machine.next_timer(),

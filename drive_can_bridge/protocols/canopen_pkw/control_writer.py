@@ -19,11 +19,11 @@ from drive_can_bridge.core.control import ControlMachine
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.told import Told
 from drive_can_bridge.protocols.canopen_pkw import addresses
-from drive_can_bridge.protocols.canopen_pkw.channel import Channel, Lane
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
-    Answered, Read, Refused, Reply, Silence, Step, Write,
+    Answered, MailboxChannel, Read, Refused, Reply, Silence, Step, Write,
 )
 from drive_can_bridge.protocols.canopen_pkw.procedures import LastWrite
+from drive_can_bridge.protocols.channel import Lane
 
 #: s until a ``disable`` that was refused is written again
 RETRY_AFTER = 0.25
@@ -44,7 +44,7 @@ class ControlWriter:
     :ivar refusal: what the drive says to a word that it refused; '' if it does not.
     """
 
-    def __init__(self, channel: Channel, control: ControlMachine, word: Parameter,
+    def __init__(self, channel: MailboxChannel, control: ControlMachine, word: Parameter,
                  changed: Callable[[float], None], refused: Callable[[str], None],
                  told: Told, *, disable: int, addressing: str, word_order: str,
                  refresh: float) -> None:
@@ -92,7 +92,7 @@ class ControlWriter:
         elif not self._control.stopping:
             self._hurried = None
         if self._channel.is_idle(Lane.CONTROL):
-            self._channel.run(Lane.CONTROL, self._write(), lambda _: None, now)
+            self._channel.run(self._write(), lambda _: None, now, Lane.CONTROL)
 
     def disable_write(self) -> LastWrite:
         """Return what writes ``disable``."""
@@ -142,7 +142,7 @@ class ControlWriter:
         """Tell whether the drive has a word that was not answered; None: nobody knows."""
         if not self._parameter.readable:
             return None
-        reply = yield Read(self._span.address, self._span.count)
+        reply = yield Read(self._span.address, self._span.count, attempts=1)
         if not isinstance(reply, Answered):
             return None
         found = addresses.raw_from_words(

@@ -21,14 +21,17 @@ write that was sent like this might be executed although it seems lost; it is re
 sent*, unless whoever asks for it says that this does not matter (:attr:`Write.blind`).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
 import math
-from typing import NamedTuple, Union
+from typing import Any, NamedTuple, Union
 
 from drive_can_bridge.core.outbox import Left
+from drive_can_bridge.core.retry import RetryPolicy
 from drive_can_bridge.protocols.canopen_pkw import abort_codes, pkw
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Function, Message
+from drive_can_bridge.protocols.channel import Channel
+from drive_can_bridge.protocols.courier import Courier
 
 #: s that an answer to function 00h is waited for at most
 SYNCHRONISATION_TIMEOUT = 0.1
@@ -38,10 +41,15 @@ REFUSED_PAUSE = 0.01
 
 @dataclass(frozen=True)
 class Read:
-    """Read one register, or two adjacent ones."""
+    """
+    Read one register, or two adjacent ones.
+
+    :param attempts: None: as configured.
+    """
 
     address: Address
     count: int = 1
+    attempts: int | None = None
 
 
 @dataclass(frozen=True)
@@ -93,20 +101,21 @@ class Silence(NamedTuple):
 
 
 Reply = Union[Answered, Refused, Silence]
+Procedure = Generator[Step, Reply, Any]
 
 
-class Mailbox:
+class Mailbox(Courier[Step, Reply]):
     """
-    One exchange at a time.
+    One exchange at a time. Late answers have the wrong toggle.
 
     :param send: takes a request that leaves now, and who is told whether it did.
     :param order: of the halves of abort codes: ``auto``, ``low_first``, ``high_first``.
-    :param timeout: s to wait for an answer.
+    :param retry: how long and how often the device is asked.
     """
 
     def __init__(self, send: Callable[[Message, Left], None], *, order: str,
-                 timeout: float) -> None:
-        self.timeout = timeout
+                 retry: RetryPolicy) -> None:
+        self._retry = retry
         self._send = send
         self._order = order
         self._synchronised = False
@@ -121,18 +130,22 @@ class Mailbox:
 
     @property
     def busy(self) -> bool:
-        """An exchange is under way."""
         return self._step is not None
 
     @property
     def deadline(self) -> float:
-        """When ``handle_timer`` has something to do; infinity: never."""
         if self._refused_at is None or not self._waits_for_nobody:
             return self._deadline
         return min(self._deadline, self._refused_at + REFUSED_PAUSE)
 
+    def attempts(self, step: Step) -> int:
+        # What takes more than one write tells what may be executed twice, and what may not.
+        return (step.attempts or self._retry.attempts) if isinstance(step, Read) else 1
+
+    def unanswered(self, step: Step, reply: Reply) -> bool:
+        return isinstance(reply, Silence) and isinstance(step, Read)
+
     def begin(self, step: Step, now: float) -> None:
-        """Begin an exchange; none may be under way."""
         if self._step is not None:
             raise RuntimeError('an exchange is under way')
         self._step = step
@@ -140,7 +153,7 @@ class Mailbox:
             self._send_step(step, now)
             return
         self._request = pkw.idle_request()
-        self._deadline = now + min(self.timeout, SYNCHRONISATION_TIMEOUT)
+        self._deadline = now + min(self._retry.timeout, SYNCHRONISATION_TIMEOUT)
         self._send(self._request, self._left)
 
     def abandon(self, until: float) -> None:
@@ -176,15 +189,14 @@ class Mailbox:
             return Refused(abort_codes.code_from_words(message.words, self._order))
         return Answered(message.words)
 
-    def handle_timer(self, now: float) -> Reply | None:
-        """Return the reply that ends an overdue exchange; None: nothing ended."""
+    def handle_timer(self, now: float) -> Reply | bool:
         request, step = self._request, self._step
         if request is None or step is None:
-            return None
+            return False
         if self._refused_at is not None:
             return self._try_again(step, self._refused_at, now)
         if now < self._deadline:
-            return None
+            return False
         if self._abandoned:
             sent = request.code != Function.NONE
             self.forget()
@@ -196,7 +208,7 @@ class Mailbox:
             self.forget()
             return Silence(sent=False)
         self._send_step(step, now)
-        return None
+        return False
 
     def forget(self) -> None:
         """Expect nothing any more; what the device's last function byte is, is unknown."""
@@ -226,7 +238,7 @@ class Mailbox:
     def _waits_for_nobody(self) -> bool:
         return isinstance(self._step, Write) and self._step.blind
 
-    def _try_again(self, step: Step, refused_at: float, now: float) -> Reply | None:
+    def _try_again(self, step: Step, refused_at: float, now: float) -> Reply | bool:
         """Go on after a refusal: a read ends when its time is over, a write at once."""
         again = self._waits_for_nobody
         if now >= self._deadline or self._abandoned or isinstance(step, Write) and not again:
@@ -236,12 +248,12 @@ class Mailbox:
             deadline, self._refused_at, self._late = self._deadline, None, True
             self._send_step(step, now)
             self._deadline = deadline
-        return None
+        return False
 
     def _send_step(self, step: Step, now: float) -> None:
         # inverted after function 00h, too: a late answer to the request before never fits
         self._toggle = not self._toggle
-        timeout = self.timeout
+        timeout = self._retry.timeout
         if isinstance(step, Read):
             self._request = pkw.read_request(step.address, step.count, self._toggle)
         else:
@@ -250,3 +262,19 @@ class Mailbox:
         self._patience = timeout
         self._deadline = now + timeout
         self._send(self._request, self._left)
+
+
+class MailboxChannel(Channel[Step, Reply]):
+    """Runs procedures through a mailbox."""
+
+    def __init__(self, mailbox: Mailbox) -> None:
+        super().__init__(mailbox)
+        self.mailbox = mailbox
+
+    def receive(self, message: Message, now: float) -> bool:
+        """Take a response; False: nobody asked for it."""
+        reply = self.mailbox.receive(message, now)
+        if isinstance(reply, bool):
+            return reply
+        self.ended(reply, now)
+        return True

@@ -2,148 +2,97 @@
 """
 What takes more than one request: parameters of users, the round of reads, the safe stop.
 
-Every function here is a generator for :class:`.channel.Channel`.
+Every generator here is for :class:`.mailbox.MailboxChannel`.
 """
 
 from collections.abc import Callable, Generator, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple, Union
 
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.core.requests import (
-    Failure, NO_ANSWER_OFFLINE, NOT_SENT, Outcome, ReadRequest, ReadValue, Request, Written,
-)
+from drive_can_bridge.core.requests import Failure, NOT_SENT, Outcome, Written
+from drive_can_bridge.core.retry import RetryPolicy
+from drive_can_bridge.protocols.access import Access, Found, Item, Outcomes
 from drive_can_bridge.protocols.canopen_pkw import addresses
 from drive_can_bridge.protocols.canopen_pkw.addresses import Span
-from drive_can_bridge.protocols.canopen_pkw.channel import Procedure
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
     Answered, Read, Refused, Reply, Silence, Step, Write,
 )
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address
-from drive_can_bridge.protocols.patience import Patience
 
 NOT_TOGETHER = ('cannot be written in one frame, nothing was written: two 16-bit parameters in '
                 'adjacent registers fit, or one of 32 bits')
 
 
-@dataclass(frozen=True)
-class Conditions(Patience):
+# -- parameters of users --------------------------------------------------------------------------
+
+
+class RegisterAccess(Access[Span, Step, Reply]):
     """
-    What the procedures need to know of their drive.
+    Parameters by register or object; adjacent registers share a request.
 
     :param addressing: how listed parameters are reached.
     :param word_order: of 32-bit values.
     """
 
-    addressing: str
-    word_order: str
+    def __init__(self, retry: RetryPolicy, *, addressing: str, word_order: str) -> None:
+        super().__init__(retry)
+        self._addressing = addressing
+        self._word_order = word_order
 
     def span(self, parameter: Parameter) -> Span:
-        """Return what a parameter takes."""
-        return addresses.span_of(parameter, self.addressing)
+        return addresses.span_of(parameter, self._addressing)
 
+    def addresses(self, span: Span) -> Sequence[Address]:
+        return span.addresses
 
-# -- parameters of users --------------------------------------------------------------------------
+    def plan(self, spans: Sequence[Span]) -> list[Span]:
+        return addresses.plan(spans)
 
-
-def of_request(request: Request, conditions: Conditions) -> Procedure:
-    """Return the procedure that serves a request of a user."""
-    if isinstance(request, ReadRequest):
-        return read_parameters(request.parameters, conditions)
-    if request.atomic:
-        return write_together(request.items, conditions)
-    return write_parameters(request.items, conditions)
-
-
-def read_parameters(parameters: Sequence[Parameter], conditions: Conditions,
-                    ) -> Generator[Step, Reply, tuple[Outcome, ...]]:
-    """Read parameters; adjacent registers share a request, and a shared request may fail alone."""
-    spans = [conditions.span(parameter) for parameter in parameters]
-    words: dict[Address, int] = {}
-    failures: dict[Span, Failure] = {}
-    pending = addresses.plan(spans)
-    while pending:
-        span = pending.pop(0)
-        reply: Reply = Silence()
-        for _ in range(conditions.attempts):
-            reply = yield Read(span.address, span.count)
-            if not isinstance(reply, Silence):
-                break
+    def read(self, span: Span) -> Generator[Step, Reply, Found]:
+        reply = yield Read(span.address, span.count)
         if isinstance(reply, Answered):
-            words.update(zip(span.addresses, reply.words))
-            continue
-        if isinstance(reply, Silence) and conditions.offline():
-            break
-        pending[:0] = _parts(span, spans)
-        failures[span] = conditions.unanswered() if isinstance(
-            reply, Silence) else Failure(reply.text)
+            return reply.words[:span.count]
+        return self.retry.unanswered() if isinstance(reply, Silence) else Failure(reply.text)
 
-    def outcome(parameter: Parameter, span: Span) -> Outcome:
-        if all(address in words for address in span.addresses):
-            return ReadValue(addresses.raw_from_words(
-                parameter, [words[address] for address in span.addresses],
-                conditions.word_order))
-        return failures.get(span) or conditions.unanswered()
+    def raw(self, parameter: Parameter, words: tuple[int, ...]) -> int:
+        return addresses.raw_from_words(parameter, words, self._word_order)
 
-    return tuple(map(outcome, parameters, spans))
+    def write(self, parameter: Parameter, raw: int) -> Generator[Step, Reply, Outcome]:
+        return self._put(self.span(parameter).address, self._words(parameter, raw))
 
+    def write_together(self, items: Sequence[Item]) -> Generator[Step, Reply, Outcomes]:
+        words: dict[Address, int] = {}
+        spans = [self.span(parameter) for parameter, _ in items]
+        for span, item in zip(spans, items):
+            words.update(zip(span.addresses, self._words(*item)))
+        shared = addresses.plan(spans)
+        if len(shared) != 1 or sum(span.count for span in spans) != shared[0].count:
+            return (Failure(NOT_TOGETHER),) * len(items)
+        outcome = yield from self._put(
+            shared[0].address, tuple(words[address] for address in shared[0].addresses))
+        return (outcome,) * len(items)
 
-def _parts(shared: Span, spans: Sequence[Span]) -> list[Span]:
-    """Return the spans that a request covers besides itself."""
-    return sorted({span for span in spans if span != shared
-                   and set(span.addresses) <= set(shared.addresses)})
+    def _words(self, parameter: Parameter, raw: int) -> tuple[int, ...]:
+        return addresses.words_from_raw(parameter, raw, self._word_order)
 
+    def _put(self, address: Address, words: tuple[int, ...]) -> Generator[Step, Reply, Outcome]:
+        """
+        Write once.
 
-def write_parameters(items: Sequence[tuple[Parameter, int]], conditions: Conditions,
-                     ) -> Generator[Step, Reply, tuple[Outcome, ...]]:
-    """Write parameters one after the other; after one that an absent drive missed, none."""
-    outcomes: list[Outcome] = []
-    for parameter, raw in items:
-        words = addresses.words_from_raw(parameter, raw, conditions.word_order)
-        outcome = yield from _write(conditions.span(parameter).address, words, conditions)
-        outcomes.append(outcome)
-        if isinstance(outcome, Failure) and outcome.reason in (NO_ANSWER_OFFLINE, NOT_SENT):
-            outcomes += [outcome] * (len(items) - len(outcomes))
-            break
-    return tuple(outcomes)
-
-
-def write_together(items: Sequence[tuple[Parameter, int]], conditions: Conditions,
-                   ) -> Generator[Step, Reply, tuple[Outcome, ...]]:
-    """Write parameters in one request, or nothing (``set_parameters_atomically``)."""
-    words: dict[Address, int] = {}
-    spans = [conditions.span(parameter) for parameter, _ in items]
-    for span, (parameter, raw) in zip(spans, items):
-        words.update(zip(span.addresses, addresses.words_from_raw(
-            parameter, raw, conditions.word_order)))
-    shared = addresses.plan(spans)
-    if len(shared) != 1 or sum(span.count for span in spans) != shared[0].count:
-        return (Failure(NOT_TOGETHER),) * len(items)
-    outcome = yield from _write(
-        shared[0].address, tuple(words[address] for address in shared[0].addresses), conditions)
-    return (outcome,) * len(items)
-
-
-def _write(address: Address, words: tuple[int, ...], conditions: Conditions,
-           ) -> Generator[Step, Reply, Outcome]:
-    """
-    Write once.
-
-    The device acknowledges. A lost acknowledgement is a failure: sent again, the write could be
-    executed twice. What was not sent because the mailbox was out of step is tried again.
-    """
-    reply: Reply = Silence()
-    for _ in range(conditions.attempts):
-        reply = yield Write(address, words)
-        if isinstance(reply, Answered):
-            return Written()
-        if isinstance(reply, Refused):
-            return Failure(reply.text)
-        if reply.refused:
-            return Failure(NOT_SENT)
-        if reply.sent:
-            return conditions.unanswered(1)
-    return conditions.unanswered()
+        The device acknowledges. A lost acknowledgement is a failure: sent again, the write could
+        be executed twice. What was not sent because the mailbox was out of step is tried again.
+        """
+        for _ in range(self.retry.attempts):
+            reply = yield Write(address, words)
+            if isinstance(reply, Answered):
+                return Written()
+            if isinstance(reply, Refused):
+                return Failure(reply.text)
+            if reply.refused:
+                return Failure(NOT_SENT)
+            if reply.sent:
+                return self.retry.unanswered(1)
+        return self.retry.unanswered()
 
 
 # -- the exchange ---------------------------------------------------------------------------------
@@ -181,7 +130,7 @@ def read_round(spans: Sequence[Span], answered: Callable[[Span, tuple[int, ...]]
     pending = list(spans)
     while pending:
         span = pending.pop(0)
-        reply = yield Read(span.address, span.count)
+        reply = yield Read(span.address, span.count, attempts=1)
         if isinstance(reply, Silence):
             return None
         if isinstance(reply, Refused):
@@ -193,21 +142,24 @@ def read_round(spans: Sequence[Span], answered: Callable[[Span, tuple[int, ...]]
     return words
 
 
-def write_until_answered(writes: Sequence[LastWrite], attempts: int, timeout: float) -> Farewell:
+def write_until_answered(writes: Sequence[LastWrite], attempts: int, timeout: float,
+                         last: float) -> Farewell:
     """
     Tell a drive to stand still, each thing until it is answered or was tried ``attempts`` times.
 
     It may be executed twice: that does no harm. As the toggle is inverted with every attempt, not
     even an unknown function byte of the device keeps it from taking notice.
 
-    :param timeout: s for each attempt.
+    :param timeout: s for each attempt but the last.
+    :param last: s for that.
     :return: what failed, in words.
     """
     failed = []
     for name, span, words in writes:
         reply: Reply = Silence()
-        for _ in range(attempts):
-            reply = yield Write(span.address, words, blind=True, timeout=timeout)
+        for attempt in range(1, attempts + 1):
+            reply = yield Write(span.address, words, blind=True,
+                                timeout=last if attempt == attempts else timeout)
             if not isinstance(reply, Silence):
                 break
         if isinstance(reply, Refused):

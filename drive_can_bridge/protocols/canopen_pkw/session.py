@@ -39,14 +39,14 @@ from drive_can_bridge.core.session import LOOKING, Session
 from drive_can_bridge.core.told import MAY_RUN
 from drive_can_bridge.protocols.canopen_pkw import addresses, network, pkw, procedures
 from drive_can_bridge.protocols.canopen_pkw.addresses import Span
-from drive_can_bridge.protocols.canopen_pkw.channel import Channel, Lane
 from drive_can_bridge.protocols.canopen_pkw.control_writer import ControlWriter
 from drive_can_bridge.protocols.canopen_pkw.identifiers import Identifiers
-from drive_can_bridge.protocols.canopen_pkw.mailbox import Mailbox, Refused
+from drive_can_bridge.protocols.canopen_pkw.mailbox import Mailbox, MailboxChannel, Refused
 from drive_can_bridge.protocols.canopen_pkw.node import Change, Node
 from drive_can_bridge.protocols.canopen_pkw.notes import PacedNotes
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Layout, Message
 from drive_can_bridge.protocols.canopen_pkw.setpoint_writer import SetpointWriter
+from drive_can_bridge.protocols.channel import Lane
 from drive_can_bridge.protocols.polling import Beat
 
 #: how often a drive is told to stand still
@@ -73,7 +73,7 @@ class PkwSession(Session):
         table = drive.profile.control
         control: ControlMachine | None = None
         if table is not None:
-            control = ControlMachine(table, timeout=drive.control_timeout)
+            control = ControlMachine(table, timeout=drive.control_timeout, pulse=1)
         super().__init__(drive, control)
         options = drive.options
         self._identifiers = Identifiers.of(drive)
@@ -83,9 +83,10 @@ class PkwSession(Session):
         self._notes = PacedNotes(lambda note: self._events.append(note))
         self._node = Node(drive.station, nmt_start=options.nmt_start,
                           heartbeat_timeout=options.heartbeat_timeout)
-        self._channel = Channel(Mailbox(
-            self._send, order=options.abort_code_order, timeout=drive.parameter_timeout))
-        self._conditions = self._make_conditions()
+        self._channel = MailboxChannel(Mailbox(
+            self._send, order=options.abort_code_order, retry=self.retry))
+        self._access = procedures.RegisterAccess(
+            self.retry, addressing=self._addressing, word_order=self._word_order)
         self._setpoint_writer = SetpointWriter(
             self._channel, self.setpoints, self._warn, self.told, addressing=self._addressing,
             word_order=self._word_order, refresh=options.refresh_interval)
@@ -133,8 +134,13 @@ class PkwSession(Session):
         self._phase = Phase.STOPPING
         self._stop_now(self._stop_time, now)
 
-    def _stop_now(self, time: float, now: float) -> None:
-        """Tell the drive to stand still, within so many s."""
+    def _stop_now(self, time: float, now: float, *, in_the_end: float = 0.0) -> None:
+        """
+        Tell the drive to stand still, within so many s.
+
+        :param in_the_end: s that the answer to the last attempt is waited for at least: a device
+            may be slow, and nobody waits for the end of this stop.
+        """
         writes = [] if self._control_writer is None else [self._control_writer.disable_write()]
         writes += self._setpoint_writer.neutral_writes()
         self._owed = self.told.owed
@@ -142,8 +148,9 @@ class PkwSession(Session):
         self._channel.make_room(now)
         timeout = min(self.drive.parameter_timeout, time / (STOP_ATTEMPTS * max(1, len(writes))))
         self._channel.run(
-            Lane.STOP, procedures.write_until_answered(writes, STOP_ATTEMPTS, timeout),
-            self._stop_ended, now)
+            procedures.write_until_answered(
+                writes, STOP_ATTEMPTS, timeout, max(timeout, in_the_end)),
+            self._stop_ended, now, Lane.STOP)
 
     def _stop_ended(self, failed: list[str]) -> None:
         if not failed:
@@ -171,6 +178,7 @@ class PkwSession(Session):
         super().bus_down(now, reason)
 
     def time_lost(self, now: float) -> None:
+        self._channel.time_lost(now)
         if self._phase is not Phase.RUNNING:
             return
         self._lose('the bridge stood still', now)
@@ -216,7 +224,7 @@ class PkwSession(Session):
         """Make the drive offline, if it is not."""
         self._withdraw(reason, now)
         self._advice = reason
-        self._channel.cancel(Lane.ROUND)
+        self._channel.cancel(Lane.OWN)
         self._channel.cancel(Lane.SETPOINTS)
         self._channel.cancel(Lane.CONTROL)
         self._missed_in_row = 0
@@ -231,7 +239,7 @@ class PkwSession(Session):
 
     def _stop_if_owed(self, now: float) -> None:
         if self.told.owed:
-            self._stop_now(STOP_TIME_SILENT, now)
+            self._stop_now(STOP_TIME_SILENT, now, in_the_end=self.drive.parameter_timeout)
 
     def _leave_alone(self, reason: str, now: float) -> None:
         """Handle a drive that is silent, but may be listening: it has to stand still."""
@@ -240,7 +248,7 @@ class PkwSession(Session):
         self._node.offline(now)
         self._send_nmt()
         if was_online:
-            self._stop_now(STOP_TIME_SILENT, now)
+            self._stop_now(STOP_TIME_SILENT, now, in_the_end=self.drive.parameter_timeout)
 
     def _cut_off(self, reason: str, answer: str, now: float) -> None:
         """
@@ -271,8 +279,8 @@ class PkwSession(Session):
             self._setpoint_writer.look(now)
             self._see_to_control_word(now)
         self._channel.run(
-            Lane.ROUND, procedures.read_round(self._plan, self._read_answered,
-                                              self._read_refused), self._round_ended, now)
+            procedures.read_round(self._plan, self._read_answered, self._read_refused),
+            self._round_ended, now)
 
     def _read_answered(self, span: Span, words: tuple[int, ...]) -> None:
         """Take an answer of the round; the status counts from the moment it was read."""
@@ -448,14 +456,14 @@ class PkwSession(Session):
                 self._control_changed(now)
             self._expire(now)
         self._channel.advance(now)
-        if now >= self._beat.due and self._channel.is_idle(Lane.ROUND):
+        if now >= self._beat.due and self._channel.is_idle(Lane.OWN):
             self._start_round(now)
 
     def next_timer(self) -> float:
         soonest = self._channel.next_timer()
         if self._phase is not Phase.RUNNING:
             return soonest
-        if self._channel.is_idle(Lane.ROUND):
+        if self._channel.is_idle(Lane.OWN):
             soonest = min(soonest, self._beat.due)
         soonest = min(soonest, self._node.next_timer(), self._notes.next_timer())
         return soonest if self.control is None else min(soonest, self.control.next_timer())
@@ -482,8 +490,8 @@ class PkwSession(Session):
 
     def _enqueue(self, request: Request, now: float) -> None:
         self._channel.run(
-            Lane.USERS, procedures.of_request(request, self._conditions),
-            lambda outcomes: self._answer(request, outcomes), now)
+            self._access.serve(request), lambda outcomes: self._answer(request, outcomes), now,
+            Lane.USERS)
 
     def _fail_requests(self, reason: str) -> None:
         self._channel.cancel(Lane.USERS)
@@ -505,21 +513,6 @@ class PkwSession(Session):
                 return (f'one half of {other.name}: set that' if other.writable
                         else f'read-only: one half of {other.name}')
         return ''
-
-    def reconfigure(self, *, command_timeout: float | None = None,
-                    rearm_immediate: bool | None = None,
-                    parameter_timeout: float | None = None) -> None:
-        super().reconfigure(command_timeout=command_timeout, rearm_immediate=rearm_immediate,
-                            parameter_timeout=parameter_timeout)
-        self._channel.mailbox.timeout = self.drive.parameter_timeout
-        self._conditions = self._make_conditions()
-
-    def _make_conditions(self) -> procedures.Conditions:
-        drive = self.drive
-        return procedures.Conditions(
-            offline=lambda: not self.online, timeout=drive.parameter_timeout,
-            attempts=drive.parameter_retries + 1, addressing=self._addressing,
-            word_order=self._word_order)
 
     # -- state ------------------------------------------------------------------------------------
 

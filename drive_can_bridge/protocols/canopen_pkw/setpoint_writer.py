@@ -7,11 +7,11 @@ from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.setpoints import Setpoints
 from drive_can_bridge.core.told import Told
 from drive_can_bridge.protocols.canopen_pkw import addresses
-from drive_can_bridge.protocols.canopen_pkw.channel import Channel, Lane
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
-    Answered, Reply, Silence, Step, Write,
+    Answered, MailboxChannel, Reply, Silence, Step, Write,
 )
 from drive_can_bridge.protocols.canopen_pkw.procedures import LastWrite
+from drive_can_bridge.protocols.channel import Lane
 from drive_can_bridge.protocols.polling import WriteSchedule
 
 
@@ -25,8 +25,9 @@ class SetpointWriter:
     :ivar refusals: what the drive says to setpoints that it refused, by name.
     """
 
-    def __init__(self, channel: Channel, setpoints: Setpoints, refused: Callable[[str], None],
-                 told: Told, *, addressing: str, word_order: str, refresh: float) -> None:
+    def __init__(self, channel: MailboxChannel, setpoints: Setpoints,
+                 refused: Callable[[str], None], told: Told, *, addressing: str,
+                 word_order: str, refresh: float) -> None:
         self.refusals: dict[str, str] = {}
         self._channel = channel
         self._setpoints = setpoints
@@ -51,7 +52,7 @@ class SetpointWriter:
             return
         self._schedule.look([setpoint.raw for setpoint in self._setpoints.items], now)
         if self._schedule.waiting and self._channel.is_idle(Lane.SETPOINTS):
-            self._channel.run(Lane.SETPOINTS, self._write(), lambda _: None, now)
+            self._channel.run(self._write(), lambda _: None, now, Lane.SETPOINTS)
 
     def neutral_writes(self) -> list[LastWrite]:
         """Return what writes the neutral value of every setpoint."""

@@ -6,6 +6,7 @@ The control word is written when it changes, before everything else that waits; 
 drive waits for nothing at all. Nothing acknowledges that: as long as the status says that the
 drive takes no notice, the word is written again, less and less often. Where that wears an
 EEPROM (or may), only a drive that runs on although it shall not gets its word again, a few times.
+A pulse is written as often as it has to leave.
 The status word is read twice a second, and twenty times while a request is under way. What has its
 slot in the cyclic telegrams is none of this module's business.
 """
@@ -42,13 +43,14 @@ class AcyclicControl:
     :param offset: added to parameter numbers on the wire.
     :param changed: called after anything that may have changed the control word.
     :param told: takes note of the words that left.
+    :param spacing: s between the writes of a pulse.
     :ivar look_at: when the status word is to be read; infinity: not planned.
-    :ivar retry_at: when a word that the bus refused is to be written again.
+    :ivar retry_at: when a word that the bus refused, or a pulse, is to be written again.
     """
 
     def __init__(self, channel: AcyclicChannel, control: ControlMachine, *,
                  word: Parameter | None, status: Parameter | None, offset: int,
-                 changed: Callable[[float], None], told: Told) -> None:
+                 changed: Callable[[float], None], told: Told, spacing: float) -> None:
         self.look_at = self.retry_at = math.inf
         self._channel = channel
         self._control = control
@@ -57,6 +59,7 @@ class AcyclicControl:
         self._offset = offset
         self._changed = changed
         self._told = told
+        self._spacing = spacing
         self._written: int | None = None
         self._repeat_at = math.inf
         self._repeats = 0
@@ -115,6 +118,8 @@ class AcyclicControl:
     def _may_repeat(self, parameter: Parameter, now: float) -> bool:
         if now < self._repeat_at:
             return False
+        if self._control.pulsing:
+            return True
         if parameter.storage is Storage.RAM:
             return self._control.unconfirmed
         return self._control.disregard != '' and self._repeats < EEPROM_REPEATS
@@ -134,6 +139,8 @@ class AcyclicControl:
         self._repeat_at = now + min(REPEAT_FIRST * 2 ** min(self._repeats, 10), REPEAT_LAST)
         if word == self._control.word:
             self._control.word_sent(now)
+            if self._control.pulsing:
+                self._repeat_at = self.retry_at = now + self._spacing
         self._changed(now)
 
     def _read(self, status: Parameter) -> Procedure:
@@ -154,16 +161,18 @@ class AcyclicControl:
 
 def control_by_hand(drive: DriveConfiguration, channel: AcyclicChannel,
                     control: ControlMachine | None, changed: Callable[[float], None],
-                    told: Told, *, word: str, status: str) -> AcyclicControl | None:
+                    told: Told, *, word: str, status: str,
+                    spacing: float) -> AcyclicControl | None:
     """
     Return what looks after the words that have no slot; None where there are none.
 
     :param word: name of the control word's parameter; '' where it has its slot.
     :param status: name of the status word's parameter; '' likewise, or where there is none.
+    :param spacing: s between the writes of a pulse.
     """
     parameters = drive.profile.parameters
     if control is None or not word and not status:
         return None
     return AcyclicControl(channel, control, word=parameters.get(word),
                           status=parameters.get(status), changed=changed, told=told,
-                          offset=drive.options.parameter_offset)
+                          spacing=spacing, offset=drive.options.parameter_offset)

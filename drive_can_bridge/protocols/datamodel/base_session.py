@@ -10,13 +10,12 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.requests import Request
 from drive_can_bridge.core.roles import Cells
-from drive_can_bridge.core.session import DriveState, Session
+from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.told import MAY_RUN
+from drive_can_bridge.protocols.channel import Lane
 from drive_can_bridge.protocols.datamodel import procedures
 from drive_can_bridge.protocols.datamodel.acyclic_control import control_by_hand, CONTROL_WORD
-from drive_can_bridge.protocols.datamodel.channel import (
-    AcyclicChannel, Lane, Polling, Words, Write,
-)
+from drive_can_bridge.protocols.datamodel.channel import AcyclicChannel, Polling, Words, Write
 from drive_can_bridge.protocols.datamodel.extended import SLOTS
 from drive_can_bridge.protocols.datamodel.process_words import slot_of
 from drive_can_bridge.protocols.datamodel.safe_stop import SafeStop, StopWrite
@@ -50,18 +49,17 @@ class DataModelSession(Session):
             for place, parameter in enumerate(self.sent.parameters)}
         self._channel = AcyclicChannel(
             encode_read=encode_read, encode_write=encode_write, send=self._outbox.put,
-            wrote=self._note_write,
-            timeout=drive.parameter_timeout, attempts=drive.parameter_retries + 1,
+            wrote=self._note_write, retry=self.retry,
             eeprom_gap=options.eeprom_write_gap, polling=polling)
-        self._together = together
-        self._conditions = self._make_conditions()
+        self._access = procedures.ParameterAccess(
+            self.retry, verify=drive.verify_writes, offset=self._offset, together=together)
         status_name = table.status_parameter or '' if table is not None else ''
         self._control_slot = slot_of(drive.cyclic_request, self._control_name)
         self._status_slot = slot_of(drive.cyclic_response, status_name)
         self._by_hand = control_by_hand(
             drive, self._channel, self.control, self._control_changed, self.told,
             word=self._control_name if self._control_slot is None else '',
-            status=status_name if self._status_slot is None else '')
+            status=status_name if self._status_slot is None else '', spacing=self._stop_spacing)
         self._safe_stop = SafeStop(self._channel, self._safe_stop_ended)
         self._owed = False  # there was something to be stopped when the stop began
         self._stops_all = False  # setpoints, too
@@ -79,7 +77,7 @@ class DataModelSession(Session):
 
     def _enqueue(self, request: Request, now: float) -> None:
         self._channel.run(
-            procedures.of_request(request, self._conditions),
+            self._access.serve(request),
             lambda outcomes: self._answer(request, outcomes), now, Lane.USERS)
 
     def _waiting_requests(self) -> int:
@@ -92,24 +90,10 @@ class DataModelSession(Session):
     def _clear_channel(self) -> None:
         """Forget everything acyclic, and whatever waits for its outcome."""
         self._channel.clear()
+        self._channel.hold(-math.inf)
         self._safe_stop.forget()
         if self._by_hand is not None:
             self._by_hand.stop()
-
-    def reconfigure(self, *, command_timeout: float | None = None,
-                    rearm_immediate: bool | None = None,
-                    parameter_timeout: float | None = None) -> None:
-        super().reconfigure(command_timeout=command_timeout, rearm_immediate=rearm_immediate,
-                            parameter_timeout=parameter_timeout)
-        self._channel.timeout = self.drive.parameter_timeout
-        self._conditions = self._make_conditions()
-
-    def _make_conditions(self) -> procedures.Conditions:
-        drive = self.drive
-        return procedures.Conditions(
-            offline=lambda: self.state is DriveState.OFFLINE, timeout=drive.parameter_timeout,
-            attempts=drive.parameter_retries + 1, verify=drive.verify_writes,
-            offset=self._offset, together=self._together)
 
     @property
     def map_cells(self) -> Cells:

@@ -99,21 +99,6 @@ Telegram = Union[CyclicRequest, CyclicResponse, Write, ReadRequest, ReadResponse
 # -- encoding -------------------------------------------------------------------------------------
 
 
-def encode_cyclic_request(station: int, words: Sequence[int]) -> Frame:
-    """
-    Encode a cyclic request.
-
-    :param words: 0 to 4 unsigned words in slot order; unused slots are sent as 0.
-    :raises LocalProtocolError: station, number of words or a word out of range.
-    """
-    return Frame(cyclic_request_identifier(station), pack_words(words), True)
-
-
-def encode_cyclic_response(station: int, words: Sequence[int]) -> Frame:
-    """Encode a cyclic response (the drive's side)."""
-    return Frame(cyclic_request_identifier(station) | DIR, pack_words(words), True)
-
-
 def encode_write(station: int, number: int, words: Sequence[int]) -> Frame:
     """
     Encode an acyclic write of consecutive parameters.
@@ -131,9 +116,14 @@ def encode_read_request(station: int, number: int, count: int) -> Frame:
     return Frame(_acyclic_identifier(station, number, count), bytes(PAYLOAD), True)
 
 
-def encode_read_response(station: int, number: int, words: Sequence[int]) -> Frame:
-    """Encode a read response (the drive's side)."""
-    return Frame(_acyclic_identifier(station, number, len(words)) | DIR, pack_words(words), True)
+def encode_answer(request: int, words: Sequence[int]) -> Frame:
+    """
+    Encode what a drive says to a request, cyclic or not; it repeats the identifier.
+
+    :param request: identifier of the request.
+    :raises LocalProtocolError: more than four words, or a word out of range.
+    """
+    return Frame(request | DIR, pack_words(words), True)
 
 
 def cyclic_request_identifier(station: int) -> int:

@@ -35,9 +35,7 @@ from drive_can_bridge.core.session import (
 from drive_can_bridge.protocols.datamodel import extended
 from drive_can_bridge.protocols.datamodel.base_session import DataModelSession
 from drive_can_bridge.protocols.datamodel.map_supervision import MapSupervision, Verdict
-from drive_can_bridge.protocols.datamodel.process_words import (
-    unpack_unusual, wire_numbers, words_struct,
-)
+from drive_can_bridge.protocols.datamodel.process_words import CyclicCodec, wire_numbers
 from drive_can_bridge.protocols.datamodel.safe_stop import ANSWER_TIME, ATTEMPTS
 
 #: so many looks at the maps in a row may go unanswered until that is told
@@ -73,11 +71,11 @@ class ExtendedSession(DataModelSession):
         options = drive.options
         self._verify: bool = options.mapping != 'assume'
         self._strict: bool = options.length_policy == 'strict'
-        self._request_identifier = extended.cyclic_request_identifier(station)
-        self._response_identifier = self._request_identifier | extended.DIR
-        self._pack = words_struct(drive.cyclic_request, unsigned=self._control_slot).pack
-        self._padding = extended.PADDING[len(drive.cyclic_request)]
-        self._unpack = words_struct(drive.cyclic_response).unpack_from
+        self._codec = CyclicCodec(
+            station, drive.cyclic_request, drive.cyclic_response,
+            control_slot=self._control_slot, strict=self._strict)
+        self._request_identifier = self._codec.request_identifier
+        self._response_identifier = self._codec.response_identifier
         self._maps = MapSupervision(
             self._channel, request_base=self._request_base, response_base=self._response_base,
             request=wire_numbers(drive.cyclic_request, self._offset),
@@ -262,8 +260,11 @@ class ExtendedSession(DataModelSession):
                 and control.word == self._sent_word):  # else it has changed since
             fresh = control.word_due
             control.word_sent(now)
-            if fresh:
+            if fresh or control.word != self._sent_word:
                 self._control_changed(now)
+            if control.pulsing and self._next_cycle > now + self._stop_spacing:
+                self._in_pace = False
+                self._next_cycle = now + self._stop_spacing
         if self._cycles_left > 0:  # the last cycles before silence
             self._cycles_left -= 1
             if self._cycles_left == 0 and (self._stopping or self._differs):
@@ -300,7 +301,7 @@ class ExtendedSession(DataModelSession):
                 self._frame_runs = self._frame_runs or not self.control.at_rest
         self.setpoints.changed = False
         self._frame_raws = raws
-        return Frame(self._request_identifier, self._pack(*raws) + self._padding, True)
+        return self._codec.encode_request(raws)
 
     def _miss(self, now: float) -> None:
         self._awaiting = False
@@ -363,17 +364,13 @@ class ExtendedSession(DataModelSession):
             else:
                 self._reject('cyclic response that nobody asked for')
             return
-        if len(data) == extended.PAYLOAD:
-            raws: tuple[int, ...] = self._unpack(data)
-        else:
-            raws, wrong = unpack_unusual(
-                self.drive.cyclic_response, data, strict=self._strict)
-            if wrong:
-                self._reject(f'cyclic response with {wrong}')
-                if not raws:
-                    return
-            else:
-                statistics.short += 1
+        raws, wrong = self._codec.decode_response(data)
+        if wrong:
+            self._reject(f'cyclic response with {wrong}')
+            if not raws:
+                return
+        elif len(data) != extended.PAYLOAD:
+            statistics.short += 1
         self._awaiting = False
         self._missed_in_row = 0
         statistics.exchanges += 1

@@ -10,7 +10,7 @@ from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter, ParameterType, Storage
 from drive_can_bridge.protocols.datamodel import extended, standard
-from drive_can_bridge.protocols.datamodel.process_words import unpack_unusual, words_struct
+from drive_can_bridge.protocols.datamodel.process_words import CyclicCodec
 from drive_can_bridge.protocols.datamodel.standard_round import reads
 from drive_can_bridge.protocols.observer import (
     Direction, DriveObserver, Emit, Handler, Kind, Questions, RoundWatch, Telegram, Verdict,
@@ -75,7 +75,6 @@ class ExtendedObserver(_DataModelObserver):
     def __init__(self, drive: DriveConfiguration, emit: Emit) -> None:
         super().__init__(drive, emit)
         self._period = drive.period
-        self._cyclic_request = extended.cyclic_request_identifier(drive.station)
         self._request, self._response = drive.cyclic_request, drive.cyclic_response
         control = drive.profile.control
         # a control word is unsigned whatever its type
@@ -85,9 +84,9 @@ class ExtendedObserver(_DataModelObserver):
         self._station = drive.station << extended.STATION_SHIFT
         slots = [slot for slot, parameter in enumerate(self._request)
                  if control and parameter.name == control.parameter]
-        self._unpack_request = words_struct(
-            self._request, unsigned=slots[0] if slots else None).unpack_from
-        self._unpack_response = words_struct(self._response).unpack_from
+        self._codec = CyclicCodec(
+            drive.station, self._request, self._response,
+            control_slot=slots[0] if slots else None, strict=self._strict)
         self._asked = math.nan      # when the cyclic request under way was sent
         self._last = -math.inf      # the one before, answered or not
         self._forgiven = False      # one answer too many may come
@@ -95,9 +94,9 @@ class ExtendedObserver(_DataModelObserver):
     def handler(self, identifier: int, extended_format: bool) -> Handler | None:
         if not extended_format or identifier & extended.STATION_MASK != self._station:
             return None
-        if identifier == self._cyclic_request:
+        if identifier == self._codec.request_identifier:
             return self._take_request
-        if identifier == self._cyclic_request | extended.DIR:
+        if identifier == self._codec.response_identifier:
             return self._take_response
         return lambda data, now: self._take_acyclic(identifier, data, now)
 
@@ -111,12 +110,13 @@ class ExtendedObserver(_DataModelObserver):
         due = now + _PATIENCE * self._period
         if due < self.deadline:
             self.deadline = due
-        if len(data) != extended.PAYLOAD:
+        raws, wrong = self._codec.decode_request(data)
+        if wrong:
             self._tell(now, _REQUEST, _CYCLIC, 'cyclic request', verdict=Verdict.MALFORMED,
-                       remark=f'{len(data)} data bytes instead of {extended.PAYLOAD}')
+                       remark=wrong)
             return
         self._emit(Telegram(now, self.name, _REQUEST, _CYCLIC, 'cyclic request',
-                            self._request_shown, self._unpack_request(data)))
+                            self._request_shown, raws))
 
     def _take_response(self, data: bytes, now: float) -> None:
         observed = self.observed
@@ -127,10 +127,10 @@ class ExtendedObserver(_DataModelObserver):
             if self._last == -math.inf:     # asked before the trace began
                 verdict = Verdict.NORMAL
             self._tell(now, _RESPONSE, _CYCLIC, 'cyclic response', self._response,
-                       self._words(data)[0], verdict=verdict,
+                       self._codec.decode_response(data)[0], verdict=verdict,
                        latency=now - self._last if late else math.nan)
             return
-        raws, wrong = self._words(data)
+        raws, wrong = self._codec.decode_response(data)
         if wrong:
             self._tell(now, _RESPONSE, _CYCLIC, 'cyclic response', self._response, raws,
                        verdict=Verdict.MALFORMED, remark=wrong)
@@ -143,11 +143,6 @@ class ExtendedObserver(_DataModelObserver):
         if not wrong:
             self._emit(Telegram(now, self.name, _RESPONSE, _CYCLIC, 'cyclic response',
                                 self._response, raws, _NORMAL, '', latency))
-
-    def _words(self, data: bytes) -> tuple[tuple[int, ...], str]:
-        if len(data) == extended.PAYLOAD:
-            return self._unpack_response(data), ''
-        return unpack_unusual(self._response, data, strict=self._strict)
 
     def _miss(self, now: float) -> None:
         self._tell(now, _RESPONSE, _CYCLIC, 'cyclic response', verdict=Verdict.LOST,

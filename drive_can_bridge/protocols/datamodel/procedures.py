@@ -1,46 +1,127 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-What takes more than one acyclic frame: reading and writing parameters, checking and writing maps.
+What takes more than one acyclic frame: parameters of users, checking and writing maps.
 
-Every function here is a generator for :class:`.channel.AcyclicChannel`.
+Every generator here is for :class:`.channel.AcyclicChannel`.
 """
 
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass
-from typing import NamedTuple, Union
+from typing import NamedTuple
 
 from drive_can_bridge.core.parameters import Parameter, ParameterType, Storage
-from drive_can_bridge.core.requests import (
-    Failure, NO_ANSWER_OFFLINE, NOT_SENT, Outcome, ReadRequest, ReadValue, Request,
-    SENT_UNACKNOWLEDGED, Written,
-)
+from drive_can_bridge.core.requests import Failure, NOT_SENT, Outcome, SENT_UNACKNOWLEDGED, Written
+from drive_can_bridge.core.retry import RetryPolicy
 from drive_can_bridge.core.words import value_text
-from drive_can_bridge.protocols.datamodel.channel import Procedure, Read, Step, Words, Write
+from drive_can_bridge.protocols.access import Access, Found, Item, Outcomes
+from drive_can_bridge.protocols.datamodel.channel import Read, Reply, Step, Words, Write
 from drive_can_bridge.protocols.datamodel.extended import CYCLIC_PARAMETER, SLOTS
 from drive_can_bridge.protocols.datamodel.mapping import effective, padded
-from drive_can_bridge.protocols.patience import Patience
-
-Reply = Union[Words, None]
+from drive_can_bridge.protocols.polling import Chunk, Place, plan_reads
 
 NOT_WRITABLE = f'parameter {CYCLIC_PARAMETER} is never written: its number marks cyclic frames'
 
 
-@dataclass(frozen=True)
-class Conditions(Patience):
+class Put(NamedTuple):
     """
-    What the procedures need to know of their drive.
+    What became of words that a drive was to get.
 
+    :param found: what the drive has now; None: nobody answered; (): nobody looked.
+    :param sent: False: the bus did not take the write.
+    """
+
+    found: Words | None
+    sent: bool = True
+
+
+def put(write: Write, *, look: bool, verify: bool = True) -> Generator[Step, Reply, Put]:
+    """
+    Write words and read them back, since nobody acknowledges writes.
+
+    A write is never repeated: it may be a command, and the read-back tells what became of it.
+
+    :param look: write nothing where the drive has the words already: EEPROM cells wear.
+    :param verify: read them back.
+    """
+    read = Read(write.number, len(write.words))
+    if look:
+        found = yield read
+        if found is None or found == write.words:
+            return Put(found)
+    sent = yield write
+    if sent is None:
+        return Put(None, sent=False)
+    if not verify:
+        return Put(())
+    found = yield read
+    return Put(found)
+
+
+class ParameterAccess(Access[Chunk, Step, Reply]):
+    """
+    Parameters by number; runs of consecutive ones share a frame.
+
+    :param verify: read back what was written.
     :param offset: added to every parameter number that goes over the wire.
     :param together: parameters that fit one write frame.
     """
 
-    verify: bool
-    offset: int
-    together: int = SLOTS
+    def __init__(self, retry: RetryPolicy, *, verify: bool, offset: int, together: int) -> None:
+        super().__init__(retry)
+        self._verify = verify
+        self._offset = offset
+        self._together = together
 
-    def wire_number(self, parameter: Parameter) -> int:
-        """Return the parameter's number on the wire."""
-        return (parameter.number or 0) + self.offset
+    def span(self, parameter: Parameter) -> Chunk:
+        return Chunk((parameter.number or 0) + self._offset, 1)
+
+    def addresses(self, span: Chunk) -> range:
+        return range(span.address, span.address + span.size)
+
+    def plan(self, spans: Sequence[Chunk]) -> list[Chunk]:
+        return plan_reads([Place(*span) for span in spans], SLOTS)
+
+    def read(self, span: Chunk) -> Generator[Step, Reply, Found]:
+        # one bad number makes the drive ignore the whole frame
+        words = yield Read(span.address, span.size)
+        return self.retry.unanswered() if words is None else words
+
+    def raw(self, parameter: Parameter, words: tuple[int, ...]) -> int:
+        return parameter.raw_from_word(words[0])
+
+    def write(self, parameter: Parameter, raw: int) -> Generator[Step, Reply, Outcome]:
+        if self.span(parameter).address == CYCLIC_PARAMETER:
+            return Failure(NOT_WRITABLE)
+        outcome, = yield from self._put([(parameter, raw)])
+        return outcome
+
+    def write_together(self, items: Sequence[Item]) -> Generator[Step, Reply, Outcomes]:
+        refusal = together_refusal(items, self._together)
+        if refusal:
+            return (Failure(refusal),) * len(items)
+        outcomes = yield from self._put(items)
+        return outcomes
+
+    def _put(self, items: Sequence[Item]) -> Generator[Step, Reply, Outcomes]:
+        """Write parameters with consecutive numbers in one frame."""
+        numbers = [self.span(parameter).address for parameter, _ in items]
+        first = min(numbers)
+        words = [0] * len(items)
+        for number, (parameter, raw) in zip(numbers, items):
+            words[number - first] = parameter.word_from_raw(raw)
+        readable = all(parameter.readable for parameter, _ in items)
+        write = Write(first, tuple(words), any(
+            parameter.storage is not Storage.RAM for parameter, _ in items))
+        became = yield from put(write, look=write.eeprom and readable,
+                                verify=self._verify and readable)
+        if not became.sent:
+            return (Failure(NOT_SENT),) * len(items)
+        if became.found is None:
+            return (self.retry.unanswered(),) * len(items)
+        if not became.found:
+            return (Written(SENT_UNACKNOWLEDGED),) * len(items)
+        return tuple(
+            _compare(parameter, parameter.raw_from_word(became.found[number - first]), raw)
+            for number, (parameter, raw) in zip(numbers, items))
 
 
 class Maps(NamedTuple):
@@ -48,128 +129,6 @@ class Maps(NamedTuple):
 
     request: Words
     response: Words | None
-
-
-def groups(numbers: Sequence[int], size: int = SLOTS) -> list[list[int]]:
-    """
-    Split parameter numbers into runs of consecutive ones, each of which fits a frame.
-
-    >>> groups([31, 30, 209, 210, 211, 212, 213])
-    [[30, 31], [209, 210, 211, 212], [213]]
-    """
-    runs: list[list[int]] = []
-    for number in sorted(set(numbers)):
-        if runs and runs[-1][-1] == number - 1 and len(runs[-1]) < size:
-            runs[-1].append(number)
-        else:
-            runs.append([number])
-    return runs
-
-
-def of_request(request: Request, conditions: Conditions) -> Procedure:
-    """Return the procedure that serves a request of a user."""
-    if isinstance(request, ReadRequest):
-        return read_parameters(request.parameters, conditions)
-    if request.atomic:
-        return write_together(request.items, conditions)
-    return write_parameters(request.items, conditions)
-
-
-def read_parameters(parameters: Sequence[Parameter], conditions: Conditions,
-                    ) -> Generator[Step, Reply, tuple[Outcome, ...]]:
-    """Read parameters; consecutive numbers share a frame, and a shared frame may fail alone."""
-    words: dict[int, int] = {}
-    failures: dict[int, Failure] = {}
-    pending = groups([conditions.wire_number(parameter) for parameter in parameters])
-    while pending:
-        run = pending.pop(0)
-        reply = yield Read(run[0], len(run))
-        if reply is not None:
-            words.update(zip(run, reply))
-        elif conditions.offline():
-            break
-        elif len(run) > 1:
-            # one bad number makes the drive ignore the whole frame: ask for each alone
-            pending[:0] = [[number] for number in run]
-        else:
-            failures[run[0]] = conditions.unanswered()
-
-    def outcome(parameter: Parameter) -> Outcome:
-        number = conditions.wire_number(parameter)
-        if number in words:
-            return ReadValue(parameter.raw_from_word(words[number]))
-        return failures.get(number) or conditions.unanswered()
-
-    return tuple(map(outcome, parameters))
-
-
-def write_parameters(items: Sequence[tuple[Parameter, int]], conditions: Conditions,
-                     ) -> Generator[Step, Reply, tuple[Outcome, ...]]:
-    """Write parameters one after the other; after one that an absent drive missed, none."""
-    outcomes: list[Outcome] = []
-    for parameter, raw in items:
-        outcome = yield from write_parameter(parameter, raw, conditions)
-        outcomes.append(outcome)
-        if isinstance(outcome, Failure) and outcome.reason in (NO_ANSWER_OFFLINE, NOT_SENT):
-            outcomes += [outcome] * (len(items) - len(outcomes))
-            break
-    return tuple(outcomes)
-
-
-def write_parameter(parameter: Parameter, raw: int, conditions: Conditions,
-                    ) -> Generator[Step, Reply, Outcome]:
-    """
-    Write one parameter and read it back, since nobody acknowledges writes.
-
-    EEPROM cells wear: what is there already is not written again. A write is never repeated: it
-    may be a command, and the read-back tells what became of it.
-    """
-    number = conditions.wire_number(parameter)
-    if number == CYCLIC_PARAMETER:
-        return Failure(NOT_WRITABLE)
-    word = parameter.word_from_raw(raw)
-    eeprom = parameter.storage is not Storage.RAM
-    if eeprom and parameter.readable:
-        reply = yield Read(number)
-        if reply is None:
-            return conditions.unanswered()
-        if reply[0] == word:
-            return Written()
-    sent = yield Write(number, (word,), eeprom)
-    if sent is None:
-        return Failure(NOT_SENT)
-    if not (conditions.verify and parameter.readable):
-        return Written(SENT_UNACKNOWLEDGED)
-    reply = yield Read(number)
-    if reply is None:
-        return conditions.unanswered()
-    return _compare(parameter, parameter.raw_from_word(reply[0]), raw)
-
-
-def write_together(items: Sequence[tuple[Parameter, int]], conditions: Conditions,
-                   ) -> Generator[Step, Reply, tuple[Outcome, ...]]:
-    """Write consecutive parameters in one frame, or nothing (``set_parameters_atomically``)."""
-    refusal = together_refusal(items, conditions.together)
-    if refusal:
-        return (Failure(refusal),) * len(items)
-    if len(items) == 1:
-        outcome = yield from write_parameter(*items[0], conditions)
-        return (outcome,)
-    ordered = sorted(items, key=lambda item: item[0].number or 0)
-    first = conditions.wire_number(ordered[0][0])
-    words = tuple(parameter.word_from_raw(raw) for parameter, raw in ordered)
-    sent = yield Write(first, words, eeprom=False)
-    if sent is None:
-        return (Failure(NOT_SENT),) * len(items)
-    if not (conditions.verify and all(parameter.readable for parameter, _ in ordered)):
-        return (Written(SENT_UNACKNOWLEDGED),) * len(items)
-    reply = yield Read(first, len(words))
-    if reply is None:
-        return (conditions.unanswered(),) * len(items)
-    return tuple(
-        _compare(parameter, parameter.raw_from_word(
-            reply[conditions.wire_number(parameter) - first]), raw)
-        for parameter, raw in items)
 
 
 def together_refusal(items: Sequence[tuple[Parameter, int]], size: int = SLOTS) -> str:
@@ -187,7 +146,7 @@ def together_refusal(items: Sequence[tuple[Parameter, int]], size: int = SLOTS) 
 
 
 def read_maps(request_base: int, response_base: int, *, needed: tuple[int, ...] | None = None,
-              ) -> Generator[Step, Reply, Union[Maps, None]]:
+              ) -> Generator[Step, Reply, Maps | None]:
     """
     Read both maps, each in one frame; None when nobody answers.
 
@@ -219,16 +178,13 @@ def write_maps(request_base: int, response_base: int, *, request: Sequence[int],
     sequence += list(enumerate(wanted_response, response_base))
     sequence += [(request_base, wanted_request[0])]
     for number, word in sequence:
-        reply = yield Read(number)
-        if reply is not None and reply[0] == word:
-            continue
-        if reply is not None:
-            yield Write(number, (word,), eeprom=True)
-            reply = yield Read(number)
-        if reply is None:
+        became = yield from put(Write(number, (word,), eeprom=True), look=True)
+        if not became.sent:
+            return f'map parameter {number}: {NOT_SENT}'
+        if not became.found:
             return f'no answer for map parameter {number}'
-        if reply[0] != word:
-            return f'map parameter {number}: read back {reply[0]} instead of {word}'
+        if became.found[0] != word:
+            return f'map parameter {number}: read back {became.found[0]} instead of {word}'
     return ''
 
 

@@ -6,37 +6,87 @@ Words are 16 bit, high byte first, slot 0 in BYTE0 and BYTE1, as in all telegram
 :mod:`~drive_can_bridge.protocols.datamodel.extended`; here with the sign of each parameter.
 """
 
+from collections.abc import Sequence
 import struct
 
+from drive_can_bridge.core.errors import LocalProtocolError
+from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.protocols.datamodel.extended import PAYLOAD
+from drive_can_bridge.protocols.datamodel import extended
+from drive_can_bridge.protocols.datamodel.extended import PADDING, PAYLOAD, SLOTS
 
 
-def words_struct(parameters: tuple[Parameter, ...], *, unsigned: int | None = None,
-                 ) -> struct.Struct:
+class CyclicCodec:
     """
-    Return the packer of process data.
+    The cyclic telegrams of one drive; the fast path of session and observer.
 
-    :param unsigned: slot of a control word, which is unsigned whatever its type.
+    :param request: parameters of the request, in slot order.
+    :param response: of the response.
+    :param control_slot: of a control word in the request, which is unsigned whatever its type.
+    :param strict: do not take responses shorter than eight bytes.
+    :raises LocalProtocolError: station out of range, or too many parameters.
     """
+
+    def __init__(self, station: int, request: Sequence[Parameter],
+                 response: Sequence[Parameter], *, control_slot: int | None = None,
+                 strict: bool = False) -> None:
+        for parameters in (request, response):
+            if len(parameters) > SLOTS:
+                raise LocalProtocolError(
+                    f'{len(parameters)} words do not fit a frame: at most {SLOTS}')
+        self.request_identifier = extended.cyclic_request_identifier(station)
+        self.response_identifier = self.request_identifier | extended.DIR
+        self._strict = strict
+        self._response = response
+        requested = _words_struct(request, unsigned=control_slot)
+        self._pack, self._unpack_request = requested.pack, requested.unpack_from
+        self._padding = PADDING[len(request)]
+        self._unpack_response = _words_struct(response).unpack_from
+
+    def encode_request(self, raws: Sequence[int]) -> Frame:
+        """
+        Encode a cyclic request.
+
+        :param raws: of all parameters of the request.
+        :raises LocalProtocolError: one of them does not fit its word.
+        """
+        try:
+            return Frame(self.request_identifier, self._pack(*raws) + self._padding, True)
+        except struct.error as error:
+            raise LocalProtocolError(f'{list(raws)}: {error}') from None
+
+    def decode_request(self, data: bytes) -> tuple[tuple[int, ...], str]:
+        """
+        Decode the payload of a cyclic request, which has eight bytes.
+
+        :return: the raw integers; and what is wrong with it, '' for nothing.
+        """
+        if len(data) != PAYLOAD:
+            return (), f'{len(data)} data bytes instead of {PAYLOAD}'
+        return self._unpack_request(data), ''
+
+    def decode_response(self, data: bytes) -> tuple[tuple[int, ...], str]:
+        """
+        Decode the payload of a cyclic response.
+
+        :return: the raw integers that it holds, as far as they are wanted; and what is wrong with
+            it, '' where it holds them all and that will do.
+        """
+        if len(data) == PAYLOAD:
+            return self._unpack_response(data), ''
+        if self._strict:
+            return (), f'{len(data)} data bytes instead of {PAYLOAD}'
+        needed = 2 * len(self._response)
+        raws = _words_struct(self._response[:len(data) // 2]).unpack_from(data)
+        return raws, '' if len(data) >= needed else f'{len(data)} data bytes, {needed} needed'
+
+
+def _words_struct(parameters: Sequence[Parameter], *, unsigned: int | None = None,
+                  ) -> struct.Struct:
+    """Return what packs process data."""
     return struct.Struct('>' + ''.join(
         'h' if parameter.type.signed and slot != unsigned else 'H'
         for slot, parameter in enumerate(parameters)))
-
-
-def unpack_unusual(parameters: tuple[Parameter, ...], data: bytes, *,
-                   strict: bool) -> tuple[tuple[int, ...], str]:
-    """
-    Unpack a payload that has not eight bytes.
-
-    :return: the words that it holds, as far as they are wanted; and what is wrong with it, ''
-        where it holds them all and that will do.
-    """
-    if strict:
-        return (), f'{len(data)} data bytes instead of {PAYLOAD}'
-    needed = 2 * len(parameters)
-    raws = words_struct(parameters[:len(data) // 2]).unpack_from(data)
-    return raws, '' if len(data) >= needed else f'{len(data)} data bytes, {needed} needed'
 
 
 def slot_of(parameters: tuple[Parameter, ...], name: str) -> int | None:

@@ -10,9 +10,8 @@ from collections.abc import Callable, Generator, Sequence
 from typing import NamedTuple
 
 from drive_can_bridge.core.parameters import Parameter, Storage
-from drive_can_bridge.protocols.datamodel.channel import (
-    AcyclicChannel, Lane, Read, Step, Words, Write,
-)
+from drive_can_bridge.protocols.channel import Lane
+from drive_can_bridge.protocols.datamodel.channel import AcyclicChannel, Read, Step, Words, Write
 
 #: how often everything is written at most
 ATTEMPTS = 3
@@ -63,8 +62,8 @@ class SafeStop:
         self.running = True
         for each in writes:
             self._channel.write_now(each.write, lambda sent, then: None, now)
-        self._channel.run(_confirm(writes, min(self._channel.timeout, ANSWER_TIME)), self._done,
-                          now, Lane.STOP)
+        timeout = min(self._channel.courier.retry.timeout, ANSWER_TIME)
+        self._channel.run(_confirm(writes, timeout), self._done, now, Lane.STOP)
 
     def forget(self) -> None:
         """Take note that the channel was cleared."""

@@ -67,6 +67,7 @@ class StandardSession(DataModelSession):
         self._round_began = -math.inf
         self._status_asked_at = -math.inf
         self._word_written_at = -math.inf
+        self._pulse_at = math.inf  # when the control word is due again, whatever it was
         self._received_at = -math.inf
         self._expected = False  # the answer of a read that nobody wants any more may come
         self._missed_in_row = 0
@@ -146,14 +147,19 @@ class StandardSession(DataModelSession):
     def handle_timer(self, now: float) -> None:
         if now >= self._beat.due:
             self._tick(now)
+        if now >= self._pulse_at and self._control_slot is not None:
+            self._pulse_at = math.inf
+            self._writes.failed(self._control_slot)
+            self._see_to_control_word(now)
         self._write_setpoint(now)
         self._serve_control(now)
         if now >= self._channel.next_timer():
             self._channel.advance(now)
 
     def next_timer(self) -> float:
-        soonest = min(self._beat.due, self._channel.next_timer(), self._control_timer())
-        return min(soonest, self._channel.free_at) if self._writes.waiting else soonest
+        soonest = min(self._beat.due, self._pulse_at, self._channel.next_timer(),
+                      self._control_timer())
+        return min(soonest, self._channel.courier.free_at) if self._writes.waiting else soonest
 
     def _tick(self, now: float) -> None:
         """Begin a period: look what is to be written, then read."""
@@ -197,12 +203,12 @@ class StandardSession(DataModelSession):
 
     def _write_setpoint(self, now: float) -> None:
         """Write one that is due, if there is one, with the value that it has now."""
-        if not self._writes.waiting or now < self._channel.free_at:
+        if not self._writes.waiting or now < self._channel.courier.free_at:
             return
         index = self._writes.next()
         parameter, raw = self.drive.cyclic_request[index], self._raws()[index]
         # What is sent cyclically is volatile: EEPROM parameters are refused by the configuration.
-        self._channel.write_at_once(
+        self._channel.courier.write(
             Write((parameter.number or 0) + self._offset, (parameter.word_from_raw(raw),),
                   eeprom=False),
             lambda sent, then: self._written(index, raw, sent, then), now)
@@ -221,6 +227,8 @@ class StandardSession(DataModelSession):
         self._word_written_at = now
         if raw == control.word:
             control.word_sent(now)
+            if control.pulsing:
+                self._pulse_at = now + self._stop_spacing
             self._control_changed(now)
 
     def _see_to_control_word(self, now: float) -> None:
@@ -246,7 +254,7 @@ class StandardSession(DataModelSession):
                     f'does this drive have it')
                 return None
             if chunk is self._status_read:
-                self._status_asked_at = self._channel.asked_at
+                self._status_asked_at = self._channel.courier.asked_at
             result.take(chunk, words)
         return tuple(
             parameter.raw_from_word(word)
@@ -313,7 +321,8 @@ class StandardSession(DataModelSession):
                 f'another master sends requests to station {self.drive.station}: {frame}'))
             return
         step = self._channel.outstanding
-        if step is None or now - age < self._channel.asked_at:  # it came before the question
+        # it may have come before the question
+        if step is None or now - age < self._channel.courier.asked_at:
             self._channel.disturbed(now)
             if self._expected:
                 self._expected = False

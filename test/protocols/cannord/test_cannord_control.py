@@ -137,7 +137,9 @@ def test_a_fault_ends_an_enable() -> None:
 def test_reset_is_a_rising_edge() -> None:
     talk = online(FAULT)
     talk.asks(RESET_FAULT, 10.003)
-    assert words(talk, 10.02, FAULT, DISABLED, READY) == ['FE04', 'FE04', '7E04']
+    assert words(talk, 10.02, FAULT, DISABLED, DISABLED) == ['FE04'] * 3
+    assert talk.control_outcomes() == []
+    assert words(talk, 10.08, DISABLED, READY) == ['7E04', '7E04']
     assert talk.control_outcomes() == [('reset_fault', True, 'switch-on disabled')]
     assert talk.session.state is not DriveState.FAULT
 
@@ -145,13 +147,14 @@ def test_reset_is_a_rising_edge() -> None:
 def test_reset_while_the_cause_is_there() -> None:
     talk = online(FAULT, control_timeout=0.1)
     talk.asks(RESET_FAULT, 10.003)
-    assert words(talk, 10.02, FAULT, FAULT, FAULT, FAULT) == ['FE04', 'FE04', 'FE04', 'FE04']
-    assert talk.until(10.104)[0][1] == '002#FE040000'
+    assert words(talk, 10.02, FAULT, FAULT, FAULT, FAULT) == ['FE04', 'FE04', 'FE04', '7E04']
+    assert talk.until(10.104)[0][1] == '002#7E040000'
     assert talk.control_outcomes() == [
         ('reset_fault', False, 'fault still present after 0.1 s (status word 0B38h)')]
     assert words(talk, 10.12, FAULT) == ['7E04']
     talk.asks(RESET_FAULT, 10.13)      # with an edge of its own
-    assert words(talk, 10.14, FAULT, DISABLED) == ['FE04', 'FE04']
+    assert words(talk, 10.14, FAULT, DISABLED, DISABLED, DISABLED) == [
+        'FE04', 'FE04', 'FE04', '7E04']
     assert talk.control_outcomes() == [('reset_fault', True, 'switch-on disabled')]
 
 
@@ -159,9 +162,18 @@ def test_reset_waits_for_the_end_of_the_fault_reaction() -> None:
     talk = online(REACTION)
     assert talk.session.state is DriveState.FAULT
     talk.asks(RESET_FAULT, 10.003)
-    assert words(talk, 10.02, REACTION, REACTION, FAULT, FAULT, DISABLED) == [
-        '7E04', '7E04', '7E04', 'FE04', 'FE04']
-    assert talk.control_outcomes() == [('reset_fault', True, 'switch-on disabled')]
+    assert words(talk, 10.02, REACTION, REACTION, FAULT, FAULT, DISABLED, DISABLED, READY) == [
+        '7E04', '7E04', '7E04', 'FE04', 'FE04', 'FE04', '7E04']
+    assert talk.control_outcomes() == [('reset_fault', True, 'ready to switch on')]
+
+
+def test_reset_pulse_hurries_where_the_period_is_long() -> None:
+    talk = online(FAULT, period=0.5)
+    talk.asks(RESET_FAULT, 10.003)
+    sent = [(now, text[4:8]) for now, text in talk.until(10.74)]
+    assert [word for _, word in sent] == ['FE04', 'FE04', 'FE04', '7E04']
+    times = [now for now, _ in sent]
+    assert times == pytest.approx([10.5, 10.6, 10.7, 10.705])
 
 
 def test_reset_without_a_fault_succeeds() -> None:
@@ -197,7 +209,7 @@ def test_parameter_set_is_in_every_word() -> None:
     talk.asks(QUICK_STOP, 10.05)
     assert words(talk, 10.06, FAULT, FAULT) == ['7A84', '7E84']
     talk.asks(RESET_FAULT, 10.095)
-    assert words(talk, 10.1, FAULT, READY, READY) == ['FE84', 'FE84', '7E84']
+    assert words(talk, 10.1, FAULT, READY, READY, READY) == ['FE84', 'FE84', 'FE84', '7E84']
 
 
 def test_stop_disables() -> None:

@@ -287,7 +287,7 @@ def test_status_bits() -> None:
 def test_normalisation(row: dict[str, Any]) -> None:
     for unit, reference, key in (('%', 100.0, 'percent'), ('Hz', 50.0, 'hertz_of_50')):
         setpoint = Parameter('setpoint', ParameterType.INT16, unit=unit, scaled=True,
-                             scale=reference / process_data.FULL_SCALE)
+                             scale=reference / 0x4000)
         assert setpoint.value_from_raw(row['raw']) == row[key]
         assert setpoint.raw_from_value(row[key]) == row['raw']
 

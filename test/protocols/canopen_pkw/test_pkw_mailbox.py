@@ -4,6 +4,7 @@
 import pytest
 
 from drive_can_bridge.core.outbox import Left
+from drive_can_bridge.core.retry import RetryPolicy
 from drive_can_bridge.protocols.canopen_pkw import pkw
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
     Answered, Mailbox, Read, Refused, Reply, Silence, Write,
@@ -18,10 +19,9 @@ READ = Read(REGISTER)
 class Box:
     """A mailbox, spoken to in hex."""
 
-    def __init__(self, **options: object) -> None:
+    def __init__(self, order: str = 'auto', timeout: float = 0.5) -> None:
         self.sent: list[str] = []
-        settings = {'order': 'auto', 'timeout': 0.5, **options}
-        self.box = Mailbox(self.send, **settings)  # type: ignore[arg-type]
+        self.box = Mailbox(self.send, order=order, retry=RetryPolicy(timeout, attempts=1))
         self.left: Left = lambda sent, now: None
 
     def send(self, message: pkw.Message, left: Left) -> None:
@@ -102,7 +102,7 @@ def test_low_byte_of_a_register_response_does_not_matter(box: Box) -> None:
 
 def test_nothing_is_expected_while_nothing_was_asked(box: Box) -> None:
     assert box.hears('C7 01 00 A5 83 20 00 00', 1.0) is False
-    assert box.box.handle_timer(100.0) is None
+    assert box.box.handle_timer(100.0) is False
 
 
 def test_all_eight_functions(box: Box) -> None:
@@ -140,7 +140,7 @@ def test_refusals(data: str, order: str, code: int) -> None:
 def test_after_silence_function_zero_goes_first_again(box: Box) -> None:
     box.begin(READ, 1.0)
     assert box.box.deadline == 1.5
-    assert box.box.handle_timer(1.499) is None
+    assert box.box.handle_timer(1.499) is False
     assert box.box.handle_timer(1.5) == Silence(sent=True)
     assert box.begin(READ, 2.0) == ['00 00 00 00 00 00 00 00']
     # the late answer of the request before is no answer any more
@@ -163,7 +163,7 @@ def test_device_that_does_not_answer_function_zero_is_read_all_the_same() -> Non
     box.begin(READ, 0.0)
     box.take()
     assert box.box.deadline == 0.1
-    assert box.box.handle_timer(0.1) is None
+    assert box.box.handle_timer(0.1) is False
     assert box.take() == ['C7 01 00 A5 00 00 00 00']
     assert box.hears('00 00 00 00 00 00 00 00', 0.2) is False
     assert box.hears('C7 01 00 A5 83 20 00 00', 0.3) == Answered((0x2083, 0))
@@ -175,7 +175,7 @@ def test_two_silences_in_a_row_invert_the_toggle() -> None:
     sent = []
     for start in (0.0, 10.0, 20.0):
         sent += box.begin(READ, start)
-        assert box.box.handle_timer(start + 0.1) is None
+        assert box.box.handle_timer(start + 0.1) is False
         sent += box.take()
         assert box.box.handle_timer(start + 0.6) == Silence(sent=True)
     assert [text[9:11] for text in sent] == ['00', 'A5', '00', '25', '00', 'A5']
@@ -211,9 +211,9 @@ def test_write_that_the_bus_refuses_was_not_sent(box: Box, step: Write) -> None:
     if not step.blind:
         assert box.box.handle_timer(1.0) == Silence(sent=False, refused=True)
     else:
-        assert box.box.handle_timer(1.009) is None
+        assert box.box.handle_timer(1.009) is False
         assert box.box.deadline == pytest.approx(1.01)
-        assert box.box.handle_timer(1.01) is None
+        assert box.box.handle_timer(1.01) is False
         assert box.take() == ['C7 01 00 2A 01 00 00 00']
         box.left(False, 1.01)
         assert box.box.handle_timer(1.5) == Silence(sent=False, refused=True)
@@ -231,7 +231,7 @@ def test_refused_write_that_has_to_make_room_ends(box: Box) -> None:
 def test_read_that_the_bus_refuses_ends_when_its_time_is_over(box: Box) -> None:
     box.begin(READ, 1.0)
     box.left(False, 1.0)
-    assert box.box.handle_timer(1.499) is None
+    assert box.box.handle_timer(1.499) is False
     assert box.box.deadline == 1.5
     assert box.box.handle_timer(1.5) == Silence(sent=False, refused=True)
     assert box.begin(READ, 2.0) == ['C7 01 00 25 00 00 00 00']

@@ -94,6 +94,20 @@ def test_bus_that_comes_back_stops_setpoints_without_control_too() -> None:
     assert talk.bus_up(12.0) == [START, STILL_0]
 
 
+def test_slow_device_after_the_bus_came_back() -> None:
+    """It answers after 0.3 s: that is too late for the attempts in between, not for the last."""
+    talk = running()
+    talk.bus_down(10.2)
+    sent = [(11.0, text) for text in talk.bus_up(11.0)]
+    sent += talk.until(11.45)
+    stops = [(now, text) for now, text in sent if text in (DISABLE_0, DISABLE_1)]
+    assert len(stops) == 3
+    talk.hears(DISABLED_1 if stops[-1][1] == DISABLE_1 else DISABLED_0, stops[-1][0] + 0.3)
+    talk.until(12.5)
+    assert worries(talk) == ['the bus was lost before it could be told to stop: '
+                             'it may still be running']
+
+
 def test_end_while_the_bus_is_lost() -> None:
     talk = running()
     talk.bus_down(10.1)
@@ -137,7 +151,7 @@ def test_nothing_more_to_a_node_that_is_held_back_and_has_stopped() -> None:
 def test_held_back_and_silent_is_told() -> None:
     talk = running()
     talk.hears(PRE_OPERATIONAL, 10.3)
-    sent = talk.until(11.0)
+    sent = talk.until(11.1)
     assert sent == [(10.433333, DISABLE_1), (10.566667, DISABLE_0)]
     assert worries(talk) == [
         f'told to stop, but control_register_1 0000h not acknowledged in 3 attempts: {RUNNING_ON}']

@@ -7,8 +7,10 @@ import pytest
 
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.outbox import Outbox
+from drive_can_bridge.core.retry import RetryPolicy
+from drive_can_bridge.protocols.channel import Lane
 from drive_can_bridge.protocols.datamodel.channel import (
-    AcyclicChannel, Lane, Polling, Procedure, Read, Words, Write,
+    AcyclicChannel, Polling, Procedure, Read, Words, Write,
 )
 
 
@@ -25,7 +27,7 @@ class Line:
         self.channel = AcyclicChannel(
             encode_read=lambda number, count: Frame(number, b'?' * count, True),
             encode_write=lambda number, words: Frame(number, bytes(words), True),
-            send=self.outbox.put, timeout=timeout, attempts=attempts, eeprom_gap=gap,
+            send=self.outbox.put, retry=RetryPolicy(timeout, attempts), eeprom_gap=gap,
             polling=None if quarantine is None else Polling(quarantine))
         self.results: list[object] = []
 

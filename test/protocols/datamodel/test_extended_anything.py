@@ -1,12 +1,14 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The 29-bit codec with anything that fits, and with anything at all."""
 
+from builders import parameter
 from hypothesis import example, given, strategies as st
 
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.protocols.datamodel import extended
 from drive_can_bridge.protocols.datamodel.mapping import differences, effective, padded
+from drive_can_bridge.protocols.datamodel.process_words import CyclicCodec
 
 STATIONS = st.integers(0, 127)
 WORDS = st.lists(st.integers(0, 0xFFFF), min_size=1, max_size=4)
@@ -21,8 +23,12 @@ def windows(draw: st.DrawFn) -> tuple[int, list[int]]:
 
 @given(STATIONS, st.lists(st.integers(0, 0xFFFF), max_size=4))
 def test_cyclic_telegrams(station: int, words: list[int]) -> None:
-    request = extended.encode_cyclic_request(station, words)
-    response = extended.encode_cyclic_response(station, words)
+    parameters = [parameter(f'word_{slot}', 10 + slot) for slot in range(len(words))]
+    codec = CyclicCodec(station, parameters, parameters)
+    request = codec.encode_request(words)
+    response = extended.encode_answer(request.identifier, words)
+    assert codec.decode_request(request.data) == (tuple(words), '')
+    assert codec.decode_response(response.data) == (tuple(words), '')
     assert extended.decode(request, count=len(words), strict=True) == extended.CyclicRequest(
         station, tuple(words))
     assert extended.decode(response, count=len(words), strict=True) == extended.CyclicResponse(
@@ -34,7 +40,7 @@ def test_cyclic_telegrams(station: int, words: list[int]) -> None:
 def test_acyclic_telegrams(station: int, window: tuple[int, list[int]]) -> None:
     number, words = window
     asked = extended.encode_read_request(station, number, len(words))
-    answer = extended.encode_read_response(station, number, words)
+    answer = extended.encode_answer(asked.identifier, words)
     assert extended.decode(asked) == extended.ReadRequest(station, number, len(words))
     assert extended.decode(answer) == extended.ReadResponse(station, number, tuple(words))
     assert answer.identifier == asked.identifier + 0x10000000

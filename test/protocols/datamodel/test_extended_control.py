@@ -396,9 +396,10 @@ def test_drive_that_reports_nothing() -> None:
 
 def test_reset_pulse_of_a_drive_that_reports_nothing() -> None:
     talk = beside(control=SILENT_CONTROL, period=10.0)
-    sent = talk.asks(ControlAction.RESET_FAULT, 10.1)
-    sent += [text for _, text in talk.until(10.2)]
-    assert sent == [RESET, DISABLE]
+    assert talk.asks(ControlAction.RESET_FAULT, 10.1) == [RESET]
+    sent = talk.until(10.4)
+    assert [text for _, text in sent] == [RESET, RESET, DISABLE]
+    assert [now for now, _ in sent] == pytest.approx([10.2, 10.3, 10.301])
     assert [done[:2] for done in talk.control_outcomes()] == [('reset_fault', True)]
 
 

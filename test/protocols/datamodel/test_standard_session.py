@@ -17,6 +17,7 @@ from drive_can_bridge.core.events import (
     ForeignMasterSeen, FrameRejected, Noted, ProcessDataReceived, SetpointsExpired, StationFound,
     StationLost,
 )
+from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.session import DriveState
 from drive_can_bridge.core.setpoints import CommandOutcome
 from drive_can_bridge.protocols.families import FAMILIES
@@ -613,6 +614,7 @@ def test_a_parameter_that_nobody_has_is_named() -> None:
 # -- control --------------------------------------------------------------------------------------
 
 READY, ENABLED, FAULT = ('7F1#E803FA0001000000', '7F1#E803FA0003000000', '7F1#E803FA0009000000')
+RESET_WORD = '3F1#0634008000000000'
 DISABLE_WORD, ENABLE_WORD = '3F1#0634000000000000', '3F1#0634000100000000'
 
 
@@ -686,6 +688,30 @@ def test_a_word_by_hand_that_got_lost_is_written_again() -> None:
     assert len(written) == 3
     assert 10 <= written[1] - written[0] <= 11
     assert 20 <= written[2] - written[1] <= 21
+
+
+@pytest.mark.parametrize(('period', 'rounds'), [(0.02, 5), (0.5, 3)])
+@pytest.mark.parametrize('request_', [(SPEED, WORD), (SPEED,)])
+def test_reset_is_a_pulse_of_three_writes(request_: tuple[Parameter, ...], period: float,
+                                          rounds: int) -> None:
+    """Nobody acknowledges them: three, at most 0.1 s apart, and then ``disable``."""
+    talk = polling(request=request_, control=CONTROL, period=period, refresh_interval=60.0)
+    talk.hears(FAULT, 10.002)
+    talk.until(10.0 + 0.9 * period)
+    talk.asks(ControlAction.RESET_FAULT, 10.0 + 0.95 * period)
+    sent = []
+    for begin in (10.0 + number * period for number in range(1, rounds)):
+        sent += talk.until(begin + 0.002)
+        sent += [(begin + 0.002, text) for text in talk.hears(FAULT, begin + 0.002)]
+        sent += talk.until(begin + 0.9 * period)
+    pulse = [(now, text) for now, text in sent if text[4:8] == '0634']
+    assert [text for _, text in pulse] == [RESET_WORD] * 3 + [DISABLE_WORD]
+    times = [now for now, _ in pulse]
+    spacing = min(period, 0.1)
+    assert all(0.9 * spacing <= second - first <= spacing + 0.0011
+               for first, second in zip(times, times[1:3]))
+    round_of(talk, 10.0 + rounds * period, READY)
+    assert talk.control_outcomes() == [('reset_fault', True, 'ready')]
 
 
 def test_the_stop_disables() -> None:

@@ -1,0 +1,129 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+How the parameters of a drive are read and written for users.
+
+What a request needs is the same for all families: as few frames as possible, a shared frame that
+fails must take no name along, an absent drive is not asked twice, nothing is written after it, and
+every parameter gets its outcome. Only how one frame is read, and how one parameter is written, is
+the family's. All functions here are generators for :class:`.channel.Channel`.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Generator, Hashable, Sequence
+from typing import Generic, TypeVar, Union
+
+from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.requests import (
+    Failure, NO_ANSWER_OFFLINE, NOT_SENT, Outcome, ReadRequest, ReadValue, Request,
+)
+from drive_can_bridge.core.retry import RetryPolicy
+from drive_can_bridge.protocols.courier import ReplyT, StepT
+
+#: what one read asks for, and what one parameter takes
+SpanT = TypeVar('SpanT', bound=Hashable)
+
+Outcomes = tuple[Outcome, ...]
+Item = tuple[Parameter, int]
+#: the words that a read brought, one for each address of its span
+Found = Union[tuple[int, ...], Failure]
+
+
+class Access(ABC, Generic[SpanT, StepT, ReplyT]):
+    """
+    The parameters of one drive.
+
+    :param retry: what is said when nobody answers.
+    """
+
+    def __init__(self, retry: RetryPolicy) -> None:
+        self.retry = retry
+
+    def serve(self, request: Request) -> Generator[StepT, ReplyT, Outcomes]:
+        """Return the procedure that serves a request of a user."""
+        if isinstance(request, ReadRequest):
+            return self._read_all(request.parameters)
+        if request.atomic and len(request) > 1:
+            return self.write_together(request.items)
+        return self._write_all(request.items)
+
+    # -- what a family knows ----------------------------------------------------------------------
+
+    @abstractmethod
+    def span(self, parameter: Parameter) -> SpanT:
+        """Return what a parameter takes."""
+
+    @abstractmethod
+    def addresses(self, span: SpanT) -> Sequence[Hashable]:
+        """Return the address of each word of a span."""
+
+    @abstractmethod
+    def plan(self, spans: Sequence[SpanT]) -> list[SpanT]:
+        """Cover everything by as few reads as possible."""
+
+    @abstractmethod
+    def read(self, span: SpanT) -> Generator[StepT, ReplyT, Found]:
+        """Read what one frame can bring."""
+
+    @abstractmethod
+    def raw(self, parameter: Parameter, words: tuple[int, ...]) -> int:
+        """Return the raw integer of a parameter."""
+
+    @abstractmethod
+    def write(self, parameter: Parameter, raw: int) -> Generator[StepT, ReplyT, Outcome]:
+        """Write one parameter, and see that the drive has it."""
+
+    @abstractmethod
+    def write_together(self, items: Sequence[Item]) -> Generator[StepT, ReplyT, Outcomes]:
+        """Write several parameters in one frame, or nothing (``set_parameters_atomically``)."""
+
+    def aside(self, parameter: Parameter, *, write: bool) -> Outcome | None:
+        """Return the outcome for a parameter that no frame can reach; None: one can."""
+        return None
+
+    # -- what is the same for all -----------------------------------------------------------------
+
+    def _read_all(self, parameters: Sequence[Parameter]) -> Generator[StepT, ReplyT, Outcomes]:
+        """Read parameters; what shares a frame with one that fails is asked for alone."""
+        spans = [self.span(parameter) for parameter in parameters]
+        words: dict[Hashable, int] = {}
+        failures: dict[SpanT, Failure] = {}
+        gone: Failure | None = None
+        pending = self.plan([span for parameter, span in zip(parameters, spans)
+                             if self.aside(parameter, write=False) is None])
+        while pending and gone is None:
+            span = pending.pop(0)
+            found = yield from self.read(span)
+            if not isinstance(found, Failure):
+                words.update(zip(self.addresses(span), found))
+            elif found.reason == NO_ANSWER_OFFLINE:
+                gone = found
+            else:
+                failures[span] = found
+                covered = set(self.addresses(span))
+                pending[:0] = [part for part in dict.fromkeys(spans)
+                               if part != span and covered.issuperset(self.addresses(part))]
+
+        def outcome(parameter: Parameter, span: SpanT) -> Outcome:
+            known = self.aside(parameter, write=False)
+            if known is not None:
+                return known
+            addresses = self.addresses(span)
+            if all(address in words for address in addresses):
+                return ReadValue(self.raw(parameter, tuple(words[each] for each in addresses)))
+            return failures.get(span) or gone or self.retry.unanswered()
+
+        return tuple(map(outcome, parameters, spans))
+
+    def _write_all(self, items: Sequence[Item]) -> Generator[StepT, ReplyT, Outcomes]:
+        """Write parameters one after the other; after one that an absent drive missed, none."""
+        outcomes: list[Outcome] = []
+        gone: Failure | None = None
+        for parameter, raw in items:
+            outcome = self.aside(parameter, write=True) or gone
+            if outcome is None:
+                outcome = yield from self.write(parameter, raw)
+                if isinstance(outcome, Failure) and outcome.reason in (
+                        NO_ANSWER_OFFLINE, NOT_SENT):
+                    gone = outcome
+            outcomes.append(outcome)
+        return tuple(outcomes)

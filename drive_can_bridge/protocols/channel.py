@@ -1,0 +1,371 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The acyclic channel to one drive: procedures, lanes, repetitions, and what must not be asked yet.
+
+Anything that takes several exchanges (a verified write, a map check, a round of reads) is a
+*procedure*: a generator that yields steps and is sent what became of each, so that it reads like
+the sequence it is. What the steps are, and how one of them is done, is the family's business: its
+:class:`.Courier` does one exchange at a time. Everything else is done here, for all families.
+
+*Order.* Every lane (:class:`Lane`) runs its procedures one after the other. A stop comes first,
+whatever holds the others back; then the control word, then setpoints. Our own procedures and those
+of users take turns after every step, and after every attempt at one, so that neither a flood of
+users nor a parameter that nobody answers keeps the other waiting for more than one. Where our own
+are rounds that must not be torn (``own_to_end``), they run to their end, users get one step in
+between and whatever time is left.
+
+*Repetitions.* A step that nobody answered is done again as often as its courier says. Between its
+attempts others may have their turn.
+
+*Quarantine* (:mod:`.quarantine`). After a step that nobody answered, nothing is asked that the
+late answer could be mistaken for, for as long as such an answer may come. The attempts at one step
+do not wait for each other where answers say what they answer: the late one is as good. Where they
+do not (``anonymous``), nothing at all is asked, and whatever arrives meanwhile begins the silence
+anew.
+"""
+
+from collections import deque
+from collections.abc import Callable, Generator
+from enum import Enum
+import math
+from typing import Any, Generic
+
+from drive_can_bridge.protocols.courier import ANYTHING, Courier, ReplyT, StepT
+from drive_can_bridge.protocols.quarantine import Quarantine
+
+#: s that a stop waits for the answer under way, where a device has one request at a time
+STOP_PATIENCE = 0.05
+
+Done = Callable[[Any], None]
+
+
+class Lane(Enum):
+    """Who a procedure works for; the first comes first."""
+
+    STOP = 'what makes the drive stand still'
+    CONTROL = 'control word'
+    SETPOINTS = 'setpoints'
+    OWN = 'rounds, map checks and the like'
+    USERS = 'parameter services'
+
+
+class _Queue(Generic[StepT, ReplyT]):
+    """The procedures of one lane, and the step that the first of them wants done."""
+
+    __slots__ = ('_attempts', '_running', 'attempts_left', 'repeated', 'step', 'waiting')
+
+    def __init__(self, attempts: Callable[[StepT], int]) -> None:
+        self.waiting: deque[tuple[Generator[StepT, ReplyT, Any], Done]] = deque()
+        self.step: StepT | None = None
+        self.attempts_left = 0
+        self.repeated = False  # nobody answered the attempt before
+        self._running: tuple[Generator[StepT, ReplyT, Any], Done] | None = None
+        self._attempts = attempts
+
+    def fetch(self) -> StepT | None:
+        """Return the step to be done next, beginning procedures as needed."""
+        while self.step is None and self.waiting:
+            self._running = self.waiting.popleft()
+            self.resume(None)
+        return self.step
+
+    def resume(self, reply: ReplyT | None) -> None:
+        """Tell the running procedure what became of its step; None begins it."""
+        if self._running is None:
+            raise RuntimeError('no procedure to resume')
+        procedure, done = self._running
+        self.repeated = False
+        try:
+            step = procedure.send(reply)  # type: ignore[arg-type]
+        except StopIteration as stop:
+            self._running = self.step = None
+            done(stop.value)
+        else:
+            self.step = step
+            self.attempts_left = self._attempts(step)
+
+    @property
+    def idle(self) -> bool:
+        """Nothing runs and nothing waits."""
+        return self._running is None and not self.waiting
+
+    def clear(self) -> None:
+        """Forget everything."""
+        if self._running is not None:
+            self._running[0].close()
+        for procedure, _ in self.waiting:
+            procedure.close()
+        self.waiting.clear()
+        self._running = self.step = None
+
+
+class Channel(Generic[StepT, ReplyT]):
+    """
+    Runs procedures through a courier.
+
+    :param own_to_end: our own procedures do not take turns with users after every step.
+    :ivar now: ``now`` of the call being served, for whoever is called back.
+    """
+
+    def __init__(self, courier: Courier[StepT, ReplyT], *, own_to_end: bool = False) -> None:
+        self.now = -math.inf
+        self._courier = courier
+        courier.wake = self.wake
+        self._own_to_end = own_to_end
+        self._queues: dict[Lane, _Queue[StepT, ReplyT]] = {
+            lane: _Queue(courier.attempts) for lane in Lane}
+        self._users_next = False
+        self._serving: Lane | None = None  # whose step is under way
+        self._hurried = False  # and it has to make room
+        self._deadline = math.inf  # of the exchange under way, as it was at first
+        self._quarantine = Quarantine()
+        self._held_until = -math.inf
+        self._awake = False  # something may be waiting or under way
+        self._advancing = False
+
+    # -- queueing ---------------------------------------------------------------------------------
+
+    def run(self, procedure: Generator[StepT, ReplyT, Any], done: Done, now: float,
+            lane: Lane = Lane.OWN) -> None:
+        """Queue a procedure; ``done`` gets its return value."""
+        self._queues[lane].waiting.append((procedure, done))
+        self.wake(now)
+
+    def is_idle(self, lane: Lane) -> bool:
+        """Tell whether a lane has nothing to do."""
+        return self._queues[lane].idle
+
+    @property
+    def waiting_users(self) -> int:
+        """User procedures that have not begun."""
+        return len(self._queues[Lane.USERS].waiting)
+
+    def cancel(self, lane: Lane) -> None:
+        """Forget the procedures of a lane; an exchange under way is still waited for."""
+        if self._serving is lane:
+            self._expect_late()
+            self._serving = None
+            self._courier.abandon(math.inf)
+        self._queues[lane].clear()
+
+    def clear(self) -> None:
+        """
+        Forget everything under way. Nobody is told: that is the caller's business.
+
+        An answer may still be on its way. It must not meet the next question.
+        """
+        self._expect_late()
+        for queue in self._queues.values():
+            queue.clear()
+        self._courier.forget()
+        self._serving = None
+        self._hurried = self._awake = False
+
+    def make_room(self, now: float) -> None:
+        """Let a stop follow soon: the answer under way is waited for a moment only."""
+        if self._courier.busy and not self._hurried:
+            self._hurried = True
+            self._courier.abandon(now + STOP_PATIENCE)
+
+    def drop(self, now: float) -> None:
+        """Forget everything but the exchange under way, for which a stop waits a moment."""
+        for lane in Lane:
+            self.cancel(lane)
+        self.make_room(now)
+
+    def hold(self, until: float) -> None:
+        """Begin nothing before ``until``, but what stops the drive."""
+        self._held_until = until
+
+    def release(self, now: float) -> None:
+        """Go on."""
+        self._held_until = -math.inf
+        if self._awake:
+            self.advance(now)
+
+    # -- input ------------------------------------------------------------------------------------
+
+    def ended(self, reply: ReplyT, now: float) -> None:
+        """Take the reply that ended the exchange under way (the courier has matched it)."""
+        self.now = now
+        self._end(reply)
+        self.advance(now)
+
+    def disturbed(self, now: float) -> None:
+        """Take note of an answer that nobody asked for: more may follow."""
+        self._quarantine.begin(ANYTHING, now + self._courier.silence)
+
+    def wake(self, now: float) -> None:
+        """Look at everything: there is something new."""
+        self._awake = True
+        self.advance(now)
+
+    def time_lost(self, now: float) -> None:
+        """Take note that nobody listened until now: an answer may lie in some buffer."""
+        self.now = now
+        self._quarantine.time_lost(now)
+        if self._courier.busy:
+            self._deadline = max(self._deadline, now)
+            reply = self._courier.time_lost(now)
+            if reply is not False:
+                self._end(reply)  # type: ignore[arg-type]  # True is never returned
+
+    def advance(self, now: float) -> None:
+        """Do all that is possible now."""
+        self.now = now
+        if self._advancing:  # called back from below: whatever was added is seen there
+            return
+        self._advancing = True
+        try:
+            while self._awake and self._advance_once(now):
+                pass
+        finally:
+            self._advancing = False
+
+    def next_timer(self) -> float:
+        """Return when ``advance`` wants to be called."""
+        if not self._awake:
+            return math.inf
+        soonest = self._courier.express_at(self._held_until)
+        if self._courier.busy:
+            return min(soonest, self._courier.deadline)
+        if soonest < math.inf:
+            return soonest
+        for lane in self._order():
+            queue = self._queues[lane]
+            if queue.step is not None:
+                soonest = min(soonest, self._ready_at(lane, queue.step))
+                if not self._steps_aside(queue):
+                    break
+            elif queue.waiting:     # begun only when it can be done: held
+                return min(soonest, self._held_until)
+        return soonest
+
+    # -- inside -----------------------------------------------------------------------------------
+
+    def _advance_once(self, now: float) -> bool:
+        """Do the next thing; False when it cannot be done yet."""
+        courier = self._courier
+        went = courier.express(now, self._held_until)
+        if went:
+            return True
+        if courier.busy:
+            reply = courier.handle_timer(now)
+            if reply is False:
+                return False
+            self._finish(reply)  # type: ignore[arg-type]  # True is never returned
+            return True
+        if went is not None:
+            return False
+        lane = self._choose(now)
+        if lane is None:
+            self._awake = not all(queue.idle for queue in self._queues.values()) or (
+                courier.express_at(self._held_until) < math.inf)
+            return self._awake and now >= self._held_until
+        queue = self._queues[lane]
+        step = queue.step
+        if step is None:
+            raise RuntimeError('a lane without a step was chosen')
+        ready_at = self._ready_at(lane, step)
+        if now < ready_at or self._quarantined(queue) and (
+                self._quarantine.holds(courier.key(step), now, now - ready_at)):
+            return False
+        self._serving = lane
+        queue.attempts_left -= 1
+        courier.begin(step, now)
+        self._deadline = courier.deadline
+        return True
+
+    def _order(self) -> tuple[Lane, ...]:
+        """Return the lanes in the order in which they are served now."""
+        if not self._queues[Lane.STOP].idle:
+            return (Lane.STOP,)
+        if self._users_next:
+            return Lane.CONTROL, Lane.SETPOINTS, Lane.USERS, Lane.OWN
+        return Lane.CONTROL, Lane.SETPOINTS, Lane.OWN, Lane.USERS
+
+    def _choose(self, now: float) -> Lane | None:
+        """Return the lane whose step is to be done next; None when there is nothing to do."""
+        self._queues[Lane.STOP].fetch()
+        chosen: tuple[float, Lane] | None = None
+        for lane in self._order():
+            queue = self._queues[lane]
+            if lane is not Lane.STOP and now < self._held_until:
+                return None     # what is begun later tells newer things
+            step = queue.fetch()
+            if step is None:
+                continue
+            if not self._steps_aside(queue):
+                return lane
+            ready_at = self._ready_at(lane, step)
+            if chosen is None or ready_at < chosen[0]:
+                chosen = ready_at, lane
+        return None if chosen is None else chosen[1]
+
+    def _ready_at(self, lane: Lane, step: StepT) -> float:
+        """Return when the step of a lane may be done."""
+        stop = lane is Lane.STOP
+        ready = self._courier.ready_at(step, stop=stop)
+        if not stop:
+            ready = max(ready, self._held_until)
+        if self._quarantined(self._queues[lane]):
+            ready = max(ready, self._quarantine.ready_at(self._courier.key(step)))
+        return ready
+
+    def _quarantined(self, queue: _Queue[StepT, ReplyT]) -> bool:
+        """Tell whether a quarantine, if there is one, concerns the step of a queue."""
+        courier = self._courier
+        return (queue.step is not None and courier.key(queue.step) is not None
+                and (courier.anonymous or not queue.repeated))
+
+    def _steps_aside(self, queue: _Queue[StepT, ReplyT]) -> bool:
+        """Tell whether others go on while the step of this queue is in quarantine."""
+        return (not self._courier.anonymous and self._quarantined(queue)
+                and queue.step is not None
+                and self._quarantine.ready_at(self._courier.key(queue.step)) > self.now)
+
+    def _expect_late(self) -> None:
+        """Take note that the answer under way is not waited for any more."""
+        if self._serving is None or not self._courier.busy:
+            return
+        step = self._queues[self._serving].step
+        key = None if step is None else self._courier.key(step)
+        if key is not None:
+            self._quarantine.begin(key, self._deadline + self._courier.silence)
+
+    def _end(self, reply: ReplyT) -> None:
+        """End the exchange under way; what that sets in motion waits."""
+        self._advancing = True
+        try:
+            self._finish(reply)
+        finally:
+            self._advancing = False
+
+    def _finish(self, reply: ReplyT) -> None:
+        """End the exchange under way; then it is another lane's turn."""
+        lane, self._serving = self._serving, None
+        hurried, self._hurried = self._hurried, False
+        if lane is None:
+            return
+        courier, queue = self._courier, self._queues[lane]
+        step = queue.step
+        if step is None:
+            return
+        silent = courier.unanswered(step, reply)
+        key = courier.key(step)
+        if key is not None and silent:
+            self._quarantine.begin(key, self.now + courier.silence)
+        elif key is not None and queue.repeated and not courier.anonymous:
+            # it may be the answer to the attempt before
+            self._quarantine.begin(key, self._deadline + courier.silence)
+        if silent and hurried:  # it had to make room: that was no attempt
+            queue.attempts_left += 1
+        if silent and queue.attempts_left > 0:
+            queue.repeated = True
+        else:
+            queue.step = None
+            queue.resume(reply)
+        if lane is Lane.USERS:
+            self._users_next = False
+        elif lane is Lane.OWN and (not self._own_to_end or queue.step is None):
+            self._users_next = True

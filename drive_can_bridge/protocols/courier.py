@@ -1,0 +1,104 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+What does one acyclic exchange at a time, as a family does it; :mod:`.channel` does the rest.
+
+A courier knows the frames of its family, what answers what, how long answers take, and how frames
+are paced. It knows nothing of procedures, lanes, repetitions and quarantine.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Hashable
+import math
+from typing import Generic, TypeVar
+
+#: what an answer that does not say what it answers can be mistaken for
+ANYTHING: Hashable = 'anything'
+
+#: what a procedure wants done, and what it is told of it
+StepT = TypeVar('StepT')
+ReplyT = TypeVar('ReplyT')
+
+
+class Courier(ABC, Generic[StepT, ReplyT]):
+    """
+    Does one exchange at a time, as a family does it.
+
+    :ivar anonymous: answers do not say what they answer.
+    :ivar wake: to be called with the time when an exchange ended in another way than by
+        :meth:`receive` and :meth:`handle_timer`, which then tells how.
+    """
+
+    anonymous: bool = False
+    wake: Callable[[float], None]
+
+    @property
+    @abstractmethod
+    def busy(self) -> bool:
+        """An exchange is under way."""
+
+    @property
+    @abstractmethod
+    def deadline(self) -> float:
+        """When :meth:`handle_timer` wants to be called because of it; infinity: never."""
+
+    @abstractmethod
+    def begin(self, step: StepT, now: float) -> None:
+        """Begin an exchange; none is under way."""
+
+    @abstractmethod
+    def handle_timer(self, now: float) -> ReplyT | bool:
+        """Return the reply that ends the exchange under way; False: none does."""
+
+    @abstractmethod
+    def forget(self) -> None:
+        """End the exchange under way, if any, without a reply; drop what waits."""
+
+    @abstractmethod
+    def attempts(self, step: StepT) -> int:
+        """Return how often a step is done until it counts as unanswered."""
+
+    @abstractmethod
+    def unanswered(self, step: StepT, reply: ReplyT) -> bool:
+        """Tell whether a reply says that nobody answered, and a late answer may come."""
+
+    @property
+    def silence(self) -> float:
+        """How many s after its deadline an answer may still come."""
+        return 0.0
+
+    def abandon(self, until: float) -> None:
+        """Wait for the answer under way until then at most, where others have to wait for it."""
+
+    def key(self, step: StepT) -> Hashable | None:
+        """Return what a late answer to the step could be mistaken for; None: nothing."""
+        return None
+
+    def ready_at(self, step: StepT, *, stop: bool) -> float:
+        """
+        Return when a step may begin.
+
+        :param stop: it stops the drive.
+        """
+        return -math.inf
+
+    def time_lost(self, now: float) -> ReplyT | bool:
+        """
+        Take note that nobody listened until now.
+
+        :return: the reply that ends the exchange under way; False: none does.
+        """
+        return False
+
+    def express(self, now: float, held_until: float) -> bool | None:
+        """
+        Send something that is no exchange and goes before all of them.
+
+        :param held_until: nothing that does not stop the drive is sent before.
+        :return: True: something was sent; False: something waits, and nothing may begin before;
+            None: there is nothing.
+        """
+        return None
+
+    def express_at(self, held_until: float) -> float:
+        """Return when :meth:`express` wants to be called; infinity: never."""
+        return math.inf
