@@ -38,9 +38,10 @@ class Measured:
         if not self.bridge.start():
             raise SystemExit('the bridge did not start')
         self.sessions = [drive.session for drive in self.bridge.drives.values()]
-        exchange, = self.bridge.exchanges.values()
-        self._threads = {'timer': exchange._thread, 'reader': exchange.link._thread,
-                         'services': self._spinner._thread}
+        exchanges = self.bridge.exchanges.values()
+        self._threads = {'timer': [exchange._thread for exchange in exchanges],
+                         'reader': [exchange.link._thread for exchange in exchanges],
+                         'services': [self._spinner._thread]}
         self._before: dict[str, Any] = {}
 
     def clear(self) -> bool:
@@ -72,7 +73,7 @@ class Measured:
         recorder = self.bridge._flight._recorder
         answers: queue.SimpleQueue[tuple[str, str]] = queue.SimpleQueue()
         begun = time.monotonic()
-        recorder.save('main', 'bench', lambda *answer: answers.put(answer))
+        recorder.save('bus0', 'bench', lambda *answer: answers.put(answer))
         path, reason = answers.get(timeout=60.0)
         if not path:
             raise SystemExit(reason)
@@ -92,7 +93,7 @@ class Measured:
             'at': time.monotonic(), 'process': time.process_time(),
             'exchanges': sum(each.statistics.exchanges for each in self.sessions),
             'missed': sum(each.statistics.missed for each in self.sessions),
-            'cpu': {name: _cpu(thread) for name, thread in self._threads.items()},
+            'cpu': {name: sum(map(_cpu, threads)) for name, threads in self._threads.items()},
         }
 
 

@@ -52,6 +52,21 @@ def exchange_figures(found: dict[str, Any], name: str, goal: float) -> list[Figu
     ]
 
 
+def buses_figures(found: dict[str, Any]) -> list[Figure]:
+    """Two full buses."""
+    figures = []
+    for name, result in found.items():
+        held = result['exchanges_per_s'] / result['wanted']
+        figures.append(Figure(
+            f'exchanges/s held, two full buses, {name}',
+            f'{result["exchanges_per_s"]:.0f} ({result["missed"]} missed, '
+            f'{100 * result["cpu"]:.0f} % of a core, period error p99 '
+            f'{1e3 * p99(result["period_errors"]):.2f} ms)',
+            f'{result["wanted"]:.0f}', held if not result['missed'] else 0.0, 0.995,
+            at_least=True))
+    return figures
+
+
 def diy_figures(found: dict[str, Any]) -> list[Figure]:
     """Against the node of an ordinary user."""
     bridge, diy = found['bridge'], found['diy']
@@ -194,7 +209,8 @@ FIGURES: dict[str, Callable[[Any], list[Figure]]] = {
     'subscribed': lambda found: exchange_figures(found, 'subscribed', 1.5),
     'unsubscribed': lambda found: exchange_figures(found, 'nobody subscribed', 1.0),
     'ordinary': lambda found: exchange_figures(found, 'all of it at ordinary priority', 1.5),
-    'diy': diy_figures, 'latency': latency_figures, 'service': service_figures,
+    'diy': diy_figures, 'buses': buses_figures,
+    'latency': latency_figures, 'service': service_figures,
     'flood': flood_figures, 'stop': stop_figures, 'monitor': monitor_figures,
     'drives': drives_figures, 'decode': decode_figures, 'flight': flight_figures,
     'start': start_figures,

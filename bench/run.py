@@ -29,6 +29,8 @@ def plan(options: argparse.Namespace) -> dict[str, Callable[[], Any]]:
             Load(drives, period, subscribed=False), duration),
         'ordinary': lambda: scenarios.exchange(
             Load(drives, period, commands=200.0, real_time=False), duration),
+        'buses': lambda: scenarios.buses(
+            Load(2 * drives, period, commands=800.0, buses=2), duration),
         'latency': lambda: scenarios.latency(Load(drives, period), duration),
         'diy': lambda: scenarios.do_it_yourself(Load(8, 0.01, commands=100.0), duration),
         'service': lambda: scenarios.service(Load(1, 0.02, subscribed=False), 300),

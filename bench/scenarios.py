@@ -18,9 +18,11 @@ import time
 from typing import Any
 
 from child import Child, child, HERE
-from unix_bus import INTERFACE
+from unix_bus import INTERFACE, register
 from viewer import viewer
 
+from drive_can_bridge.configuration.load import configuration_from_file
+from drive_can_bridge.configuration.writing import of_one_bus, write_parameter_file
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.trace.ring import Ring
 
@@ -41,6 +43,7 @@ class Load:
     :param trace: s that the flight recorder keeps; 0: it is off.
     :param control: the drives have a control word.
     :param stuck: nobody reads the bridge's standard error.
+    :param buses: among which the drives are shared out.
     """
 
     drives: int
@@ -51,6 +54,7 @@ class Load:
     trace: float = 0.0
     control: bool = False
     stuck: bool = False
+    buses: int = 1
 
     @property
     def how(self) -> tuple[str, ...]:
@@ -63,25 +67,42 @@ class Bus:
 
     def __init__(self, stack: ExitStack, load: Load) -> None:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        self.channel = folder / 'bus'
+        self.channels = [folder / f'bus{number}' for number in range(load.buses)]
+        self.channel = self.channels[0]
         self.file = folder / 'bench.yaml'
-        lines = ['/**/drive_can_bridge:', '  ros__parameters:', '    buses:', '      main:',
-                 f'        interface: {INTERFACE}', f'        channel: {self.channel}',
-                 '        bitrate: 1000000', f'        trace_seconds: {load.trace}',
-                 f'        trace_directory: {folder}', '    drives:']
+        lines = ['/**/drive_can_bridge:', '  ros__parameters:', '    buses:']
+        for channel in self.channels:
+            lines += [f'      {channel.name}:', f'        interface: {INTERFACE}',
+                      f'        channel: {channel}', '        bitrate: 1000000',
+                      f'        trace_seconds: {load.trace}',
+                      f'        trace_directory: {folder}']
+        lines.append('    drives:')
         profile, requests, responses = HERE / 'profile.yaml', REQUESTS, RESPONSES
         if load.control:
             profile = HERE / 'profile_control.yaml'
             requests = requests.replace('digital_outputs', 'control_word')
             responses = responses.replace('digital_inputs', 'status_word')
         for number in range(load.drives):
-            lines += [f'      drive{number}:', '        bus: main',
-                      '        protocol: datamodel_extended', f'        station: {number + 1}',
+            lines += [f'      drive{number}:', f'        bus: bus{number % load.buses}',
+                      '        protocol: datamodel_extended',
+                      f'        station: {number // load.buses + 1}',
                       f'        profile: {profile}', '        rearm: immediate',
                       f'        period: {load.period}', f'        cyclic_request: [{requests}]',
                       f'        cyclic_response: [{responses}]']
         self.file.write_text('\n'.join(lines) + '\n', encoding='utf-8')
-        self.drives = stack.enter_context(child('drives.py', self.channel))
+        self.drives, *_ = [stack.enter_context(child('drives.py', channel))
+                           for channel in self.channels]
+
+    @property
+    def file_each(self) -> list[Path]:
+        """A parameter file for each bus, as ``bridge_per_bus.launch.py`` makes them."""
+        register()
+        whole = configuration_from_file(self.file)
+        files = []
+        for channel in self.channels:
+            files.append(channel.with_suffix('.yaml'))
+            write_parameter_file(of_one_bus(whole, channel.name), files[-1])
+        return files
 
 
 @contextmanager
@@ -119,6 +140,33 @@ def exchange(load: Load, duration: float, *, floor: bool = True) -> dict[str, An
             found['bridge']['process_cpu'] = bridge.cpu() - begun
             found['sleeper'] = sleeper.ask('errors')
             found['resident_mb'] = bridge.resident_mb()
+    return found
+
+
+def buses(load: Load, duration: float) -> dict[str, Any]:
+    """Measure full buses: all of them by one process, and by one process each."""
+    found: dict[str, Any] = {}
+    for name in ('one process', 'one process a bus'):
+        with ExitStack() as stack:
+            bus = Bus(stack, load)
+            subscribers(stack, load)
+            files = [bus.file] if name == 'one process' else bus.file_each
+            bridges = [stack.enter_context(child('bridge.py', file, *load.how))
+                       for file in files]
+            if load.commands:
+                stack.enter_context(child('publisher.py', 'commands', load.drives, load.commands))
+            time.sleep(SETTLE)
+            for bridge in bridges:
+                bridge.ask('clear')
+            time.sleep(duration)
+            results = [bridge.ask('result') for bridge in bridges]
+        elapsed = max(result['elapsed'] for result in results)
+        found[name] = {
+            'exchanges_per_s': sum(result['exchanges'] for result in results) / elapsed,
+            'missed': sum(result['missed'] for result in results),
+            'cpu': sum(result['process_cpu'] for result in results) / elapsed,
+            'period_errors': [error for result in results for error in result['period_errors']],
+            'wanted': load.drives / load.period}
     return found
 
 
@@ -198,6 +246,7 @@ def monitor(load: Load, duration: float, rounds: int = 4) -> dict[str, Any]:
                     for key in ('missed', 'elapsed'):
                         found[name][key] += result[key]
                     found[name]['cpu'] += result['process_cpu']
+    return found
 
 
 def stop(load: Load, calls: int, commands: float, under_way: int) -> dict[str, Any]:
