@@ -27,7 +27,7 @@ from drive_can_bridge.core.control import (
     ControlAction, ControlCompleted, ControlMachine, ControlTicket,
 )
 from drive_can_bridge.core.events import (
-    Event, FrameRejected, Noted, RequestCompleted, StationLost,
+    Event, FrameRejected, Noted, RequestCompleted, SetpointsExpired, StationFound, StationLost,
 )
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.last_sent import LastSent
@@ -451,11 +451,25 @@ class Session(ABC):
         """Return how many s lie between two cycles of a stop, or of a pulse."""
         return min(self.drive.period, STOP_SPACING_MAX)
 
+    def _be_online(self) -> None:
+        """Tell that the drive exchanges process data."""
+        self.online = self.ever_online = True
+        self._advice = ''
+        self._events.append(StationFound())
+
     def _be_offline(self, reason: str) -> None:
         """Tell that the drive is offline, if it was not."""
         if self.online:
             self.online = False
             self._events.append(StationLost(reason))
+
+    def _expire(self, now: float) -> bool:
+        """Let setpoints go neutral that no fresh command keeps; tell whether there were any."""
+        expired = self.setpoints.expire(now)
+        if expired:
+            self._events.append(SetpointsExpired(
+                tuple(setpoint.parameter.name for setpoint in expired)))
+        return bool(expired)
 
     def _reject(self, text: str) -> None:
         """Count and tell a frame of the drive that is malformed or unasked."""

@@ -27,7 +27,6 @@ LOAD_WARNING = 70.0
 COMMANDS_RECENT = 1.5
 
 
-
 @dataclass
 class Report:
     """One diagnostic status before it becomes a message; views use it as it is."""

@@ -21,7 +21,7 @@ import math
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.events import (
-    ForeignMasterSeen, Noted, ProcessDataReceived, SetpointsExpired, StationFound,
+    ForeignMasterSeen, Noted, ProcessDataReceived,
 )
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.outbox import Left
@@ -196,12 +196,8 @@ class CannordSession(Session):
     def _cycle(self, now: float) -> None:
         """Send what is due once a period. The fast path of the timer."""
         self._settle(now)
-        setpoints = self.setpoints
-        expired = setpoints.expire(now)
-        if expired:
-            self._events.append(SetpointsExpired(
-                tuple(setpoint.parameter.name for setpoint in expired)))
-        if setpoints.changed or self._machine.word != self._sent_word:
+        self._expire(now)
+        if self.setpoints.changed or self._machine.word != self._sent_word:
             self._payloads = self._encode()
         period = self.drive.period
         if self._in_pace:
@@ -415,10 +411,7 @@ class CannordSession(Session):
         self._events.append(sample)
 
     def _found(self, now: float) -> None:
-        self.online = True
-        self.ever_online = True
-        self._advice = ''
-        self._events.append(StationFound())
+        self._be_online()
         self._look_at_timeout(now)
 
     def _take_status(self, word: int, now: float) -> None:

@@ -28,7 +28,7 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlMachine
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.events import (
-    ForeignMasterSeen, ProcessDataReceived, SetpointsExpired, StationFound,
+    ForeignMasterSeen, ProcessDataReceived,
 )
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.outbox import Left
@@ -209,11 +209,8 @@ class PkwSession(Session):
     # -- online and offline -----------------------------------------------------------------------
 
     def _found(self, now: float) -> None:
-        self.online = True
-        self.ever_online = True
-        self._advice = ''
         self._node.online()
-        self._events.append(StationFound())
+        self._be_online()
         self._setpoint_writer.forget()
         if self._control_writer is not None:
             self._control_writer.forget()
@@ -270,7 +267,7 @@ class PkwSession(Session):
     # -- the round --------------------------------------------------------------------------------
 
     def _start_round(self, now: float) -> None:
-        self._expire(now)
+        self._write_expired(now)
         error = self._beat.begun(now)
         if not math.isnan(error):
             self.statistics.period_error.add(error)
@@ -353,11 +350,8 @@ class PkwSession(Session):
         elif not self._node.heartbeat_lost:
             self._advice = SILENT
 
-    def _expire(self, now: float) -> None:
-        expired = self.setpoints.expire(now)
-        if expired:
-            self._events.append(SetpointsExpired(
-                tuple(setpoint.parameter.name for setpoint in expired)))
+    def _write_expired(self, now: float) -> None:
+        if self._expire(now):
             self._setpoint_writer.look(now)
 
     # -- frames -----------------------------------------------------------------------------------
@@ -454,7 +448,7 @@ class PkwSession(Session):
             if self.control is not None and now >= self.control.next_timer():
                 self.control.handle_timer(now)
                 self._control_changed(now)
-            self._expire(now)
+            self._write_expired(now)
         self._channel.advance(now)
         if now >= self._beat.due and self._channel.is_idle(Lane.OWN):
             self._start_round(now)

@@ -24,8 +24,7 @@ import math
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.events import (
-    Event, ForeignMasterSeen, MappingDiffered, Noted, ProcessDataReceived, SetpointsExpired,
-    StationFound,
+    Event, ForeignMasterSeen, MappingDiffered, Noted, ProcessDataReceived,
 )
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.requests import BRIDGE_INACTIVE
@@ -222,13 +221,9 @@ class ExtendedSession(DataModelSession):
             self._miss(now)
             if self._next_cycle == math.inf:
                 return
-        setpoints = self.setpoints
-        expired = setpoints.expire(now)
-        if expired:
-            self._events.append(SetpointsExpired(
-                tuple(setpoint.parameter.name for setpoint in expired)))
+        self._expire(now)
         control = self.control
-        if (setpoints.changed or self._frame is None
+        if (self.setpoints.changed or self._frame is None
                 or control is not None and control.word != self._sent_word):
             self._frame = self._encode()
         self._outbox.put(self._frame, self._cycle_left)
@@ -390,10 +385,7 @@ class ExtendedSession(DataModelSession):
         self._channel.release(now)
 
     def _found(self, now: float) -> None:
-        self.online = True
-        self.ever_online = True
-        self._advice = ''
-        self._events.append(StationFound())
+        self._be_online()
         if self._by_hand is not None:
             self._by_hand.begin(now)
         self._control_changed(now)

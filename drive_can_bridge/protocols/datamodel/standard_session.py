@@ -16,7 +16,7 @@ import math
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.events import (
-    ForeignMasterSeen, ProcessDataReceived, SetpointsExpired, StationFound,
+    ForeignMasterSeen, ProcessDataReceived,
 )
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.requests import BRIDGE_INACTIVE
@@ -164,10 +164,7 @@ class StandardSession(DataModelSession):
     def _tick(self, now: float) -> None:
         """Begin a period: look what is to be written, then read."""
         if self.online:
-            expired = self.setpoints.expire(now)
-            if expired:
-                self._events.append(SetpointsExpired(
-                    tuple(setpoint.parameter.name for setpoint in expired)))
+            self._expire(now)
             self._look(now)
         error = self._beat.begun(now)
         if not self._in_round:
@@ -290,10 +287,7 @@ class StandardSession(DataModelSession):
         self._events.append(ProcessDataReceived(raws, self._received_at))
 
     def _found(self, now: float) -> None:
-        self.online = True
-        self.ever_online = True
-        self._advice = ''
-        self._events.append(StationFound())
+        self._be_online()
         self._writes.forget()
         self._look(now)
         if self._by_hand is not None:
