@@ -48,10 +48,6 @@ WAITING_REQUESTS_MAX = 64
 STOP_CYCLES = 3
 #: s of pause between them at most, however long the period is; and between those of a pulse
 STOP_SPACING_MAX = 0.1
-#: s that a cycle may be away when a stop is wanted; else it is brought forward
-STOP_WAIT_MAX = 0.025
-#: s between two cycles at least, however much a stop hurries
-CYCLE_SPACING_MIN = 0.005
 #: advice until more is known
 LOOKING = 'being looked for'
 

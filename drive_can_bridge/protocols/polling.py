@@ -85,47 +85,6 @@ def round_time(frame_bits: Iterable[int], requests: int, bitrate: int) -> float:
     return sum(frame_bits) / bitrate + requests * REQUEST_TIME
 
 
-class Beat:
-    """
-    The rhythm of the rounds: absolute deadlines a period apart.
-
-    A round that could not begin in time begins late; rounds that were missed altogether are left
-    out, and the beat is kept.
-
-    :ivar due: when the next round is to begin; infinity: never.
-    """
-
-    __slots__ = ('_began_at', 'due', 'period')
-
-    def __init__(self, period: float) -> None:
-        self.period = period
-        self.due = math.inf
-        self._began_at = math.nan
-
-    def start(self, now: float) -> None:
-        """Begin with the next round now."""
-        self.due = now
-        self._began_at = math.nan
-
-    def stop(self) -> None:
-        """Plan no further round."""
-        self.due = math.inf
-
-    def begun(self, now: float) -> float:
-        """
-        Take note that a round begins, and plan the next.
-
-        :return: distance to the previous one less the period, in s; NaN for the first.
-        """
-        error = abs(now - self._began_at - self.period)
-        self._began_at = now
-        self.due += self.period
-        soonest = now + 0.5 * self.period
-        if self.due < soonest:
-            self.due += math.ceil((soonest - self.due) / self.period) * self.period
-        return error
-
-
 class WriteSchedule:
     """
     Which setpoints have to be written: those that changed, and those not written for a while.

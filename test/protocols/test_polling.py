@@ -7,8 +7,9 @@ import math
 from hypothesis import given, strategies as st
 import pytest
 
+from drive_can_bridge.protocols.cycle_timer import CycleTimer
 from drive_can_bridge.protocols.polling import (
-    Beat, Chunk, Place, plan_reads, Round, round_time, WriteSchedule,
+    Chunk, Place, plan_reads, Round, round_time, WriteSchedule,
 )
 
 
@@ -63,7 +64,7 @@ def test_the_time_of_a_round() -> None:
 
 
 def test_rounds_keep_their_beat() -> None:
-    beat = Beat(0.02)
+    beat = CycleTimer(0.02)
     assert beat.due == math.inf
     beat.start(10.0)
     assert beat.due == 10.0
@@ -75,6 +76,25 @@ def test_rounds_keep_their_beat() -> None:
     assert beat.due == pytest.approx(10.12), 'not 10.1: no burst'
     beat.stop()
     assert beat.due == math.inf
+
+
+def test_cycles_that_stop_a_drive_are_brought_forward() -> None:
+    timer = CycleTimer(0.5)
+    timer.hurry(9.0)
+    timer.no_later(9.0)
+    assert timer.due == math.inf, 'nothing is planned'
+    timer.start(10.0)
+    timer.begun(10.0)
+    timer.hurry(10.001)
+    assert timer.due == pytest.approx(10.005), 'not in a burst'
+    assert math.isnan(timer.begun(10.005, 0.1))
+    assert timer.due == pytest.approx(10.105)
+    timer.hurry(10.09)
+    assert timer.due == pytest.approx(10.105), 'it comes soon in any case'
+    timer.no_later(10.2)
+    assert timer.due == pytest.approx(10.105)
+    timer.no_later(10.095)
+    assert timer.due == 10.095
 
 
 def test_setpoints_are_written_on_change_and_again_after_a_while() -> None:

@@ -31,7 +31,7 @@ from drive_can_bridge.core.requests import (
 )
 from drive_can_bridge.core.roles import Cells
 from drive_can_bridge.core.session import (
-    CYCLE_SPACING_MIN, Session, STOP_CYCLES, STOP_WAIT_MAX,
+    Session, STOP_CYCLES,
 )
 from drive_can_bridge.protocols.cannord import procedures
 from drive_can_bridge.protocols.cannord.channel import TaskChannel
@@ -46,6 +46,7 @@ from drive_can_bridge.protocols.cannord.process_data import (
 )
 from drive_can_bridge.protocols.cannord.states import is_faulted, STATUS_BITS, STATUS_WORD
 from drive_can_bridge.protocols.channel import Lane
+from drive_can_bridge.protocols.cycle_timer import CycleTimer
 
 NO_ANSWER = 'no answer to process data'
 #: what the inverter is told, for the books of what it was told
@@ -112,8 +113,7 @@ class CannordSession(Session):
         self._last_sample: tuple[int, ...] = ()
         self._sent_at = -math.inf
         self._answer_due = math.inf
-        self._in_pace = False  # the last cycle was a period ago: its distance says something
-        self._next_cycle = math.inf
+        self._timer = CycleTimer(drive.period)
         self._missed_in_row = 0
         self._timeout_warning = ''
         self._asking_timeout = False
@@ -139,10 +139,9 @@ class CannordSession(Session):
             self._go_idle('deactivated')
             return
         self._stopping = True
-        self._in_pace = False
         self._cycles_left = STOP_CYCLES
-        self._next_cycle = min(self._next_cycle, max(now, self._sent_at + self._stop_spacing))
-        self._hurry(now)
+        self._timer.no_later(max(now, self._timer.began_at + self._stop_spacing))
+        self._timer.hurry(now)
 
     @property
     def stopped(self) -> bool:
@@ -162,18 +161,17 @@ class CannordSession(Session):
         self._stop_awaiting()
         self._missed_in_row = 0
         self._cycling = True
-        self._in_pace = False
-        self._next_cycle = self._first_cycle(now)
+        self._timer.start(self._first_cycle(now))
         if self.told.owed:
-            self._hurry(now)
+            self._timer.hurry(now)
 
     def _first_cycle(self, now: float) -> float:
-        return max(now, self._sent_at + self.drive.period)
+        return max(now, self._timer.began_at + self.drive.period)
 
     def _go_idle(self, advice: str) -> None:
         self._cycling = self._stopping = False
         self.setpoints.allow(False)
-        self._next_cycle = math.inf
+        self._timer.stop()
         self._stop_awaiting()
         self._advice = advice
         self._be_offline(advice)
@@ -199,20 +197,11 @@ class CannordSession(Session):
         self._expire(now)
         if self.setpoints.changed or self._machine.word != self._sent_word:
             self._payloads = self._encode()
-        period = self.drive.period
-        if self._in_pace:
-            self.statistics.period_error.add(abs(now - self._sent_at - period))
-        self._in_pace = not self._stopping
-        self._sent_at = now
+        error = self._timer.begun(now, self._stop_spacing if self._stopping else None)
+        if error == error:  # not NaN
+            self.statistics.period_error.add(error)
         self._frames_out, self._whole = 0, True
         self._transmit(now)
-        if self._stopping:
-            self._next_cycle = now + self._stop_spacing
-            return
-        soonest = now + 0.5 * period
-        self._next_cycle += period
-        if self._next_cycle < soonest:  # late: leave cycles out, keep the beat, never in a burst
-            self._next_cycle += math.ceil((soonest - self._next_cycle) / period) * period
 
     def _transmit(self, now: float) -> None:
         """Hand out the frames of this cycle."""
@@ -246,25 +235,18 @@ class CannordSession(Session):
             self._machine.word_sent(now)
             if fresh or self._machine.word != self._sent_word:
                 self._control_changed(now)
-            if self._machine.pulsing and self._next_cycle > now + self._stop_spacing:
-                self._in_pace = False
-                self._next_cycle = now + self._stop_spacing
+            if self._machine.pulsing:
+                self._timer.no_later(now + self._stop_spacing)
         if self._stopping:
             self._cycles_left -= 1
             if self._cycles_left == 0:
                 self._go_idle('deactivated')
 
-    def _hurry(self, now: float) -> None:
-        """Bring the next cycle forward: it stops the drive."""
-        if math.inf > self._next_cycle > now + STOP_WAIT_MAX:
-            self._in_pace = False
-            self._next_cycle = max(now, self._sent_at + CYCLE_SPACING_MIN)
-
     def _see_to_control_word(self, now: float) -> None:
         if self._machine.stopping and not self._stopping and (
                 self._machine.word != self._sent_word
                 or self.setpoints.changed and self.told.owed):
-            self._hurry(now)
+            self._timer.hurry(now)
 
     def _encode(self) -> list[bytes]:
         self._sent_word = self._machine.word
@@ -494,7 +476,7 @@ class CannordSession(Session):
     def handle_timer(self, now: float) -> None:
         if now >= self._answer_due:
             self._settle(now)
-        if now >= self._next_cycle:
+        if now >= self._timer.due:
             self._cycle(now)
         if now >= self._machine.next_timer():
             self._machine.handle_timer(now)
@@ -503,7 +485,7 @@ class CannordSession(Session):
             self._channel.advance(now)
 
     def next_timer(self) -> float:
-        return min(self._next_cycle, self._answer_due, self._machine.next_timer(),
+        return min(self._timer.due, self._answer_due, self._machine.next_timer(),
                    self._channel.next_timer())
 
     # -- state ------------------------------------------------------------------------------------

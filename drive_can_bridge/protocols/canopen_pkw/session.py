@@ -47,7 +47,7 @@ from drive_can_bridge.protocols.canopen_pkw.notes import PacedNotes
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Layout, Message
 from drive_can_bridge.protocols.canopen_pkw.setpoint_writer import SetpointWriter
 from drive_can_bridge.protocols.channel import Lane
-from drive_can_bridge.protocols.polling import Beat
+from drive_can_bridge.protocols.cycle_timer import CycleTimer
 
 #: how often a drive is told to stand still
 STOP_ATTEMPTS = 3
@@ -107,7 +107,7 @@ class PkwSession(Session):
             for place, parameter in enumerate(self.sent.parameters)}
         self._plan = addresses.round_plan(drive)
         self._refusals: dict[Span, str] = {}
-        self._beat = Beat(drive.period)
+        self._timer = CycleTimer(drive.period)
         self._phase = Phase.IDLE
         self._missed_in_row = 0
         self._status_known = False  # it was read just now
@@ -124,7 +124,7 @@ class PkwSession(Session):
         self._fail_requests(BRIDGE_INACTIVE)
         self._withdraw(BRIDGE_INACTIVE, now)
         self._node.stop()
-        self._beat.stop()
+        self._timer.stop()
         self._channel.drop(now)
         if not was_running:
             if not self.bus_available:
@@ -199,7 +199,7 @@ class PkwSession(Session):
     def _go_idle(self, advice: str) -> None:
         self._phase = Phase.IDLE
         self._node.stop()
-        self._beat.stop()
+        self._timer.stop()
         self._channel.clear()
         self._notes.flush(self._channel.now)
         self._refusals.clear()
@@ -268,7 +268,7 @@ class PkwSession(Session):
 
     def _start_round(self, now: float) -> None:
         self._write_expired(now)
-        error = self._beat.begun(now)
+        error = self._timer.begun(now)
         if not math.isnan(error):
             self.statistics.period_error.add(error)
         self._round_began = now
@@ -433,7 +433,7 @@ class PkwSession(Session):
         free_at = self._node.free_at
         self._channel.hold(free_at)
         if not self.online and (fresh or now < free_at):
-            self._beat.start(max(now, free_at))
+            self._timer.start(max(now, free_at))
         self._channel.advance(now)
 
     # -- timer ------------------------------------------------------------------------------------
@@ -450,7 +450,7 @@ class PkwSession(Session):
                 self._control_changed(now)
             self._write_expired(now)
         self._channel.advance(now)
-        if now >= self._beat.due and self._channel.is_idle(Lane.OWN):
+        if now >= self._timer.due and self._channel.is_idle(Lane.OWN):
             self._start_round(now)
 
     def next_timer(self) -> float:
@@ -458,7 +458,7 @@ class PkwSession(Session):
         if self._phase is not Phase.RUNNING:
             return soonest
         if self._channel.is_idle(Lane.OWN):
-            soonest = min(soonest, self._beat.due)
+            soonest = min(soonest, self._timer.due)
         soonest = min(soonest, self._node.next_timer(), self._notes.next_timer())
         return soonest if self.control is None else min(soonest, self.control.next_timer())
 

@@ -29,8 +29,9 @@ from drive_can_bridge.core.events import (
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.requests import BRIDGE_INACTIVE
 from drive_can_bridge.core.session import (
-    CYCLE_SPACING_MIN, DriveState, STOP_CYCLES, STOP_WAIT_MAX,
+    DriveState, STOP_CYCLES,
 )
+from drive_can_bridge.protocols.cycle_timer import CycleTimer
 from drive_can_bridge.protocols.datamodel import extended
 from drive_can_bridge.protocols.datamodel.base_session import DataModelSession
 from drive_can_bridge.protocols.datamodel.map_supervision import MapSupervision, Verdict
@@ -92,9 +93,7 @@ class ExtendedSession(DataModelSession):
         self._sent_word: int | None = None
         self._awaiting = False
         self._forgiven = False
-        self._sent_at = -math.inf
-        self._in_pace = False  # the last cycle was a period ago: its distance says something
-        self._next_cycle = math.inf
+        self._timer = CycleTimer(drive.period)
         self._missed_in_row = 0
 
     # -- life cycle -------------------------------------------------------------------------------
@@ -106,10 +105,9 @@ class ExtendedSession(DataModelSession):
         self._stopping = cycling or self._phase is not Phase.IDLE and self.told.owed
         self._withdraw(BRIDGE_INACTIVE, now)
         if cycling:
-            self._in_pace = False
             self._cycles_left = STOP_CYCLES
-            self._next_cycle = min(self._next_cycle, max(now, self._sent_at + self._stop_spacing))
-            self._hurry(now)
+            self._timer.no_later(max(now, self._timer.began_at + self._stop_spacing))
+            self._timer.hurry(now)
             self._stop_by_writes(now, setpoints=False)
         elif self._stopping:
             self._phase = Phase.STOPPING
@@ -145,7 +143,7 @@ class ExtendedSession(DataModelSession):
             self._stop_by_writes(now, setpoints=self._verify)
         if self._verify:
             self._phase = Phase.CHECKING
-            self._next_cycle = math.inf
+            self._timer.stop()
             self._maps.look_afresh(now)
         else:
             self._start_cycling(now)
@@ -156,7 +154,7 @@ class ExtendedSession(DataModelSession):
         self._cycles_left = -1
         self.setpoints.allow(False)
         self._clear_channel()
-        self._next_cycle = math.inf
+        self._timer.stop()
         self._stop_awaiting()
         self._advice = advice
         self._be_offline(advice)
@@ -184,10 +182,10 @@ class ExtendedSession(DataModelSession):
                 self._stop_by_writes(now, setpoints=not by_cycles)
             if by_cycles:
                 if self._phase is not Phase.LEAVING:
-                    self._start_leaving(max(now, self._sent_at + self._stop_spacing))
+                    self._start_leaving(max(now, self._timer.began_at + self._stop_spacing))
             else:
                 self._phase = Phase.DIFFERS
-                self._next_cycle = math.inf
+                self._timer.stop()
         elif self._phase is Phase.LEAVING:
             self._maps.look_at = math.inf  # that comes after the last neutral cycle
         elif self._phase is Phase.CYCLIC:  # there, the cyclic answers tell who is there
@@ -210,16 +208,15 @@ class ExtendedSession(DataModelSession):
         self._phase = Phase.CYCLIC
         self._cycles_left = -1
         self._forgiven = False
-        self._in_pace = False
         self._missed_in_row = 0
-        self._next_cycle = self._next_turn(max(now, self._sent_at + self.drive.period))
+        self._timer.start(self._next_turn(max(now, self._timer.began_at + self.drive.period)))
         self._advice = 'no cyclic response: drive silent or response identifier taken'
 
     def _cycle(self, now: float) -> None:
         """Send one cyclic request. The fast path of the timer."""
         if self._awaiting:
             self._miss(now)
-            if self._next_cycle == math.inf:
+            if self._timer.due == math.inf:
                 return
         self._expire(now)
         control = self.control
@@ -227,20 +224,11 @@ class ExtendedSession(DataModelSession):
                 or control is not None and control.word != self._sent_word):
             self._frame = self._encode()
         self._outbox.put(self._frame, self._cycle_left)
-        period = self.drive.period
-        if self._in_pace:
-            self.statistics.period_error.add(abs(now - self._sent_at - period))
-        self._in_pace = not self._stopping
+        error = self._timer.begun(now, self._stop_spacing if self._cycles_left >= 0 else None)
+        if error == error:  # not NaN
+            self.statistics.period_error.add(error)
         self._awaiting = True
-        self._sent_at = now
-        soonest = now + 0.5 * period
-        self._channel.hold(soonest)
-        if self._cycles_left >= 0:
-            self._next_cycle = now + self._stop_spacing
-            return
-        self._next_cycle += period
-        if self._next_cycle < soonest:  # late: leave cycles out, keep the beat, never in a burst
-            self._next_cycle += math.ceil((soonest - self._next_cycle) / period) * period
+        self._channel.hold(now + 0.5 * self.drive.period)
 
     def _cycle_left(self, sent: bool, now: float) -> None:
         """Take note of a cyclic request that left; what the bus refused does not count."""
@@ -257,13 +245,12 @@ class ExtendedSession(DataModelSession):
             control.word_sent(now)
             if fresh or control.word != self._sent_word:
                 self._control_changed(now)
-            if control.pulsing and self._next_cycle > now + self._stop_spacing:
-                self._in_pace = False
-                self._next_cycle = now + self._stop_spacing
+            if control.pulsing:
+                self._timer.no_later(now + self._stop_spacing)
         if self._cycles_left > 0:  # the last cycles before silence
             self._cycles_left -= 1
             if self._cycles_left == 0 and (self._stopping or self._differs):
-                self._next_cycle = math.inf
+                self._timer.stop()
                 if not self._stopping:
                     self._stop_awaiting()
                     self._phase = Phase.DIFFERS
@@ -278,13 +265,7 @@ class ExtendedSession(DataModelSession):
         """Send the last cycles to a drive that is to be left alone."""
         self._phase = Phase.LEAVING
         self._cycles_left = STOP_CYCLES
-        self._next_cycle = first
-
-    def _hurry(self, now: float) -> None:
-        """Bring the next cycle forward: it stops the drive."""
-        if math.inf > self._next_cycle > now + STOP_WAIT_MAX:
-            self._in_pace = False
-            self._next_cycle = max(now, self._sent_at + CYCLE_SPACING_MIN)
+        self._timer.start(first)
 
     def _encode(self) -> Frame:
         raws = [setpoint.raw for setpoint in self.setpoints.items]
@@ -321,7 +302,7 @@ class ExtendedSession(DataModelSession):
         if owed:  # of the word that has no slot; setpoints go neutral with the next cycles
             self._stop_by_writes(now, setpoints=False)
         if self._verify:  # it may still be listening, before it is left alone
-            self._start_leaving(self._next_cycle)
+            self._start_leaving(self._timer.due)
 
     def _stop_awaiting(self) -> None:
         """Expect no answer any more; one that is on its way is no surprise, though."""
@@ -369,7 +350,7 @@ class ExtendedSession(DataModelSession):
         self._awaiting = False
         self._missed_in_row = 0
         statistics.exchanges += 1
-        latency = received_at - self._sent_at
+        latency = received_at - self._timer.began_at
         statistics.latency.add(latency if latency > 0.0 else 0.0)
         if not self.online and not self._stopping:
             if self._phase is Phase.LEAVING:
@@ -393,7 +374,7 @@ class ExtendedSession(DataModelSession):
     # -- timer ------------------------------------------------------------------------------------
 
     def handle_timer(self, now: float) -> None:
-        if now >= self._next_cycle:
+        if now >= self._timer.due:
             self._cycle(now)
         if now >= self._maps.look_at:
             self._maps.look(now)
@@ -402,7 +383,7 @@ class ExtendedSession(DataModelSession):
             self._channel.advance(now)
 
     def next_timer(self) -> float:
-        return min(self._next_cycle, self._channel.next_timer(), self._maps.look_at,
+        return min(self._timer.due, self._channel.next_timer(), self._maps.look_at,
                    self._control_timer())
 
     def _see_to_control_word(self, now: float) -> None:
@@ -413,7 +394,7 @@ class ExtendedSession(DataModelSession):
             self._by_hand.update(now)
         if control.stopping and (self.setpoints.changed or (
                 self._control_slot is not None and control.word != self._sent_word)):
-            self._hurry(now)
+            self._timer.hurry(now)
 
     @property
     def warning(self) -> str:

@@ -20,12 +20,13 @@ from drive_can_bridge.core.events import (
 )
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.requests import BRIDGE_INACTIVE
+from drive_can_bridge.protocols.cycle_timer import CycleTimer
 from drive_can_bridge.protocols.datamodel import standard
 from drive_can_bridge.protocols.datamodel.base_session import DataModelSession
 from drive_can_bridge.protocols.datamodel.channel import Polling, Procedure, Read, Write
 from drive_can_bridge.protocols.datamodel.safe_stop import ANSWER_TIME, ATTEMPTS
 from drive_can_bridge.protocols.datamodel.standard_round import places, reads
-from drive_can_bridge.protocols.polling import Beat, Chunk, Round, WriteSchedule
+from drive_can_bridge.protocols.polling import Chunk, Round, WriteSchedule
 
 SILENT = 'no answer to reads: drive silent, wrong station, bit rate or identifier mode'
 
@@ -61,7 +62,7 @@ class StandardSession(DataModelSession):
             <= self._places[self._status_slot].address < chunk.address + chunk.size)
         self._writes = WriteSchedule(len(drive.cyclic_request), options.refresh_interval)
         self._phase = Phase.IDLE
-        self._beat = Beat(drive.period)
+        self._timer = CycleTimer(drive.period)
         self._in_round = False
         self._void = False  # this round began before the process stood still
         self._round_began = -math.inf
@@ -84,7 +85,7 @@ class StandardSession(DataModelSession):
             self._phase = Phase.STOPPING
         self._withdraw(BRIDGE_INACTIVE, now)
         if stop:
-            self._beat.stop()
+            self._timer.stop()
             self._writes.forget()
             self._stop_by_writes(now)
         if not self._safe_stop.running:
@@ -110,7 +111,7 @@ class StandardSession(DataModelSession):
         self._channel.time_lost(now)
         if self._phase is Phase.POLLING:
             self._lose('the bridge stood still', now)
-            self._beat.start(now)
+            self._timer.start(now)
 
     def _begin(self, now: float) -> None:
         """Start over: nothing is known of the drive."""
@@ -118,7 +119,7 @@ class StandardSession(DataModelSession):
         self._advice, self._gap = SILENT, ''
         self._phase = Phase.POLLING
         self._missed_in_row = 0
-        self._beat.start(now)
+        self._timer.start(now)
 
     def _lose(self, reason: str, now: float) -> None:
         was_online = self.online
@@ -130,7 +131,7 @@ class StandardSession(DataModelSession):
 
     def _go_idle(self, advice: str) -> None:
         self._phase = Phase.IDLE
-        self._beat.stop()
+        self._timer.stop()
         self._writes.forget()
         self.setpoints.allow(False)
         self._clear_channel()
@@ -145,7 +146,7 @@ class StandardSession(DataModelSession):
     # -- the beat ---------------------------------------------------------------------------------
 
     def handle_timer(self, now: float) -> None:
-        if now >= self._beat.due:
+        if now >= self._timer.due:
             self._tick(now)
         if now >= self._pulse_at and self._control_slot is not None:
             self._pulse_at = math.inf
@@ -157,7 +158,7 @@ class StandardSession(DataModelSession):
             self._channel.advance(now)
 
     def next_timer(self) -> float:
-        soonest = min(self._beat.due, self._pulse_at, self._channel.next_timer(),
+        soonest = min(self._timer.due, self._pulse_at, self._channel.next_timer(),
                       self._control_timer())
         return min(soonest, self._channel.courier.free_at) if self._writes.waiting else soonest
 
@@ -166,7 +167,7 @@ class StandardSession(DataModelSession):
         if self.online:
             self._expire(now)
             self._look(now)
-        error = self._beat.begun(now)
+        error = self._timer.begun(now)
         if not self._in_round:
             if not math.isnan(error):
                 self.statistics.period_error.add(error)
