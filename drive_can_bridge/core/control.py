@@ -53,6 +53,9 @@ seldom: so the word leaves :data:`RESET_CYCLES` times, and whoever sends it lets
 between them (:attr:`~ControlMachine.pulsing`). Where a write is acknowledged, one is enough. The
 pulse is the same whether or not the fault goes meanwhile; what counts is the status after it.
 
+*Several drives with one control word.* What a status has to confirm, all of them have to
+(:mod:`.status_reports`). ENABLE wants all of them to be there, and ends when one is lost.
+
 *A drive that takes no notice.* A word that is written when it changes may get lost on the way.
 :attr:`~ControlMachine.unconfirmed` tells the session that the drive, by what it reports since,
 does not do as the word says: then the word is written again. A drive that goes on running under
@@ -61,11 +64,13 @@ that says that it refuses the word (:meth:`~ControlMachine.word_refused`) ends w
 with its reason.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 import math
 
 from drive_can_bridge.core.profile import ControlTable, StatusPattern
+from drive_can_bridge.core.status_reports import StatusReports, Wording
 
 
 class ControlAction(Enum):
@@ -124,11 +129,13 @@ class ControlMachine:
 
     :param timeout: seconds until an unconfirmed request fails.
     :param pulse: how often the reset word leaves.
+    :param members: names of the drives, where several share the control word.
+    :param wording: what the family knows of status words.
     :ivar table: the words and conditions.
     """
 
-    def __init__(self, table: ControlTable, *, timeout: float,
-                 pulse: int = RESET_CYCLES) -> None:
+    def __init__(self, table: ControlTable, *, timeout: float, pulse: int = RESET_CYCLES,
+                 members: Sequence[str] = (), wording: Wording | None = None) -> None:
         self.table = self._table = table
         self._timeout = timeout
         self._pulse = pulse
@@ -141,11 +148,10 @@ class ControlMachine:
             self._words[ControlAction.QUICK_STOP] = table.quick_stop
         if table.reset_fault is not None:
             self._words[ControlAction.RESET_FAULT] = table.reset_fault
-        self._reports = any((table.ready, table.enabled, table.fault))
+        self._reports = StatusReports(table, members)
+        self._wording = wording
         self._sending = ControlAction.DISABLE   # by name: two words may have the same bits
         self._sent = False                      # the current word left at least once
-        self._raw: int | None = None            # the last status word
-        self._answer: int | None = None         # the last one since the current word left
         self._fault: bool | None = None         # None: not known
         self._reached = False                   # enabled was confirmed for this enable word
         self._runs_on_since = math.inf          # under disable; told when it lasts
@@ -195,16 +201,18 @@ class ControlMachine:
         condition for ready), ``enable sent`` and the like (where the drive does not report), or
         ``unknown``.
         """
-        table = self._table
-        if self._reports and self._raw is None:
+        if self._wording is not None:
+            return self._reports.states(self._wording.state)
+        table, says = self._table, self._reports.says
+        if any((table.ready, table.enabled, table.fault)) and self._reports.telling is None:
             return 'unknown'
-        if self._says(table.fault):
+        if says(table.fault):
             return 'fault'
-        if self._says(table.enabled):
+        if says(table.enabled):
             return 'enabled'
         if table.ready is not None and (
                 table.enabled is not None or self._sending is ControlAction.DISABLE):
-            return 'ready' if self._says(table.ready) else 'not ready'
+            return 'ready' if says(table.ready) else 'not ready'
         if table.enabled is not None:
             return 'disabled'
         return f'{self._sending.value} sent' if self._sent else 'unknown'
@@ -222,10 +230,10 @@ class ControlMachine:
     @property
     def unconfirmed(self) -> bool:
         """The drive has reported since the current word left, but not what the word wants."""
-        if not self._sent or self._answer is None:
+        if not self._sent or not self._reports.answered:
             return False
         if self._sending is ControlAction.DISABLE:
-            return self._still_on()
+            return self._reports.running_on
         # what the drive does not report at all, it cannot confirm; and a pulse has its own end
         return self.pending and not self.pulsing and self._table.enabled is not None
 
@@ -250,6 +258,10 @@ class ControlMachine:
         """Ask for something; the outcome may be there when this returns."""
         self.handle_timer(now)
         ticket = ControlTicket(action)
+        missing = self._reports.missing if action is ControlAction.ENABLE else ()
+        if missing:
+            self._complete(ticket, False, f'{", ".join(missing)} offline')
+            return ticket
         if action not in self._words and self._nothing_to_do(action):
             under_way = self._operation
             if action is ControlAction.QUICK_STOP and under_way is not None and (
@@ -293,21 +305,38 @@ class ControlMachine:
         self.handle_timer(now)
         self._advance()
 
-    def status_received(self, raw: int | None, now: float) -> None:
+    def status_received(self, raw: int | None, now: float, member: str = '') -> None:
         """
         Take a status word.
 
         :param raw: None when a response arrived that should hold a status word, but did not.
+        :param member: whose it is, where several drives share the control word.
         """
         self.handle_timer(now)
-        self._raw = raw
-        if self._sent:
-            self._answer = raw
-        if raw is not None:
+        if self._reports.take(member, raw, counts=self._sent) and raw is not None:
             self._watch_fault(raw)
             self._watch_enabled(raw)
             self._advance()
             self._watch_disabled(now)
+
+    def member_found(self, name: str) -> None:
+        """Take note that a member is online."""
+        self._reports.find(name)
+
+    def member_lost(self, name: str) -> None:
+        """Take note that a member is offline. The others do not run without it."""
+        if not self._reports.lose(name):
+            return
+        self._fault = None if self._fault is None else self._reports.faulted
+        under_way = self._operation
+        if self._reached or (
+                under_way is not None and under_way.action is ControlAction.ENABLE):
+            text = f'{name} offline'
+            if self._reached:
+                self._notes.append(f'enable withdrawn: {text}; only ~/enable starts the group '
+                                   'again')
+            self._end(False, text)
+        self._advance()
 
     def word_refused(self, word: int, reason: str, now: float) -> None:
         """
@@ -340,7 +369,7 @@ class ControlMachine:
             self._notes.append(f'enable withdrawn: {reason}; only ~/enable starts the drive again')
         self._end(False, reason)
         self._sent = False
-        self._raw = self._answer = None
+        self._reports.forget()
         self._forget_disregard()
         if not self._fault:         # a known fault stands until the drive says otherwise
             self._fault = None
@@ -388,7 +417,7 @@ class ControlMachine:
                 if self._pulses_left <= 0:
                     under_way.pulsed = True
                     self._send(ControlAction.DISABLE)
-            elif not under_way.pulsed and self._confirmed_resettable():
+            elif not under_way.pulsed and self._resettable():
                 self._pulses_left = self._pulse
                 self._send(ControlAction.RESET_FAULT)
             elif self._confirmed(table.fault, False):
@@ -405,17 +434,20 @@ class ControlMachine:
         """Note a fault that comes or goes; it ends everything but stops and resets."""
         if self._table.fault is None:
             return
-        had_fault, self._fault = self._fault, self._table.fault.matches(raw)
+        fault = self._table.fault.matches(raw)
+        if not fault and self._reports.faulted:
+            return      # rid of it when the last of them is
+        had_fault, self._fault = self._fault, fault
         if not self._fault:
             if had_fault:
-                self._notes.append(f'fault gone ({self._status_text})')
+                self._notes.append(f'fault gone ({self._reports.text})')
             return
         if not had_fault:
             again = '; only ~/enable starts the drive again' if self._reached else ''
-            self._notes.append(f'fault ({self._status_text}){again}')
+            self._notes.append(f'fault ({self._reports.text}){again}')
         under_way = self._operation
         if under_way is not None and under_way.action is ControlAction.ENABLE:
-            self._end(False, f'fault while enabling ({self._status_text}): reset it first')
+            self._end(False, f'fault while enabling ({self._reports.text}): reset it first')
         elif self._sending is not ControlAction.RESET_FAULT:
             self._send(ControlAction.DISABLE)
 
@@ -423,21 +455,21 @@ class ControlMachine:
         """Withdraw the enable word from a drive that dropped out by itself."""
         enabled = self._table.enabled
         if self._reached and enabled is not None and not enabled.matches(raw):
-            text = f'no longer enabled, by itself ({self._status_text})'
+            text = f'no longer enabled, by itself ({self._reports.text})'
             self._notes.append(f'{text}; only ~/enable starts the drive again')
             self._end(False, text)
 
     def _watch_disabled(self, now: float) -> None:
         """Tell of a drive that runs on although its control word is ``disable``."""
         if (self._sending is not ControlAction.DISABLE or not self._sent or self._fault
-                or not self._still_on()):
+                or not self._reports.running_on):
             self._forget_disregard()
             return
         self._runs_on_since = min(self._runs_on_since, now)
         # whoever asked for the stop waits for so long, ramps included
         longest = max(RUNNING_ON_MAX, self._timeout)
         if not self._disregard and now - self._runs_on_since > longest:
-            self._disregard = (f'still {self.state} ({self._status_text}) although its control '
+            self._disregard = (f'still {self.state} ({self._reports.text}) although its control '
                                f'word is disable ({self.word:04X}h): stop it by other means, or '
                                f'set a control_timeout longer than its ramp')
             self._notes.append(self._disregard)
@@ -452,28 +484,17 @@ class ControlMachine:
         return (self._sending in (ControlAction.ENABLE, ControlAction.QUICK_STOP)
                 or not self._confirmed_off())
 
-    def _says(self, pattern: StatusPattern | None) -> bool:
-        """Tell whether the last status word fulfils a condition."""
-        return pattern is not None and self._raw is not None and pattern.matches(self._raw)
-
     def _confirmed(self, pattern: StatusPattern | None, wanted: bool) -> bool:
         """Tell whether the drive, knowing the current word, reports a condition (or cannot)."""
-        if pattern is None:
-            return self._sent
-        return self._answer is not None and pattern.matches(self._answer) is wanted
+        return self._sent if pattern is None else self._reports.confirmed(pattern, wanted)
 
     def _confirmed_off(self) -> bool:
         """Tell whether the drive, knowing the current word, reports that it does not run."""
-        return self._confirmed(self._table.enabled, False)
+        return self._sent if self._table.enabled is None else self._reports.standing
 
-    def _still_on(self) -> bool:
-        """Tell whether the drive, knowing the current word, reports that it runs."""
-        return (self._table.enabled is not None and self._answer is not None
-                and not self._confirmed_off())
-
-    def _confirmed_resettable(self) -> bool:
+    def _resettable(self) -> bool:
         """Tell whether the drive, knowing ``disable``, reports a fault that can be reset."""
-        return self._confirmed(self._table.fault, True)
+        return self._sent if self._table.fault is None else self._reports.resettable
 
     # -- effects ----------------------------------------------------------------------------------
 
@@ -481,7 +502,7 @@ class ControlMachine:
         """Make the word of this name the current one."""
         if self._words[action] != self.word:
             self._sent = False
-            self._answer = None
+            self._reports.forget_answers()
             self._forget_disregard()
         self._sending = action
         self._reached = self._reached and action is ControlAction.ENABLE
@@ -505,10 +526,6 @@ class ControlMachine:
 
     # -- words ------------------------------------------------------------------------------------
 
-    @property
-    def _status_text(self) -> str:
-        return 'no status word' if self._raw is None else f'status word {self._raw:04X}h'
-
     def _success_text(self) -> str:
         """Name the state reached, or say that nobody knows."""
         if self._table.enabled is None:
@@ -516,16 +533,21 @@ class ControlMachine:
         return self.state
 
     def _overdue_text(self) -> str:
-        """Say where the drive is stuck."""
+        """Say where the drive is stuck, and what usually keeps one there."""
+        raw = self._reports.telling
+        hint = '' if self._wording is None or raw is None else self._wording.hint(raw)
+        return f'{self._stuck_text()}{hint}'
+
+    def _stuck_text(self) -> str:
         under_way = self._operation
-        if under_way is not None and under_way.pulsed and self._answer is not None:
-            return f'fault still present after {self._timeout:g} s ({self._status_text})'
+        if under_way is not None and under_way.pulsed and self._reports.answered:
+            return f'fault still present after {self._timeout:g} s ({self._reports.text})'
         text = (f'no confirmation in {self._timeout:g} s: '
-                f'stuck in state {self.state} ({self._status_text})')
+                f'stuck in state {self.state} ({self._reports.text})')
         if not self._sent:
             return f'{text}; control word {self.word:04X}h could not be sent'
-        if self._answer is None:
+        if not self._reports.answered:
             return f'{text}; no status word since control word {self.word:04X}h'
-        if self._says(self._table.enabled):
+        if self._reports.says(self._table.enabled):
             return f'{text}; it does not follow control word {self.word:04X}h'
         return text

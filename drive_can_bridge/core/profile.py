@@ -29,6 +29,8 @@ class ControlTable:
     :param quick_stop: None where the drive has none.
     :param reset_fault: None where the drive has none.
     :param status_parameter: name of the parameter that carries the status word, or None.
+    :param running: the drive does not stand still yet; None: the same as ``enabled``.
+    :param reaction: there is a fault, but it cannot be reset yet; None: it always can.
     """
 
     parameter: str
@@ -40,6 +42,8 @@ class ControlTable:
     ready: StatusPattern | None = None
     enabled: StatusPattern | None = None
     fault: StatusPattern | None = None
+    running: StatusPattern | None = None
+    reaction: StatusPattern | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,14 +17,14 @@ from collections.abc import Sequence
 import math
 
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.control import ControlAction, ControlTicket
+from drive_can_bridge.core.control import ControlAction, ControlMachine, ControlTicket
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.requests import BRIDGE_INACTIVE
 from drive_can_bridge.core.session import STOP_CYCLES
 from drive_can_bridge.core.setpoints import Setpoints
 from drive_can_bridge.protocols.cannord.broadcast import broadcast_identifier
-from drive_can_bridge.protocols.cannord.control import CannordControl, GroupControl
+from drive_can_bridge.protocols.cannord.control import make_control
 from drive_can_bridge.protocols.cannord.session import CannordSession, values_needed
 
 
@@ -46,7 +46,7 @@ def make_group(drives: Sequence[DriveConfiguration]) -> 'list[GroupSession]':
 class GroupSession(CannordSession):
     """What leader and members share: frames of a foreign master on the broadcast identifier."""
 
-    def __init__(self, drive: DriveConfiguration, control: CannordControl | None = None, *,
+    def __init__(self, drive: DriveConfiguration, control: ControlMachine | None = None, *,
                  places: int) -> None:
         super().__init__(drive, control, places=places)
         self._broadcast = broadcast_identifier(drive) or 0
@@ -67,9 +67,9 @@ class LeaderSession(GroupSession):
 
     def __init__(self, drives: Sequence[DriveConfiguration], *, places: int) -> None:
         own = drives[0]
-        self._group = GroupControl(
-            [drive.name for drive in drives],
-            parameter_set=own.options.parameter_set, timeout=own.control_timeout)
+        self._group = make_control(
+            parameter_set=own.options.parameter_set, timeout=own.control_timeout,
+            members=[drive.name for drive in drives])
         super().__init__(own, self._group, places=places)
         self.members: list[GroupSession] = [self]
         self._turn = 0
@@ -115,7 +115,7 @@ class LeaderSession(GroupSession):
 
     def member_status(self, name: str, word: int, now: float) -> None:
         """Take the status word of an inverter of the group."""
-        self._group.member_status(name, word, now)
+        self._group.status_received(word, now, name)
         self._control_changed(now)
 
     def _found(self, now: float) -> None:

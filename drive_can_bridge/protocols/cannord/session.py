@@ -19,6 +19,7 @@ data beside them: lower identifiers win on the bus.
 import math
 
 from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.control import ControlMachine
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.events import (
     ForeignMasterSeen, Noted, ProcessDataReceived,
@@ -35,7 +36,7 @@ from drive_can_bridge.core.session import (
 )
 from drive_can_bridge.protocols.cannord import procedures
 from drive_can_bridge.protocols.cannord.channel import TaskChannel
-from drive_can_bridge.protocols.cannord.control import CannordControl
+from drive_can_bridge.protocols.cannord.control import make_control
 from drive_can_bridge.protocols.cannord.identifiers import identifier, MessageObject
 from drive_can_bridge.protocols.cannord.monitoring import (
     TIMEOUT_NUMBER, timeout_parameter, timeout_warning,
@@ -74,10 +75,10 @@ class CannordSession(Session):
     :param places: how many values the frames to and from the inverter hold at least.
     """
 
-    def __init__(self, drive: DriveConfiguration, control: CannordControl | None = None, *,
+    def __init__(self, drive: DriveConfiguration, control: ControlMachine | None = None, *,
                  places: int = 0) -> None:
         options = drive.options
-        self._machine = control or CannordControl(
+        self._machine = control or make_control(
             parameter_set=options.parameter_set, timeout=drive.control_timeout)
         super().__init__(drive, self._machine)
         self._extended: bool = options.extended_identifiers

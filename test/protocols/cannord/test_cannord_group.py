@@ -22,7 +22,7 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.session import DriveState, Session
 from drive_can_bridge.core.setpoints import CommandOutcome
 from drive_can_bridge.exchange.exchange import BusExchange
-from drive_can_bridge.protocols.cannord.control import GroupControl
+from drive_can_bridge.protocols.cannord.control import make_control
 from drive_can_bridge.protocols.families import FAMILIES, make_sessions
 
 ENABLE, DISABLE = ControlAction.ENABLE, ControlAction.DISABLE
@@ -766,13 +766,13 @@ def test_the_same_word_means_the_same_everywhere() -> None:
 
 def test_members_that_have_not_answered_yet_do_not_run_on() -> None:
     """They are polled in turn: in a large group that takes longer than any stop."""
-    control = GroupControl(['a', 'b', 'c'], parameter_set=1, timeout=2.0)
+    control = make_control(parameter_set=1, timeout=2.0, members=['a', 'b', 'c'])
     for name in ('a', 'b', 'c'):
         control.member_found(name)
     control.word_sent(0.0)
     for step in range(10):
-        control.member_status('a', 0x0B31, 0.1 + 0.5 * step)
+        control.status_received(0x0B31, 0.1 + 0.5 * step, 'a')
         assert control.disregard == ''
     for step in range(10, 20):
-        control.member_status('b', 0x0F37, 0.1 + 0.5 * step)
+        control.status_received(0x0F37, 0.1 + 0.5 * step, 'b')
     assert 'although its control word is disable (047Eh)' in control.disregard

@@ -1,0 +1,167 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+What the drives behind one control word report, and what follows from all of it together.
+
+A drive that is addressed by itself is a set of one; the drives of a broadcast group are several.
+What they confirm, all of them have to confirm; a fault, or an output that is on, is enough in one.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from drive_can_bridge.core.profile import ControlTable, StatusPattern
+
+
+@dataclass(slots=True)
+class _Member:
+    """What is known of one drive."""
+
+    raw: int | None = None      # the last status word
+    answer: int | None = None   # the last one since the current control word left
+
+
+@dataclass(frozen=True)
+class Wording:
+    """
+    How status words are put in words where the family knows more than the table.
+
+    :param state: (status word) -> state.
+    :param hint: (status word) -> what keeps the drive in that state, '' for nothing.
+    """
+
+    state: Callable[[int], str]
+    hint: Callable[[int], str]
+
+
+class StatusReports:
+    """
+    The status words of a set of drives that share a control word.
+
+    :param members: their names; one drive alone has no name, and is always there.
+    """
+
+    def __init__(self, table: ControlTable, members: Sequence[str] = ()) -> None:
+        self._table = table
+        self._members = members
+        self._present = {} if members else {'': _Member()}
+        self._running = table.running or table.enabled
+
+    # -- inputs -----------------------------------------------------------------------------------
+
+    def find(self, name: str) -> None:
+        """Take note that a member is online."""
+        self._present[name] = _Member()
+
+    def lose(self, name: str) -> bool:
+        """Take note that a member is offline; tell whether it was not."""
+        return self._present.pop(name, None) is not None
+
+    def take(self, name: str, raw: int | None, *, counts: bool) -> bool:
+        """
+        Take a status word.
+
+        :param raw: None where a response arrived that should hold one, but did not.
+        :param counts: it arrived after the current control word had left.
+        :return: False: the member is not there.
+        """
+        member = self._present.get(name)
+        if member is None:
+            return False
+        member.raw = raw
+        if counts:
+            member.answer = raw
+        return True
+
+    def forget_answers(self) -> None:
+        """Take note that the control word has changed."""
+        for member in self._present.values():
+            member.answer = None
+
+    def forget(self) -> None:
+        """Take note that nothing is known any more."""
+        for member in self._present.values():
+            member.raw = member.answer = None
+
+    # -- what they say ----------------------------------------------------------------------------
+
+    @property
+    def missing(self) -> list[str]:
+        """The members that are not there."""
+        return [name for name in self._members if name not in self._present]
+
+    @property
+    def answered(self) -> bool:
+        """One of them has reported since the current control word left."""
+        return any(member.answer is not None for member in self._present.values())
+
+    @property
+    def telling(self) -> int | None:
+        """The status word that says most: of a fault, else of whoever lags behind."""
+        raws = [member.raw for member in self._present.values() if member.raw is not None]
+        faults = [raw for raw in raws if _matches(self._table.fault, raw)]
+        behind = [raw for raw in raws if not _matches(self._running, raw)]
+        return next(iter((*faults, *behind, *raws)), None)
+
+    @property
+    def faulted(self) -> bool:
+        """One of them reports a fault, as far as is known."""
+        return any(member.raw is not None and _matches(self._table.fault, member.raw)
+                   for member in self._present.values())
+
+    def says(self, pattern: StatusPattern | None) -> bool:
+        """Tell whether the status word that says most fulfils a condition."""
+        raw = self.telling
+        return raw is not None and _matches(pattern, raw)
+
+    def confirmed(self, pattern: StatusPattern, wanted: bool) -> bool:
+        """Tell whether all, knowing the current word, report a condition, or that it is not so."""
+        return self._all(lambda answer: pattern.matches(answer) is wanted)
+
+    @property
+    def standing(self) -> bool:
+        """All of them, knowing the current word, report that they do not run."""
+        return self._running is not None and self.confirmed(self._running, False)
+
+    @property
+    def running_on(self) -> bool:
+        """One of them, knowing the current word, reports that it runs."""
+        # they may answer in turn: who has not answered yet says nothing
+        return any(member.answer is not None and _matches(self._running, member.answer)
+                   for member in self._present.values())
+
+    @property
+    def resettable(self) -> bool:
+        """There is a fault, and all of them, knowing the current word, can have it reset."""
+        table = self._table
+        return (self._all(lambda answer: not _matches(table.reaction, answer))
+                and any(_matches(table.fault, member.answer)
+                        for member in self._present.values() if member.answer is not None))
+
+    def _all(self, condition: Callable[[int], bool]) -> bool:
+        return bool(self._present) and all(
+            member.answer is not None and condition(member.answer)
+            for member in self._present.values())
+
+    # -- in words ---------------------------------------------------------------------------------
+
+    @property
+    def text(self) -> str:
+        """The last status words."""
+        if not self._members:
+            raw = self.telling
+            return 'no status word' if raw is None else f'status word {raw:04X}h'
+        words = [f'{name} {"unknown" if member.raw is None else f"{member.raw:04X}h"}'
+                 for name, member in self._present.items()]
+        return f'status words: {", ".join(words)}' if words else 'no status word'
+
+    def states(self, state_of: Callable[[int], str]) -> str:
+        """Return the common state of all, or the states of all by name."""
+        states = {name: 'unknown' if member.raw is None else state_of(member.raw)
+                  for name, member in self._present.items()}
+        if len(set(states.values())) == 1:
+            return next(iter(states.values()))
+        return ', '.join(f'{name}: {state}' for name, state in states.items()) or 'unknown'
+
+
+def _matches(pattern: StatusPattern | None, raw: int) -> bool:
+    return pattern is not None and pattern.matches(raw)
