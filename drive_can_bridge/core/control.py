@@ -435,8 +435,8 @@ class ControlMachine:
         if self._table.fault is None:
             return
         fault = self._table.fault.matches(raw)
-        if not fault and self._reports.faulted:
-            return      # rid of it when the last of them is
+        if not fault and (self._fault is False or self._reports.faulted):
+            return      # nothing new; or rid of it when the last of them is
         had_fault, self._fault = self._fault, fault
         if not self._fault:
             if had_fault:

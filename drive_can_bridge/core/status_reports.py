@@ -105,8 +105,12 @@ class StatusReports:
     @property
     def faulted(self) -> bool:
         """One of them reports a fault, as far as is known."""
-        return any(member.raw is not None and _matches(self._table.fault, member.raw)
-                   for member in self._present.values())
+        fault = self._table.fault
+        if fault is not None:
+            for member in self._present.values():
+                if member.raw is not None and fault.matches(member.raw):
+                    return True
+        return False
 
     def says(self, pattern: StatusPattern | None) -> bool:
         """Tell whether the status word that says most fulfils a condition."""
@@ -126,8 +130,12 @@ class StatusReports:
     def running_on(self) -> bool:
         """One of them, knowing the current word, reports that it runs."""
         # they may answer in turn: who has not answered yet says nothing
-        return any(member.answer is not None and _matches(self._running, member.answer)
-                   for member in self._present.values())
+        running = self._running
+        if running is not None:
+            for member in self._present.values():
+                if member.answer is not None and running.matches(member.answer):
+                    return True
+        return False
 
     @property
     def resettable(self) -> bool:

@@ -52,9 +52,10 @@ class Lane(Enum):
 class _Queue(Generic[StepT, ReplyT]):
     """The procedures of one lane, and the step that the first of them wants done."""
 
-    __slots__ = ('_attempts', '_running', 'attempts_left', 'repeated', 'step', 'waiting')
+    __slots__ = ('_attempts', '_running', 'attempts_left', 'lane', 'repeated', 'step', 'waiting')
 
-    def __init__(self, attempts: Callable[[StepT], int]) -> None:
+    def __init__(self, lane: Lane, attempts: Callable[[StepT], int]) -> None:
+        self.lane = lane
         self.waiting: deque[tuple[Generator[StepT, ReplyT, Any], Done]] = deque()
         self.step: StepT | None = None
         self.attempts_left = 0
@@ -113,9 +114,12 @@ class Channel(Generic[StepT, ReplyT]):
         courier.wake = self.wake
         self._own_to_end = own_to_end
         self._queues: dict[Lane, _Queue[StepT, ReplyT]] = {
-            lane: _Queue(courier.attempts) for lane in Lane}
+            lane: _Queue(lane, courier.attempts) for lane in Lane}
+        stop, control, setpoints, own, users = self._queues.values()
+        self._stop = stop
+        self._orders = (control, setpoints, own, users), (control, setpoints, users, own)
         self._users_next = False
-        self._serving: Lane | None = None  # whose step is under way
+        self._serving: _Queue[StepT, ReplyT] | None = None  # whose step is under way
         self._hurried = False  # and it has to make room
         self._deadline = math.inf  # of the exchange under way, as it was at first
         self._quarantine = Quarantine()
@@ -142,11 +146,12 @@ class Channel(Generic[StepT, ReplyT]):
 
     def cancel(self, lane: Lane) -> None:
         """Forget the procedures of a lane; an exchange under way is still waited for."""
-        if self._serving is lane:
+        queue = self._queues[lane]
+        if self._serving is queue:
             self._expect_late()
             self._serving = None
             self._courier.abandon(math.inf)
-        self._queues[lane].clear()
+        queue.clear()
 
     def clear(self) -> None:
         """
@@ -231,10 +236,9 @@ class Channel(Generic[StepT, ReplyT]):
             return min(soonest, self._courier.deadline)
         if soonest < math.inf:
             return soonest
-        for lane in self._order():
-            queue = self._queues[lane]
+        for queue in self._order():
             if queue.step is not None:
-                soonest = min(soonest, self._ready_at(lane, queue.step))
+                soonest = min(soonest, self._ready_at(queue, queue.step))
                 if not self._steps_aside(queue):
                     break
             elif queue.waiting:     # begun only when it can be done: held
@@ -257,58 +261,51 @@ class Channel(Generic[StepT, ReplyT]):
             return True
         if went is not None:
             return False
-        lane = self._choose(now)
-        if lane is None:
+        queue = self._choose(now)
+        if queue is None or queue.step is None:
             self._awake = not all(queue.idle for queue in self._queues.values()) or (
                 courier.express_at(self._held_until) < math.inf)
             return self._awake and now >= self._held_until
-        queue = self._queues[lane]
         step = queue.step
-        if step is None:
-            raise RuntimeError('a lane without a step was chosen')
-        ready_at = self._ready_at(lane, step)
+        ready_at = self._ready_at(queue, step)
         if now < ready_at or self._quarantined(queue) and (
                 self._quarantine.holds(courier.key(step), now, now - ready_at)):
             return False
-        self._serving = lane
+        self._serving = queue
         queue.attempts_left -= 1
         courier.begin(step, now)
         self._deadline = courier.deadline
         return True
 
-    def _order(self) -> tuple[Lane, ...]:
-        """Return the lanes in the order in which they are served now."""
-        if not self._queues[Lane.STOP].idle:
-            return (Lane.STOP,)
-        if self._users_next:
-            return Lane.CONTROL, Lane.SETPOINTS, Lane.USERS, Lane.OWN
-        return Lane.CONTROL, Lane.SETPOINTS, Lane.OWN, Lane.USERS
+    def _order(self) -> tuple[_Queue[StepT, ReplyT], ...]:
+        """Return the queues in the order in which they are served now."""
+        return self._orders[self._users_next] if self._stop.idle else (self._stop,)
 
-    def _choose(self, now: float) -> Lane | None:
-        """Return the lane whose step is to be done next; None when there is nothing to do."""
-        self._queues[Lane.STOP].fetch()
-        chosen: tuple[float, Lane] | None = None
-        for lane in self._order():
-            queue = self._queues[lane]
-            if lane is not Lane.STOP and now < self._held_until:
-                return None     # what is begun later tells newer things
-            step = queue.fetch()
+    def _choose(self, now: float) -> _Queue[StepT, ReplyT] | None:
+        """Return the queue whose step is to be done next; None when there is nothing to do."""
+        if self._stop.fetch() is not None:
+            return self._stop
+        if now < self._held_until:
+            return None     # what is begun later tells newer things
+        chosen: tuple[float, _Queue[StepT, ReplyT]] | None = None
+        for queue in self._order():
+            step = queue.step if queue.step is not None or not queue.waiting else queue.fetch()
             if step is None:
                 continue
             if not self._steps_aside(queue):
-                return lane
-            ready_at = self._ready_at(lane, step)
+                return queue
+            ready_at = self._ready_at(queue, step)
             if chosen is None or ready_at < chosen[0]:
-                chosen = ready_at, lane
+                chosen = ready_at, queue
         return None if chosen is None else chosen[1]
 
-    def _ready_at(self, lane: Lane, step: StepT) -> float:
-        """Return when the step of a lane may be done."""
-        stop = lane is Lane.STOP
+    def _ready_at(self, queue: _Queue[StepT, ReplyT], step: StepT) -> float:
+        """Return when the step of a queue may be done."""
+        stop = queue is self._stop
         ready = self._courier.ready_at(step, stop=stop)
         if not stop:
             ready = max(ready, self._held_until)
-        if self._quarantined(self._queues[lane]):
+        if self._quarantined(queue):
             ready = max(ready, self._quarantine.ready_at(self._courier.key(step)))
         return ready
 
@@ -320,15 +317,16 @@ class Channel(Generic[StepT, ReplyT]):
 
     def _steps_aside(self, queue: _Queue[StepT, ReplyT]) -> bool:
         """Tell whether others go on while the step of this queue is in quarantine."""
-        return (not self._courier.anonymous and self._quarantined(queue)
-                and queue.step is not None
-                and self._quarantine.ready_at(self._courier.key(queue.step)) > self.now)
+        if self._courier.anonymous or queue.repeated or queue.step is None:
+            return False
+        key = self._courier.key(queue.step)
+        return key is not None and self._quarantine.ready_at(key) > self.now
 
     def _expect_late(self) -> None:
         """Take note that the answer under way is not waited for any more."""
         if self._serving is None or not self._courier.busy:
             return
-        step = self._queues[self._serving].step
+        step = self._serving.step
         key = None if step is None else self._courier.key(step)
         if key is not None:
             self._quarantine.begin(key, self._deadline + self._courier.silence)
@@ -343,11 +341,11 @@ class Channel(Generic[StepT, ReplyT]):
 
     def _finish(self, reply: ReplyT) -> None:
         """End the exchange under way; then it is another lane's turn."""
-        lane, self._serving = self._serving, None
+        queue, self._serving = self._serving, None
         hurried, self._hurried = self._hurried, False
-        if lane is None:
+        if queue is None:
             return
-        courier, queue = self._courier, self._queues[lane]
+        courier = self._courier
         step = queue.step
         if step is None:
             return
@@ -365,7 +363,7 @@ class Channel(Generic[StepT, ReplyT]):
         else:
             queue.step = None
             queue.resume(reply)
-        if lane is Lane.USERS:
+        if queue.lane is Lane.USERS:
             self._users_next = False
-        elif lane is Lane.OWN and (not self._own_to_end or queue.step is None):
+        elif queue.lane is Lane.OWN and (not self._own_to_end or queue.step is None):
             self._users_next = True
