@@ -40,10 +40,11 @@ INTERNAL: dict[str, set[str]] = {
     'ros.monitor': {'', 'core', 'monitor'},
     'ros.demo': {'', 'core', 'configuration', 'simulation', 'monitor', 'ros', 'ros.monitor'},
     'demo': {'', 'core', 'configuration', 'process'},
+    'client': {'', 'core'},
     'cli': {
         '', 'core', 'configuration', 'protocols', 'resources', 'transport', 'exchange', 'process',
-        'profiles', 'simulation', 'trace', 'monitor', 'view', 'demo', 'ros', 'ros.monitor',
-        'ros.demo'},
+        'profiles', 'simulation', 'trace', 'monitor', 'view', 'demo', 'client', 'ros',
+        'ros.monitor', 'ros.demo'},
 }
 
 ROS_PACKAGES = {
