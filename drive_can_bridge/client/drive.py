@@ -29,9 +29,14 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol
 
+from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.profile import RestoreTable
 from drive_can_bridge.core.roles import Role
+
+
+class WhichBridge(DriveCanError):
+    """Several bridges are running, and nobody has said which one is meant."""
 
 
 class Enabled(Enum):
@@ -182,6 +187,18 @@ class Drive(Protocol):
         """
 
 
+def readable_names(drive: Drive) -> list[str]:
+    """
+    Return what ``read`` reads when no name is given.
+
+    What exists in process data only can be read only while these are received: through a bridge,
+    where they are mapped.
+    """
+    return [name for name, parameter in drive.parameters.items() if parameter.readable and (
+        parameter.number is not None or parameter.index is not None
+        or drive.facts.through and not parameter.writable and drive.role(name) is Role.CYCLIC)]
+
+
 class Drives(Mapping[str, Drive]):
     """
     The drives that were opened, by name, in the order of the configuration.
@@ -195,7 +212,7 @@ class Drives(Mapping[str, Drive]):
     def __init__(self, drives: Mapping[str, Drive], close: Callable[[], object], *,
                  warnings: Sequence[str] = ()) -> None:
         self._drives = dict(drives)
-        self._close: Callable[[], object] | None = close
+        self._closers = [close]
         self.warnings = tuple(warnings)
 
     def __getitem__(self, name: str) -> Drive:
@@ -209,9 +226,12 @@ class Drives(Mapping[str, Drive]):
 
     def close(self) -> None:
         """Close everything."""
-        close, self._close = self._close, None
-        if close is not None:
-            close()
+        while self._closers:
+            self._closers.pop(0)()
+
+    def also_close(self, close: Callable[[], object]) -> None:
+        """Have something else closed afterwards."""
+        self._closers.append(close)
 
     def __enter__(self) -> 'Drives':
         return self
