@@ -72,7 +72,8 @@ EXTERNAL: dict[str, set[str]] = {
     'ros.demo': ROS_PACKAGES,
     'view': {'rich'},
     'demo': {'yaml'},
-    'cli': {'rich'},
+    # argcomplete: an optional extra
+    'cli': {'argcomplete', 'rich'},
 }
 
 #: Layer: edges that may be used inside functions only, so that importing the layer stays cheap and

@@ -65,7 +65,9 @@ class DirectSource:
         """Take the locks, open the buses of these drives, listen for another master."""
         configuration = self.configuration
         wanted = [drive for name, drive in configuration.drives.items() if name in names]
-        groups = {bus: [drive for drive in configuration.drives.values() if drive.bus == bus]
+        everyone = [*wanted, *(drive for drive in configuration.drives.values()
+                               if drive not in wanted)]
+        groups = {bus: [drive for drive in everyone if drive.bus == bus]
                   for bus in dict.fromkeys(drive.bus for drive in wanted)}
         ownership = Ownership([(configuration.buses[bus], drives)
                                for bus, drives in groups.items()], _program(), ADVICE)
@@ -155,9 +157,9 @@ class DirectDrive(Drive):
         if parameter.writable:
             owner = self._session.roles.owner(parameter)
             if owner is not None and owner[0] is Role.CONTROL:
-                return 'control word: a bridge sends it, this does not'
+                return 'control word: only a running bridge sends it'
             if owner is not None and owner[0] is Role.CYCLIC:
-                return f'setpoint ({owner[1].name}): a bridge sends it, this does not'
+                return f'setpoint {owner[1].name}: only a running bridge sends it'
             refusal = self._session.write_refusal(parameter)
             if refusal:
                 return refusal

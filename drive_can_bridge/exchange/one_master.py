@@ -12,11 +12,13 @@ from collections.abc import Iterable, Sequence
 
 from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration
 from drive_can_bridge.core.errors import DriveCanError
-from drive_can_bridge.process.locks import Held, HostLock, take
+from drive_can_bridge.process.locks import Held, holder, HostLock, take
 from drive_can_bridge.transport.places import place_of
 
 #: what a bridge calls itself
 BRIDGE = 'drive_can_bridge'
+#: what to do for commands that have only the direct way
+END_FIRST = 'end that first'
 
 
 class InUse(DriveCanError):
@@ -33,7 +35,7 @@ class InUse(DriveCanError):
 
 class Ownership:
     """
-    The locks that a process has.
+    The locks that a process has; a context manager.
 
     :param buses: with all drives on each of them that it will talk to.
     :param who: what it calls itself: ``drive_can_bridge``, ``drive_can read``.
@@ -46,16 +48,28 @@ class Ownership:
         claims: dict[str, str] = {}
         for bus, drives in buses:
             place = place_of(bus)
-            for name in place.names:
-                for drive in drives:
+            for drive in drives:
+                for name in place.names:
                     claims[f'drive {name} {drive.protocol} {drive.station}'] = (
                         f'bus {bus.name}: drive {drive.name}')
-                if place.port:      # sorts behind the drives: they say more
-                    claims[name] = f'bus {bus.name}: the serial port {place.port}'
+            if place.port:      # behind the drives: they say more
+                claims.update(dict.fromkeys(
+                    place.names, f'bus {bus.name}: the serial port {place.port}'))
         try:
             self._locks: list[HostLock] = take(list(claims), who)
         except Held as held:
-            raise _in_words(held, claims[held.args[-1]], advice) from None
+            # which one it was is chance: the first in the caller's order says more
+            for key, what in claims.items():
+                other = holder(key)
+                if other is not None:
+                    raise _in_words(other, what, advice) from None
+            raise _in_words(held, next(iter(claims.values())), advice) from None
+
+    def __enter__(self) -> 'Ownership':
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.release()
 
     def release(self) -> None:
         """Let others talk to the drives. Idempotent."""

@@ -83,21 +83,26 @@ def take(keys: Sequence[str], who: str) -> list[HostLock]:
 
     In the order of their keys, so that of two processes that want the same one gets all.
 
-    :raises Held: somebody has one of them; its ``args`` are followed by the key.
+    :raises Held: somebody has one of them.
     """
     taken: list[HostLock] = []
     try:
         for key in sorted(set(keys)):
-            try:
-                taken.append(HostLock(key, who))
-            except Held as held:
-                held.args = (*held.args, key)
-                raise
+            taken.append(HostLock(key, who))
     except BaseException:
         for lock in taken:
             lock.release()
         raise
     return taken
+
+
+def holder(key: str) -> Held | None:
+    """Return who has a lock; None: nobody."""
+    try:
+        HostLock(key, '').release()
+    except Held as held:
+        return held
+    return None
 
 
 def _holder(digest: str) -> Held:
