@@ -82,8 +82,8 @@ def split_words(names: Sequence[str], words: Sequence[str]) -> tuple[list[str], 
     if words and matching(names, words[0]):
         return matching(names, words[0]), list(words[1:])
     if len(names) != 1:
-        said = f'which drive? {words[0]!r} matches none' if words else 'which drive?'
-        raise WrongUsage(f'{said}; there are: {", ".join(names) or "none"}')
+        said = f'{words[0]!r} is none. ' if words else ''
+        raise WrongUsage(f'which drive? {said}There are: {", ".join(names) or "none"}')
     return list(names), list(words)
 
 

@@ -85,9 +85,10 @@ class BridgedDrive(Drive):
         if parameter.writable and role is Role.CONTROL:
             return 'use ~/enable'
         if parameter.writable and role is Role.CYCLIC:
-            return 'sent cyclically: publish its command topic'
+            own = next((each.name for each in self._directory.twins(parameter)), name)
+            return f'sent cyclically: publish ~/command/{own}'
         if role is Role.MAP:
-            return 'mapping parameter: not written by way of a bridge'
+            return 'mapping parameter: not written while the bridge is active'
         try:
             self._directory.raw_from_user(parameter, value)
         except ValueRefused as error:
