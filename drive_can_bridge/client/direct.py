@@ -28,8 +28,10 @@ from drive_can_bridge.protocols.families import FAMILIES
 
 #: s to listen for another master before the first request
 LISTEN = 1.2
-#: parameters that are handed to a session at once; two such requests are under way at a time
-BLOCK = 32
+#: parameters that are handed to a session at once: two frames where four share one; and how many
+#: such requests wait in it, so that the drive never waits for us
+BLOCK = 8
+AHEAD = 3
 #: parameters that are tried until a drive counts as absent
 TRIES = 3
 #: s between looks whether a node has started, and how many there are
@@ -206,7 +208,7 @@ class DirectDrive(Drive):
                 outcomes: Sequence[Outcome] = self._ask([each for _, each in blocks[0]])
                 yield from _paired(blocks.pop(0), outcomes)
                 continue
-            while blocks and len(waiting) < 2:
+            while blocks and len(waiting) < AHEAD:
                 request = ReadRequest(tuple(each for _, each in blocks[0]))
                 self._conversation.submit(self.name, request)
                 waiting.append((blocks.pop(0), request))

@@ -11,13 +11,13 @@ from waiting import wait_for
 
 from drive_can_bridge.process.locks import Held, holder, HostLock, take
 
-HOLDER = '''
+HOLDER = """
 import sys, time
 from drive_can_bridge.process.locks import take
 locks = take(sys.argv[1:], 'drive_can write')
 print('taken', flush=True)
 time.sleep(600)
-'''
+"""
 
 
 def key(name: str) -> str:

@@ -19,7 +19,7 @@ from drive_can_bridge.ros.client.descriptors import (
 from drive_can_bridge.ros.client.graph import Graph
 
 #: parameters that are read with one call
-BLOCK = 32
+BLOCK = 16
 _NO_VALUE = 'no value; the log of the bridge says why'
 #: s beyond its period that a diagnostic message may take
 _DIAGNOSTICS_MARGIN = 5.0
