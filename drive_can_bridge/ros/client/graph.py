@@ -33,8 +33,8 @@ from drive_can_bridge.core.errors import DriveCanError
 #: a leading underscore hides a node from ``ros2 node list``
 _NODE_NAME = '_drive_can_client_{}'
 _SLICE = 0.05
-#: s after which a greeting is said again
-_GREETING = 1.0
+#: s after which a greeting is said again for the first time; then twice as many, and so on
+_GREETING = 0.1
 #: s that a server may take to be found, or to know us
 _FIND_TIMEOUT = 10.0
 #: s that an answer may take: many reads that nobody answers are slow
@@ -155,15 +155,16 @@ class Graph:
         deadline = time.monotonic() + _FIND_TIMEOUT
         greeting = self.node.create_client(
             GetParameterTypes, f'{node}/get_parameter_types', qos_profile=qos_profile_parameters)
+        patience = _GREETING
+        futures: list[Any] = []
         try:
+            self.wait(greeting.service_is_ready, _FIND_TIMEOUT)
             while time.monotonic() < deadline:
-                if not self.wait(greeting.service_is_ready, _GREETING):
-                    continue
-                future = greeting.call_async(GetParameterTypes.Request())
-                if self.wait(future.done, _GREETING):
+                futures.append(greeting.call_async(GetParameterTypes.Request()))
+                if self.wait(lambda: any(each.done() for each in futures), patience):
                     self._known.add(node)
                     return
-                greeting.remove_pending_request(future)
+                patience *= 2.0
         finally:
             self.node.destroy_client(greeting)
         raise NoAnswer(f'{node} does not answer')
