@@ -98,9 +98,10 @@ class BusConversation:
         :raises DriveCanError: another master talks to a drive, or the bus is lost.
         """
         with self._changed:
+            self._check()
             while id(request) not in self._outcomes:
-                self._check()
                 self._changed.wait(_PATIENCE)
+                self._check()
             return self._outcomes.pop(id(request))
 
     def send(self, frame: Frame) -> None:
