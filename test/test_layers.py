@@ -45,10 +45,11 @@ INTERNAL: dict[str, set[str]] = {
     'client': {
         '', 'core', 'configuration', 'protocols', 'transport', 'exchange', 'process',
         'client.drive', 'ros.client'},
+    'backup': {'', 'core', 'configuration', 'client.drive'},
     'cli': {
         '', 'core', 'configuration', 'protocols', 'resources', 'transport', 'exchange', 'process',
         'profiles', 'simulation', 'trace', 'monitor', 'view', 'demo', 'client', 'client.drive',
-        'ros', 'ros.monitor', 'ros.demo'},
+        'backup', 'ros', 'ros.monitor', 'ros.demo'},
 }
 
 ROS_PACKAGES = {

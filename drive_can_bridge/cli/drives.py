@@ -87,6 +87,35 @@ def split_words(names: Sequence[str], words: Sequence[str]) -> tuple[list[str], 
     return list(names), list(words)
 
 
+def chosen(names: Sequence[str], words: Sequence[str]) -> list[str]:
+    """
+    Return the drives that words or shell patterns name, in the order of the configuration.
+
+    :raises WrongUsage: one of them names none; or there are several, and no word.
+    """
+    there = f'there are: {", ".join(names) or "none"}'
+    if not words:
+        if len(names) != 1:
+            raise WrongUsage(f"which drive? '*' means all; {there}")
+        return list(names)
+    for word in words:
+        if not matching(names, word):
+            raise WrongUsage(f'no drive {word!r}; {there}')
+    return [name for name in names if any(name in matching(names, word) for word in words)]
+
+
+def chosen_one(names: Sequence[str], word: str) -> str:
+    """
+    Return the one drive that a word names.
+
+    :raises WrongUsage: it names none, or several.
+    """
+    found = chosen(names, [word])
+    if len(found) > 1:
+        raise WrongUsage(f'{word!r} names several drives: {", ".join(found)}')
+    return found[0]
+
+
 @contextmanager
 def opened(source: Source, names: Sequence[str]) -> Iterator[Drives]:
     """Open drives, and say what the user should know."""

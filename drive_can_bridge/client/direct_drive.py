@@ -56,10 +56,14 @@ class DirectDrive(Drive):
             drive.station, drive.profile_key or drive.profile.name, drive.profile.sha256,
             drive.profile.restore)
 
+    def _start(self) -> None:
+        if self._nmt_start and self._start_frame is not None:
+            self._conversation.send(self._start_frame)
+
     def begin(self) -> Iterator[str]:
         """Start the node where that is wanted; yield what the user should know."""
         if self._nmt_start and self._start_frame is not None:
-            self._conversation.send(self._start_frame)
+            self._start()
             for _ in range(_START_LOOKS):   # until its heartbeat, too, says that it has started
                 self._conversation.listen(_START_PAUSE)
                 if self._greet()[1] is None:
@@ -143,6 +147,7 @@ class DirectDrive(Drive):
         while blocks or waiting:
             if blocks and not self._session.online:
                 # nobody answered last time, or ever: not a time-out for each parameter
+                self._start()   # it may have restarted
                 known, failure = self._greet([each for _, each in blocks[0]])
                 if failure is not None:
                     for block in blocks:
@@ -223,6 +228,7 @@ class DirectDrive(Drive):
         if refusal or parameter is None:
             return WriteOutcome(name, False, parameter, refusal)
         if not self._session.online:    # what does not answer is told nothing
+            self._start()
             _, failure = self._greet()
             if failure is not None:
                 return WriteOutcome(name, False, parameter, self._explained(failure.reason))
