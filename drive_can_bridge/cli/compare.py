@@ -117,8 +117,7 @@ def _drive(drive: Drive, files: Sequence[Backup]) -> Side:
     unread = [f'{drive.name}: {outcome.name} could not be read: {outcome.reason}'
               for outcome in outcomes.values() if not outcome.ok]
     if unread:
-        raise DriveCanError(printable(unread[0], None) if len(unread) == 1 else
-                            '\n'.join(printable(line, None) for line in unread))
+        raise DriveCanError('\n'.join(map(printable, unread)))
     return side_of_drive(drive, outcomes)
 
 

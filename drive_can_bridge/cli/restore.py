@@ -23,11 +23,13 @@ from drive_can_bridge.cli.progress import Bar
 from drive_can_bridge.cli.questions import agreed, must_be_answerable, NobodyToAsk
 from drive_can_bridge.cli.tables import print_json, print_table, printable
 from drive_can_bridge.client.drive import Drive, Enabled, Source
-from drive_can_bridge.core.parameters import Value
+from drive_can_bridge.core.parameters import Parameter, Storage, Value
 from drive_can_bridge.core.words import value_text
 from drive_can_bridge.process.interruption import Interruption, postponed
 
 _NOTHING = 'Nothing was written'
+_WHY_VOLATILE = {True: 'its profile says: storage: ram',
+                 False: 'persist_writes: true in its configuration would write to EEPROM'}
 _HEADINGS = ('parameter', 'drive', 'file', 'unit', '')
 
 
@@ -197,6 +199,11 @@ def _report(args: Namespace, drive: Drive, plan: RestorePlan, result: RestoreRes
     for text in result.steps:
         complain(printable(f'{drive.name}: {text}. Look at it by hand: the drive may still be in '
                            'the mode in which settings are written'))
+    volatile = [change.name for change in plan.changes
+                if change.name in result.written and _is_volatile(drive, change.parameter)]
+    if volatile:
+        complain(printable(f'{drive.name}: gone when it loses power: {_list(volatile)} '
+                           f'({_WHY_VOLATILE[drive.facts.persist_writes]})'))
     if result.trouble is not None:
         complain(printable(f'{drive.name}: {result.trouble}'))
     if result.stopped is not None:
@@ -219,6 +226,12 @@ def _report(args: Namespace, drive: Drive, plan: RestorePlan, result: RestoreRes
         print(printable(f'{drive.name}: {_count(plan.changes)} written, all '
                         f'{len(plan.words)} are as in the file'))
     return 0
+
+
+def _is_volatile(drive: Drive, parameter: Parameter) -> bool:
+    if parameter.storage is None:
+        return not drive.facts.persist_writes
+    return parameter.storage is Storage.RAM
 
 
 def _print_outcome(drive: Drive, name: str, ok: bool, found: Value | None, wanted: Value,

@@ -22,23 +22,27 @@ def write_whole(path: Path, data: bytes) -> None:
     :raises OSError: the disk is full, the directory cannot be written, ….
     """
     path = path.resolve()
-    if path.exists() and not path.is_file():  # /dev/stdout, a pipe
-        path.write_bytes(data)
-        return
-    name = ''
     try:
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f'.{path.name}.')
+        if path.exists() and not path.is_file():  # /dev/stdout, a pipe
+            path.write_bytes(data)
+        else:
+            _replace(path, data)
+    except OSError as error:
+        error.filename = str(path)      # not that of a file which is gone, or none at all
+        raise
+
+
+def _replace(path: Path, data: bytes) -> None:
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f'.{path.name}.')
+    try:
         with os.fdopen(handle, 'wb') as file:
             file.write(data)
             file.flush()
             os.fsync(file.fileno())
         os.chmod(name, 0o666 & ~_umask())
         os.replace(name, path)
-    except BaseException as error:
-        if name:
-            os.unlink(name)
-        if isinstance(error, OSError):
-            error.filename = str(path)      # not that of what is gone
+    except BaseException:
+        os.unlink(name)
         raise
 
 

@@ -54,7 +54,8 @@ class DirectDrive(Drive):
         self._facts = DriveFacts(
             drive.name, bus.name, bus.interface, str(bus.channel), bus.bitrate, drive.protocol,
             drive.station, drive.profile_key or drive.profile.name, drive.profile.sha256,
-            drive.profile.restore)
+            drive.profile.restore,
+            persist_writes=getattr(drive.options, 'persist_writes', True))
 
     def _start(self) -> None:
         if self._nmt_start and self._start_frame is not None:

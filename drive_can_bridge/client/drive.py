@@ -98,6 +98,7 @@ class DriveFacts:
     :param restore: the ``restore`` section of the profile; None: not known (a bridge of another
         version).
     :param through: full name of the bridge that the drive is reached through; '': directly.
+    :param persist_writes: what has no ``storage`` in the profile survives the loss of power.
     """
 
     name: str
@@ -111,6 +112,7 @@ class DriveFacts:
     profile_sha256: str
     restore: RestoreTable | None
     through: str = ''
+    persist_writes: bool = True
 
 
 class Drive(Protocol):

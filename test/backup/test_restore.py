@@ -218,7 +218,8 @@ class TestMode:
 class TestFile:
 
     @pytest.mark.parametrize(('values', 'problem'), [
-        ({'rampe': 1.0}, 'conveyor.yaml:3: rampe: unknown parameter rampe, did you mean ramp_time?'),
+        ({'rampe': 1.0}, 'conveyor.yaml:3: rampe: unknown parameter rampe, did you mean '
+                         'ramp_time?'),
         ({'actual_speed': 1.0}, 'conveyor.yaml:3: actual_speed: read-only'),
         ({'ramp_time': True}, 'conveyor.yaml:3: ramp_time: wrong type: bool, expected double'),
         ({'ramp_time': 61.0}, 'conveyor.yaml:3: ramp_time: 61 is out of range: 0.01 to 60 s'),

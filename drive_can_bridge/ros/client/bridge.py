@@ -138,6 +138,7 @@ class BridgeSource:
         values = self._values([prefix + key for key in _DRIVE_KEYS])
         bus = str(values[f'{prefix}bus'])
         place = self._values([f'buses.{bus}.{key}' for key in _BUS_KEYS])
+        persist = f'{prefix}persist_writes'     # of one family only
         return DriveFacts(
             name=drive, bus=bus, interface=str(place[f'buses.{bus}.interface']),
             channel=str(place[f'buses.{bus}.channel']),
@@ -145,7 +146,8 @@ class BridgeSource:
             protocol=str(values[f'{prefix}protocol']), station=int(values[f'{prefix}station']),
             profile=str(values[f'{prefix}profile']),
             profile_sha256=str(values[f'{prefix}profile_sha256']),
-            restore=_restore_table(values[f'{prefix}restore']), through=self.bridge)
+            restore=_restore_table(values[f'{prefix}restore']), through=self.bridge,
+            persist_writes=self._values([persist])[persist] is not False)
 
     def _identity(self, drive: str) -> str:
         name = f'drives.{drive}.identity'
