@@ -212,7 +212,8 @@ def _report(args: Namespace, drive: Drive, plan: RestorePlan, result: RestoreRes
             f'{_list(result.stopped)}. Repeat the command to go on'))
         return interrupted.exit_code
     if wrong:
-        complain(printable(f'{drive.name}: not as in the file:'))
+        complain(printable(f'{drive.name}: written: {_list(result.written)}; not as in the '
+                           'file:'))
         for each in result.wrong:
             found = 'unknown' if each.found is None else _with_unit(plan, each.name, each.found)
             reason = f': {each.reason}' if each.reason else ''
@@ -223,8 +224,8 @@ def _report(args: Namespace, drive: Drive, plan: RestorePlan, result: RestoreRes
     if not result.complete:
         return FAILED
     if not args.json:
-        print(printable(f'{drive.name}: {_count(plan.changes)} written, all '
-                        f'{len(plan.words)} are as in the file'))
+        print(printable(f'{drive.name}: {_count(plan.changes)} written, {len(plan.words)} read '
+                        'back: as in the file'))
     return 0
 
 

@@ -108,7 +108,7 @@ class TestThroughTheBridge:
         simulator.write(f'pump {BY_HAND["pump"]} cut_at=2')
         simulator.line('pump: fault cut_at')
         broken = ask(processes, 'restore', str(file), '--yes', *way, code=1)
-        assert 'pump: not as in the file:' in broken.errors
+        assert any('; not as in the file:' in line for line in broken.errors)
         # it came back, and was taken out of the mode that it kept
         assert simulator.frames(OUT_OF_MODE)
         ask(processes, 'restore', str(file), '--yes', *way)
