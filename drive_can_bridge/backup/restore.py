@@ -189,7 +189,7 @@ class Restorer:
                     return
             except DriveCanError as error:
                 self._result.trouble = self._result.trouble or error
-                failed.append(f'{", ".join(step.parameter for step in self._after)}: {error}')
+                failed.extend(f'{step.parameter}: not set back' for step in self._after)
                 return
             if not waited:
                 names = ', '.join(dict.fromkeys(step.parameter for step in self._after))

@@ -10,6 +10,7 @@ from typing import Any
 
 from drive_can_bridge.backup.document import head_of, written
 from drive_can_bridge.backup.settings import settings_of
+from drive_can_bridge.cli.completion import complete_drives
 from drive_can_bridge.cli.drives import (
     add_drive_options, chosen, FAILED, opened, source_of, WRONG_USAGE, WrongUsage,
 )
@@ -35,8 +36,10 @@ def add_parser(subparsers: Any) -> None:
         epilog='Exit code 0: written. 1: something could not be read or written, and there is no '
                'file. 2: wrong usage, or a file exists and nobody can be asked. --json, for each '
                'drive: drive, file, settings (how many), identity, left_out (parameter, reason).')
-    parser.add_argument('words', metavar='DRIVE', nargs='*',
-                        help='name or shell pattern; may be left out where there is only one')
+    words = parser.add_argument(
+        'words', metavar='DRIVE', nargs='*',
+        help='name or shell pattern; may be left out where there is only one')
+    words.completer = complete_drives  # type: ignore[attr-defined]  # for argcomplete
     parser.add_argument('-o', '--output', metavar='FILE', required=True,
                         help='where it goes; for several drives DIR/, a file each')
     parser.add_argument('--partial', action='store_true',

@@ -14,6 +14,7 @@ from drive_can_bridge.backup.comparison import (
 from drive_can_bridge.backup.document import Backup
 from drive_can_bridge.backup.reader import read_backup
 from drive_can_bridge.backup.settings import mode_bits
+from drive_can_bridge.cli.completion import complete_drives
 from drive_can_bridge.cli.drives import (
     add_drive_options, chosen_one, opened, source_of, WrongUsage,
 )
@@ -41,7 +42,8 @@ def add_parser(subparsers: Any) -> None:
                     'looks like the name of a drive is one, ./NAME is a file. Sends reads only.',
         epilog='Exit code 0: the same. 1: different. 2: trouble, a drive in use included. '
                '--json, for each setting that differs: parameter, unit, a, b (null: not there).')
-    parser.add_argument('words', metavar='A B', nargs='+', help='backup files or drives')
+    words = parser.add_argument('words', metavar='A B', nargs='+', help='backup files or drives')
+    words.completer = complete_drives  # type: ignore[attr-defined]  # for argcomplete
     add_drive_options(parser)
     parser.set_defaults(run=run)
 

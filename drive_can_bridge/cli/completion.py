@@ -27,3 +27,16 @@ def complete_words(prefix: str, parsed_args: Namespace, **_: Any) -> list[str]:
     except Exception:  # noqa: BLE001  nothing may be written into the line that is typed
         return []
     return found
+
+
+def complete_drives(prefix: str, parsed_args: Namespace, **_: Any) -> list[str]:
+    """Propose drives; where none begins so, the shell proposes files."""
+    try:
+        source = find_source(getattr(parsed_args, 'params_file', None),
+                             namespace=getattr(parsed_args, 'namespace', None))
+        try:
+            return list(source.names)
+        finally:
+            source.close()
+    except Exception:  # noqa: BLE001  nothing may be written into the line that is typed
+        return []

@@ -15,6 +15,7 @@ from drive_can_bridge.backup.plan import (
 from drive_can_bridge.backup.reader import read_backup
 from drive_can_bridge.backup.restore import Restorer, RestoreResult
 from drive_can_bridge.backup.settings import is_setting
+from drive_can_bridge.cli.completion import complete_drives
 from drive_can_bridge.cli.drives import (
     add_drive_options, chosen_one, FAILED, opened, source_of, WRONG_USAGE, WrongUsage,
 )
@@ -27,6 +28,8 @@ from drive_can_bridge.core.parameters import Parameter, Storage, Value
 from drive_can_bridge.core.words import value_text
 from drive_can_bridge.process.interruption import Interruption, postponed
 
+#: s that a drive's identity is waited for
+_PATIENCE = 2.0
 _NOTHING = 'Nothing was written'
 _WHY_VOLATILE = {True: 'its profile says: storage: ram',
                  False: 'persist_writes: true in its configuration would write to EEPROM'}
@@ -44,9 +47,11 @@ def add_parser(subparsers: Any) -> None:
                'written is said. --json, for each setting that differs: drive, parameter, unit, '
                'found, wanted, left_alone (why, or null); and after writing for each that was to '
                'be changed: drive, parameter, ok, found, wanted, reason.')
-    parser.add_argument('words', metavar='FILE [DRIVE]', nargs='+',
-                        help='what drive_can backup has written, and where to (default: the drive '
-                             'that the file is of)')
+    words = parser.add_argument(
+        'words', metavar='FILE [DRIVE]', nargs='+',
+        help='what drive_can backup has written, and where to (default: the drive that the file '
+             'is of)')
+    words.completer = complete_drives  # type: ignore[attr-defined]  # for argcomplete
     parser.add_argument('--dry-run', action='store_true', help='only show what would change')
     parser.add_argument('--include-protected', action='store_true',
                         help='also what the profile protects: station, bit rate, what cuts off '
@@ -136,7 +141,7 @@ def _may_be(args: Namespace, backup: Backup, drive: Drive) -> bool:
         complain(problem)
     if problems:
         return False
-    differing = strangers(backup, drive, drive.identity())
+    differing = strangers(backup, drive, _identity(backup, drive))
     for text in differing:
         complain(printable(f'{backup.file}: {text}'))
     if differing and not (args.force or args.dry_run):
@@ -154,6 +159,16 @@ def _may_be(args: Namespace, backup: Backup, drive: Drive) -> bool:
         _is_enabled(drive)
         return False
     return True
+
+
+def _identity(backup: Backup, drive: Drive) -> str:
+    """Return who a drive is; a bridge that has just started is about to find out."""
+    end = time.monotonic() + _PATIENCE
+    while True:
+        found = drive.identity()
+        if found or not backup.head.identity or time.monotonic() > end:
+            return found
+        time.sleep(_PATIENCE / 10.0)
 
 
 def _is_enabled(drive: Drive) -> int:
