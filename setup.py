@@ -73,12 +73,15 @@ setup(
         ],
         # EDS and DCF files as profiles. No rosdep key: without it, CSV tables can be imported.
         'eds': ['canopen>=2.3'],
+        # completion in the shell
+        'completion': ['argcomplete'],
         # pictures of drive_can decode --plot
         'plot': [
             'matplotlib',
         ],
         'test': [
             # No rosdep keys for these two: the tests run without them, only fewer, or slower.
+            'argcomplete',
             'canopen>=2.3',
             'hypothesis',
             'matplotlib',

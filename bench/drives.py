@@ -7,9 +7,13 @@ against itself. What it notes is how regular the requests are as a drive sees th
 
 Drives have processors of their own. Here they go first where the system allows it, so that an
 answer is not late because the machine is busy.
+
+With a bit rate and the seconds that a drive takes for an answer, both frames and the answer take
+their time, and how long that was in all is noted.
 """
 
 from array import array
+import math
 import os
 import socket
 import struct
@@ -25,12 +29,16 @@ CYCLIC = 0x001FFFF0
 REQUEST_MAP = struct.pack('>4H', 50, 51, 60, 61)
 RESPONSE_MAP = struct.pack('>4H', 209, 210, 211, 212)
 STATIONS = 128
+#: of a frame with 29 bits of identifier and eight bytes, with all bits that stuffing may take
+FRAME_BITS = 160
 
 
 class Drives:
     """All drives of the bus."""
 
-    def __init__(self) -> None:
+    def __init__(self, wire: float = 0.0) -> None:
+        self._wire = wire
+        self._spent = 0.0
         self._last = [0.0] * STATIONS
         self._distances = array('d')
         self._values = 0
@@ -67,7 +75,12 @@ class Drives:
         self._last = [0.0] * STATIONS
         self._distances = array('d')
         self._stops = array('d')
+        self._spent = 0.0
         return True
+
+    def spent(self) -> float:
+        """Return how long frames and answers have taken, in s."""
+        return self._spent
 
     def distances(self) -> list[float]:
         """Return the times between two requests to the same drive in s."""
@@ -76,6 +89,11 @@ class Drives:
     def stops(self) -> list[float]:
         """Return when a drive got the first word that was not ``enable`` any more."""
         return list(self._stops)
+
+    def _take_time(self) -> None:
+        begun = time.monotonic()
+        time.sleep(self._wire)
+        self._spent += time.monotonic() - begun
 
     def run(self, server: socket.socket) -> None:
         """Serve one client after the other."""
@@ -91,6 +109,8 @@ class Drives:
                     if not frame:
                         break
                     reply = self.answer(frame)
+                    if self._wire:
+                        self._take_time()
                     if reply is not None:
                         client.send(reply)
                 except OSError:
@@ -99,13 +119,15 @@ class Drives:
 
 
 def main() -> None:
-    """Listen on the Unix socket given."""
+    """Listen on the Unix socket given; with a bit rate and the time of an answer, slowly."""
     server = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     server.bind(sys.argv[1])
     server.listen()
-    drives = Drives()
+    bitrate, answer = map(float, sys.argv[2:4] or (math.inf, 0.0))
+    drives = Drives(2 * FRAME_BITS / bitrate + answer)
     threading.Thread(target=drives.run, args=(server,), daemon=True).start()
-    serve({'clear': drives.clear, 'distances': drives.distances, 'stops': drives.stops})
+    serve({'clear': drives.clear, 'distances': drives.distances, 'stops': drives.stops,
+           'spent': drives.spent})
 
 
 if __name__ == '__main__':

@@ -140,6 +140,26 @@ def stop_figures(found: dict[str, Any]) -> list[Figure]:
     return figures
 
 
+def backup_figures(found: dict[str, Any]) -> list[Figure]:
+    """How long a backup takes, and what a bridge misses while one is made through it."""
+    runs = sorted(found['backups'], key=lambda each: each['elapsed'] / each['spent'])
+    middle = runs[len(runs) // 2]
+    during, quiet, through = found['during'], found['quiet'], found['through']
+    failed = sum(each['failed'] for each in (*runs, *through))
+    periods = [p99(each['period_errors']) for each in (during, quiet)]
+    return [
+        Figure(f'backup of {middle["settings"]} parameters at 125 kbit/s',
+               f'{middle["elapsed"]:.3f} s', f'frames and answers {middle["spent"]:.3f} s',
+               middle['elapsed'] / middle['spent'] if not failed else math.inf, 1.3),
+        Figure('exchanges missed while backups are made through a bridge',
+               f'{during["missed"]} of {during["exchanges"]}, {len(through)} backups of '
+               f'{median([each["elapsed"] for each in through]):.3f} s, period error p99 '
+               f'{1e3 * periods[0]:.3f} ms',
+               f'in quiet {quiet["missed"]} of {quiet["exchanges"]}, {1e3 * periods[1]:.3f} ms',
+               during['missed'], 0.0),
+    ]
+
+
 def drives_figures(found: dict[str, dict[str, Any]]) -> list[Figure]:
     """Cost by number of drives."""
     costs = {int(number): sum(each['bridge']['cpu'][name] for name in ('timer', 'reader'))
@@ -212,8 +232,8 @@ FIGURES: dict[str, Callable[[Any], list[Figure]]] = {
     'diy': diy_figures, 'buses': buses_figures,
     'latency': latency_figures, 'service': service_figures,
     'flood': flood_figures, 'stop': stop_figures, 'monitor': monitor_figures,
-    'drives': drives_figures, 'decode': decode_figures, 'flight': flight_figures,
-    'start': start_figures,
+    'backup': backup_figures, 'drives': drives_figures, 'decode': decode_figures,
+    'flight': flight_figures, 'start': start_figures,
 }
 
 

@@ -38,6 +38,7 @@ def plan(options: argparse.Namespace) -> dict[str, Callable[[], Any]]:
         'monitor': lambda: scenarios.monitor(Load(drives, period, subscribed=False), duration),
         'stop': lambda: scenarios.stop(
             Load(8, 0.01, subscribed=False, control=True, stuck=True), 200, 10000.0, 64),
+        'backup': lambda: scenarios.backup(Load(8, 0.01, subscribed=False, settings=119)),
         'drives': lambda: {number: scenarios.exchange(
             Load(number, period, subscribed=False), duration, floor=False)
             for number in sorted({1, 4, 8, drives})},

@@ -7,7 +7,7 @@ All return plain numbers: times in s, CPU time in s, memory in MB; lists are sam
 
 from collections.abc import Iterator
 from contextlib import contextmanager, ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import os
 from pathlib import Path
 import statistics
@@ -29,6 +29,10 @@ from drive_can_bridge.trace.ring import Ring
 #: s until discovery and the first publishes are over
 SETTLE = 2.0
 REQUESTS = 'speed_setpoint, torque_limit, position_setpoint, digital_outputs'
+#: number of the first setting
+SETTINGS_AT = 1000
+#: bit/s, and s that a drive takes to answer, for a backup
+SLOW = (125_000.0, 0.001)
 RESPONSES = 'actual_speed, motor_current, actual_position, digital_inputs'
 
 
@@ -44,6 +48,7 @@ class Load:
     :param control: the drives have a control word.
     :param stuck: nobody reads the bridge's standard error.
     :param buses: among which the drives are shared out.
+    :param settings: parameters of each drive that a backup has, none beside another.
     """
 
     drives: int
@@ -55,6 +60,7 @@ class Load:
     control: bool = False
     stuck: bool = False
     buses: int = 1
+    settings: int = 0
 
     @property
     def how(self) -> tuple[str, ...]:
@@ -63,9 +69,13 @@ class Load:
 
 
 class Bus:
-    """The drives, and the parameter file of a bridge for them."""
+    """
+    The drives, and the parameter file of a bridge for them.
 
-    def __init__(self, stack: ExitStack, load: Load) -> None:
+    :param pace: bit rate, and s that a drive takes for an answer; none: everything at once.
+    """
+
+    def __init__(self, stack: ExitStack, load: Load, *pace: float) -> None:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         self.channels = [folder / f'bus{number}' for number in range(load.buses)]
         self.channel = self.channels[0]
@@ -82,6 +92,11 @@ class Bus:
             profile = HERE / 'profile_control.yaml'
             requests = requests.replace('digital_outputs', 'control_word')
             responses = responses.replace('digital_inputs', 'status_word')
+        if load.settings:
+            profile = folder / 'profile.yaml'
+            profile.write_text((HERE / 'profile.yaml').read_text() + ''.join(
+                f'  setting_{place}: {{number: {SETTINGS_AT + 2 * place}, type: uint16}}\n'
+                for place in range(load.settings)), encoding='utf-8')
         for number in range(load.drives):
             lines += [f'      drive{number}:', f'        bus: bus{number % load.buses}',
                       '        protocol: datamodel_extended',
@@ -90,7 +105,7 @@ class Bus:
                       f'        period: {load.period}', f'        cyclic_request: [{requests}]',
                       f'        cyclic_response: [{responses}]']
         self.file.write_text('\n'.join(lines) + '\n', encoding='utf-8')
-        self.drives, *_ = [stack.enter_context(child('drives.py', channel))
+        self.drives, *_ = [stack.enter_context(child('drives.py', channel, *pace))
                            for channel in self.channels]
 
     @property
@@ -246,6 +261,34 @@ def monitor(load: Load, duration: float, rounds: int = 4) -> dict[str, Any]:
                     for key in ('missed', 'elapsed'):
                         found[name][key] += result[key]
                     found[name]['cpu'] += result['process_cpu']
+    return found
+
+
+def backup(load: Load, rounds: int = 5) -> dict[str, Any]:
+    """Measure backups on a slow bus beside its frames and answers, and what a bridge misses."""
+    found: dict[str, Any] = {'backups': [], 'through': []}
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        bus = Bus(stack, replace(load, drives=1), *SLOW)
+        with child('backup_client.py', folder / 'backup.yaml', bus.file) as client:
+            for _ in range(rounds):
+                bus.drives.ask('clear')
+                each = client.ask('backup')
+                found['backups'].append({**each, 'spent': bus.drives.ask('spent')})
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        bus = Bus(stack, load)
+        with (bridge_under(load, bus) as bridge,
+              child('backup_client.py', folder / 'backup.yaml') as client):
+            for name in ('quiet', 'during'):
+                bridge.ask('clear')
+                end = time.monotonic() + 2 * SETTLE
+                while time.monotonic() < end:
+                    if name == 'during':
+                        found['through'].append(client.ask('backup'))
+                    else:
+                        time.sleep(SETTLE)
+                found[name] = bridge.ask('result')
     return found
 
 

@@ -29,7 +29,7 @@ INTERNAL: dict[str, set[str]] = {
     'configuration': {'', 'core', 'protocols', 'resources'},
     'profiles': {'', 'core', 'configuration', 'protocols', 'resources'},
     'transport': {'', 'core'},
-    'exchange': {'', 'core', 'protocols', 'transport'},
+    'exchange': {'', 'core', 'process', 'protocols', 'transport'},
     'trace': {'', 'core', 'protocols', 'transport'},
     'simulation': {'', 'core', 'configuration', 'protocols', 'resources', 'transport'},
     'ros': {
@@ -40,10 +40,16 @@ INTERNAL: dict[str, set[str]] = {
     'ros.monitor': {'', 'core', 'monitor'},
     'ros.demo': {'', 'core', 'configuration', 'simulation', 'monitor', 'ros', 'ros.monitor'},
     'demo': {'', 'core', 'configuration', 'process'},
+    'client.drive': {'', 'core'},
+    'ros.client': {'', 'core', 'process', 'client.drive'},
+    'client': {
+        '', 'core', 'configuration', 'protocols', 'transport', 'exchange', 'process',
+        'client.drive', 'ros.client'},
+    'backup': {'', 'core', 'configuration', 'client.drive'},
     'cli': {
         '', 'core', 'configuration', 'protocols', 'resources', 'transport', 'exchange', 'process',
-        'profiles', 'simulation', 'trace', 'monitor', 'view', 'demo', 'ros', 'ros.monitor',
-        'ros.demo'},
+        'profiles', 'simulation', 'trace', 'monitor', 'view', 'demo', 'client', 'client.drive',
+        'backup', 'ros', 'ros.monitor', 'ros.demo'},
 }
 
 ROS_PACKAGES = {
@@ -63,16 +69,18 @@ EXTERNAL: dict[str, set[str]] = {
     # yaml: only to tell which nodes a parameter file names when none of them is ours
     'ros': {*ROS_PACKAGES, 'yaml'},
     'ros.monitor': ROS_PACKAGES,
+    'ros.client': ROS_PACKAGES,
     'ros.demo': ROS_PACKAGES,
     'view': {'rich'},
     'demo': {'yaml'},
-    'cli': {'rich'},
+    # argcomplete: an optional extra
+    'cli': {'argcomplete', 'rich'},
 }
 
 #: Layer: edges that may be used inside functions only, so that importing the layer stays cheap and
 #: works where the other side is missing.
 LAZY = {('cli', 'ros'), ('cli', 'ros.monitor'), ('cli', 'ros.demo'), ('cli', 'view'),
-        ('cli', 'demo')}
+        ('cli', 'demo'), ('client', 'ros.client')}
 
 #: No clock, no thread, no log, no input or output in here: time and frames are arguments.
 SANS_IO = {'core', 'protocols', 'monitor'}

@@ -13,6 +13,7 @@ import time
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.record import Record
+from drive_can_bridge.exchange.one_master import END_FIRST, Ownership
 from drive_can_bridge.trace.channels import label
 from drive_can_bridge.transport.tap import QUEUE_MAX, Tap
 
@@ -53,6 +54,9 @@ class Taps:
     def __init__(self, configuration: BridgeConfiguration) -> None:
         self._queue: queue.Queue[Record] = queue.Queue(QUEUE_MAX)
         self.taps: list[Tap] = []
+        # nothing is sent: only serial ports, which one process can read, are locked
+        self._ownership = Ownership([(bus, ()) for bus in configuration.buses.values()],
+                                    'drive_can listening', END_FIRST)
         try:
             for bus in configuration.buses.values():
                 self.taps.append(Tap(bus, label(bus), self._queue, complain))
@@ -81,6 +85,7 @@ class Taps:
             if tap.lost:
                 complain(f'bus {tap.bus.name}: {tap.lost} frames lost: this machine is too slow '
                          f'for the traffic')
+        self._ownership.release()
 
 
 @contextmanager

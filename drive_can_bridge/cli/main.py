@@ -1,4 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+# PYTHON_ARGCOMPLETE_OK
 """
 The command ``drive_can``: everything that a person runs by hand.
 
@@ -17,6 +18,7 @@ import sys
 from typing import Any
 
 from drive_can_bridge import __version__
+from drive_can_bridge.cli.argcomplete_hook import complete, typed
 from drive_can_bridge.core.errors import DriveCanError
 
 PROGRAM = 'drive_can'
@@ -36,6 +38,14 @@ SUBCOMMANDS: dict[str, tuple[str, str]] = {
     'scan': ('drive_can_bridge.cli.scan', 'find the drives on a bus'),
     'probe': ('drive_can_bridge.cli.probe',
               'settle by reads which keys a drive needs'),
+    'read': ('drive_can_bridge.cli.read', 'read parameters of a drive'),
+    'write': ('drive_can_bridge.cli.write', 'set parameters of a drive'),
+    'backup': ('drive_can_bridge.cli.backup',
+               'write the settings of drives to files'),
+    'restore': ('drive_can_bridge.cli.restore',
+                'write the settings of a backup into a drive'),
+    'compare': ('drive_can_bridge.cli.compare',
+                'show what differs between backups and drives'),
     'record': ('drive_can_bridge.cli.record',
                'write everything on the buses of a parameter file to a trace'),
     'decode': ('drive_can_bridge.cli.decode',
@@ -43,8 +53,8 @@ SUBCOMMANDS: dict[str, tuple[str, str]] = {
 }
 #: what runs until a signal comes: that is no failure
 ENDLESS = ('simulate', 'demo', 'record', 'monitor')
-#: an option that makes a subcommand one of these
-ENDLESS_OPTION = '--live'
+#: options that make a subcommand one of these
+ENDLESS_OPTIONS = ('--live', '--watch')
 #: exit code of what is interrupted before it is done
 INTERRUPTED = 130
 
@@ -57,7 +67,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     :return: exit code.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
-    endless = _wanted(arguments) in ENDLESS or ENDLESS_OPTION in arguments
+    endless = _wanted(arguments) in ENDLESS or any(
+        word.partition('=')[0] in ENDLESS_OPTIONS for word in arguments)
     if argv is None and endless:  # until the subcommand looks after signals itself
         signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
@@ -94,7 +105,8 @@ def _wanted(arguments: list[str]) -> str | None:
 
 
 def _run(arguments: list[str]) -> int:
-    wanted = _wanted(arguments)
+    completing = typed()
+    wanted = _wanted(arguments if completing is None else completing)
     parser = argparse.ArgumentParser(
         prog=PROGRAM, description='Tools of drive_can_bridge, the bridge from motor drives on '
                                   'CAN buses to ROS 2.')
@@ -107,7 +119,13 @@ def _run(arguments: list[str]) -> int:
             module.add_parser(subparsers)
         else:
             subparsers.add_parser(name, help=help_line)
-    args = parser.parse_args(arguments)
+    complete(parser)
+    args, rest = parser.parse_known_args(arguments)
+    if hasattr(args, 'words'):  # argparse takes positional arguments in one piece only
+        args.words += [word for word in rest if not word.startswith('-')]
+        rest = [word for word in rest if word.startswith('-')]
+    if rest:
+        parser.error(f'unrecognized arguments: {" ".join(rest)}')
     code: int = module.run(args)
     return code
 

@@ -12,6 +12,7 @@ from drive_can_bridge.cli.asking import Asker, LISTEN
 from drive_can_bridge.cli.listening import add_params_file, complain, load
 from drive_can_bridge.cli.tables import print_json, print_table
 from drive_can_bridge.core.configuration import BridgeConfiguration, DriveConfiguration
+from drive_can_bridge.exchange.one_master import END_FIRST, Ownership
 from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.protocols.prober import Finding, Prober
 from drive_can_bridge.transport.port import open_port
@@ -79,18 +80,19 @@ def run(args: Namespace) -> int:
 def _probe_bus(configuration: BridgeConfiguration, name: str, probers: Sequence[Prober],
                nmt_start: bool) -> Iterator[tuple[Prober, list[Finding]]]:
     bus = configuration.buses[name]
-    port = open_port(bus)
-    try:
-        asker = Asker(bus, port, [drive for drive in configuration.drives.values()
-                                  if drive.bus == name])
-        asker.listen(LISTEN)
-        for prober in probers:
-            start = prober.start_frame()
-            if nmt_start and start is not None:
-                asker.tell(start)
-            yield prober, asker.probe(prober)
-    finally:
-        port.close()
+    drives = [drive for drive in configuration.drives.values() if drive.bus == name]
+    with Ownership([(bus, drives)], 'drive_can probe', END_FIRST):
+        port = open_port(bus)
+        try:
+            asker = Asker(bus, port, drives)
+            asker.listen(LISTEN)
+            for prober in probers:
+                start = prober.start_frame()
+                if nmt_start and start is not None:
+                    asker.tell(start)
+                yield prober, asker.probe(prober)
+        finally:
+            port.close()
 
 
 def _chosen(configuration: BridgeConfiguration, word: str | None) -> list[DriveConfiguration]:

@@ -2,12 +2,12 @@
 """``drive_can profile import``: a profile from an EDS, DCF or CSV file."""
 
 from argparse import Namespace
-import os
 from pathlib import Path
 import sys
-import tempfile
 
+from drive_can_bridge.cli.questions import agreed, NobodyToAsk
 from drive_can_bridge.cli.tables import print_json, printable
+from drive_can_bridge.cli.whole_file import differs, write_whole
 from drive_can_bridge.profiles.draft import LeftOut
 from drive_can_bridge.profiles.importing import (
     columns_from_option, FileFormat, import_file, Imported, WrongOption,
@@ -110,32 +110,13 @@ def _write(path: Path, text: str, *, yes: bool) -> int:
     :return: exit code.
     """
     data = text.encode('utf-8')
-    if path.is_file() and path.read_bytes() != data and not yes:
-        question = f'{path} exists and holds something else. Overwrite it?'
-        if not sys.stdin.isatty():
-            print(printable(f'{question} Nothing was written; --yes overwrites it.'),
-                  file=sys.stderr)
+    if differs(path, data):
+        try:
+            if not agreed(f'{path} exists and holds something else. Overwrite it?', yes=yes,
+                          otherwise='Nothing was written', yes_means='overwrites it'):
+                return 1
+        except NobodyToAsk as error:
+            print(error, file=sys.stderr)
             return WRONG_USAGE
-        print(printable(f'{question} [y/N] '), end='', file=sys.stderr, flush=True)
-        if sys.stdin.readline().strip().lower() not in ('y', 'yes'):
-            print('Nothing was written.', file=sys.stderr)
-            return 1
-    if path.exists() and not path.is_file():  # /dev/stdout, a pipe
-        path.write_bytes(data)
-        return 0
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f'.{path.name}.')
-    try:
-        with os.fdopen(handle, 'wb') as file:
-            file.write(data)
-        os.chmod(name, 0o666 & ~_umask())
-        os.replace(name, path)
-    except BaseException:
-        os.unlink(name)
-        raise
+    write_whole(path, data)
     return 0
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

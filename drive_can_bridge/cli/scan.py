@@ -13,6 +13,7 @@ from drive_can_bridge.cli.found_file import write_parameter_file
 from drive_can_bridge.cli.listening import complain, positive
 from drive_can_bridge.cli.survey import Survey
 from drive_can_bridge.core.configuration import BusConfiguration
+from drive_can_bridge.exchange.one_master import END_FIRST, Ownership
 from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.trace.summary import table
 from drive_can_bridge.transport.adapters import adapter_keywords, check_interface
@@ -86,14 +87,15 @@ def run(args: Namespace) -> int:
 
 
 def _scan(args: Namespace, bus: BusConfiguration) -> int:
-    port = open_port(bus)
-    try:
-        survey = Survey(bus, port)
-        survey.listen(args.listen)
-        if not args.passive:
-            _ask(args, survey)
-    finally:
-        port.close()
+    with Ownership([(bus, ())], 'drive_can scan', END_FIRST):
+        port = open_port(bus)
+        try:
+            survey = Survey(bus, port)
+            survey.listen(args.listen)
+            if not args.passive:
+                _ask(args, survey)
+        finally:
+            port.close()
     _tell_trouble(survey, port, asked=not args.passive)
     _show(args, survey)
     if args.output is not None:
@@ -180,12 +182,13 @@ def _compare_bitrates(args: Namespace, bus: BusConfiguration) -> int:
                           'bit rates without it would disturb the bus')
     heard = 0
     for bitrate in args.bitrates:
-        port = open_port(replace(bus, bitrate=bitrate, options={'listen_only': True}))
-        try:
-            survey = Survey(bus, port)
-            survey.listen(args.listen)
-        finally:
-            port.close()
+        with Ownership([(bus, ())], 'drive_can scan', END_FIRST):
+            port = open_port(replace(bus, bitrate=bitrate, options={'listen_only': True}))
+            try:
+                survey = Survey(bus, port)
+                survey.listen(args.listen)
+            finally:
+                port.close()
         heard += survey.frames
         print(f'{bitrate} bit/s: {survey.frames} frames, {port.error_frames} error frames'
               + ('' if not survey.sightings else ': ' + ', '.join(

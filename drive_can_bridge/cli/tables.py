@@ -26,12 +26,9 @@ def print_table(headings: Sequence[str], rows: Iterable[Sequence[str]], *,
 
     :param numbers: headings of columns that are aligned to the right.
     """
-    written = [[printable(cell) for cell in row] for row in rows]
-    used = [place for place in range(len(headings)) if any(row[place] for row in written)]
-    headings = [headings[place] for place in used]
-    written = [[row[place] for place in used] for row in written]
+    headings, written = _used(headings, rows)
     if sys.stdout.isatty():
-        _print_fitting(headings, written, numbers)
+        Console().print(_fitting(headings, written, numbers))
     else:
         for line in plain_lines(headings, written, numbers=numbers):
             print(line)
@@ -50,8 +47,23 @@ def plain_lines(headings: Sequence[str], rows: Sequence[Sequence[str]], *,
     return lines
 
 
-def _print_fitting(headings: Sequence[str], rows: Sequence[Sequence[str]],
-                   numbers: Sequence[str]) -> None:
+def fitting_table(headings: Sequence[str], rows: Iterable[Sequence[str]],
+                  numbers: Sequence[str] = ()) -> Table:
+    """Make a table that fits a terminal, for those that show it again and again."""
+    return _fitting(*_used(headings, rows), numbers)
+
+
+def _used(headings: Sequence[str], rows: Iterable[Sequence[str]],
+          ) -> tuple[list[str], list[list[str]]]:
+    """Return headings and cells of the columns with any content, fit for a terminal."""
+    written = [[printable(cell) for cell in row] for row in rows]
+    used = [place for place in range(len(headings)) if any(row[place] for row in written)]
+    return [headings[place] for place in used], [[row[place] for place in used]
+                                                 for row in written]
+
+
+def _fitting(headings: Sequence[str], rows: Sequence[Sequence[str]],
+             numbers: Sequence[str]) -> Table:
     table = Table(box=None, pad_edge=False, header_style='bold')
     for place, heading in enumerate(headings):
         # a name that is broken in two cannot be copied
@@ -59,7 +71,7 @@ def _print_fitting(headings: Sequence[str], rows: Sequence[Sequence[str]],
                          overflow='fold', no_wrap=place == 0 or heading in numbers)
     for row in rows:
         table.add_row(*(Text(cell) for cell in row))
-    Console().print(table)
+    return table
 
 
 def print_json(document: Mapping[str, Any]) -> None:

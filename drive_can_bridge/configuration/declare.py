@@ -3,12 +3,14 @@
 
 from collections.abc import Container, Iterator, Mapping
 from dataclasses import is_dataclass
+import json
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from drive_can_bridge.configuration.schema import ALL_OPTIONS, definition
 from drive_can_bridge.configuration.schema_check import check_value
 from drive_can_bridge.core.configuration import BridgeConfiguration
+from drive_can_bridge.core.profile import RestoreTable
 from drive_can_bridge.protocols.families import FAMILIES
 
 #: keys of a drive that may change while the bridge runs
@@ -19,6 +21,12 @@ DYNAMIC_KEYS = ('diagnostics_period',)
 def identity_name(drive: str) -> str:
     """Return the name of the parameter that says who a drive is; the bridge itself sets it."""
     return f'drives.{drive}.identity'
+
+
+def restore_text(table: RestoreTable) -> str:
+    """Write the ``restore`` section of a profile for clients of the node."""
+    return json.dumps({phase: [[step.parameter, step.bits, step.mask] for step in steps]
+                       for phase, steps in (('before', table.before), ('after', table.after))})
 
 
 class DeclaredParameter(NamedTuple):
@@ -76,6 +84,9 @@ def _bridge(configuration: BridgeConfiguration) -> Iterator[DeclaredParameter]:
             'the section identity of its profile. Empty while not known.', False)
         yield DeclaredParameter(f'{prefix}profile_sha256', drive.profile.sha256,
                                 'SHA-256 of the file of the profile, as it was read.', False)
+        yield DeclaredParameter(f'{prefix}restore', restore_text(drive.profile.restore),
+                                'JSON of what is written around a restored backup: lists before '
+                                'and after of [name, bits, mask].', False)
         for key, option in FAMILIES[drive.protocol].options_schema.items():
             yield DeclaredParameter(prefix + key, getattr(drive.options, key),
                                     option['description'], False)

@@ -115,7 +115,7 @@ def _forget_findings(tree: Tree) -> None:
     """Leave out what the bridge finds out by itself: ``ros2 param dump`` writes that too."""
     drives = tree.data.get('drives')
     for drive in drives.values() if isinstance(drives, dict) else ():
-        for key in ('identity', 'profile_sha256'):
+        for key in ('identity', 'profile_sha256', 'restore'):
             if isinstance(drive, dict) and isinstance(drive.get(key), str):
                 del drive[key]
 

@@ -116,13 +116,23 @@ class _FileReader:
         self.problems.extend(reader.refused)
 
 
+def read_sections(path: FilePath) -> tuple[list[Section], list[Problem]]:
+    """
+    Read the sections of all nodes, and what makes rcl refuse the file.
+
+    :raises OSError: the file cannot be read.
+    """
+    reader = _FileReader(path)
+    return reader.sections, reader.problems
+
+
 def section_names(path: FilePath) -> list[str]:
     """
     Return the names of the nodes that a parameter file has sections for.
 
     :raises OSError: the file cannot be read.
     """
-    return [section.name for section in _FileReader(path).sections]
+    return [section.name for section in read_sections(path)[0]]
 
 
 def duplicate_keys(path: FilePath, node: str) -> list[Problem]:

@@ -40,12 +40,23 @@ class Written:
 
 Outcome = Union[Failure, ReadValue, Written]
 
+#: what begins every reason of a failure for which no frame of the drive came
+NO_ANSWER = 'no answer'
 SENT_UNACKNOWLEDGED = 'sent; this protocol does not acknowledge writes'
-NO_ANSWER_OFFLINE = 'no answer; drive offline'
 BUS_DOWN = 'bus down'
 NOT_SENT = 'not sent: the bus takes no frames'
 BRIDGE_INACTIVE = 'bridge inactive'
 BUSY = 'busy'
+OFFLINE = 'drive offline'
+NO_ANSWER_OFFLINE = f'{NO_ANSWER}; {OFFLINE}'
+_NOTHING_SAID = (NO_ANSWER, BUS_DOWN, NOT_SENT, BRIDGE_INACTIVE, BUSY, OFFLINE)
+
+
+def is_answer(outcome: Outcome) -> bool:
+    """Tell whether an outcome rests on something that the drive said."""
+    if isinstance(outcome, Failure):
+        return not outcome.reason.startswith(_NOTHING_SAID)
+    return not (isinstance(outcome, Written) and outcome.note)
 
 
 @dataclass(frozen=True, eq=False)

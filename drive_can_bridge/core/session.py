@@ -34,7 +34,7 @@ from drive_can_bridge.core.last_sent import LastSent
 from drive_can_bridge.core.outbox import Outbox
 from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.requests import (
-    BRIDGE_INACTIVE, BUS_DOWN, BUSY, Failure, Outcome, Request,
+    BRIDGE_INACTIVE, BUS_DOWN, BUSY, Failure, is_answer, Outcome, Request,
 )
 from drive_can_bridge.core.retry import RetryPolicy
 from drive_can_bridge.core.roles import Cells, Role, Roles
@@ -75,6 +75,8 @@ class Session(ABC):
     :ivar roles: what users may not write.
     :ivar online: the drive exchanges process data.
     :ivar ever_online: it did so at least once since activation.
+    :ivar serving: parameter requests are all that it cares for; ``online`` says then whether the
+        drive answered the last one.
     :ivar told: whether the drive may be running by our word.
     :ivar partners: sessions on the same bus whose timers and events may change with any call of
         this one.
@@ -102,6 +104,7 @@ class Session(ABC):
         self.online = False
         self.ever_online = False
         self.active = False
+        self.serving = False
         self.bus_available = False
         self.phase: float | None = None
         self.told = Told()
@@ -144,6 +147,15 @@ class Session(ABC):
             self._advice = LOOKING
             self._begin(now)
 
+    def serve(self) -> None:
+        """
+        Serve parameter requests and do nothing else, instead of ``activate``.
+
+        No exchange, no setpoint, no control word, nothing that nobody asked for: so there is
+        nothing to be stopped either, and no ``deactivate``.
+        """
+        self.active = self.serving = True
+
     @abstractmethod
     def deactivate(self, now: float) -> None:
         """Begin the safe stop: neutral setpoints, ``disable``; then silence."""
@@ -161,7 +173,7 @@ class Session(ABC):
     def bus_up(self, now: float) -> None:
         """Begin to use the bus: it was opened."""
         self.bus_available = True
-        if self.active:
+        if self.active and not self.serving:
             self._advice = LOOKING
             self._begin(now)
 
@@ -294,7 +306,9 @@ class Session(ABC):
             return 'use ~/enable'
         if role is Role.CYCLIC:
             return self._cyclic_refusal(own)
-        return 'mapping parameter: not written while the bridge is active' if self.active else ''
+        if not self.active or self.serving:
+            return ''
+        return 'mapping parameter: not written while the bridge is active'
 
     def role(self, parameter: Parameter) -> Role | None:
         """Say what the bridge uses a parameter for that users cannot set for that reason."""
@@ -348,6 +362,8 @@ class Session(ABC):
                 self.statistics.requests_failed += 1
             else:
                 self.statistics.requests_ok += 1
+        if self.serving and outcomes:
+            self.online = any(map(is_answer, outcomes))
         self._events.append(RequestCompleted(request, outcomes))
 
     def reconfigure(self, *, command_timeout: float | None = None,

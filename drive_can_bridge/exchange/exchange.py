@@ -185,6 +185,12 @@ class BusExchange:
                 self._pump(member)
         self._alarm.ring()
 
+    def serve(self) -> None:
+        """Serve parameter requests only: nothing is sent that nobody asked for."""
+        with self.lock:
+            for member in self._members:
+                member.session.serve()
+
     def deactivate(self) -> bool:
         """
         Stop every drive safely and wait until it is done.

@@ -135,6 +135,14 @@ class Family(ABC):
             is not a raw name of this family.
         """
 
+    def supervision(self, drive: DriveConfiguration) -> Parameter | None:
+        """
+        Return what is not 0 in a drive that faults when telegrams end.
+
+        Whoever only asks a few questions should know that.
+        """
+        return None
+
     @abstractmethod
     def make_session(self, drive: DriveConfiguration) -> Session:
         """Make the drive's session. Nothing is sent before ``activate``."""

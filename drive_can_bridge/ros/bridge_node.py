@@ -5,10 +5,11 @@ The bridge: a managed node that turns its parameters into buses, exchanges and d
 ========== ====================================================================================
 transition what happens
 ========== ====================================================================================
-configure  parameters are checked, buses opened, drive nodes made; nothing is sent
+configure  parameters are checked, drives locked on this host, buses opened, drive nodes made;
+           nothing is sent
 activate   the exchange begins: mapping checks, then cyclic frames with neutral setpoints
 deactivate three cycles with neutral setpoints (and ``disable``), then silence
-cleanup    buses closed, drive nodes gone
+cleanup    buses closed, drive nodes gone, locks released
 shutdown   deactivate and cleanup as far as needed
 ========== ====================================================================================
 """
@@ -31,6 +32,7 @@ from drive_can_bridge.configuration.problems import report
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.errors import ConfigurationError
 from drive_can_bridge.exchange.exchange import BusExchange
+from drive_can_bridge.exchange.one_master import BRIDGE, InUse, Ownership
 from drive_can_bridge.process.scheduling import raise_priority
 from drive_can_bridge.protocols.families import FAMILIES, make_sessions
 from drive_can_bridge.ros.diagnostics import Diagnostics
@@ -84,6 +86,7 @@ class BridgeNode(LifecycleNode):
         self._misconfigured: list[str] = []
         self._priority = ''
         self._leaving: list[DriveNode] = []
+        self._ownership: Ownership | None = None
         self.configuration: BridgeConfiguration | None = None
         self.exchanges: dict[str, BusExchange] = {}
         self.drives: dict[str, DriveNode] = {}
@@ -192,6 +195,7 @@ class BridgeNode(LifecycleNode):
         self._misconfigured = []
         self._configuring = True
         try:
+            self._lock(configuration)
             self._build(configuration)
             self._open(configuration)
         except BaseException:
@@ -199,6 +203,15 @@ class BridgeNode(LifecycleNode):
             raise
         finally:
             self._configuring = False
+
+    def _lock(self, configuration: BridgeConfiguration) -> None:
+        try:
+            self._ownership = Ownership(
+                [(bus, [drive for drive in configuration.drives.values() if drive.bus == name])
+                 for name, bus in configuration.buses.items()],
+                BRIDGE, 'a drive has one master: end it first')
+        except InUse as error:
+            raise ConfigurationError([str(error)]) from None
 
     def _build(self, configuration: BridgeConfiguration) -> None:
         flight = self._flight = FlightWatch(
@@ -281,6 +294,9 @@ class BridgeNode(LifecycleNode):
             self._diagnostics = None
         for exchange in self.exchanges.values():
             exchange.close()
+        if self._ownership is not None:
+            self._ownership.release()
+            self._ownership = None
         if self._flight is not None:
             self._flight.close()
             self._flight = None

@@ -74,6 +74,7 @@ class ParameterServices:
         self._active = active
         self._failed = failed
         self._unreadable: set[str] = set()  # what the drive did not give when last asked
+        self._errors: dict[str, str] = {}   # why there was no value, whatever the reason
         # reentrant: a request that waits for its drive must not keep the next one from being taken
         group = ReentrantCallbackGroup()
         for service_type, name, callback in (
@@ -128,15 +129,26 @@ class ParameterServices:
                         values[place] = parameter_value(
                             parameter, parameter.value_from_raw(outcome.raw))
                         self._unreadable.discard(parameter.name)
+                        self._errors.pop(request.names[place], None)
                     elif isinstance(outcome, Failure):
                         if parameter.listed and outcome.reason not in _NOT_ITS_FAULT:
                             self._unreadable.add(parameter.name)
                         self._failed(f'read {_title(parameter)}', outcome.reason, 0)
+                        self._remember(request.names[place], outcome.reason)
         elif request.names:
+            for name, known in zip(request.names, found):
+                if known is not None:
+                    self._remember(name, BRIDGE_INACTIVE)
             self._failed('read parameters', BRIDGE_INACTIVE,
                          sum(parameter is not None for parameter in found))
         response.values = [values.get(place, ParameterValue()) for place in range(len(found))]
         return response
+
+    def _remember(self, name: str, reason: str) -> None:
+        """Keep for ``describe_parameters`` why there is no value: a raw name may be anything."""
+        if len(self._errors) >= NAMES_MAX:
+            self._errors.pop(next(iter(self._errors)))
+        self._errors[name] = reason
 
     def _list(self, request: Any, response: Any) -> Any:
         if self._excess(request.prefixes, 'list parameters'):
@@ -155,7 +167,8 @@ class ParameterServices:
         response.descriptors = [
             ParameterDescriptor(name=name) if parameter is None
             else descriptor(name, parameter, role=self._role(parameter),
-                            unreadable=name in self._unreadable)
+                            unreadable=name in self._unreadable,
+                            error=self._errors.get(name, ''))
             for name, parameter in found]
         return response
 

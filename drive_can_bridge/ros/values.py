@@ -12,6 +12,7 @@ from std_msgs.msg import Bool, Float64, Int64
 
 from drive_can_bridge.core.parameters import Parameter, Value, ValueKind
 from drive_can_bridge.core.roles import Role
+from drive_can_bridge.core.text import printable
 
 TOPIC_TYPES: dict[ValueKind, Any] = {
     ValueKind.DOUBLE: Float64, ValueKind.INTEGER: Int64, ValueKind.BOOL: Bool,
@@ -68,11 +69,13 @@ def value_of(message: ParameterValue) -> object:
     return value if isinstance(value, (bool, int, float, str)) else list(value)
 
 
-def constraints(parameter: Parameter, role: Role | None) -> str:
+def constraints(parameter: Parameter, role: Role | None, error: str = '') -> str:
     """
     Return what tools want to know of a parameter: ``unit="N m" number=209 type=int16 …``.
 
     What does not apply is absent. ``shlex.split`` takes it apart.
+
+    :param error: why it had no value when it was last read.
     """
     by_object = parameter.index is not None
     fields: dict[str, object] = {
@@ -88,6 +91,7 @@ def constraints(parameter: Parameter, role: Role | None) -> str:
         'storage': None if parameter.storage is None else parameter.storage.value,
         'protected': str(parameter.protected).lower(),
         'role': None if role is None else role.value,
+        'error': printable(error) or None,
     }
     return ' '.join(f'{key}={_quoted(str(value))}' for key, value in fields.items()
                     if value is not None)
@@ -106,7 +110,7 @@ def _quoted(text: str) -> str:
 
 
 def descriptor(name: str, parameter: Parameter, *, role: Role | None = None,
-               unreadable: bool = False) -> ParameterDescriptor:
+               unreadable: bool = False, error: str = '') -> ParameterDescriptor:
     """
     Describe a parameter: type, unit, number, storage, access, range with step = scale.
 
@@ -116,6 +120,7 @@ def descriptor(name: str, parameter: Parameter, *, role: Role | None = None,
 
     :param role: what the bridge itself uses the parameter for.
     :param unreadable: there is no value to be had.
+    :param error: why there was none when it was last read; '' where there was one.
     """
     facts = [parameter.address]
     if parameter.unit:
@@ -137,7 +142,7 @@ def descriptor(name: str, parameter: Parameter, *, role: Role | None = None,
         name=name, read_only=not parameter.writable,
         type=ParameterType.PARAMETER_NOT_SET if untyped else PARAMETER_TYPES[kind],
         description=f'{text} ({", ".join(facts)})' if text else ', '.join(facts),
-        additional_constraints=constraints(parameter, role))
+        additional_constraints=constraints(parameter, role, error))
     low, high = _range(parameter)
     if low >= high:  # one value only: a slider of no length
         return message

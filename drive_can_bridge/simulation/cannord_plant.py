@@ -26,6 +26,8 @@ BUS_CONTROL = 0x0200
 ROTATING_RIGHT = 0x0800
 ROTATING_LEFT = 0x1000
 PARAMETER_SET_SHIFT = 14
+#: what an SK 5xxE says of itself, by parameter number: version of the data base
+IDENTITY = {742: 1}
 
 
 class InverterPlant(MotorPlant):
@@ -92,7 +94,8 @@ class InverterPlant(MotorPlant):
         """Return what a new inverter has in a register: the same in all parameter sets."""
         first = self._of_sets.get(parameter.name)
         if first is None:
-            return super().initial(parameter)
+            identity = IDENTITY.get(parameter.number or 0)
+            return super().initial(parameter) if identity is None else identity
         initial = super().initial(first)
         return initial_value(first, RawRange(first, limits=True)) if initial is None else initial
 

@@ -28,6 +28,7 @@ _CODES = {
     Refusal.OUT_OF_RANGE: abort_codes.VALUE_OUT_OF_RANGE,
     Refusal.CROSSED: 0x06090036,
     Refusal.FORBIDDEN: abort_codes.DEVICE_STATE,
+    Refusal.TOO_EARLY: abort_codes.DEVICE_STATE,
 }
 
 

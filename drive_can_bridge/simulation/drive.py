@@ -25,7 +25,7 @@ from typing import Protocol
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.frame import Frame, Route
-from drive_can_bridge.core.parameters import Parameter, Value
+from drive_can_bridge.core.parameters import Parameter, Value, ValueKind
 from drive_can_bridge.simulation.faults import AnswerFaults, Fault, FaultKind, parse_fault
 from drive_can_bridge.simulation.motor_plant import MotorPlant
 from drive_can_bridge.simulation.plant import Mechanics, PlantFactory
@@ -38,6 +38,8 @@ BOOT_TIME = 0.5
 #: s without power, where a fault does not say
 _POWER_CUTS = {FaultKind.RESTART: BOOT_TIME, FaultKind.FORGET: BOOT_TIME,
                FaultKind.POWER_CUT: 5.0, FaultKind.OFF: math.inf}
+_KINDS = {ValueKind.BOOL: 'true or false', ValueKind.INTEGER: 'an integer',
+          ValueKind.DOUBLE: 'a number'}
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,6 +106,8 @@ class SimulatedDrive(ABC):
                         FaultKind.REFUSE: self.registers.refused}
         self._marks: dict[tuple[FaultKind, str], Fault] = {}
         self._answer_faults = AnswerFaults(self.foreign_frames)
+        self._cut_at: int | None = None
+        self._set_by_fault: set[str] = set()
 
     # -- input and output -------------------------------------------------------------------------
 
@@ -112,6 +116,9 @@ class SimulatedDrive(ABC):
         if now >= self._deaf_until:
             self._advance(now)
             self.receive(frame, now)
+            if self._cut_at is not None and self.registers.settings_written >= self._cut_at:
+                self._cut_at = None
+                self._lose_power(now, now + _POWER_CUTS[FaultKind.POWER_CUT])
 
     def next_timer(self) -> float:
         """Return when :meth:`handle_timer` wants to be called; infinity: never."""
@@ -177,6 +184,16 @@ class SimulatedDrive(ABC):
             name = self._known(str(fault.argument))
             self._marked[kind].add(name)
             self._marks[kind, name] = fault
+        elif kind is FaultKind.NEEDS:
+            first, second = map(self._known, fault.pair)
+            self.registers.needs.add((first, second))
+            self._marks[kind, first] = fault
+        elif kind is FaultKind.SET:
+            name = self._known(fault.pair[0])
+            self.set_value(name, _value(self.registers.parameters[name], fault.pair[1]), now)
+            self._set_by_fault.add(name)
+        elif kind is FaultKind.CUT_AT:
+            self._cut_at = self.registers.settings_written + int(fault.number or 1)
         elif kind in _POWER_CUTS:
             seconds = _POWER_CUTS[kind] if fault.number is None else fault.number
             self._lose_power(now, now + seconds, forget=kind is FaultKind.FORGET)
@@ -293,6 +310,26 @@ class SimulatedDrive(ABC):
         self._marks.clear()
         for names in self._marked.values():
             names.clear()
+        self.registers.needs.clear()
+        self._cut_at = None
+        for name in self._set_by_fault:
+            self.registers.release(name)
+        self._set_by_fault.clear()
         self.plant.operation.repair()
         if self._deaf_until == math.inf:
             self._lose_power(now, now + BOOT_TIME)
+
+
+def _value(parameter: Parameter, text: str) -> Value:
+    """
+    Read a value as it stands on a command line.
+
+    :raises ValueRefused: it is none of this parameter's kind.
+    """
+    try:
+        if parameter.kind is ValueKind.BOOL:
+            return {'true': True, 'false': False}[text]
+        return int(text, 0) if parameter.kind is ValueKind.INTEGER else float(text)
+    except (KeyError, ValueError):
+        raise ValueRefused(f"'{text}' is no value of {parameter.name}, which is "
+                           f'{_KINDS[parameter.kind]}') from None

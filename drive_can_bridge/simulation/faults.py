@@ -34,6 +34,13 @@ def _integer(low: int, high: int | None) -> Callable[[str], int]:
     return convert
 
 
+def _pair(text: str) -> str:
+    first, _, second = text.partition(':')
+    if not (first.strip() and second.strip()):
+        raise ValueError
+    return f'{first.strip()}:{second.strip()}'
+
+
 class FaultKind(Enum):
     """What can be wrong with a drive: how it is written, what it does, its argument."""
 
@@ -45,11 +52,17 @@ class FaultKind(Enum):
     DUPLICATE = 'duplicate', 'each answer is sent twice'
     STUCK = 'stuck=PARAMETER', 'writes to the parameter have no effect', str
     REFUSE = 'refuse=PARAMETER', 'writes to it are refused, as far as the protocol can', str
+    NEEDS = ('needs=PARAMETER:OTHER', 'writes to it are refused until the other one was written '
+             'since power came on', _pair)
+    SET = ('set=PARAMETER:VALUE', 'gives a parameter a value by hand, also a read-only one; an '
+           'actual value stays there until ok', _pair)
     TRIP = ('trip[=SECONDS]', 'fault of the drive itself; cannot be reset before the seconds are '
             'over', _seconds)
     RESTART = ('restart[=SECONDS]', 'power is lost and back; deaf for 0.5 s, or as long as it '
                'says', _seconds)
     POWER_CUT = 'power_cut[=SECONDS]', 'the same for 5 s, or as long as it says', _seconds
+    CUT_AT = ('cut_at=N', 'the Nth write of a setting from now on is obeyed, and power is cut for '
+              '5 s before the answer', _integer(1, None))
     FORGET = 'forget[=SECONDS]', 'restart with empty maps', _seconds
     OFF = 'off', 'no power, until ok or restart'
     OK = 'ok', 'all faults end'
@@ -75,6 +88,12 @@ class Fault:
     def __str__(self) -> str:
         """Write the fault as it is read."""
         return self.kind.word if self.argument is None else f'{self.kind.word}={self.argument}'
+
+    @property
+    def pair(self) -> tuple[str, str]:
+        """Both halves of an argument with a colon; the second is '' where there is none."""
+        first, _, second = str(self.argument).partition(':')
+        return first, second
 
     @property
     def number(self) -> float | None:

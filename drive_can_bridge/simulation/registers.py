@@ -26,6 +26,7 @@ class Refusal(Enum):
     OUT_OF_RANGE = 'out of range'
     CROSSED = 'minimum above maximum'
     FORBIDDEN = 'a scripted fault'
+    TOO_EARLY = 'another parameter has to be written first'
 
 
 class Registers:
@@ -36,6 +37,8 @@ class Registers:
         say where they are stored (those exchanged cyclically live in RAM).
     :ivar stuck: names of parameters on which writes have no effect.
     :ivar refused: names of parameters whose writes are refused.
+    :ivar needs: name of a parameter that is refused until another one was written, and the other.
+    :ivar settings_written: writes that had an effect, of what is not exchanged cyclically.
     :ivar wear: EEPROM writes by name.
     :ivar stand_ins: name of the register that counts for the motor instead of another one.
     """
@@ -44,6 +47,8 @@ class Registers:
         self.parameters = parameters
         self.stuck: set[str] = set()
         self.refused: set[str] = set()
+        self.needs: set[tuple[str, str]] = set()
+        self.settings_written = 0
         self.wear: Counter[str] = Counter()
         self.stand_ins: dict[str, str] = {}
         self._volatile = volatile
@@ -54,6 +59,7 @@ class Registers:
         self._initial: dict[str, int] = {}
         self._kept: dict[str, int] = {}
         self._held: dict[str, int] = {}
+        self._written: set[str] = set()
         self._sources: dict[str, Callable[[], int]] = {}
 
     def connect(self, plant: Plant) -> None:
@@ -94,6 +100,8 @@ class Registers:
                 return Refusal.READ_ONLY
             if name in self.refused:
                 return Refusal.FORBIDDEN
+            if any(one == name and other not in self._written for one, other in self.needs):
+                return Refusal.TOO_EARLY
             if raw != self.clamped(name, raw) or not self._plant.allows(parameter, raw):
                 return Refusal.OUT_OF_RANGE
             for ends in self._crossings.get(name, ()):
@@ -115,6 +123,8 @@ class Registers:
             return
         if wear:
             self.wear[name] += wear
+        self._written.add(name)
+        self.settings_written += name not in self._volatile
         self._store(name, raw, not self.is_volatile(parameter) if keep is None else keep)
 
     def is_volatile(self, parameter: Parameter) -> bool:
@@ -128,6 +138,7 @@ class Registers:
         self._raw.update(self._initial)
         self._raw.update(self._kept)
         self._held.clear()
+        self._written.clear()
 
     # -- by hand ----------------------------------------------------------------------------------
 

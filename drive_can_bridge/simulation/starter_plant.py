@@ -41,6 +41,14 @@ SETTINGS = range(540, 700)
 #: what settings are in a new controller, by register: in configuration mode, as from the factory
 DEFAULTS = {GENERAL_CONFIGURATION: CONFIGURATION_MODE, TRIP_CLASS: 5, FULL_LOAD_RATIO: 33, 653: 33,
             682: 0, 695: 0, CONTROL_REGISTER_1: 0, CONTROL_REGISTER_2: 0}
+#: what it says of itself: port and controller firmware, serial number, ranges in 0.1 A
+IDENTITY = {62: 10205, 76: 25003, 70: 2612, 71: 301, 72: 1, 74: int.from_bytes(b'SH', 'big'),
+            81: 270, 96: 270}
+#: its commercial reference, two characters a register from this one on
+REFERENCE = 'LTMR27CFM   '
+REFERENCE_AT = 64
+#: rank in the serial number: the node-ID, so that two controllers differ
+SERIAL_RANK = 73
 #: settings that take only multiples of something, by register
 STEPS = {TRIP_CLASS: 5}
 
@@ -82,7 +90,13 @@ class StarterPlant:
 
     def initial(self, parameter: Parameter) -> int | None:
         """Return what a new controller has in a register; None: any plausible value."""
-        return DEFAULTS.get(register_number(parameter) or 0)
+        register = register_number(parameter) or 0
+        place = 2 * (register - REFERENCE_AT)
+        if 0 <= place < len(REFERENCE):
+            return int.from_bytes(REFERENCE[place:place + 2].encode('ascii'), 'big')
+        if register == SERIAL_RANK:
+            return self._node
+        return {**DEFAULTS, **IDENTITY}.get(register)
 
     def allows(self, parameter: Parameter, raw: int) -> bool:
         """Tell whether a value is one of the register's steps."""

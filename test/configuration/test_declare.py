@@ -47,6 +47,7 @@ def test_all_effective_values(tmp_path: Path) -> None:
         ('drives.conveyor.verify_writes', True),
         ('drives.conveyor.identity', ''),
         ('drives.conveyor.profile_sha256', sha256),
+        ('drives.conveyor.restore', '{"before": [], "after": []}'),
         ('drives.conveyor.mapping', 'verify'),
         ('drives.conveyor.request_map_base', 122),
         ('drives.conveyor.response_map_base', 126),

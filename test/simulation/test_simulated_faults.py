@@ -24,7 +24,9 @@ class TestWriting:
         (' drop = 3 ', Fault(FaultKind.DROP, 3)), ('length=0', Fault(FaultKind.LENGTH, 0)),
         ('stuck=ramp_time', Fault(FaultKind.STUCK, 'ramp_time')),
         ('trip', Fault(FaultKind.TRIP)), ('trip=2', Fault(FaultKind.TRIP, 2.0)),
-        ('ok', Fault(FaultKind.OK)),
+        ('ok', Fault(FaultKind.OK)), ('cut_at=2', Fault(FaultKind.CUT_AT, 2)),
+        ('needs=a:b', Fault(FaultKind.NEEDS, 'a:b')),
+        ('set= a : 1 ', Fault(FaultKind.SET, 'a:1')),
     ])
     def test_read(self, text: str, fault: Fault) -> None:
         assert parse_fault(text) == fault
@@ -39,7 +41,9 @@ class TestWriting:
         ('late=-1', 'not possible'), ('late=nan', 'not possible'), ('late=inf', 'not possible'),
         ('drop=0', 'not possible'), ('drop=1.5', 'not possible'), ('length=9', 'not possible'),
         ('silent=3', "'silent=3' is not a fault, write silent"),
-        ('stuck', 'write stuck=PARAMETER'),
+        ('stuck', 'write stuck=PARAMETER'), ('cut_at=0', 'not possible'),
+        ('needs=a', "'a' is not possible, write needs=PARAMETER:OTHER"),
+        ('set=:1', 'not possible'), ('set=a:', 'not possible'),
     ])
     def test_refused(self, text: str, message: str) -> None:
         with pytest.raises(ValueRefused, match=message):
@@ -194,6 +198,54 @@ class TestDrive:
         ask(made, '003003D1#0050000000000000', 0.0)         # maximum 80
         ask(made, '003003C1#003C000000000000', 0.0)
         assert (made.value('minimum_gain'), made.value('maximum_gain')) == (60, 80)
+
+    def test_setting_that_needs_another_one_first(self) -> None:
+        made = drive([*EXAMPLE, parameter('gain', 60, storage=RAM, maximum=100)])
+        before = made.value('gain')
+        made.fault('needs=gain:ramp_time', 0.0)
+        assert made.faults_text == 'needs=gain:ramp_time'
+        ask(made, '003003C1#0007000000000000', 0.0)
+        assert made.value('gain') == before
+        ask(made, '003001E1#00C8000000000000', 0.0)
+        ask(made, '003003C1#0007000000000000', 0.1)
+        assert made.value('gain') == 7
+        made.fault('restart=0', 1.0)                        # what was written counts no more
+        ask(made, '003003C1#0008000000000000', 1.0)
+        assert made.value('gain') == before
+        made.fault('ok', 2.0)
+        ask(made, '003003C1#0008000000000000', 2.0)
+        assert made.value('gain') == 8
+
+    def test_power_is_cut_at_a_write(self) -> None:
+        made = drive()
+        made.fault('cut_at=2', 0.0)
+        ask(made, '003001E1#00C8000000000000', 0.0)
+        assert ask(made, '003FFFF0#0BB8000000000000', 0.5) != []    # setpoints do not count
+        ask(made, '003001E1#012C000000000000', 1.0)                 # obeyed …
+        assert made.value('ramp_time') == 3.0
+        assert ask(made, POLL, 1.1) == []                           # … and off it goes
+        assert ask(made, POLL, 5.99) == []
+        assert ask(made, POLL, 6.0) == [ANSWER]
+        ask(made, '003001E1#0190000000000000', 7.0)                 # once only
+        assert ask(made, POLL, 7.1) == [ANSWER]
+
+    def test_set_by_hand(self) -> None:
+        made = drive()
+        made.fault('set=ramp_time:12.5', 0.0)
+        made.fault('set=actual_speed:77', 0.0)
+        made.fault('set=p211:0x80', 0.0)
+        assert (made.value('ramp_time'), made.value('actual_speed')) == (12.5, 77.0)
+        assert made.value('status_word') == 128
+        assert made.faults_text == 'ok'
+        made.fault('ok', 1.0)
+        assert (made.value('ramp_time'), made.value('actual_speed')) == (12.5, 0.0)
+        for text, message in (('set=ramp_time:long', "'long' is no value of ramp_time, which is "
+                                                     'a number'),
+                              ('set=status_word:1.5', 'which is an integer'),
+                              ('set=ramp:1', "no parameter 'ramp'"),
+                              ('set=ramp_time:1e9', 'not representable')):
+            with pytest.raises(ValueRefused, match=message):
+                made.fault(text, 2.0)
 
     def test_stuck_needs_a_parameter_of_the_drive(self) -> None:
         with pytest.raises(ValueRefused, match="conveyor has no parameter 'ramp'"):

@@ -796,3 +796,21 @@ def test_whatever_comes_it_stays_a_good_node(steps: list[tuple[float, Frame]]) -
         raw = made.drive.registers.raw
         assert 5 <= raw('flc1_ratio') <= 100
         assert raw('motor_trip_class') % 5 == 0
+
+
+class TestIdentity:
+
+    def test_two_controllers_differ_in_their_serial_number(self) -> None:
+        made, other = Ltmr(), SimulatedPkwDrive(configuration(station=6))
+        text = b''.join(made.read(register, 1.0 + register).to_bytes(2, 'big')
+                        for register in range(64, 70))
+        assert text == b'LTMR27CFM   '
+        assert made.read(76, 80.0) == 25003
+        assert (made.read(73, 81.0), other.value('serial_number_4')) == (5, 6)
+
+    def test_refused_until_another_register_was_written(self) -> None:
+        made = Ltmr()
+        made.fault('needs=flc1_ratio:motor_trip_class', 0.0)
+        assert made.write(652, 40, 1.0) == ['485#8C02004E22000008']
+        made.write(606, 10, 2.0)
+        assert made.write(652, 40, 3.0) == ['485#8C02002A00000000']

@@ -292,7 +292,7 @@ class TestConsole:
                 '0 EEPROM writes, faults: ok')
         assert lines('lift') == ([line], [])
         assert lines('list')[0][1] == line
-        assert '  drop=N               every Nth answer is lost (1: all)' in lines('help')[0]
+        assert '  drop=N                 every Nth answer is lost (1: all)' in lines('help')[0]
         assert lines('') == ([], [])
 
     def test_status_shows_wear(self, lines: Any, scripted: Scripted) -> None:

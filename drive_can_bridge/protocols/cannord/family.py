@@ -11,6 +11,7 @@ from drive_can_bridge.protocols.cannord.broadcast import broadcast_identifier, g
 from drive_can_bridge.protocols.cannord.identifiers import (
     ADDRESS_MAX, identifier, MessageObject, route,
 )
+from drive_can_bridge.protocols.cannord.monitoring import TIMEOUT_NUMBER, timeout_parameter
 from drive_can_bridge.protocols.cannord.options import CannordOptions
 from drive_can_bridge.protocols.cannord.parameter_frame import INDEX_MAX, NUMBER_MAX
 from drive_can_bridge.protocols.cannord.process_data import (
@@ -118,6 +119,10 @@ class Cannord(Family):
             return None
         return Parameter(name=name, type=ParameterType.UINT32, number=number, subindex=subindex,
                          listed=False, width_known=False)
+
+    def supervision(self, drive: DriveConfiguration) -> Parameter | None:
+        return timeout_parameter(drive.profile) or self.raw_parameter(
+            drive, f'p{TIMEOUT_NUMBER}')
 
     def make_session(self, drive: DriveConfiguration) -> Session:
         """Make the session of a drive that is alone, or alone in its broadcast group."""

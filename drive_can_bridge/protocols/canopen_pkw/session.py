@@ -476,7 +476,8 @@ class PkwSession(Session):
     # -- users ------------------------------------------------------------------------------------
 
     def submit(self, request: Request, now: float) -> None:
-        blocked = self._node.refusal(now) if self._phase is Phase.RUNNING else ''
+        supervised = self._phase is Phase.RUNNING or self.serving
+        blocked = self._node.refusal(now) if supervised else ''
         if blocked and len(request):
             self._complete(request, (Failure(f'drive offline: {blocked}'),) * len(request))
         else:

@@ -1,0 +1,197 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+What restoring a backup would change: found before anything is written.
+
+First the file alone (:func:`problems_in`), then the file against what the drive has now
+(:func:`plan_restore`).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+
+from drive_can_bridge.backup.comparison import same_raw
+from drive_can_bridge.backup.document import Backup, Head
+from drive_can_bridge.backup.settings import in_order, is_setting, mode_bits
+from drive_can_bridge.backup.values import raw_in_file
+from drive_can_bridge.client.drive import Drive, ReadOutcome
+from drive_can_bridge.core.errors import ValueRefused
+from drive_can_bridge.core.parameters import Parameter, Value
+from drive_can_bridge.core.roles import Role
+
+
+class LeftAlone(Enum):
+    """Why a setting of a file is not written."""
+
+    PROTECTED = 'protected'
+    MAP = 'map'
+    CYCLIC = 'cyclic'
+    CONTROL = 'control'
+    MODE = 'mode'
+
+    @property
+    def text(self) -> str:
+        """In words, with what helps."""
+        return _LEFT_ALONE[self]
+
+
+_LEFT_ALONE = {
+    LeftAlone.PROTECTED: 'protected by its profile: --include-protected restores it',
+    LeftAlone.MAP: 'a map: restored with --params-file only',
+    LeftAlone.CYCLIC: 'a setpoint: sent cyclically',
+    LeftAlone.CONTROL: 'the control word',
+    LeftAlone.MODE: "set by the section 'restore' of its profile",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """
+    A setting that is not as in the file.
+
+    :param wanted: value in the file, of which only the setting counts.
+    :param word: what is to be written, as unsigned word.
+    :param found: value that the drive has.
+    :param left_alone: why it will not be written; None: it will.
+    """
+
+    name: str
+    parameter: Parameter
+    wanted: Value
+    word: int
+    found: Value
+    left_alone: LeftAlone | None = None
+
+    @property
+    def value(self) -> Value:
+        """What is to be written, as the client takes it."""
+        return value_of_word(self.parameter, self.word)
+
+
+@dataclass(frozen=True, slots=True)
+class RestorePlan:
+    """
+    What restoring a file would do.
+
+    :param changes: in the order in which they are written.
+    :param kept: settings that are not as in the file, and stay so.
+    :param same: names of settings that are as in the file.
+    :param words: all that is to be as in the file afterwards, by name.
+    :param wanted: the same as values.
+    :param unread: what the drive did not give.
+    """
+
+    changes: tuple[Change, ...]
+    kept: tuple[Change, ...]
+    same: tuple[str, ...]
+    words: Mapping[str, int]
+    wanted: Mapping[str, Value]
+    unread: tuple[ReadOutcome, ...]
+
+
+def problems_in(backup: Backup, drive: Drive) -> list[str]:
+    """Check a file against what is known of a drive; return a line for each problem."""
+    found = []
+    for name, value in backup.values.items():
+        parameter = drive.find(name)
+        if parameter is not None and parameter.writable and why_left_alone(
+                drive, name, include_protected=True) is not None:
+            reason = ''     # whatever it is, it is not written
+            try:
+                raw_in_file(parameter, value)
+            except ValueRefused as error:
+                reason = str(error)
+        else:
+            reason = drive.check(name, value)
+        if reason:
+            found.append(backup.problem(name, reason))
+    return found
+
+
+def strangers(backup: Backup, drive: Drive, identity: str) -> list[str]:
+    """Say in which way a file is of another drive: a line each; nothing where it is not."""
+    head, facts = backup.head, drive.facts
+    found = []
+    if head.profile_sha256 and head.profile_sha256 != facts.profile_sha256:
+        found.append(
+            f'it is a backup with profile {head.profile or "?"} ({head.profile_sha256[:12]}…), '
+            f'the drive has {facts.profile} ({facts.profile_sha256[:12]}…)')
+    if head.identity and head.identity != identity:
+        found.append(f'it is a backup of {_difference(head.identity, identity)}')
+    return found
+
+
+def says_nothing(head: Head) -> bool:
+    """Tell whether a head leaves open what the file is a backup of."""
+    return not head.profile_sha256
+
+
+def plan_restore(backup: Backup, drive: Drive, outcomes: Mapping[str, ReadOutcome], *,
+                 include_protected: bool) -> RestorePlan:
+    """
+    Compare a file that is all right with what was read of the drive.
+
+    :param outcomes: of :func:`names_to_restore`.
+    """
+    bits = mode_bits(drive.facts.restore)
+    changes: list[Change] = []
+    kept: list[Change] = []
+    same, unread = [], []
+    words: dict[str, int] = {}
+    wanted: dict[str, Value] = {}
+    for name in names_to_restore(backup, drive):
+        parameter, outcome, value = drive.find(name), outcomes[name], backup.values[name]
+        if parameter is None or outcome.raw is None or outcome.value is None:
+            unread.append(outcome)
+            continue
+        raw, own_bits = raw_in_file(parameter, value), bits.get(name)
+        word = parameter.word_from_raw(raw)
+        if own_bits is not None:
+            word = own_bits.with_setting(word)
+        left_alone = why_left_alone(drive, name, include_protected=include_protected)
+        if left_alone is None:
+            words[name], wanted[name] = word, value_of_word(parameter, word)
+        if same_raw(parameter, raw, outcome.raw, own_bits):
+            same.append(name)
+            continue
+        change = Change(name, parameter, value, word,   # type: ignore[arg-type]
+                        outcome.value, left_alone)
+        (changes if left_alone is None else kept).append(change)
+    return RestorePlan(tuple(changes), tuple(kept), tuple(same), words, wanted,
+                       tuple(unread))
+
+
+def names_to_restore(backup: Backup, drive: Drive) -> tuple[str, ...]:
+    """Return the settings of a file, in the order in which they are written."""
+    return in_order(drive, [name for name in backup.values if is_setting(drive, name)])
+
+
+def why_left_alone(drive: Drive, name: str, *, include_protected: bool) -> LeftAlone | None:
+    """Say why a parameter of a file is not written; None: it is."""
+    role = drive.role(name)
+    if role is Role.CONTROL:
+        return LeftAlone.CONTROL
+    if role is Role.CYCLIC:
+        return LeftAlone.CYCLIC
+    if role is Role.MAP and drive.facts.through:
+        return LeftAlone.MAP
+    parameter = drive.find(name)
+    if parameter is not None and not is_setting(drive, name):
+        return LeftAlone.MODE
+    if parameter is not None and parameter.protected and not include_protected:
+        return LeftAlone.PROTECTED
+    return None
+
+
+def value_of_word(parameter: Parameter, word: int) -> Value:
+    """Return a word as the client takes it: raw names take raw integers."""
+    return parameter.value_from_raw(parameter.raw_from_word(word)) if parameter.listed else word
+
+
+def _difference(wanted: str, found: str) -> str:
+    """Name the parts of an identity that differ: those of the file, and those of the drive."""
+    there, here = wanted.split(), found.split()
+    only_there = [part for part in there if part not in here]
+    only_here = [part for part in here if part not in there]
+    return (f'{" ".join(only_there) or "a drive with less identity"}, the drive is '
+            f'{" ".join(only_here) or "known by less"}')

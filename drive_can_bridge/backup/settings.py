@@ -1,0 +1,76 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+Which parameters of a drive are settings: what a backup holds, and a restored one brings back.
+
+Setpoints, the control word, and what process data alone carry, are none: no command writes them.
+Neither are the bits that the profile's section ``restore`` sets and clears: they say in which mode
+a drive is, not how it is set up. A parameter with such bits comes last, as its other bits are
+written with them.
+"""
+
+from dataclasses import dataclass
+
+from drive_can_bridge.client.drive import Drive
+from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.profile import RestoreStep, RestoreTable
+from drive_can_bridge.core.roles import Role
+
+
+@dataclass(frozen=True, slots=True)
+class ModeBits:
+    """
+    What a restored backup does to a parameter that has bits of a mode.
+
+    :param mask: those bits.
+    :param at_end: what they are afterwards.
+    """
+
+    mask: int
+    at_end: int
+
+    def without(self, word: int) -> int:
+        """Return a word without the bits of the mode: what is left is a setting."""
+        return word & ~self.mask
+
+    def with_setting(self, word: int) -> int:
+        """Return the word to be written at the end, given that of a backup."""
+        return self.without(word) | self.at_end
+
+
+def mode_bits(table: RestoreTable | None) -> dict[str, ModeBits]:
+    """Return the bits that belong to modes, by parameter."""
+    found: dict[str, ModeBits] = {}
+    for step in (*table.before, *table.after) if table is not None else ():
+        known = found.get(step.parameter, ModeBits(0, 0))
+        found[step.parameter] = ModeBits(known.mask | step.mask,
+                                         known.at_end & ~step.mask | step.bits)
+    return found
+
+
+def is_whole(step: RestoreStep | ModeBits, parameter: Parameter) -> bool:
+    """Tell whether all bits of a parameter are meant."""
+    return step.mask == parameter.word_from_raw(-1)
+
+
+def is_setting(drive: Drive, name: str) -> bool:
+    """Tell whether a parameter is a setting of a drive."""
+    parameter = drive.find(name)
+    if parameter is None or not (parameter.readable and parameter.writable):
+        return False
+    if parameter.number is None and parameter.index is None:
+        return False
+    bits = mode_bits(drive.facts.restore).get(name)
+    return (drive.role(name) not in (Role.CONTROL, Role.CYCLIC)
+            and not (bits is not None and is_whole(bits, parameter)))
+
+
+def settings_of(drive: Drive) -> tuple[str, ...]:
+    """Return the names of all settings, in the order in which they are written back."""
+    return in_order(drive, [name for name in drive.parameters if is_setting(drive, name)])
+
+
+def in_order(drive: Drive, names: list[str]) -> tuple[str, ...]:
+    """Sort names as the profile has them, then raw ones; what has bits of a mode comes last."""
+    bits = mode_bits(drive.facts.restore)
+    order = {name: place for place, name in enumerate(drive.parameters)}
+    return tuple(sorted(names, key=lambda name: (name in bits, order.get(name, len(order)))))

@@ -1,0 +1,174 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""``drive_can backup``: the settings of drives as files."""
+
+from argparse import ArgumentParser, Namespace
+from collections.abc import Sequence
+from datetime import datetime, timezone
+import os
+from pathlib import Path
+from typing import Any
+
+from drive_can_bridge.backup.document import head_of, written
+from drive_can_bridge.backup.settings import settings_of
+from drive_can_bridge.cli.completion import complete_drives
+from drive_can_bridge.cli.drives import (
+    add_drive_options, chosen, FAILED, opened, source_of, WRONG_USAGE, WrongUsage,
+)
+from drive_can_bridge.cli.listening import complain
+from drive_can_bridge.cli.progress import Bar
+from drive_can_bridge.cli.questions import agreed, NobodyToAsk
+from drive_can_bridge.cli.tables import print_json, printable
+from drive_can_bridge.cli.whole_file import differs, write_whole
+from drive_can_bridge.client.drive import Drive, ReadOutcome
+from drive_can_bridge.core.errors import DriveCanError
+from drive_can_bridge.core.parameters import Parameter
+
+SUFFIX = '.yaml'
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add the subcommand to the parser of ``drive_can``."""
+    parser: ArgumentParser = subparsers.add_parser(
+        'backup', help='write the settings of a drive to a file', allow_abbrev=False,
+        description='Write the settings of a drive to a file that drive_can restore and ros2 '
+                    'param load take: everything that can be restored, nothing else. Sends reads '
+                    'only.',
+        epilog='Exit code 0: written. 1: something could not be read or written, and there is no '
+               'file. 2: wrong usage, or a file exists and nobody can be asked. --json, for each '
+               'drive: drive, file, settings (how many), identity, left_out (parameter, reason).')
+    words = parser.add_argument(
+        'words', metavar='DRIVE', nargs='*',
+        help='name or shell pattern; may be left out where there is only one')
+    words.completer = complete_drives  # type: ignore[attr-defined]  # for argcomplete
+    parser.add_argument('-o', '--output', metavar='FILE', required=True,
+                        help='where it goes; for several drives DIR/, a file each')
+    parser.add_argument('--partial', action='store_true',
+                        help='write the file although parameters could not be read; it lists them '
+                             'in a comment')
+    add_drive_options(parser)
+    parser.set_defaults(run=run)
+
+
+def run(args: Namespace) -> int:
+    """
+    Write the backups.
+
+    :return: exit code.
+    :raises DriveCanError: the drives cannot be reached.
+    :raises OSError: a file cannot be written.
+    """
+    try:
+        with source_of(args) as source:
+            names = chosen(source.names, args.words)
+            files = _files(args.output, names)
+            if not _may_write(list(files.values()), yes=args.yes):
+                return FAILED
+            with opened(source, names) as drives:
+                texts = {name: _text(args, drives[name]) for name in names}
+    except (WrongUsage, NobodyToAsk) as error:
+        complain(printable(f'drive_can backup: {error}'))
+        return WRONG_USAGE
+    for name, made in texts.items():
+        if made is not None:
+            files[name].parent.mkdir(exist_ok=True)
+            write_whole(files[name], made.text.encode('utf-8'))
+            made.tell(args, files[name])
+    return FAILED if None in texts.values() else 0
+
+
+def _files(output: str, names: Sequence[str]) -> dict[str, Path]:
+    """
+    Return where the backup of each drive goes.
+
+    :raises WrongUsage: one file for several drives.
+    :raises OSError: nothing can be written there.
+    """
+    path = Path(output)
+    if output.endswith('/') or path.is_dir():
+        folder, files = path, {name: path / f'{name}{SUFFIX}' for name in names}
+        above = folder.parent if not folder.exists() else folder
+    elif len(names) > 1:
+        raise WrongUsage(f'{len(names)} drives ({", ".join(names)}) do not go into one file: '
+                         f'write -o {output}/')
+    else:
+        above, files = path.parent, {names[0]: path}
+    if not above.is_dir():
+        raise DriveCanError(f'{above}: no such directory')
+    if not os.access(above, os.W_OK):
+        raise DriveCanError(f'{above}: cannot be written to')
+    return files
+
+
+def _may_write(files: Sequence[Path], *, yes: bool) -> bool:
+    there = [str(file) for file in files if differs(file)]
+    return not there or agreed(
+        f'{", ".join(there)} exist{"s" if len(there) == 1 else ""}. Overwrite?', yes=yes,
+        otherwise='Nothing was read or written', yes_means='overwrites')
+
+
+class _Made:
+    """A backup, ready to be written."""
+
+    def __init__(self, drive: Drive, settings: Sequence[tuple[Parameter, int]],
+                 left_out: Sequence[tuple[str, str]]) -> None:
+        self._name = drive.name
+        self._count = len(settings)
+        self._identity = drive.identity()
+        self._left_out = left_out
+        time = datetime.now(timezone.utc).strftime('%Y-%m-%dT%H:%M:%SZ')
+        self.text = written(
+            drive.facts, head_of(drive.facts, time=time, identity=self._identity), settings,
+            remarks=[f'left out: {name}: {reason}' for name, reason in left_out])
+
+    def tell(self, args: Namespace, file: Path) -> None:
+        """Say what was written where."""
+        if args.json:
+            print_json({'drive': self._name, 'file': str(file), 'settings': self._count,
+                        'identity': self._identity,
+                        'left_out': [{'parameter': name, 'reason': reason}
+                                     for name, reason in self._left_out]})
+        else:
+            settings = f'{self._count} setting{"" if self._count == 1 else "s"}'
+            print(printable(f'{self._name}: {settings} in {file}'))
+
+
+def _text(args: Namespace, drive: Drive) -> _Made | None:
+    """Read a drive; None: there is to be no file, and it was said why."""
+    names = settings_of(drive)
+    with Bar(f'reading {drive.name}', len(names)) as bar:
+        outcomes = drive.read(*names, told=bar.step) if names else {}
+    settings: list[tuple[Parameter, int]] = []
+    unread: list[tuple[str, str]] = []
+    useless: list[tuple[str, str]] = []
+    for name, outcome in outcomes.items():
+        if outcome.parameter is None or outcome.raw is None:
+            unread.append((name, outcome.reason))
+            continue
+        reason = _why_not_restorable(drive, outcome)
+        if reason:
+            useless.append((name, reason))
+        else:
+            settings.append((outcome.parameter, outcome.raw))
+    for name, reason in useless:
+        complain(printable(f'warning: {drive.name}: {name} is left out: {reason}'))
+    for name, reason in unread:
+        complain(printable(f'{drive.name}: {name} could not be read: {reason}'))
+    if unread and not args.partial:
+        complain(printable(f'{drive.name}: no file was written; --partial writes one without '
+                           f'{"it" if len(unread) == 1 else "them"}'))
+        return None
+    if not settings:
+        complain(printable(f'{drive.name}: has no settings that could be written to a file'))
+        return None
+    return _Made(drive, settings, [*unread, *useless])
+
+
+def _why_not_restorable(drive: Drive, outcome: ReadOutcome) -> str:
+    """Say why a value that was read could not be written back; '' if it could."""
+    parameter, raw = outcome.parameter, outcome.raw
+    if parameter is None or raw is None:
+        return ''
+    low, high = parameter.raw_limits
+    if low <= raw <= high:
+        return ''
+    return f'the drive has {outcome.value}, the profile allows {parameter.range_text}'

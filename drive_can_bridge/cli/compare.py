@@ -1,0 +1,169 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""``drive_can compare``: what differs between backups and drives."""
+
+from argparse import ArgumentParser, Namespace
+from collections.abc import Sequence
+from pathlib import Path
+import re
+from typing import Any
+
+from drive_can_bridge.backup.comparison import (
+    Difference, differences, names_to_read, Setting, Side, side_of_drive, side_of_file,
+    side_of_file_and_drive,
+)
+from drive_can_bridge.backup.document import Backup
+from drive_can_bridge.backup.reader import read_backup
+from drive_can_bridge.backup.settings import mode_bits
+from drive_can_bridge.cli.completion import complete_drives
+from drive_can_bridge.cli.drives import (
+    add_drive_options, chosen_one, opened, source_of, WrongUsage,
+)
+from drive_can_bridge.cli.listening import complain
+from drive_can_bridge.cli.progress import Bar
+from drive_can_bridge.cli.tables import print_json, print_table, printable
+from drive_can_bridge.client.drive import Drive, Drives
+from drive_can_bridge.configuration.profiles import ProfileStore
+from drive_can_bridge.core.errors import DriveCanError
+from drive_can_bridge.core.profile import Profile
+from drive_can_bridge.core.words import value_text
+
+SAME, DIFFERENT, TROUBLE = 0, 1, 2
+_DRIVE = re.compile(r'[a-z][a-z0-9_]*')
+_NONE = '-'
+#: names of what is left out that are told
+_NAMED_MAX = 5
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add the subcommand to the parser of ``drive_can``."""
+    parser: ArgumentParser = subparsers.add_parser(
+        'compare', help='show what differs between two backups or drives', allow_abbrev=False,
+        description='Compare the settings of A and B, each of them a backup file or a drive: what '
+                    'looks like the name of a drive is one, ./NAME is a file. Sends reads only.',
+        epilog='Exit code 0: the same. 1: different. 2: trouble, a drive in use included. '
+               '--json, for each setting that differs: parameter, unit, a, b (null: not there).')
+    words = parser.add_argument('words', metavar='A B', nargs='+', help='backup files or drives')
+    words.completer = complete_drives  # type: ignore[attr-defined]  # for argcomplete
+    add_drive_options(parser)
+    parser.set_defaults(run=run)
+
+
+def run(args: Namespace) -> int:
+    """
+    Compare.
+
+    :return: 0 the same, 1 different, 2 trouble.
+    """
+    try:
+        found = _compare(args)
+    except WrongUsage as error:
+        complain(printable(f'drive_can compare: {error}'))
+        return TROUBLE
+    except DriveCanError as error:
+        complain(str(error))
+        return TROUBLE
+    except OSError as error:
+        place = f'{error.filename}: ' if error.filename else ''
+        complain(printable(f'drive_can compare: {place}{error.strerror or error}'))
+        return TROUBLE
+    _show(args, found)
+    return DIFFERENT if found else SAME
+
+
+def _compare(args: Namespace) -> list[Difference]:
+    words = args.words
+    if len(words) != 2:
+        raise WrongUsage(f'{" ".join(words)}: allowed are two, A and B')
+    files = {word: read_backup(Path(word)) for word in words if not _DRIVE.fullmatch(word)}
+    wanted = [word for word in words if word not in files]
+    if not wanted:
+        profile = next(filter(None, map(_profile_of, files.values())), None)
+        sides = [_file_alone(files[word], profile) for word in words]
+    else:
+        with source_of(args) as source:
+            for word in wanted:
+                chosen_one(source.names, word)
+            with opened(source, list(dict.fromkeys(wanted))) as drives:
+                sides = _sides(words, files, drives)
+    for word, side in zip(words, sides, strict=True):
+        if side.left_out:
+            names = ', '.join(side.left_out[:_NAMED_MAX])
+            more = ', …' if len(side.left_out) > _NAMED_MAX else ''
+            complain(printable(f'{word}: left out, because no settings: {len(side.left_out)} '
+                               f'values ({names}{more})'))
+    return differences(*sides)
+
+
+def _sides(words: Sequence[str], files: dict[str, Backup], drives: Drives) -> list[Side]:
+    found = []
+    for word in words:
+        if word in files:
+            # there are two sides, so the other one is a drive
+            drive = drives[next(other for other in words if other not in files)]
+            found.append(side_of_file_and_drive(files[word], drive))
+            _tell_profile(files[word], drive)
+        else:
+            found.append(_drive(drives[word], list(files.values())))
+    return found
+
+
+def _drive(drive: Drive, files: Sequence[Backup]) -> Side:
+    """
+    Read a drive.
+
+    :raises DriveCanError: something cannot be read: nobody knows whether it differs.
+    """
+    names = names_to_read(drive, *files)
+    with Bar(f'reading {drive.name}', len(names)) as bar:
+        outcomes = drive.read(*names, told=bar.step) if names else {}
+    unread = [f'{drive.name}: {outcome.name} could not be read: {outcome.reason}'
+              for outcome in outcomes.values() if not outcome.ok]
+    if unread:
+        raise DriveCanError('\n'.join(map(printable, unread)))
+    return side_of_drive(drive, outcomes)
+
+
+def _profile_of(backup: Backup) -> Profile | None:
+    """Return the profile that a file names, if it is here."""
+    head = backup.head
+    loaded = ProfileStore([]).load(head.profile) if head.profile else ''
+    if isinstance(loaded, str) or loaded.profile.sha256 != head.profile_sha256:
+        return None
+    return loaded.profile
+
+
+def _file_alone(backup: Backup, profile: Profile | None) -> Side:
+    if profile is None:
+        return side_of_file(backup, find=lambda name: None, counts=lambda name: True, bits={})
+    parameters = profile.parameters
+    return side_of_file(
+        backup, find=parameters.get,
+        counts=lambda name: parameters[name].readable and parameters[name].writable,
+        bits=mode_bits(profile.restore))
+
+
+def _tell_profile(backup: Backup, drive: Drive) -> None:
+    head = backup.head
+    if head.profile_sha256 and head.profile_sha256 != drive.facts.profile_sha256:
+        complain(printable(f'warning: {backup.file} was made with another profile '
+                           f'({head.profile}) than the one of {drive.name} '
+                           f'({drive.facts.profile})'))
+
+
+def _show(args: Namespace, found: Sequence[Difference]) -> None:
+    if args.json:
+        for each in found:
+            print_json({'parameter': each.name, 'unit': each.unit,
+                        'a': each.first and each.first.value,
+                        'b': each.second and each.second.value})
+    elif found:
+        first, second = args.words
+        print_table(('parameter', first, second, 'unit'), [
+            (each.name, _text(each.first), _text(each.second), each.unit) for each in found],
+            numbers=(first, second))
+    else:
+        print('the same')
+
+
+def _text(setting: Setting | None) -> str:
+    return _NONE if setting is None else value_text(setting.value)

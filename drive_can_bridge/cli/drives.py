@@ -1,0 +1,125 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+What the commands that talk to drives have in common: the way to them, and which are meant.
+
+Positional arguments of such a command are called ``words``; options may stand between them.
+"""
+
+from argparse import ArgumentParser, Namespace
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from fnmatch import fnmatchcase
+from pathlib import Path
+
+from drive_can_bridge.cli.listening import complain
+from drive_can_bridge.cli.without_ros import what_is_missing
+from drive_can_bridge.client.drive import Drives, Source, WhichBridge
+from drive_can_bridge.client.opening import find_source
+from drive_can_bridge.core.errors import DriveCanError
+
+FAILED = 1
+WRONG_USAGE = 2
+
+
+class WrongUsage(Exception):
+    """The command line cannot be obeyed; nothing was written."""
+
+
+def add_drive_options(parser: ArgumentParser) -> None:
+    """Add the options that say how to get to the drives."""
+    parser.add_argument('--params-file', metavar='FILE', type=Path,
+                        help='open the buses of this parameter file; else the drives of a running '
+                             'bridge are asked through it')
+    parser.add_argument('--namespace', metavar='NS',
+                        help='of the running bridge, where there are several')
+    parser.add_argument('--nmt-start', action='store_true',
+                        help='with --params-file: start CANopen nodes first, because others '
+                             'answer no PKW')
+    parser.add_argument('--yes', action='store_true', help='answer every question with yes')
+    parser.add_argument('--json', action='store_true', help='a JSON document a line')
+
+
+@contextmanager
+def source_of(args: Namespace) -> Iterator[Source]:
+    """
+    Find the drives that the options point to.
+
+    :raises WrongUsage: options that exclude each other, or several bridges.
+    :raises DriveCanError: the file is wrong, no bridge, no ROS.
+    """
+    if args.params_file is not None and args.namespace is not None:
+        raise WrongUsage('--namespace is of a running bridge, --params-file goes without one')
+    if args.params_file is None and args.nmt_start:
+        raise WrongUsage('--nmt-start goes with --params-file: a bridge starts its nodes itself')
+    try:
+        source = find_source(args.params_file, namespace=args.namespace,
+                             nmt_start=args.nmt_start)
+    except WhichBridge as error:
+        raise WrongUsage(str(error)) from None
+    except ImportError as error:
+        command = f'drive_can {args.subcommand}'
+        text = what_is_missing(command, error)
+        if args.params_file is None:
+            text += ', or name a parameter file with --params-file to go without ROS'
+        raise DriveCanError(text) from error
+    try:
+        yield source
+    finally:
+        source.close()
+
+
+def matching(names: Sequence[str], word: str) -> list[str]:
+    """Return the drives that a name or shell pattern means, in their order; maybe none."""
+    return [name for name in names if fnmatchcase(name, word)]
+
+
+def split_words(names: Sequence[str], words: Sequence[str]) -> tuple[list[str], list[str]]:
+    """
+    Tell the drives from the rest of the words: the first one is a drive if it matches one.
+
+    :raises WrongUsage: there are several drives, and no word names one.
+    """
+    if words and matching(names, words[0]):
+        return matching(names, words[0]), list(words[1:])
+    if len(names) != 1:
+        said = f'{words[0]!r} is none. ' if words else ''
+        raise WrongUsage(f'which drive? {said}There are: {", ".join(names) or "none"}')
+    return list(names), list(words)
+
+
+def chosen(names: Sequence[str], words: Sequence[str]) -> list[str]:
+    """
+    Return the drives that words or shell patterns name, in the order of the configuration.
+
+    :raises WrongUsage: one of them names none; or there are several, and no word.
+    """
+    there = f'there are: {", ".join(names) or "none"}'
+    if not words:
+        if len(names) != 1:
+            raise WrongUsage(f"which drive? '*' means all; {there}")
+        return list(names)
+    for word in words:
+        if not matching(names, word):
+            raise WrongUsage(f'no drive {word!r}; {there}')
+    return [name for name in names if any(name in matching(names, word) for word in words)]
+
+
+def chosen_one(names: Sequence[str], word: str) -> str:
+    """
+    Return the one drive that a word names.
+
+    :raises WrongUsage: it names none, or several.
+    """
+    found = chosen(names, [word])
+    if len(found) > 1:
+        raise WrongUsage(f'{word!r} names several drives: {", ".join(found)}')
+    return found[0]
+
+
+@contextmanager
+def opened(source: Source, names: Sequence[str]) -> Iterator[Drives]:
+    """Open drives, and say what the user should know."""
+    with source.open(names) as drives:
+        for warning in drives.warnings:
+            complain(f'warning: {warning}')
+        yield drives

@@ -1,0 +1,50 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""A bar on standard error for what takes its time; only in a terminal."""
+
+import sys
+import time
+from types import TracebackType
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+#: s after which a bar appears
+PATIENCE = 1.0
+
+
+class Bar:
+    """
+    Counts steps.
+
+    :param what: what they are for, ``reading conveyor``.
+    :param total: how many there are.
+    """
+
+    def __init__(self, what: str, total: int) -> None:
+        self._what = what
+        self._total = total
+        self._done = 0
+        self._began = time.monotonic()
+        self._progress: Progress | None = None
+
+    def __enter__(self) -> 'Bar':
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 traceback: TracebackType | None) -> None:
+        if self._progress is not None:
+            self._progress.stop()
+
+    def step(self, _: object = None) -> None:
+        """Take note of a step."""
+        self._done += 1
+        if self._progress is None:
+            if time.monotonic() - self._began < PATIENCE or not sys.stderr.isatty():
+                return
+            self._progress = Progress(
+                TextColumn('{task.description}'), BarColumn(), MofNCompleteColumn(),
+                TimeRemainingColumn(), console=Console(stderr=True), transient=True)
+            self._progress.add_task(self._what, total=self._total)
+            self._progress.start()
+        task, = self._progress.task_ids
+        self._progress.update(task, completed=self._done)

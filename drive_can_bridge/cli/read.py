@@ -1,0 +1,135 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""``drive_can read``: the parameters of drives, as a table."""
+
+from argparse import ArgumentParser, Namespace
+from collections.abc import Sequence
+import sys
+import time
+from typing import Any
+
+from rich.live import Live
+
+from drive_can_bridge.cli.completion import complete_words
+from drive_can_bridge.cli.drives import (
+    add_drive_options, FAILED, opened, source_of, split_words, WRONG_USAGE, WrongUsage,
+)
+from drive_can_bridge.cli.listening import complain, positive
+from drive_can_bridge.cli.progress import Bar
+from drive_can_bridge.cli.tables import fitting_table, print_json, print_table
+from drive_can_bridge.client.drive import Drive, Drives, readable_names, ReadOutcome
+from drive_can_bridge.core.words import value_text
+
+_HEADINGS = ('drive', 'name', 'value', 'unit', 'raw', 'number', 'storage', 'description',
+             'why not')
+_NUMBERS = ('value', 'raw')
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add the subcommand to the parser of ``drive_can``."""
+    parser: ArgumentParser = subparsers.add_parser(
+        'read', help='read parameters of a drive', allow_abbrev=False,
+        description='Read all parameters of a drive that its profile lists, or those named: '
+                    'through a running bridge, or directly with --params-file. Sends reads only.',
+        epilog='Exit code 0: all was read. 1: something was not, its row says why. 2: wrong '
+               'usage.')
+    words = parser.add_argument('words', metavar='[DRIVE] NAME', nargs='*', help=(
+        'the drive, also as a shell pattern (may be left out where there is only one); names of '
+        'the profile, or raw ones: p30, p613.5, x2004.10'))
+    words.completer = complete_words  # type: ignore[attr-defined]  # for argcomplete
+    add_drive_options(parser)
+    parser.add_argument('--watch', metavar='S', type=positive,
+                        help='read again every S seconds, until Ctrl-C')
+    parser.set_defaults(run=run)
+
+
+def run(args: Namespace) -> int:
+    """
+    Read.
+
+    :return: 0 everything, 1 not everything, 2 wrong usage.
+    :raises DriveCanError: another master, a bus or a bridge that is not there.
+    """
+    try:
+        with source_of(args) as source:
+            names, wanted = split_words(source.names, args.words)
+            with opened(source, names) as drives:
+                return _watch(args, drives, wanted) if args.watch else _read(args, drives, wanted)
+    except WrongUsage as error:
+        complain(f'drive_can read: {error}')
+        return WRONG_USAGE
+
+
+def _read(args: Namespace, drives: Drives, wanted: Sequence[str]) -> int:
+    outcomes = []
+    for drive in drives.values():
+        names = wanted or readable_names(drive)
+        with Bar(f'reading {drive.name}', len(names)) as bar:
+            outcomes += [(drive, outcome)
+                         for outcome in drive.read(*names, told=bar.step).values()]
+    if args.json:
+        for drive, outcome in outcomes:
+            print_json(document(drive, outcome))
+    else:
+        print_table(_HEADINGS, _rows(drives, outcomes), numbers=_NUMBERS)
+    return 0 if all(outcome.ok for _, outcome in outcomes) else FAILED
+
+
+def _watch(args: Namespace, drives: Drives, wanted: Sequence[str]) -> int:
+    """Read again and again."""
+    due = time.monotonic()
+    live = Live(auto_refresh=False) if sys.stdout.isatty() and not args.json else None
+    first = True
+    try:
+        if live is not None:
+            live.start()
+        while True:
+            outcomes = [(drive, outcome) for drive in drives.values()
+                        for outcome in drive.read(*wanted).values()]
+            if live is not None:
+                live.update(fitting_table(_HEADINGS, _rows(drives, outcomes), _NUMBERS),
+                            refresh=True)
+            elif args.json:
+                now = time.time()
+                for drive, outcome in outcomes:
+                    print_json({'time': round(now, 3), **document(drive, outcome)})
+            else:
+                if not first:
+                    print()
+                print_table(_HEADINGS, _rows(drives, outcomes), numbers=_NUMBERS)
+            first = False
+            sys.stdout.flush()
+            due = max(due + args.watch, time.monotonic())
+            time.sleep(due - time.monotonic() if due > time.monotonic() else 0.0)
+    finally:
+        if live is not None:
+            live.stop()
+
+
+def document(drive: Drive, outcome: ReadOutcome) -> dict[str, Any]:
+    """Return what ``--json`` prints of a parameter; the keys are documented."""
+    parameter = outcome.parameter
+    return {
+        'drive': drive.name, 'name': outcome.name, 'value': outcome.value,
+        'unit': parameter.unit if parameter else '', 'raw': outcome.raw,
+        'number': parameter.number if parameter else None,
+        'index': parameter.index if parameter else None,
+        'subindex': parameter.subindex if parameter else None,
+        'storage': parameter.storage.value if parameter and parameter.storage else None,
+        'description': parameter.description if parameter else '',
+        'reason': outcome.reason}
+
+
+def _rows(drives: Drives, outcomes: Sequence[tuple[Drive, ReadOutcome]],
+          ) -> list[tuple[str, ...]]:
+    rows: list[tuple[str, ...]] = []
+    for drive, outcome in outcomes:
+        parameter = outcome.parameter
+        rows.append((
+            drive.name if len(drives) > 1 else '', outcome.name,
+            '–' if outcome.value is None else value_text(outcome.value),
+            parameter.unit if parameter else '',
+            '–' if outcome.raw is None else str(outcome.raw),
+            parameter.address if parameter else '',
+            parameter.storage.value if parameter and parameter.storage else '',
+            parameter.description if parameter else '', outcome.reason))
+    return rows

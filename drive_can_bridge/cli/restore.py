@@ -1,0 +1,269 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""``drive_can restore``: the settings of a backup back into a drive."""
+
+from argparse import ArgumentParser, Namespace
+from collections.abc import Sequence
+from pathlib import Path
+import time
+from typing import Any
+
+from drive_can_bridge.backup.document import Backup
+from drive_can_bridge.backup.plan import (
+    Change, names_to_restore, plan_restore, problems_in, RestorePlan, says_nothing, strangers,
+    why_left_alone,
+)
+from drive_can_bridge.backup.reader import read_backup
+from drive_can_bridge.backup.restore import Restorer, RestoreResult
+from drive_can_bridge.backup.settings import is_setting
+from drive_can_bridge.cli.completion import complete_drives
+from drive_can_bridge.cli.drives import (
+    add_drive_options, chosen_one, FAILED, opened, source_of, WRONG_USAGE, WrongUsage,
+)
+from drive_can_bridge.cli.listening import complain
+from drive_can_bridge.cli.progress import Bar
+from drive_can_bridge.cli.questions import agreed, must_be_answerable, NobodyToAsk
+from drive_can_bridge.cli.tables import print_json, print_table, printable
+from drive_can_bridge.client.drive import Drive, Enabled, Source
+from drive_can_bridge.core.parameters import Parameter, Storage, Value
+from drive_can_bridge.core.words import value_text
+from drive_can_bridge.process.interruption import Interruption, postponed
+
+#: s that a drive's identity is waited for
+_PATIENCE = 2.0
+_NOTHING = 'Nothing was written'
+_WHY_VOLATILE = {True: 'its profile says: storage: ram',
+                 False: 'persist_writes: true in its configuration would write to EEPROM'}
+_HEADINGS = ('parameter', 'drive', 'file', 'unit', '')
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add the subcommand to the parser of ``drive_can``."""
+    parser: ArgumentParser = subparsers.add_parser(
+        'restore', help='write the settings of a backup into a drive', allow_abbrev=False,
+        description='Read the drive, show what would change, ask, write only what differs, read '
+                    'everything back. Repeating it is safe.',
+        epilog='Exit code 0: the drive is as in the file. 1: it is not, or nothing may be '
+               'written. 2: wrong usage, or nobody can be asked. 130: interrupted; what was '
+               'written is said. --json, for each setting that differs: drive, parameter, unit, '
+               'found, wanted, left_alone (why, or null); and after writing for each that was to '
+               'be changed: drive, parameter, ok, found, wanted, reason.')
+    words = parser.add_argument(
+        'words', metavar='FILE [DRIVE]', nargs='+',
+        help='what drive_can backup has written, and where to (default: the drive that the file '
+             'is of)')
+    words.completer = complete_drives  # type: ignore[attr-defined]  # for argcomplete
+    parser.add_argument('--dry-run', action='store_true', help='only show what would change')
+    parser.add_argument('--include-protected', action='store_true',
+                        help='also what the profile protects: station, bit rate, what cuts off '
+                             'the bus')
+    parser.add_argument('--force', action='store_true',
+                        help='although profile or identity are not those of the file')
+    add_drive_options(parser)
+    parser.set_defaults(run=run)
+
+
+def run(args: Namespace) -> int:
+    """
+    Restore.
+
+    :return: exit code.
+    :raises DriveCanError: the file is wrong, or the drive cannot be reached.
+    :raises OSError: the file cannot be read.
+    """
+    try:
+        if len(args.words) > 2:
+            raise WrongUsage(f'{" ".join(args.words)}: allowed is FILE [DRIVE]')
+        file, word = [*args.words, None][:2]
+        backup = read_backup(Path(file))
+        if not args.dry_run:
+            must_be_answerable(yes=args.yes, otherwise=_NOTHING, yes_means='writes without asking')
+        with source_of(args) as source:
+            name = _target(backup, word, source)
+            with opened(source, [name]) as drives:
+                return _restore(args, backup, drives[name])
+    except (WrongUsage, NobodyToAsk) as error:
+        complain(printable(f'drive_can restore: {error}'))
+        return WRONG_USAGE
+
+
+def _target(backup: Backup, word: str | None, source: Source) -> str:
+    """
+    Return the drive that is meant.
+
+    :raises WrongUsage: that is not clear.
+    """
+    if word is not None:
+        return chosen_one(source.names, word)
+    if backup.drive in source.names:
+        return backup.drive
+    if not backup.drive and len(source.names) == 1:
+        return source.names[0]
+    of = f'is of drive {backup.drive}, which is not here' if backup.drive else 'names no drive'
+    raise WrongUsage(f'{backup.file} {of}: say which one is meant; there are: '
+                     f'{", ".join(source.names) or "none"}')
+
+
+def _restore(args: Namespace, backup: Backup, drive: Drive) -> int:
+    if not _may_be(args, backup, drive):
+        return FAILED
+    names = names_to_restore(backup, drive)
+    with Bar(f'reading {drive.name}', len(names)) as bar:
+        outcomes = drive.read(*names, told=bar.step) if names else {}
+    plan = plan_restore(backup, drive, outcomes, include_protected=args.include_protected)
+    if plan.unread:
+        for outcome in plan.unread:
+            complain(printable(f'{drive.name}: {outcome.name} could not be read: '
+                               f'{outcome.reason}'))
+        complain(f'{_NOTHING}.')
+        return FAILED
+    _show(args, backup, drive, plan)
+    if args.dry_run or not plan.changes:
+        return 0
+    if drive.enabled() is Enabled.UNKNOWN:
+        complain(f'{drive.name}: whether it is enabled is not known; it should stand still')
+    if not agreed(f'Write {_count(plan.changes)} to {drive.name}?', yes=args.yes,
+                  otherwise=_NOTHING, yes_means='writes without asking'):
+        return FAILED
+    if drive.enabled() is Enabled.YES:      # since it was asked
+        return _is_enabled(drive)
+    with Bar(f'writing {drive.name}', len(plan.changes)) as bar, \
+            postponed(lambda: complain(f'{drive.name}: ending after the write under way')) \
+            as interrupted:
+        result = Restorer(drive, plan, stopped=lambda: bool(interrupted), wait=time.sleep,
+                          told=bar.step, hint=complain).run()
+    return _report(args, drive, plan, result, interrupted)
+
+
+def _may_be(args: Namespace, backup: Backup, drive: Drive) -> bool:
+    """Tell whether the file may be restored into the drive; say why not."""
+    problems = problems_in(backup, drive)
+    for problem in problems:
+        complain(problem)
+    if problems:
+        return False
+    differing = strangers(backup, drive, _identity(backup, drive))
+    for text in differing:
+        complain(printable(f'{backup.file}: {text}'))
+    if differing and not (args.force or args.dry_run):
+        complain(f'{_NOTHING}; --force restores it all the same.')
+        return False
+    if says_nothing(backup.head):
+        complain(printable(f'{backup.file}: does not say of which profile it is: whether it suits '
+                           f'{drive.name} is not checked'))
+    if drive.facts.restore is None and not args.force:
+        complain(printable(
+            f'{drive.name}: the bridge does not tell in which mode the drive takes settings; '
+            f'{_NOTHING.lower()}. --params-file goes without it, --force does not ask'))
+        return False
+    if drive.enabled() is Enabled.YES and not args.dry_run:
+        _is_enabled(drive)
+        return False
+    return True
+
+
+def _identity(backup: Backup, drive: Drive) -> str:
+    """Return who a drive is; a bridge that has just started is about to find out."""
+    end = time.monotonic() + _PATIENCE
+    while True:
+        found = drive.identity()
+        if found or not backup.head.identity or time.monotonic() > end:
+            return found
+        time.sleep(_PATIENCE / 10.0)
+
+
+def _is_enabled(drive: Drive) -> int:
+    complain(f'{drive.name}: is enabled: settings are not written while it may move. Disable it '
+             f'first. {_NOTHING}.')
+    return FAILED
+
+
+# -- what is said ---------------------------------------------------------------------------------
+
+
+def _show(args: Namespace, backup: Backup, drive: Drive, plan: RestorePlan) -> None:
+    differing = [*plan.changes, *plan.kept]
+    if args.json:
+        for change in differing:
+            print_json({'drive': drive.name, 'parameter': change.name,
+                        'unit': change.parameter.unit, 'found': change.found,
+                        'wanted': change.wanted, 'left_alone':
+                        change.left_alone.value if change.left_alone else None})
+    elif differing:
+        print_table(_HEADINGS, [
+            (change.name, value_text(change.found), value_text(change.wanted),
+             change.parameter.unit, change.left_alone.text if change.left_alone else '')
+            for change in differing], numbers=('drive', 'file'))
+    for name in backup.values:
+        why = why_left_alone(drive, name, include_protected=True)
+        if why is not None and not is_setting(drive, name):
+            complain(printable(f'{drive.name}: {name} is left alone: {why.text}'))
+    if not plan.changes and not args.json:
+        print(printable(f'{drive.name}: nothing to restore, {len(plan.same)} settings are as in '
+                        f'{backup.file}'))
+
+
+def _report(args: Namespace, drive: Drive, plan: RestorePlan, result: RestoreResult,
+            interrupted: Interruption) -> int:
+    wrong = {each.name: each for each in result.wrong}
+    if args.json:
+        for change in plan.changes:
+            if change.name not in wrong and result.stopped is None:
+                _print_outcome(drive, change.name, True, change.wanted, change.wanted, '')
+        for each in result.wrong:
+            _print_outcome(drive, each.name, False, each.found, each.wanted, each.reason)
+    for text in result.steps:
+        complain(printable(f'{drive.name}: {text}. Look at it by hand: the drive may still be in '
+                           'the mode in which settings are written'))
+    volatile = [change.name for change in plan.changes
+                if change.name in result.written and _is_volatile(drive, change.parameter)]
+    if volatile:
+        complain(printable(f'{drive.name}: gone when it loses power: {_list(volatile)} '
+                           f'({_WHY_VOLATILE[drive.facts.persist_writes]})'))
+    if result.trouble is not None:
+        complain(printable(f'{drive.name}: {result.trouble}'))
+    if result.stopped is not None:
+        complain(printable(
+            f'{drive.name}: interrupted. Written: {_list(result.written)}. Not written: '
+            f'{_list(result.stopped)}. Repeat the command to go on'))
+        return interrupted.exit_code
+    if wrong:
+        complain(printable(f'{drive.name}: written: {_list(result.written)}; not as in the '
+                           'file:'))
+        for each in result.wrong:
+            found = 'unknown' if each.found is None else _with_unit(plan, each.name, each.found)
+            reason = f': {each.reason}' if each.reason else ''
+            complain(printable(f'  {each.name}: {found} instead of '
+                               f'{_with_unit(plan, each.name, each.wanted)}{reason}'))
+    elif result.trouble is not None:
+        complain(printable(f'{drive.name}: written before: {_list(result.written)}'))
+    if not result.complete:
+        return FAILED
+    if not args.json:
+        print(printable(f'{drive.name}: {_count(plan.changes)} written, {len(plan.words)} read '
+                        'back: as in the file'))
+    return 0
+
+
+def _is_volatile(drive: Drive, parameter: Parameter) -> bool:
+    if parameter.storage is None:
+        return not drive.facts.persist_writes
+    return parameter.storage is Storage.RAM
+
+
+def _print_outcome(drive: Drive, name: str, ok: bool, found: Value | None, wanted: Value,
+                   reason: str) -> None:
+    print_json({'drive': drive.name, 'parameter': name, 'ok': ok, 'found': found,
+                'wanted': wanted, 'reason': reason})
+
+
+def _with_unit(plan: RestorePlan, name: str, value: Value) -> str:
+    units = {change.name: change.parameter.unit for change in plan.changes}
+    return f'{value_text(value)} {units.get(name, "")}'.rstrip()
+
+
+def _count(changes: Sequence[Change]) -> str:
+    return f'{len(changes)} setting{"" if len(changes) == 1 else "s"}'
+
+
+def _list(names: Sequence[str]) -> str:
+    return ', '.join(names) or 'nothing'

@@ -1,0 +1,131 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""``drive_can write``: set parameters of drives, and see that they have arrived."""
+
+from argparse import ArgumentParser, Namespace
+from collections.abc import Sequence
+from typing import Any
+
+from drive_can_bridge.cli.completion import complete_words
+from drive_can_bridge.cli.drives import (
+    add_drive_options, FAILED, opened, source_of, split_words, WRONG_USAGE, WrongUsage,
+)
+from drive_can_bridge.cli.listening import complain
+from drive_can_bridge.cli.progress import Bar
+from drive_can_bridge.cli.tables import print_json, print_table
+from drive_can_bridge.client.drive import Drive, Drives, WriteOutcome
+from drive_can_bridge.core.parameters import Parameter, Value, ValueKind
+
+_HEADINGS = ('drive', 'name', 'value', 'unit', 'number', 'storage', 'result')
+_BOOLS = {'true': True, '1': True, 'false': False, '0': False}
+_EXPECTED = {ValueKind.DOUBLE: 'a number', ValueKind.INTEGER: 'an integer',
+             ValueKind.BOOL: 'true or false'}
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add the subcommand to the parser of ``drive_can``."""
+    parser: ArgumentParser = subparsers.add_parser(
+        'write', help='set parameters of a drive', allow_abbrev=False,
+        description='Set parameters of a drive one after the other: through a running bridge, or '
+                    'directly with --params-file. Each one is acknowledged by the drive, or read '
+                    'back. No setpoint, no control word.',
+        epilog='Exit code 0: all was written. 1: something was not, its row says why. 2: wrong '
+               'usage, nothing was sent. After Ctrl-C (130) the write under way is complete.')
+    words = parser.add_argument('words', metavar='[DRIVE] NAME=VALUE', nargs='+', help=(
+        'the drive, also as a shell pattern (may be left out where there is only one); names of '
+        'the profile, or raw ones, with the new value'))
+    words.completer = complete_words  # type: ignore[attr-defined]  # for argcomplete
+    add_drive_options(parser)
+    parser.set_defaults(run=run)
+
+
+def run(args: Namespace) -> int:
+    """
+    Write.
+
+    :return: 0 everything, 1 not everything, 2 wrong usage.
+    :raises DriveCanError: another master, a bus or a bridge that is not there.
+    """
+    try:
+        with source_of(args) as source:
+            names, words = split_words(source.names, args.words)
+            wanted = _assignments(words)
+            with opened(source, names) as drives:
+                return _write(args, drives, wanted)
+    except WrongUsage as error:
+        complain(f'drive_can write: {error}')
+        return WRONG_USAGE
+
+
+def _assignments(words: Sequence[str]) -> dict[str, str]:
+    """
+    Take ``NAME=VALUE`` apart.
+
+    :raises WrongUsage: a word is none, or there is none at all.
+    """
+    wanted: dict[str, str] = {}
+    for word in words:
+        name, separator, text = word.partition('=')
+        if not separator or not name or not text:
+            raise WrongUsage(f'{word!r}: allowed is NAME=VALUE; nothing was written')
+        if name in wanted:
+            raise WrongUsage(f'{name} stands twice; nothing was written')
+        wanted[name] = text
+    if not wanted:
+        raise WrongUsage('what is to be written? NAME=VALUE is missing')
+    return wanted
+
+
+def _write(args: Namespace, drives: Drives, wanted: dict[str, str]) -> int:
+    outcomes: list[tuple[Drive, WriteOutcome]] = []
+    try:
+        for drive in drives.values():
+            with Bar(f'writing {drive.name}', len(wanted)) as bar:
+                for name, text in wanted.items():
+                    _write_one(drive, name, text, outcomes)
+                    bar.step()
+    finally:    # also what was written before Ctrl-C, or before the bus was lost
+        _show(args, drives, wanted, outcomes)
+    return 0 if all(outcome.ok for _, outcome in outcomes) else FAILED
+
+
+def _write_one(drive: Drive, name: str, text: str,
+               outcomes: list[tuple[Drive, WriteOutcome]]) -> None:
+    parameter = drive.find(name)
+    value = None if parameter is None else _value(parameter, text)
+    if parameter is not None and value is None:
+        outcomes.append((drive, WriteOutcome(
+            name, False, parameter, f'wrong type: {text!r}, expected {_EXPECTED[parameter.kind]}'
+        )))
+        return
+    drive.write({name: 0 if value is None else value},
+                told=lambda outcome: outcomes.append((drive, outcome)))
+
+
+def _value(parameter: Parameter, text: str) -> Value | None:
+    """Read a value as the parameter wants it; None: it is no such thing."""
+    if parameter.kind is ValueKind.BOOL:
+        return _BOOLS.get(text.lower())
+    try:
+        return float(text) if parameter.kind is ValueKind.DOUBLE else int(text, 0)
+    except ValueError:
+        return None
+
+
+def _show(args: Namespace, drives: Drives, wanted: dict[str, str],
+          outcomes: Sequence[tuple[Drive, WriteOutcome]]) -> None:
+    rows = []
+    for drive, outcome in outcomes:
+        parameter = outcome.parameter
+        if args.json:
+            print_json({'drive': drive.name, 'name': outcome.name,
+                        'value': wanted[outcome.name], 'ok': outcome.ok,
+                        'reason': outcome.reason})
+            continue
+        result = outcome.reason or 'written'
+        rows.append((
+            drive.name if len(drives) > 1 else '', outcome.name, wanted[outcome.name],
+            parameter.unit if parameter else '', parameter.address if parameter else '',
+            parameter.storage.value if parameter and parameter.storage else '',
+            result if outcome.ok else f'not written: {result}'))
+    if rows:
+        print_table(_HEADINGS, rows, numbers=('value',))

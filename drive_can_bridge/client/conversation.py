@@ -1,0 +1,186 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+Parameter requests on one bus, without a bridge: its exchange and its sessions, but no exchange.
+
+The sessions only *serve* (see :meth:`.Session.serve`): nothing is sent but the acyclic frames of
+the requests that are handed in here. Whatever only a master sends to a drive of this bus, and was
+not sent by this process, ends the conversation.
+"""
+
+from collections.abc import Sequence
+import threading
+import time
+
+from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration
+from drive_can_bridge.core.control import ControlCompleted
+from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, DriveCanError
+from drive_can_bridge.core.events import Event, ProcessDataReceived, RequestCompleted
+from drive_can_bridge.core.frame import Frame, Route
+from drive_can_bridge.core.requests import Outcome, Request
+from drive_can_bridge.core.session import Session
+from drive_can_bridge.exchange.exchange import BusExchange
+from drive_can_bridge.protocols.families import FAMILIES
+
+#: s that a bus has to open
+_OPEN_TIMEOUT = 5.0
+#: s between two looks whether all is well while nothing happens
+_PATIENCE = 0.1
+
+
+class AnotherMaster(DriveCanError):
+    """Somebody else talks to one of the drives."""
+
+
+class BusConversation:
+    """
+    One open bus.
+
+    :param drives: those that will be asked.
+    :param neighbours: all drives that are known on the bus: no other master may talk to them.
+    :raises TransportError: the bus cannot be opened.
+    """
+
+    def __init__(self, bus: BusConfiguration, drives: Sequence[DriveConfiguration],
+                 neighbours: Sequence[DriveConfiguration]) -> None:
+        self.bus = bus
+        self._changed = threading.Condition()
+        self._outcomes: dict[int, tuple[Outcome, ...]] = {}
+        self._trouble: DriveCanError | None = None
+        self._opened = False
+        self._requests: list[tuple[str, Route]] = [
+            (drive.name, route) for drive in neighbours
+            for route in FAMILIES[drive.protocol].make_prober(drive).requests]
+        self.sessions: dict[str, Session] = {
+            drive.name: FAMILIES[drive.protocol].make_session(drive) for drive in drives}
+        self._exchange = BusExchange(
+            bus, list(self.sessions.values()),
+            [[claim.route for claim in FAMILIES[drive.protocol].claims(drive) if claim.heard]
+             for drive in drives],
+            self, counted=[route for _, route in self._requests], note=self._note)
+        for session in self.sessions.values():
+            self._exchange.attach(session, _Ears(self))
+        self._exchange.serve()
+        self._exchange.open()
+        try:
+            self._exchange.link.wait_first_attempt(_OPEN_TIMEOUT)
+            with self._changed:
+                self._changed.wait_for(lambda: self._opened or self._trouble, _OPEN_TIMEOUT)
+                if not self._opened and self._trouble is None:
+                    self._trouble = BusUnavailable(f'bus {bus.name}: it does not open')
+                self._check()
+        except BaseException:
+            self.close()
+            raise
+
+    def listen(self, seconds: float) -> None:
+        """
+        Do nothing but listen.
+
+        :raises DriveCanError: another master talks to a drive, or the bus is lost.
+        """
+        end = time.monotonic() + seconds
+        with self._changed:
+            while True:
+                self._check()
+                left = end - time.monotonic()
+                if left <= 0.0:
+                    return
+                self._changed.wait(left)
+
+    def submit(self, drive: str, request: Request) -> None:
+        """Hand in a request; :meth:`wait` brings its outcomes."""
+        self._exchange.submit(self.sessions[drive], request)
+
+    def wait(self, request: Request) -> tuple[Outcome, ...]:
+        """
+        Wait for the outcomes of a request that was handed in.
+
+        :raises DriveCanError: another master talks to a drive, or the bus is lost.
+        """
+        with self._changed:
+            self._check()
+            while id(request) not in self._outcomes:
+                self._changed.wait(_PATIENCE)
+                self._check()
+            return self._outcomes.pop(id(request))
+
+    def send(self, frame: Frame) -> None:
+        """
+        Send a frame that is no parameter request.
+
+        :raises BusUnavailable: the bus does not take it.
+        """
+        with self._exchange.lock:
+            if not self._exchange.link.send(frame):
+                raise BusUnavailable(f'bus {self.bus.name}: {self._exchange.link.last_error}')
+
+    def close(self) -> None:
+        """Close the bus. Idempotent."""
+        self._exchange.close()
+
+    def _check(self) -> None:
+        if self._trouble is not None:
+            raise self._trouble
+
+    def _fail(self, trouble: DriveCanError) -> None:
+        with self._changed:
+            self._trouble = self._trouble or trouble
+            self._changed.notify_all()
+
+    # -- from the exchange ------------------------------------------------------------------------
+
+    def completed(self, request: Request, outcomes: tuple[Outcome, ...]) -> None:
+        """Take what became of a request."""
+        with self._changed:
+            self._outcomes[id(request)] = outcomes
+            self._changed.notify_all()
+
+    def _note(self, frame: Frame, now: float, sent: bool) -> None:
+        if sent:
+            return
+        for name, route in self._requests:
+            if route.matches(frame):
+                self._fail(AnotherMaster(f'bus {self.bus.name}: another master talks to drive '
+                                         f'{name} ({frame}); end it first'))
+
+    def bus_opened(self, bus: str) -> None:
+        """Take note that the bus is there."""
+        with self._changed:
+            self._opened = True
+            self._changed.notify_all()
+
+    def bus_lost(self, bus: str, reason: str) -> None:
+        """End: what the drives do now nobody knows."""
+        self._fail(BusUnavailable(f'bus {bus}: {reason}'))
+
+    def fatal(self, bus: str, reason: str, *, misconfigured: bool) -> None:
+        """End likewise."""
+        kind = BusMisconfigured if misconfigured else DriveCanError
+        self._fail(kind(f'bus {bus}: {reason}'))
+
+
+class _Ears:
+    """Listens to one session (a ``DriveListener``): only answered requests matter."""
+
+    def __init__(self, conversation: BusConversation) -> None:
+        self._conversation = conversation
+
+    def take_commands(self, now: float) -> None:
+        """There are none."""
+
+    def discard_commands(self, why: str) -> None:
+        """There are none."""
+
+    def process_data(self, event: ProcessDataReceived) -> None:
+        """Not asked for."""
+
+    def request_sent(self, now: float) -> None:
+        """Nothing to be told."""
+
+    def handle_event(self, event: Event) -> None:
+        """Hand on what became of a request."""
+        if isinstance(event, RequestCompleted):
+            self._conversation.completed(event.request, event.outcomes)
+
+    def control_completed(self, outcome: ControlCompleted) -> None:
+        """Nobody asked."""

@@ -1,0 +1,265 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+One drive, asked by this process.
+
+A drive that is not there costs a few time-outs, not one for each parameter: while nobody knows
+whether it is there (at the beginning, and after a request of which nothing was answered), it is
+greeted by single reads before anything else.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+
+from drive_can_bridge.client.conversation import BusConversation
+from drive_can_bridge.client.drive import (
+    Drive, DriveFacts, Enabled, readable_names, ReadOutcome, WriteOutcome,
+)
+from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration
+from drive_can_bridge.core.directory import ParameterDirectory
+from drive_can_bridge.core.errors import ValueRefused
+from drive_can_bridge.core.parameters import Parameter, Value
+from drive_can_bridge.core.requests import (
+    Failure, is_answer, NO_ANSWER, NO_ANSWER_OFFLINE, OFFLINE, Outcome, ReadRequest, ReadValue,
+    WriteRequest, Written,
+)
+from drive_can_bridge.core.roles import Role
+from drive_can_bridge.core.words import value_text
+from drive_can_bridge.process.interruption import finish_first
+from drive_can_bridge.protocols.families import FAMILIES
+
+#: parameters that are handed to a session at once: two frames where four share one; and how many
+#: such requests wait in it, so that the drive never waits for us
+BLOCK = 8
+AHEAD = 3
+#: parameters that are tried until a drive counts as absent
+TRIES = 3
+#: s between looks whether a node has started, and how many there are
+_START_PAUSE = 0.1
+_START_LOOKS = 25
+_START_HINT = 'a CANopen node that is not operational answers no PKW, --nmt-start starts it'
+
+
+class DirectDrive(Drive):
+    """One drive, asked by this process."""
+
+    def __init__(self, drive: DriveConfiguration, bus: BusConfiguration,
+                 conversation: BusConversation, nmt_start: bool) -> None:
+        self._drive = drive
+        self._family = FAMILIES[drive.protocol]
+        self._conversation = conversation
+        self._session = conversation.sessions[drive.name]
+        self._directory = ParameterDirectory(
+            drive.profile.parameters, lambda name: self._family.raw_parameter(drive, name))
+        self._start_frame = self._family.make_prober(drive).start_frame()
+        self._nmt_start = nmt_start
+        self._facts = DriveFacts(
+            drive.name, bus.name, bus.interface, str(bus.channel), bus.bitrate, drive.protocol,
+            drive.station, drive.profile_key or drive.profile.name, drive.profile.sha256,
+            drive.profile.restore,
+            persist_writes=getattr(drive.options, 'persist_writes', True))
+
+    def _start(self) -> None:
+        if self._nmt_start and self._start_frame is not None:
+            self._conversation.send(self._start_frame)
+
+    def begin(self) -> Iterator[str]:
+        """Start the node where that is wanted; yield what the user should know."""
+        if self._nmt_start and self._start_frame is not None:
+            self._start()
+            for _ in range(_START_LOOKS):   # until its heartbeat, too, says that it has started
+                self._conversation.listen(_START_PAUSE)
+                if self._greet()[1] is None:
+                    break
+        supervision = self._family.supervision(self._drive)
+        if supervision is not None:
+            outcome, = self._wait_for((supervision,))
+            if isinstance(outcome, ReadValue) and outcome.raw != 0:
+                yield (f'{self.name}: {supervision.address} is not 0: the drive supervises '
+                       'telegrams once it has got one, and faults when they end')
+
+    @property
+    def name(self) -> str:
+        return self._drive.name
+
+    @property
+    def facts(self) -> DriveFacts:
+        return self._facts
+
+    @property
+    def parameters(self) -> Mapping[str, Parameter]:
+        return self._drive.profile.parameters
+
+    def find(self, name: str) -> Parameter | None:
+        return self._directory.find(name)
+
+    def role(self, name: str) -> Role | None:
+        parameter = self.find(name)
+        return None if parameter is None else self._session.role(parameter)
+
+    def check(self, name: str, value: object) -> str:
+        parameter = self.find(name)
+        if parameter is None:
+            return self._directory.unknown(name)
+        if parameter.writable:
+            owner = self._session.roles.owner(parameter)
+            if owner is not None and owner[0] is Role.CONTROL:
+                return 'control word: only a running bridge sends it'
+            if owner is not None and owner[0] is Role.CYCLIC:
+                return f'setpoint {owner[1].name}: only a running bridge sends it'
+            refusal = self._session.write_refusal(parameter)
+            if refusal:
+                return refusal
+        try:
+            self._directory.raw_from_user(parameter, value)
+        except ValueRefused as error:
+            return str(error)
+        return ''
+
+    # -- reading ----------------------------------------------------------------------------------
+
+    def read(self, *names: str,
+             told: Callable[[ReadOutcome], object] | None = None) -> dict[str, ReadOutcome]:
+        wanted = names or readable_names(self)
+        found: dict[str, ReadOutcome] = {}
+        asked: list[tuple[str, Parameter]] = []
+        for name in dict.fromkeys(wanted):
+            parameter = self.find(name)
+            if parameter is None:
+                found[name] = ReadOutcome(name, reason=self._directory.unknown(name))
+            elif not parameter.readable:
+                found[name] = ReadOutcome(name, parameter, reason='write-only')
+            else:
+                asked.append((name, parameter))
+        if told is not None:
+            for unasked in found.values():
+                told(unasked)
+        asked.sort(key=lambda each: (each[1].number or 0, each[1].subindex or 0))
+        for name, parameter, outcome in self._outcomes(asked):
+            made = self._read_outcome(name, parameter, outcome)
+            found[name] = made
+            if told is not None:
+                told(made)
+        return {name: found[name] for name in wanted}
+
+    def _outcomes(self, asked: Sequence[tuple[str, Parameter]],
+                  ) -> Iterator[tuple[str, Parameter, Outcome]]:
+        """Ask in blocks; the next one waits in the session while one is being served."""
+        blocks = [asked[start:start + BLOCK] for start in range(0, len(asked), BLOCK)]
+        waiting: list[tuple[Sequence[tuple[str, Parameter]], ReadRequest]] = []
+        while blocks or waiting:
+            if blocks and not self._session.online:
+                # nobody answered last time, or ever: not a time-out for each parameter
+                self._start()   # it may have restarted
+                known, failure = self._greet([each for _, each in blocks[0]])
+                if failure is not None:
+                    for block in blocks:
+                        yield from _paired(block, [failure] * len(block))
+                    return
+                rest = tuple(each for _, each in blocks[0] if each not in known)
+                known.update(zip(rest, self._wait_for(rest)))
+                block = blocks.pop(0)
+                yield from _paired(block, [known[each] for _, each in block])
+                continue
+            while blocks and len(waiting) < AHEAD:
+                request = ReadRequest(tuple(each for _, each in blocks[0]))
+                self._conversation.submit(self.name, request)
+                waiting.append((blocks.pop(0), request))
+            block, request = waiting.pop(0)
+            outcomes = self._conversation.wait(request)
+            if Failure(NO_ANSWER_OFFLINE) in outcomes:
+                # the one before had no answer at all, which may have been the fault of its names
+                blocks.insert(0, block)
+            else:
+                yield from _paired(block, outcomes)
+
+    def _greet(self, wanted: Sequence[Parameter] = (),
+               ) -> tuple[dict[Parameter, Outcome], Failure | None]:
+        """
+        Find out whether the drive is there, preferably by what is wanted anyway.
+
+        :return: what was learnt by that, and why the drive counts as absent; None: it does not.
+        """
+        known: dict[Parameter, Outcome] = {}
+        listed = [each for each in self.parameters.values()
+                  if each.readable and self._session.cells(each)]
+        candidates = dict.fromkeys([*wanted[:1], *listed[:TRIES], *wanted])
+        outcome: Outcome = Failure(NO_ANSWER_OFFLINE)
+        for candidate in list(candidates)[:TRIES]:
+            outcome, = self._wait_for((candidate,))
+            if is_answer(outcome):
+                if candidate in wanted:
+                    known[candidate] = outcome
+                return known, None
+        return known, outcome if isinstance(outcome, Failure) else None
+
+    def _wait_for(self, parameters: tuple[Parameter, ...]) -> tuple[Outcome, ...]:
+        request = ReadRequest(parameters)
+        self._conversation.submit(self.name, request)
+        return self._conversation.wait(request)
+
+    def _read_outcome(self, name: str, parameter: Parameter, outcome: Outcome) -> ReadOutcome:
+        if isinstance(outcome, ReadValue):
+            return ReadOutcome(name, parameter, outcome.raw,
+                               parameter.value_from_raw(outcome.raw))
+        reason = outcome.reason if isinstance(outcome, Failure) else 'no result'
+        return ReadOutcome(name, parameter, reason=self._explained(reason))
+
+    def _explained(self, reason: str) -> str:
+        """Add what may be the matter with a drive that says nothing at all."""
+        silent = reason.startswith(OFFLINE) or (
+            reason.startswith(NO_ANSWER) and not self._session.online)
+        if silent and self._start_frame is not None and not self._nmt_start:
+            return f'{reason}; {_START_HINT}'
+        return reason
+
+    # -- writing ----------------------------------------------------------------------------------
+
+    def write(self, values: Mapping[str, Value], *,
+              told: Callable[[WriteOutcome], object] | None = None) -> dict[str, WriteOutcome]:
+        found = {}
+        for name, value in values.items():
+            with finish_first():
+                outcome = found[name] = self._write_one(name, value)
+                if told is not None:
+                    told(outcome)
+        return found
+
+    def _write_one(self, name: str, value: Value) -> WriteOutcome:
+        parameter = self.find(name)
+        refusal = self.check(name, value)
+        if refusal or parameter is None:
+            return WriteOutcome(name, False, parameter, refusal)
+        if not self._session.online:    # what does not answer is told nothing
+            self._start()
+            _, failure = self._greet()
+            if failure is not None:
+                return WriteOutcome(name, False, parameter, self._explained(failure.reason))
+        request = WriteRequest(((parameter, self._directory.raw_from_user(parameter, value)),))
+        self._conversation.submit(self.name, request)
+        outcome, = self._conversation.wait(request)
+        if isinstance(outcome, Written):
+            return WriteOutcome(name, True, parameter, outcome.note)
+        reason = outcome.reason if isinstance(outcome, Failure) else 'no result'
+        return WriteOutcome(name, False, parameter, self._explained(reason))
+
+    # -- state ------------------------------------------------------------------------------------
+
+    def enabled(self) -> Enabled:
+        control = self._drive.profile.control
+        if control is None or control.enabled is None or control.status_parameter is None:
+            return Enabled.UNKNOWN
+        outcome = self.read(control.status_parameter)[control.status_parameter]
+        if outcome.raw is None:
+            return Enabled.UNKNOWN
+        return Enabled.YES if control.enabled.matches(outcome.raw) else Enabled.NO
+
+    def identity(self) -> str:
+        names = self._drive.profile.identity
+        outcomes = self.read(*names) if names else {}
+        return ' '.join(f'{name}={value_text(outcome.value)}'
+                        for name, outcome in outcomes.items() if outcome.value is not None)
+
+
+def _paired(block: Sequence[tuple[str, Parameter]], outcomes: Sequence[Outcome],
+            ) -> Iterator[tuple[str, Parameter, Outcome]]:
+    for (name, parameter), outcome in zip(block, outcomes, strict=True):
+        yield name, parameter, outcome

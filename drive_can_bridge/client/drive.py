@@ -1,0 +1,269 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+Drives as a person or a script sees them: parameters with names, units and reasons.
+
+The same interface stands on two ways to the drives: directly on the buses of a parameter file, and
+through a running bridge (see :func:`drive_can_bridge.client.open_drives`).
+
+.. code-block:: python
+
+    with open_drives('robot.yaml') as drives:
+        outcome = drives['conveyor'].read('ramp_time')['ramp_time']
+        print(outcome.value if outcome.ok else outcome.reason)
+
+Whatever the drive itself has to do with a request ends in an *outcome*, one for each name, never
+in an exception. Exceptions are for what ends the whole conversation: another master, a lost bus, a
+bridge that has gone, all of them :class:`~drive_can_bridge.core.errors.DriveCanError`.
+
+:func:`~drive_can_bridge.client.find_source` gives names before anything is opened, which is what
+commands need that have to know which drive is meant:
+
+.. code-block:: python
+
+    find_source(params_file=None, *, namespace=None, nmt_start=False) -> Source
+    open_drives(params_file=None, *, only=('*',), namespace=None, nmt_start=False) -> Drives
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import Protocol
+
+from drive_can_bridge.core.errors import DriveCanError
+from drive_can_bridge.core.parameters import Parameter, Value
+from drive_can_bridge.core.profile import RestoreTable
+from drive_can_bridge.core.roles import Role
+
+
+class WhichBridge(DriveCanError):
+    """Several bridges are running, and nobody has said which one is meant."""
+
+
+class Enabled(Enum):
+    """Whether a drive may move by the word of its master."""
+
+    YES = 'enabled'
+    NO = 'not enabled'
+    UNKNOWN = 'unknown'
+
+
+@dataclass(frozen=True, slots=True)
+class ReadOutcome:
+    """
+    What became of reading one parameter.
+
+    :param name: as it was asked for.
+    :param parameter: None where nobody knows the name.
+    :param raw: integer read by the parameter's type; None where reading failed.
+    :param value: in the unit of the parameter; None where reading failed.
+    :param reason: why it failed, in words; '' where it did not.
+    """
+
+    name: str
+    parameter: Parameter | None = None
+    raw: int | None = None
+    value: Value | None = None
+    reason: str = ''
+
+    @property
+    def ok(self) -> bool:
+        """There is a value."""
+        return self.raw is not None
+
+
+@dataclass(frozen=True, slots=True)
+class WriteOutcome:
+    """
+    What became of writing one parameter.
+
+    :param ok: acknowledged by the drive, or read back; or sent, where ``reason`` says that nothing
+        more is known (``verify_writes: false``).
+    :param reason: why it failed, in words; or that note.
+    """
+
+    name: str
+    ok: bool
+    parameter: Parameter | None = None
+    reason: str = ''
+
+
+@dataclass(frozen=True, slots=True)
+class DriveFacts:
+    """
+    What is known of a drive without asking it.
+
+    :param protocol: name of the family.
+    :param profile: name or path, as the configuration has it.
+    :param profile_sha256: of the profile's file, hexadecimal.
+    :param restore: the ``restore`` section of the profile; None: not known (a bridge of another
+        version).
+    :param through: full name of the bridge that the drive is reached through; '': directly.
+    :param persist_writes: what has no ``storage`` in the profile survives the loss of power.
+    """
+
+    name: str
+    bus: str
+    interface: str
+    channel: str
+    bitrate: int
+    protocol: str
+    station: int
+    profile: str
+    profile_sha256: str
+    restore: RestoreTable | None
+    through: str = ''
+    persist_writes: bool = True
+
+
+class Drive(Protocol):
+    """
+    One drive.
+
+    Calls block until everything is done. They belong into one thread.
+    """
+
+    @property
+    def name(self) -> str:
+        """Name of the drive in the configuration."""
+
+    @property
+    def facts(self) -> DriveFacts:
+        """What is known of the drive without asking it."""
+
+    @property
+    def parameters(self) -> Mapping[str, Parameter]:
+        """
+        The parameters that the profile lists, by name, in its order.
+
+        Limits (``minimum``, ``maximum``) that come through a bridge are those in effect: where the
+        profile has none, what the type can carry.
+        """
+
+    def find(self, name: str) -> Parameter | None:
+        """Return a parameter by profile name or raw name; None if there is no such thing."""
+
+    def role(self, name: str) -> Role | None:
+        """
+        Say what a bridge uses a parameter for itself; None: nothing, or an unknown name.
+
+        What is ``CONTROL`` or ``CYCLIC`` and writable cannot be written here either way; ``MAP``
+        only directly.
+        """
+
+    def check(self, name: str, value: object) -> str:
+        """
+        Say why a value cannot be written, without asking the drive; '' if nothing is known.
+
+        Unknown name, read-only, wrong type, out of range, a setpoint, a control word.
+        """
+
+    def read(self, *names: str,
+             told: Callable[[ReadOutcome], object] | None = None) -> dict[str, ReadOutcome]:
+        """
+        Read parameters: those named, or all readable listed ones.
+
+        :param told: is told each outcome as soon as it is known, in any order.
+        :return: one outcome for each name, in the order asked.
+        """
+
+    def write(self, values: Mapping[str, Value], *,
+              told: Callable[[WriteOutcome], object] | None = None) -> dict[str, WriteOutcome]:
+        """
+        Write parameters one after the other, in the order given, each one verified.
+
+        :param values: in the units of the parameters; raw names take raw integers.
+        :param told: is told each outcome before the next write begins.
+        :raises KeyboardInterrupt: on Ctrl-C; not before the write under way has its outcome, and
+            ``told`` knows it.
+        """
+
+    def enabled(self) -> Enabled:
+        """Tell whether the drive is enabled, asking for its status where that is possible."""
+
+    def identity(self) -> str:
+        """
+        Say who the drive is: ``firmware=10205 serial_number=4711``.
+
+        What the profile section ``identity`` names, as far as it can be read; '' where there is
+        none.
+        """
+
+
+def readable_names(drive: Drive) -> list[str]:
+    """
+    Return what ``read`` reads when no name is given.
+
+    What exists in process data only can be read only while these are received: through a bridge,
+    where they are mapped.
+    """
+    return [name for name, parameter in drive.parameters.items() if parameter.readable and (
+        parameter.number is not None or parameter.index is not None
+        or drive.facts.through and not parameter.writable and drive.role(name) is Role.CYCLIC)]
+
+
+class Drives(Mapping[str, Drive]):
+    """
+    The drives that were opened, by name, in the order of the configuration.
+
+    A context manager: leaving it closes the buses, or leaves the ROS graph.
+
+    :param close: closes everything; called once.
+    :ivar warnings: what the user should know before anything is written, a line each.
+    """
+
+    def __init__(self, drives: Mapping[str, Drive], close: Callable[[], object], *,
+                 warnings: Sequence[str] = ()) -> None:
+        self._drives = dict(drives)
+        self._closers = [close]
+        self.warnings = tuple(warnings)
+
+    def __getitem__(self, name: str) -> Drive:
+        return self._drives[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._drives)
+
+    def __len__(self) -> int:
+        return len(self._drives)
+
+    def close(self) -> None:
+        """Close everything."""
+        while self._closers:
+            self._closers.pop(0)()
+
+    def also_close(self, close: Callable[[], object]) -> None:
+        """Have something else closed afterwards."""
+        self._closers.append(close)
+
+    def __enter__(self) -> 'Drives':
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+class Source(Protocol):
+    """
+    Where drives come from: known by name before anything is opened or sent.
+
+    Made by :func:`drive_can_bridge.client.find_source`.
+    """
+
+    @property
+    def names(self) -> Sequence[str]:
+        """All drives, in the order of the configuration."""
+
+    def parameter_names(self, drive: str) -> Sequence[str]:
+        """Return the names of the listed parameters of a drive."""
+
+    def open(self, names: Sequence[str]) -> Drives:
+        """
+        Open the drives of these names.
+
+        Directly: takes the locks, opens their buses, listens for another master for 1.2 s.
+
+        :raises DriveCanError: in use, another master, bus not available, a bridge that has gone.
+        """
+
+    def close(self) -> None:
+        """Leave the ROS graph, if that is where it is. Idempotent."""

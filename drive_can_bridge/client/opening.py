@@ -1,0 +1,53 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Which of both ways to take to the drives."""
+
+from collections.abc import Sequence
+from fnmatch import fnmatchcase
+from pathlib import Path
+
+from drive_can_bridge.client.drive import Drives, Source
+from drive_can_bridge.core.errors import DriveCanError
+
+
+def find_source(params_file: str | Path | None = None, *, namespace: str | None = None,
+                nmt_start: bool = False) -> Source:
+    """
+    Say which drives there are, before anything is sent.
+
+    :param params_file: its drives, directly on its buses; None: those of a running bridge.
+    :param namespace: of the bridge, where several run.
+    :param nmt_start: directly: start CANopen nodes before they are asked.
+    :raises ConfigurationError: the file is wrong.
+    :raises DriveCanError: no bridge is running, or several in different namespaces.
+    """
+    if params_file is not None:
+        from drive_can_bridge.client.direct import DirectSource
+        return DirectSource(params_file, nmt_start=nmt_start)
+    from drive_can_bridge.ros.client.bridge import BridgeSource
+    return BridgeSource(namespace)
+
+
+def open_drives(params_file: str | Path | None = None, *, only: Sequence[str] = ('*',),
+                namespace: str | None = None, nmt_start: bool = False) -> Drives:
+    """
+    Open drives.
+
+    :param only: their names, or shell patterns.
+    :raises DriveCanError: no drive of such a name, and what :func:`find_source` and
+        :meth:`.Source.open` raise.
+    """
+    source = find_source(params_file, namespace=namespace, nmt_start=nmt_start)
+    try:
+        names: list[str] = []
+        for pattern in only:
+            found = [name for name in source.names if fnmatchcase(name, pattern)]
+            if not found:
+                raise DriveCanError(f'no drive {pattern!r}; there are: '
+                                    f'{", ".join(source.names) or "none"}')
+            names += found
+        drives = source.open(names)
+    except BaseException:
+        source.close()
+        raise
+    drives.also_close(source.close)
+    return drives

@@ -1,0 +1,86 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+One master for each drive: whoever talks to drives locks them on this host before.
+
+A drive is known by its place (interface, channel), its protocol and its station, whatever a
+parameter file calls it. Serial ports are locked as a whole: what two processes read from one
+arrives at neither. Buses that other processes may use besides (SocketCAN) are not locked; drives
+on them that the other process does not know are nobody's business.
+"""
+
+from collections.abc import Iterable, Sequence
+
+from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration
+from drive_can_bridge.core.errors import DriveCanError
+from drive_can_bridge.process.locks import Held, holder, HostLock, take
+from drive_can_bridge.transport.places import place_of
+
+#: what a bridge calls itself
+BRIDGE = 'drive_can_bridge'
+#: what to do for commands that have only the direct way
+END_FIRST = 'end that first'
+
+
+class InUse(DriveCanError):
+    """
+    Another process talks to a drive, or has the serial port open.
+
+    :ivar by_bridge: that process is a bridge, as far as is known.
+    """
+
+    def __init__(self, text: str, *, by_bridge: bool) -> None:
+        super().__init__(text)
+        self.by_bridge = by_bridge
+
+
+class Ownership:
+    """
+    The locks that a process has; a context manager.
+
+    :param buses: with all drives on each of them that it will talk to.
+    :param who: what it calls itself: ``drive_can_bridge``, ``drive_can read``.
+    :param advice: what to do where a bridge has a drive.
+    :raises InUse: another process has one; nothing is locked then.
+    """
+
+    def __init__(self, buses: Iterable[tuple[BusConfiguration, Sequence[DriveConfiguration]]],
+                 who: str, advice: str) -> None:
+        claims: dict[str, str] = {}
+        for bus, drives in buses:
+            place = place_of(bus)
+            for drive in drives:
+                for name in place.names:
+                    claims[f'drive {name} {drive.protocol} {drive.station}'] = (
+                        f'bus {bus.name}: drive {drive.name}')
+            if place.port:      # behind the drives: they say more
+                claims.update(dict.fromkeys(
+                    place.names, f'bus {bus.name}: the serial port {place.port}'))
+        try:
+            self._locks: list[HostLock] = take(list(claims), who)
+        except Held as held:
+            # which one it was is chance: the first in the caller's order says more
+            for key, what in claims.items():
+                other = holder(key)
+                if other is not None:
+                    raise _in_words(other, what, advice) from None
+            raise _in_words(held, next(iter(claims.values())), advice) from None
+
+    def __enter__(self) -> 'Ownership':
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.release()
+
+    def release(self) -> None:
+        """Let others talk to the drives. Idempotent."""
+        while self._locks:
+            self._locks.pop().release()
+
+
+def _in_words(held: Held, what: str, advice: str) -> InUse:
+    process = 'another process' if held.process is None else f'process {held.process}'
+    by_bridge = held.who in ('', BRIDGE)
+    if not by_bridge:
+        process += f' ({held.who.replace("_", " ").replace("drive can", "drive_can")})'
+        advice = 'wait until it is done, or end it'
+    return InUse(f'{what} is used by {process}; {advice}', by_bridge=by_bridge)

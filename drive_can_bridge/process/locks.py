@@ -1,0 +1,121 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+Locks that all processes of this host respect, whoever they belong to.
+
+A lock is a socket in the abstract name space of Linux, bound to a name that is made of its key.
+The kernel lets one process have a name, and takes it away when that process ends, however it ends.
+There is no file: none that is left behind, that another user may not write, that somebody has put
+a symbolic link in the place of, or that a service with a ``/tmp`` of its own does not see. The
+names belong to the network namespace, as CAN interfaces do.
+
+Beside each lock its holder has a second name that says who it is; ``/proc/net/unix`` shows it to
+everybody.
+"""
+
+from collections.abc import Sequence
+import hashlib
+import os
+from pathlib import Path
+import re
+import socket
+import time
+
+#: all names begin with this
+_PREFIX = 'drive_can_bridge'
+_SOCKETS = Path('/proc/net/unix')
+#: characters of a holder's name that have room in that of a socket
+_WHO_MAX = 40
+#: s until whoever has just taken a lock has also said who it is
+_PATIENCE = 0.1
+
+
+class Held(Exception):
+    """
+    Somebody has a lock.
+
+    :param process: number of its process; None: not known.
+    :param who: what its holder calls itself; '' where that is not known.
+    """
+
+    def __init__(self, process: int | None, who: str) -> None:
+        super().__init__(process, who)
+        self.process = process
+        self.who = who
+
+
+class HostLock:
+    """
+    One lock, from its making until it is released.
+
+    :param key: what is locked; the same on the whole host.
+    :param who: what the holder calls itself.
+    :raises Held: somebody has it, be it this very process.
+    """
+
+    def __init__(self, key: str, who: str) -> None:
+        digest = hashlib.sha256(key.encode()).hexdigest()[:24]
+        self._sockets: list[socket.socket] = []
+        try:
+            self._bind(f'lock/{digest}')
+        except OSError:
+            self.release()
+            raise _holder(digest) from None
+        words = re.sub(r'[^A-Za-z0-9_]+', '_', who)[:_WHO_MAX]
+        try:
+            self._bind(f'who/{digest}/{os.getpid()}/{words}')
+        except OSError:     # then nobody is told, but it is locked all the same
+            pass
+
+    def _bind(self, name: str) -> None:
+        made = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self._sockets.append(made)
+        made.bind(f'\0{_PREFIX}/{name}')
+
+    def release(self) -> None:
+        """Let others have it. Idempotent."""
+        while self._sockets:
+            self._sockets.pop().close()
+
+
+def take(keys: Sequence[str], who: str) -> list[HostLock]:
+    """
+    Take several locks, or none.
+
+    In the order of their keys, so that of two processes that want the same one gets all.
+
+    :raises Held: somebody has one of them.
+    """
+    taken: list[HostLock] = []
+    try:
+        for key in sorted(set(keys)):
+            taken.append(HostLock(key, who))
+    except BaseException:
+        for lock in taken:
+            lock.release()
+        raise
+    return taken
+
+
+def holder(key: str) -> Held | None:
+    """Return who has a lock; None: nobody."""
+    try:
+        HostLock(key, '').release()
+    except Held as held:
+        return held
+    return None
+
+
+def _holder(digest: str) -> Held:
+    """Find out who has a lock."""
+    deadline = time.monotonic() + _PATIENCE
+    wanted = re.compile(rf'@{_PREFIX}/who/{digest}/(\d+)/(\w*)$', re.MULTILINE)
+    while True:
+        try:
+            found = wanted.search(_SOCKETS.read_text(encoding='utf-8', errors='replace'))
+        except OSError:
+            found = None
+        if found is not None:
+            return Held(int(found[1]), found[2])
+        if time.monotonic() > deadline:
+            return Held(None, '')
+        time.sleep(0.005)

@@ -1,0 +1,188 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""One drive, asked through its node of a running bridge."""
+
+from collections.abc import Callable, Mapping, Sequence
+
+from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters
+
+from drive_can_bridge.client.drive import (
+    Drive, DriveFacts, Enabled, readable_names, ReadOutcome, WriteOutcome,
+)
+from drive_can_bridge.core.directory import ParameterDirectory
+from drive_can_bridge.core.errors import ValueRefused
+from drive_can_bridge.core.parameters import Parameter, Value
+from drive_can_bridge.core.roles import Role
+from drive_can_bridge.process.interruption import finish_first
+from drive_can_bridge.ros.client.descriptors import (
+    facts_of, message_of, parameter_of, plain, raw_of, role_of,
+)
+from drive_can_bridge.ros.client.graph import Graph
+
+#: parameters that are read with one call
+BLOCK = 16
+_NO_VALUE = 'no value; the log of the bridge says why'
+#: s beyond its period that a diagnostic message may take
+_DIAGNOSTICS_MARGIN = 5.0
+_ENABLED = {'online': Enabled.YES, 'not armed': Enabled.YES, 'disabled': Enabled.NO,
+            'fault': Enabled.NO}
+
+
+class BridgedDrive(Drive):
+    """
+    One drive.
+
+    :param node: full name of its node.
+    :param table: the parameters that it lists.
+    :param roles: what the bridge uses them for.
+    :param period: s between diagnostic messages of the bridge.
+    :param identity: asks the bridge who a drive is.
+    """
+
+    def __init__(self, graph: Graph, node: str, facts: DriveFacts, table: dict[str, Parameter],
+                 roles: dict[str, Role], period: float, identity: Callable[[str], str]) -> None:
+        self._graph = graph
+        self._node = node
+        self._facts = facts
+        self._table = table
+        self._roles = roles
+        self._period = period
+        self._identity = identity
+        self._raw: dict[str, Parameter | None] = {}
+        self._directory = ParameterDirectory(table, self._raw_parameter)
+
+    @property
+    def name(self) -> str:
+        return self._facts.name
+
+    @property
+    def facts(self) -> DriveFacts:
+        return self._facts
+
+    @property
+    def parameters(self) -> Mapping[str, Parameter]:
+        return self._table
+
+    def find(self, name: str) -> Parameter | None:
+        return self._directory.find(name)
+
+    def _raw_parameter(self, name: str) -> Parameter | None:
+        if name not in self._raw:
+            message, = self._describe([name])
+            self._raw[name] = parameter_of(message, listed=False)
+            role = role_of(message)
+            if role is not None:
+                self._roles[name] = role
+        return self._raw[name]
+
+    def role(self, name: str) -> Role | None:
+        return None if self.find(name) is None else self._roles.get(name)
+
+    def check(self, name: str, value: object) -> str:
+        parameter = self.find(name)
+        if parameter is None:
+            return self._directory.unknown(name)
+        role = self.role(name)
+        if parameter.writable and role is Role.CONTROL:
+            return 'use ~/enable'
+        if parameter.writable and role is Role.CYCLIC:
+            own = next((each.name for each in self._directory.twins(parameter)), name)
+            return f'sent cyclically: publish ~/command/{own}'
+        if role is Role.MAP:
+            return 'mapping parameter: not written while the bridge is active'
+        try:
+            self._directory.raw_from_user(parameter, value)
+        except ValueRefused as error:
+            return str(error)
+        return ''
+
+    def read(self, *names: str,
+             told: Callable[[ReadOutcome], object] | None = None) -> dict[str, ReadOutcome]:
+        wanted = names or readable_names(self)
+        found: dict[str, ReadOutcome] = {}
+        asked: list[str] = []
+        for name in dict.fromkeys(wanted):
+            parameter = self.find(name)
+            if parameter is None:
+                found[name] = ReadOutcome(name, reason=self._directory.unknown(name))
+            elif not parameter.readable:
+                found[name] = ReadOutcome(name, parameter, reason='write-only')
+            else:
+                asked.append(name)
+        if told is not None:
+            for outcome in found.values():
+                told(outcome)
+        # neighbours share frames
+        asked.sort(key=lambda name: self._place(name))
+        for start in range(0, len(asked), BLOCK):
+            for outcome in self._get(asked[start:start + BLOCK]):
+                found[outcome.name] = outcome
+                if told is not None:
+                    told(outcome)
+        return {name: found[name] for name in wanted}
+
+    def _place(self, name: str) -> tuple[int, int]:
+        parameter = self.find(name)
+        return ((parameter.number or 0, parameter.subindex or 0) if parameter is not None
+                else (0, 0))
+
+    def _get(self, names: Sequence[str]) -> list[ReadOutcome]:
+        answer = self._graph.call(self._node, 'get_parameters',
+                                  GetParameters.Request(names=list(names)))
+        values = dict(zip(names, map(plain, answer.values)))
+        missing = [name for name in names if values.get(name) is None]
+        reasons = dict(zip(missing, self._reasons(missing)))
+        made = []
+        for name in names:
+            parameter, value = self.find(name), values.get(name)
+            if parameter is None or value is None:
+                made.append(ReadOutcome(name, parameter, reason=reasons.get(name, _NO_VALUE)))
+            else:
+                made.append(ReadOutcome(name, parameter, raw_of(parameter, value), value))
+        return made
+
+    def _reasons(self, names: Sequence[str]) -> list[str]:
+        """Ask why there is no value."""
+        if not names:
+            return []
+        return [facts_of(message).get('error') or _NO_VALUE for message in self._describe(names)]
+
+    def _describe(self, names: Sequence[str]) -> list[object]:
+        answer = self._graph.call(self._node, 'describe_parameters',
+                                  DescribeParameters.Request(names=list(names)))
+        return list(answer.descriptors)
+
+    def write(self, values: Mapping[str, Value], *,
+              told: Callable[[WriteOutcome], object] | None = None) -> dict[str, WriteOutcome]:
+        found = {}
+        for name, value in values.items():
+            with finish_first():
+                outcome = found[name] = self._write_one(name, value)
+                if told is not None:
+                    told(outcome)
+        return found
+
+    def _write_one(self, name: str, value: Value) -> WriteOutcome:
+        parameter = self.find(name)
+        refusal = self.check(name, value)
+        if refusal or parameter is None:
+            return WriteOutcome(name, False, parameter, refusal)
+        answer = self._graph.call(self._node, 'set_parameters', SetParameters.Request(
+            parameters=[message_of(name, parameter, value)]))
+        result, = answer.results
+        return WriteOutcome(name, result.successful, parameter, result.reason)
+
+    def enabled(self) -> Enabled:
+        wanted = f'{self._facts.through.lstrip("/")}: drive {self.name}'
+        found: list[dict[str, str]] = []
+
+        def look(status: object) -> bool:
+            if getattr(status, 'name', '') == wanted:
+                found.append({pair.key: pair.value for pair in getattr(status, 'values', ())})
+            return bool(found)
+        self._graph.statuses(look, self._period + _DIAGNOSTICS_MARGIN)
+        if not found or 'control_state' not in found[0]:
+            return Enabled.UNKNOWN
+        return _ENABLED.get(found[0].get('state', ''), Enabled.UNKNOWN)
+
+    def identity(self) -> str:
+        return self._identity(self.name)

@@ -1,0 +1,170 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+A hidden node that calls services and waits for their answers.
+
+No thread: everything happens while somebody waits. rcl's wait does not end at a signal, so it is
+cut into slices; Ctrl-C comes through between two of them.
+
+``service_is_ready`` says that this side has found the server, not that the server has found this
+client. A server that has not gives its answer up, though it has done what it was asked. So before
+the first call another one is made that changes nothing, through a client that was made later,
+until it is answered: endpoints are announced in order, so that a server which knows the later one
+knows the earlier ones of this node, too.
+"""
+
+from collections.abc import Callable
+import os
+import time
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rcl_interfaces.srv import (
+    DescribeParameters, GetParameters, GetParameterTypes, ListParameters, SetParameters,
+)
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import qos_profile_parameters, QoSProfile
+from rclpy.signals import SignalHandlerOptions
+
+from drive_can_bridge.core.errors import DriveCanError
+
+#: a leading underscore hides a node from ``ros2 node list``
+_NODE_NAME = '_drive_can_client_{}'
+_SLICE = 0.05
+#: s after which a greeting is said again for the first time; then twice as many, and so on
+_GREETING = 0.1
+#: s that a server may take to be found, or to know us
+_FIND_TIMEOUT = 10.0
+#: s that an answer may take: many reads that nobody answers are slow
+_CALL_TIMEOUT = 120.0
+#: s without the server until it has gone
+_GONE = 2.0
+
+SERVICES: dict[str, Any] = {
+    'get_parameters': GetParameters, 'set_parameters': SetParameters,
+    'list_parameters': ListParameters, 'describe_parameters': DescribeParameters}
+
+
+class NoAnswer(DriveCanError):
+    """A node does not answer, or has gone."""
+
+
+class Graph:
+    """
+    This process in the ROS graph.
+
+    :raises DriveCanError: ROS does not start.
+    """
+
+    def __init__(self) -> None:
+        self._context = Context()
+        try:
+            rclpy.init(args=[], context=self._context,
+                       signal_handler_options=SignalHandlerOptions.NO)
+            self.node = Node(_NODE_NAME.format(os.getpid()), context=self._context,
+                             use_global_arguments=False, enable_rosout=False,
+                             start_parameter_services=False)
+        except Exception as error:  # rcl fails in several types
+            reason = str(error).partition(', at ')[0]
+            raise DriveCanError(f'ROS does not start: {reason}') from error
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self.node)
+        self._clients: dict[tuple[str, str], Any] = {}
+        self._known: set[str] = set()
+
+    def close(self) -> None:
+        """Leave the graph. Idempotent."""
+        if self._context.ok():
+            self._executor.shutdown()
+            self.node.destroy_node()
+            self._context.try_shutdown()
+
+    def wait(self, condition: Callable[[], bool], timeout: float) -> bool:
+        """Wait until a condition is true; False if it does not become so in time."""
+        deadline = time.monotonic() + timeout
+        while not condition():
+            left = deadline - time.monotonic()
+            if left <= 0.0:
+                return False
+            self._executor.spin_once(timeout_sec=min(_SLICE, left))
+        return True
+
+    def nodes_with(self, service: str, service_type: str) -> list[str]:
+        """Return the full names of the nodes that offer a service of this name and type."""
+        ending = f'/{service}'
+        return sorted(name.removesuffix(ending)
+                      for name, types in self.node.get_service_names_and_types()
+                      if name.endswith(ending) and service_type in types)
+
+    def call(self, node: str, service: str, request: Any, timeout: float = _CALL_TIMEOUT) -> Any:
+        """
+        Call a parameter service of a node.
+
+        :raises NoAnswer: nobody answers.
+        """
+        client = self._client(node, service)
+        self._acquaint(node)
+        future = client.call_async(request)
+        deadline = time.monotonic() + timeout
+        seen = time.monotonic()
+        while not self.wait(future.done, 4 * _SLICE):
+            now = time.monotonic()
+            if client.service_is_ready():
+                seen = now
+            if now - seen > _GONE or now > deadline:
+                client.remove_pending_request(future)
+                self._known.discard(node)
+                gone = now - seen > _GONE
+                raise NoAnswer(f'{node} has gone' if gone
+                               else f'{node} does not answer for {timeout:g} s')
+        return future.result()
+
+    def statuses(self, taken: Callable[[Any], bool], timeout: float) -> bool:
+        """
+        Wait for a diagnostic status.
+
+        :param taken: is told each one; True: that was it.
+        """
+        done: list[bool] = []
+
+        def look(message: DiagnosticArray) -> None:
+            if any(taken(status) for status in message.status):
+                done.append(True)
+        subscription = self.node.create_subscription(
+            DiagnosticArray, '/diagnostics', look, QoSProfile(depth=50))
+        try:
+            return self.wait(lambda: bool(done), timeout)
+        finally:
+            self.node.destroy_subscription(subscription)
+
+    def _client(self, node: str, service: str) -> Any:
+        key = node, service
+        if key not in self._clients:
+            self._known.discard(node)
+            for name, service_type in SERVICES.items():     # all that may ever be wanted
+                self._clients.setdefault((node, name), self.node.create_client(
+                    service_type, f'{node}/{name}', qos_profile=qos_profile_parameters))
+        return self._clients[key]
+
+    def _acquaint(self, node: str) -> None:
+        """Return when a node knows our clients."""
+        if node in self._known:
+            return
+        deadline = time.monotonic() + _FIND_TIMEOUT
+        greeting = self.node.create_client(
+            GetParameterTypes, f'{node}/get_parameter_types', qos_profile=qos_profile_parameters)
+        patience = _GREETING
+        futures: list[Any] = []
+        try:
+            self.wait(greeting.service_is_ready, _FIND_TIMEOUT)
+            while time.monotonic() < deadline:
+                futures.append(greeting.call_async(GetParameterTypes.Request()))
+                if self.wait(lambda: any(each.done() for each in futures), patience):
+                    self._known.add(node)
+                    return
+                patience *= 2.0
+        finally:
+            self.node.destroy_client(greeting)
+        raise NoAnswer(f'{node} does not answer')

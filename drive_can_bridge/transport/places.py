@@ -1,0 +1,66 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+Which buses are the same one, as far as that can be told without opening them.
+
+A serial port has many names: the device, the links of udev below ``/dev/serial``, links of one's
+own. They are the same port when the device is the same. While there is no device (an adapter that
+is not plugged in), the name has to do.
+"""
+
+import os
+from pathlib import Path
+import stat
+from typing import NamedTuple
+
+from drive_can_bridge.core.configuration import BusConfiguration
+
+#: interfaces of python-can whose channel is a serial port
+SERIAL_INTERFACES = frozenset(('slcan', 'robotell', 'serial', 'seeedstudio'))
+#: options without which a channel does not say which bus is meant
+_DISTINGUISHING = ('host', 'port', 'unique_hardware_id', 'serial', 'device_id')
+#: major device numbers of pseudo-terminals
+_PSEUDO_TERMINALS = range(136, 144)
+_FLEETING = '/dev/pts/'
+
+
+class Place(NamedTuple):
+    """
+    A bus on this host.
+
+    :param names: the same for the same bus: two places with a name in common are one.
+    :param port: name of its serial port, which one process at a time can use; '' for adapters
+        that several can.
+    """
+
+    names: tuple[str, ...]
+    port: str = ''
+
+
+def place_of(bus: BusConfiguration) -> Place:
+    """Say where a bus is."""
+    channel = str(bus.channel)
+    if bus.interface in SERIAL_INTERFACES:
+        return Place(_port_names(channel), channel)
+    words = [bus.interface, channel]
+    if bus.interface == 'virtual':      # of one process only
+        words.append(str(os.getpid()))
+    words += [f'{key}={bus.options[key]}' for key in _DISTINGUISHING if key in bus.options]
+    return Place(('/'.join(words),))
+
+
+def _port_names(channel: str) -> tuple[str, ...]:
+    if '://' in channel:
+        return (f'port {channel}',)
+    path = channel.split('@')[0]        # slcan: the speed of the port may follow
+    # the number of a pseudo-terminal soon belongs to another one
+    names = [] if path.startswith(_FLEETING) else [f'port {os.path.abspath(path)}']
+    try:
+        found = Path(path).stat()
+    except (OSError, ValueError):
+        return tuple(names) or (f'port {path}',)
+    if not stat.S_ISCHR(found.st_mode):
+        return (*names, f'port file {found.st_dev} {found.st_ino}')
+    device = f'port device {os.major(found.st_rdev)} {os.minor(found.st_rdev)}'
+    if os.major(found.st_rdev) in _PSEUDO_TERMINALS:
+        device += f' of {found.st_dev} since {found.st_ctime_ns}'
+    return (*names, device)

@@ -1,0 +1,72 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Simulated drives of all families on a bus in this process, and files about them."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from itertools import count
+import os
+from pathlib import Path
+
+from drive_can_bridge.client import open_drives
+from drive_can_bridge.client.drive import Drive
+from drive_can_bridge.configuration.load import configuration_from_file
+from drive_can_bridge.resources import share_directory
+from drive_can_bridge.simulation.simulation import Simulation
+
+ALL_FAMILIES = share_directory() / 'config' / 'all_families.yaml'
+#: what is changed by hand in a drive of each family: three settings
+BY_HAND = {
+    'conveyor': {'ramp_time': 4.5, 'maximum_speed': 1200.0, 'brake_enabled': True},
+    'lift': {'ramp_time': 3.0, 'maximum_speed': 7.0, 'torque_limit': 55.0},
+    'mixer': {'acceleration_time': 5.0, 'minimum_frequency_set_2': 3.0, 'torque_current_limit': 7},
+    'pump': {'flc1_ratio': 50.0, 'motor_trip_class': 10.0, 'network_fallback': 2},
+}
+_CHANNELS = count()
+
+
+class Shop:
+    """
+    One drive of each family, simulated, and a parameter file for whoever wants to reach them.
+
+    :ivar file: the parameter file.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.file = folder / 'all_families.yaml'
+        channel = f'backup_{os.getpid()}_{next(_CHANNELS)}'
+        self.file.write_text(ALL_FAMILIES.read_text().replace(
+            'channel: all_families', f'channel: {channel}'))
+        self.simulation = Simulation(configuration_from_file(self.file))
+        self.drives = self.simulation.drives
+
+    def change_by_hand(self, name: str) -> dict[str, float]:
+        """Change three settings at a drive; return what they are now."""
+        for parameter, value in BY_HAND[name].items():
+            self.drives[name].set_value(parameter, value)
+        return BY_HAND[name]
+
+    def values(self, name: str, *parameters: str) -> tuple[float, ...]:
+        """Return what stands in registers of a drive."""
+        return tuple(self.drives[name].value(parameter) for parameter in parameters)
+
+    @contextmanager
+    def reached(self, name: str) -> Iterator[Drive]:
+        """Reach a drive directly."""
+        with open_drives(self.file, only=[name], nmt_start=True) as drives:
+            yield drives[name]
+
+    def write_backup(self, name: str, head: str = '', **values: object) -> Path:
+        """Write a file as somebody might by hand."""
+        path = self.folder / f'{name}.yaml'
+        lines = [f'    {key}: {str(value).lower()}\n' for key, value in values.items()]
+        path.write_text(f'{head}/{name}:\n  ros__parameters:\n{"".join(lines)}')
+        return path
+
+
+@contextmanager
+def shop(folder: Path) -> Iterator[Shop]:
+    """Open shop."""
+    made = Shop(folder)
+    with made.simulation:
+        yield made

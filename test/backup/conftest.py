@@ -1,0 +1,16 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Drives of all families for the tests of backups."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from backup_builders import Shop, shop
+import pytest
+
+
+@pytest.fixture(name='shop')
+def shop_fixture(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Shop]:
+    """Give drives to each test; whoever opens them does not listen for long."""
+    monkeypatch.setattr('drive_can_bridge.client.direct.LISTEN', 0.05)
+    with shop(tmp_path) as made:
+        yield made

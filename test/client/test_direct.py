@@ -1,0 +1,268 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""The direct way to drives: what it sends and what it does not, and what ends it."""
+
+from collections.abc import Iterator
+import copy
+from pathlib import Path
+import threading
+import time
+from typing import Any
+
+from builders import frame
+from client_builders import a_world, ALL, CONVEYOR, LIFT, MIXER, PUMP, World
+import pytest
+from waiting import wait_for
+
+from drive_can_bridge.client import find_source, open_drives
+from drive_can_bridge.client.conversation import AnotherMaster
+from drive_can_bridge.client.direct import LISTEN
+from drive_can_bridge.client.drive import Drives, Enabled
+from drive_can_bridge.core.errors import BusUnavailable, DriveCanError
+from drive_can_bridge.core.roles import Role
+from drive_can_bridge.exchange.one_master import InUse
+
+#: everything that only a master sends to these drives, but acyclic requests
+CYCLIC_REQUEST = 0x003FFFF0
+MIXER_PROCESS_DATA = 0x260
+
+
+@pytest.fixture(scope='module')
+def world(tmp_path_factory: pytest.TempPathFactory) -> Iterator[World]:
+    with a_world(tmp_path_factory.mktemp('world')) as made:
+        yield made
+        assert not made.errors
+
+
+@pytest.fixture(scope='module')
+def drives(world: World) -> Iterator[Drives]:
+    """Return the drives of all families, their node started."""
+    with open_drives(world.file, nmt_start=True) as opened:
+        yield opened
+
+
+def reasons(outcomes: dict[str, Any]) -> dict[str, str]:
+    return {name: outcome.reason for name, outcome in outcomes.items()}
+
+
+@pytest.mark.parametrize('name', ALL)
+def test_all_listed_parameters_are_read(drives: Drives, world: World, name: str) -> None:
+    drive = drives[name]
+    outcomes = drive.read()
+    assert list(outcomes) == [
+        each for each, parameter in drive.parameters.items()
+        if parameter.readable and (parameter.number, parameter.index) != (None, None)]
+    assert set(reasons(outcomes).values()) == {''}
+    for outcome in outcomes.values():
+        assert outcome.parameter is not None
+        assert outcome.raw is not None and outcome.value is not None
+        assert outcome.value == outcome.parameter.value_from_raw(outcome.raw)
+
+
+def test_values_are_those_of_the_drive(drives: Drives, world: World) -> None:
+    world.drives['conveyor'].set_value('ramp_time', 3.25)
+    outcome = drives['conveyor'].read('ramp_time')['ramp_time']
+    assert (outcome.raw, outcome.value) == (325, 3.25)
+    assert drives['conveyor'].read('p30')['p30'].value == 325
+
+
+@pytest.mark.parametrize(('name', 'parameter', 'value'), [
+    ('conveyor', 'ramp_time', 1.75), ('lift', 'ramp_time', 2.5),
+    ('mixer', 'acceleration_time', 4.5), ('pump', 'motor_trip_class', 10)])
+def test_a_write_arrives(drives: Drives, world: World, name: str, parameter: str,
+                         value: float) -> None:
+    outcome = drives[name].write({parameter: value})[parameter]
+    assert (outcome.ok, outcome.reason) == (True, '')
+    assert world.drives[name].value(parameter) == pytest.approx(value)
+
+
+def test_what_cannot_be_written_says_why(drives: Drives, world: World) -> None:
+    conveyor = drives['conveyor']
+    before = len(world.seen())
+    wanted = {'ramp_tim': 1.0, 'actual_speed': 1.0, 'ramp_time': 99.0, 'speed_setpoint': 5.0,
+              'p50': 7}
+    assert reasons(conveyor.write(wanted)) == {
+        'ramp_tim': 'unknown parameter ramp_tim, did you mean ramp_time?',
+        'actual_speed': 'read-only', 'ramp_time': '99 is out of range: 0.01 to 60 s',
+        'speed_setpoint': 'setpoint speed_setpoint: only a running bridge sends it',
+        'p50': 'setpoint speed_setpoint: only a running bridge sends it'}
+    assert reasons(drives['lift'].write({'control_word': 1, 'p52': 1})) == {
+        'control_word': 'control word: only a running bridge sends it',
+        'p52': 'control word: only a running bridge sends it'}
+    assert conveyor.check('ramp_time', True) == 'wrong type: bool, expected double'
+    assert conveyor.role('speed_setpoint') is Role.CYCLIC
+    assert [each for each in world.seen()[before:] if each.identifier < 0x700] == []
+
+
+def test_maps_are_written_directly(drives: Drives, world: World) -> None:
+    conveyor = drives['conveyor']
+    assert conveyor.role('p122') is Role.MAP
+    assert conveyor.write({'p122': 50})['p122'].ok
+
+
+def test_one_that_nobody_answers_takes_no_other_along(drives: Drives) -> None:
+    outcomes = drives['conveyor'].read('p9999', 'ramp_time', 'bogus', 'p9998')
+    assert reasons(outcomes) == {
+        'p9999': 'no answer in 0.3 s, 3 attempts', 'ramp_time': '',
+        'bogus': 'unknown parameter bogus', 'p9998': 'no answer in 0.3 s, 3 attempts'}
+    assert list(outcomes) == ['p9999', 'ramp_time', 'bogus', 'p9998']
+
+
+def test_many_that_nobody_answers_take_no_other_along(tmp_path: Path) -> None:
+    keys = {**CONVEYOR, 'parameter_timeout': 0.02, 'parameter_retries': 0}
+    with a_world(tmp_path, conveyor=keys) as world, open_drives(world.file) as drives:
+        nowhere = [f'p{number}' for number in range(1000, 1040)]
+        outcomes = drives['conveyor'].read(*nowhere, 'p209', *(f'p{n}' for n in range(1, 20)))
+        assert outcomes['p209'].ok
+        assert {outcomes[name].reason for name in nowhere} == {'no answer in 0.02 s, 1 attempt'}
+
+
+def test_state(drives: Drives) -> None:
+    assert drives['lift'].enabled() is Enabled.NO
+    assert drives['conveyor'].enabled() is Enabled.UNKNOWN
+    assert drives['pump'].identity().startswith('controller_reference_1=')
+    assert drives['conveyor'].identity() == ''
+    facts = drives['pump'].facts
+    assert (facts.bus, facts.protocol, facts.station, facts.through) == (
+        'main', 'canopen_pkw', 5, '')
+    assert facts.restore is not None and facts.restore.before
+
+
+def test_each_outcome_is_told(drives: Drives) -> None:
+    told: list[str] = []
+    drives['conveyor'].read('ramp_time', 'bogus', told=lambda outcome: told.append(outcome.name))
+    drives['conveyor'].write({'ramp_time': 1.0, 'speed_setpoint': 1.0},
+                             told=lambda outcome: told.append(outcome.name))
+    assert sorted(told) == ['bogus', 'ramp_time', 'ramp_time', 'speed_setpoint']
+
+
+def test_nothing_is_sent_unasked(tmp_path: Path) -> None:
+    keys: dict[str, Any] = copy.deepcopy(ALL)
+    del keys['mixer']   # whose telegram time-out is asked for
+    with a_world(tmp_path, **keys) as world, open_drives(world.file) as drives:
+        opened = {each.identifier for each in world.seen()}
+        assert opened <= {0x705}     # the heartbeats of the node
+        drives['lift'].read('ramp_time')
+        requests = {each.identifier for each in world.seen()} - {0x705, 0x7F2}
+        assert requests == {0x3F2}
+        drives['conveyor'].read()
+        seen = world.seen()
+        # every 29-bit request is a read: one frame for each answer, nothing cyclic
+        assert CYCLIC_REQUEST not in {each.identifier for each in seen if each.extended}
+        assert 0 not in {each.identifier for each in seen if not each.extended}
+
+
+def test_no_process_data_and_no_nmt(drives: Drives, world: World, tmp_path: Path) -> None:
+    with a_world(tmp_path, mixer=MIXER, pump=PUMP) as own, open_drives(own.file) as opened:
+        opened['mixer'].read()
+        opened['mixer'].write({'acceleration_time': 3.0})
+        wait_for(lambda: 0x705 in {each.identifier for each in own.seen()}, 'a heartbeat')
+        outcome = opened['pump'].read('trip_code')['trip_code']
+        assert outcome.reason.startswith(('drive offline: node is pre-operational',
+                                          'no answer; drive offline'))
+        assert outcome.reason.endswith('answers no PKW, --nmt-start starts it')
+        identifiers = {each.identifier for each in own.seen()}
+        assert 0 not in identifiers
+        assert not identifiers & set(range(MIXER_PROCESS_DATA, 0x264))
+
+
+def test_the_node_is_started_when_asked_for(tmp_path: Path) -> None:
+    with a_world(tmp_path, pump=PUMP) as world:
+        with open_drives(world.file, nmt_start=True) as drives:
+            assert drives['pump'].read('trip_code')['trip_code'].ok
+        assert [each for each in world.seen() if each.identifier == 0] == [frame('000#0105')]
+
+
+def test_supervision_of_telegrams_is_warned_about(tmp_path: Path) -> None:
+    with a_world(tmp_path, mixer=MIXER) as world:
+        with open_drives(world.file) as drives:
+            assert drives.warnings == ()
+        world.drives['mixer'].set_value('p513', 20)
+        with open_drives(world.file) as drives:
+            assert drives.warnings == (
+                'mixer: P513 is not 0: the drive supervises telegrams once it has got one, and '
+                'faults when they end',)
+
+
+def test_a_silent_drive_costs_little(tmp_path: Path) -> None:
+    with a_world(tmp_path, conveyor=CONVEYOR, lift=LIFT) as world:
+        world.drives['conveyor'].fault('silent')
+        with open_drives(world.file) as drives:
+            before = len(world.seen())
+            outcomes = drives['conveyor'].read()
+            assert set(reasons(outcomes).values()) == {'no answer; drive offline'}
+            written = drives['conveyor'].write({'ramp_time': 2.0})['ramp_time']
+            assert (written.ok, written.reason) == (False, 'no answer; drive offline')
+            # three parameters, three times each, twice; no write among them
+            assert len(world.seen()) - before == 18
+            world.drives['conveyor'].fault('ok')
+            assert drives['conveyor'].read('ramp_time')['ramp_time'].ok
+
+
+def test_a_drive_that_goes_away_in_the_middle(tmp_path: Path) -> None:
+    with a_world(tmp_path, conveyor=CONVEYOR) as world, open_drives(world.file) as drives:
+        first = drives['conveyor'].read('ramp_time')
+        world.drives['conveyor'].fault('silent')
+        outcomes = drives['conveyor'].read('maximum_speed', 'ramp_time')
+        assert first['ramp_time'].ok
+        assert set(reasons(outcomes).values()) == {'no answer in 0.3 s, 3 attempts'}
+
+
+# -- one master -----------------------------------------------------------------------------------
+
+REQUESTS = {'conveyor': '002003C4#0000000000000000', 'lift': '3F2#1E00',
+            'mixer': '264#0012000000000000', 'pump': '505#0000000000000000'}
+
+
+@pytest.mark.parametrize('name', REQUESTS)
+def test_another_master_before_the_first_request(tmp_path: Path, name: str) -> None:
+    with a_world(tmp_path, **ALL) as world:
+        def disturb() -> None:
+            world.send(frame(REQUESTS[name]))
+        timer = threading.Timer(0.5 * LISTEN, disturb)
+        timer.start()
+        try:
+            with pytest.raises(AnotherMaster) as caught:
+                open_drives(world.file, only=['conveyor'])
+        finally:
+            timer.join()
+        assert str(caught.value).startswith(f'bus main: another master talks to drive {name} (')
+
+
+def test_another_master_later(tmp_path: Path) -> None:
+    with a_world(tmp_path, conveyor=CONVEYOR, lift=LIFT) as world:
+        with open_drives(world.file) as drives:
+            assert drives['lift'].read('ramp_time')['ramp_time'].ok
+            world.send(frame(REQUESTS['conveyor']))
+            with pytest.raises(AnotherMaster, match='drive conveyor'):
+                for _ in range(1000):
+                    drives['lift'].read()
+            with pytest.raises(AnotherMaster):
+                drives['lift'].write({'ramp_time': 1.0})
+
+
+def test_locks_are_held_while_it_is_open(tmp_path: Path) -> None:
+    with a_world(tmp_path, conveyor=CONVEYOR, lift=LIFT) as world:
+        with open_drives(world.file, only=['lift']):
+            with pytest.raises(InUse, match='^bus main: drive conveyor is used by process'):
+                open_drives(world.file, only=['conveyor'])
+        open_drives(world.file, only=['conveyor']).close()
+
+
+def test_a_bus_that_is_not_there(tmp_path: Path) -> None:
+    with a_world(tmp_path, conveyor=CONVEYOR) as world:
+        text = world.file.read_text().replace('interface: virtual', 'interface: slcan')
+        world.file.write_text(text)
+        began = time.monotonic()
+        with pytest.raises(BusUnavailable, match='^bus main: '):
+            open_drives(world.file)
+        assert time.monotonic() - began < 30.0
+        with pytest.raises(BusUnavailable, match='^bus main: '):    # nothing stays locked
+            open_drives(world.file)
+
+
+def test_names(world: World) -> None:
+    source = find_source(world.file)
+    assert list(source.names) == ['conveyor', 'lift', 'mixer', 'pump']
+    assert 'ramp_time' in source.parameter_names('conveyor')
+    with pytest.raises(DriveCanError, match="^no drive 'x.'; there are: conveyor, lift, mixer"):
+        open_drives(world.file, only=['x?'])

@@ -1,0 +1,217 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""``drive_can read`` and ``write`` on the buses of a file: words, tables, JSON, exit codes."""
+
+from collections.abc import Callable, Iterator
+import json
+import os
+from pathlib import Path
+import subprocess
+import sys
+import threading
+from typing import Any
+
+from builders import frame
+from client_builders import a_world, CONVEYOR, LIFT, parameter_file, World
+import pytest
+
+from drive_can_bridge.cli.main import main
+from drive_can_bridge.client import open_drives
+
+Run = Callable[..., tuple[int, list[str], str]]
+
+
+@pytest.fixture(scope='module')
+def world(tmp_path_factory: pytest.TempPathFactory) -> Iterator[World]:
+    """Return two drives."""
+    with a_world(tmp_path_factory.mktemp('world'), conveyor=CONVEYOR, lift=LIFT) as made:
+        yield made
+
+
+@pytest.fixture
+def run(world: World, capsys: pytest.CaptureFixture[str]) -> Run:
+    """Run a command on the file; return exit code, lines, and standard error."""
+    def started(command: str, *words: str, file: Path | None = None) -> tuple[int, list[str], str]:
+        capsys.readouterr()
+        code = main([command, *words, '--params-file', str(file or world.file)])
+        told = capsys.readouterr()
+        return code, told.out.splitlines(), told.err
+    return started
+
+
+def test_table(run: Run, world: World) -> None:
+    world.drives['conveyor'].set_value('ramp_time', 2.5)
+    code, lines, errors = run('read', 'conveyor', 'ramp_time', 'p30', 'brake_enabled')
+    assert (code, errors) == (0, '')
+    assert lines == [
+        'name           value  unit  raw  number  storage  description',
+        'ramp_time        2.5  s     250  P30     eeprom   Ramp from standstill to maximum speed',
+        'p30              250        250  P30     eeprom',
+        'brake_enabled  false          0  P34     eeprom   The drive operates a holding brake']
+
+
+def test_all_of_a_drive(run: Run) -> None:
+    code, lines, _ = run('read', 'lift')
+    assert code == 0
+    assert [line.split()[0] for line in lines[1:]] == [
+        'control_word', 'speed_setpoint', 'torque_limit', 'actual_speed', 'motor_current',
+        'status_word', 'motor_temperature', 'fault_code', 'ramp_time', 'maximum_speed']
+
+
+def test_several_drives_by_a_pattern(run: Run) -> None:
+    code, lines, _ = run('read', '*', 'ramp_time')
+    assert code == 0
+    assert lines[0].split()[0] == 'drive'
+    assert [line.split()[:2] for line in lines[1:]] == [
+        ['conveyor', 'ramp_time'], ['lift', 'ramp_time']]
+
+
+def test_what_fails_says_why_in_its_row(run: Run) -> None:
+    code, lines, _ = run('read', 'conveyor', 'ramp_time', 'ramp_tim', 'p9999')
+    assert code == 1
+    assert lines[0].endswith('why not')
+    assert lines[2].endswith('unknown parameter ramp_tim, did you mean ramp_time?')
+    assert lines[3].endswith('no answer in 0.3 s, 3 attempts')
+
+
+def test_json(run: Run, world: World) -> None:
+    world.drives['conveyor'].set_value('ramp_time', 2.5)
+    code, lines, _ = run('read', '--json', 'conveyor', 'ramp_time', 'nothing')
+    assert code == 1
+    assert [json.loads(line) for line in lines] == [
+        {'drive': 'conveyor', 'name': 'ramp_time', 'value': 2.5, 'unit': 's', 'raw': 250,
+         'number': 30, 'index': None, 'subindex': None, 'storage': 'eeprom',
+         'description': 'Ramp from standstill to maximum speed', 'reason': ''},
+        {'drive': 'conveyor', 'name': 'nothing', 'value': None, 'unit': '', 'raw': None,
+         'number': None, 'index': None, 'subindex': None, 'storage': None, 'description': '',
+         'reason': 'unknown parameter nothing'}]
+
+
+def test_options_stand_anywhere(run: Run, world: World, capsys: pytest.CaptureFixture[str],
+                                ) -> None:
+    file = ('--params-file', str(world.file))
+    for words in (['read', *file, 'conveyor', '--json', 'ramp_time'],
+                  ['read', 'conveyor', *file, 'ramp_time', '--json'],
+                  ['read', '--json', 'conveyor', 'ramp_time', *file]):
+        capsys.readouterr()
+        assert main(words) == 0
+        assert json.loads(capsys.readouterr().out)['name'] == 'ramp_time'
+
+
+def test_the_drive_may_be_left_out_where_there_is_one(run: Run, tmp_path: Path) -> None:
+    with a_world(tmp_path, conveyor=CONVEYOR) as single:
+        assert run('read', 'ramp_time', file=single.file)[0] == 0
+        assert run('write', 'ramp_time=1.5', file=single.file)[0] == 0
+        assert single.drives['conveyor'].value('ramp_time') == 1.5
+
+
+@pytest.mark.parametrize(('command', 'words', 'complaint'), [
+    ('read', [], 'drive_can read: which drive? There are: conveyor, lift'),
+    ('read', ['ramp_time'],
+     "drive_can read: which drive? 'ramp_time' is none. There are: conveyor, lift"),
+    ('write', ['ramp_time=1'], "which drive? 'ramp_time=1' is none"),
+    ('write', ['conveyor'], 'what is to be written? NAME=VALUE is missing'),
+    ('write', ['conveyor', 'ramp_time'], "'ramp_time': allowed is NAME=VALUE; nothing was"),
+    ('write', ['conveyor', 'ramp_time='], "'ramp_time=': allowed is NAME=VALUE; nothing was"),
+    ('write', ['conveyor', 'ramp_time=1', 'ramp_time=2'], 'ramp_time stands twice; nothing was'),
+    ('read', ['conveyor', '--namespace', 'x'], '--namespace is of a running bridge'),
+])
+def test_wrong_usage(run: Run, world: World, command: str, words: list[str], complaint: str,
+                     ) -> None:
+    before = world.seen()
+    code, lines, errors = run(command, *words)
+    assert (code, lines) == (2, [])
+    assert complaint in errors
+    assert len(errors.splitlines()) == 1
+    assert world.seen() == before
+
+
+def test_write_tells_each_result(run: Run, world: World) -> None:
+    code, lines, errors = run('write', 'conveyor', 'ramp_time=3.25', 'p31=0x7530',
+                              'brake_enabled=true', 'actual_speed=1', 'speed_gain=much',
+                              'speed_setpoint=5', 'minimum_speed=-1e9')
+    assert (code, errors) == (1, '')
+    results = {line.split()[0]: line for line in lines[1:]}
+    for name in ('ramp_time', 'p31', 'brake_enabled'):
+        assert results[name].endswith('  written')
+    assert results['actual_speed'].endswith('not written: read-only')
+    assert results['speed_gain'].endswith("not written: wrong type: 'much', expected a number")
+    assert results['speed_setpoint'].endswith(
+        'not written: setpoint speed_setpoint: only a running bridge sends it')
+    assert 'is out of range' in results['minimum_speed']
+    drive = world.drives['conveyor']
+    assert (drive.value('ramp_time'), drive.value('maximum_speed'), drive.value('brake_enabled')
+            ) == (3.25, 3000.0, True)
+
+
+def test_write_json(run: Run) -> None:
+    code, lines, _ = run('write', 'lift', 'ramp_time=2', '--json')
+    assert code == 0
+    assert json.loads(lines[0]) == {'drive': 'lift', 'name': 'ramp_time', 'value': '2',
+                                    'ok': True, 'reason': ''}
+
+
+def test_a_write_that_does_not_arrive(run: Run, world: World) -> None:
+    world.drives['conveyor'].fault('stuck=ramp_time')
+    try:
+        code, lines, _ = run('write', 'conveyor', 'ramp_time=9')
+    finally:
+        world.drives['conveyor'].fault('ok')
+    assert code == 1
+    assert lines[1].endswith('not written: read back 3.25 instead of 9')
+
+
+def test_a_wrong_file(run: Run, tmp_path: Path) -> None:
+    file = parameter_file(tmp_path, {'conveyor': {**CONVEYOR, 'station': 500}})
+    code, lines, errors = run('read', file=file)
+    assert (code, lines) == (1, [])
+    assert f'{file}:' in errors and 'drives.conveyor.station' in errors
+    code, _, errors = run('read', file=tmp_path / 'nothing.yaml')
+    assert code == 1
+    assert len(errors.splitlines()) == 1
+
+
+def test_in_use(run: Run, world: World) -> None:
+    with open_drives(world.file):
+        code, lines, errors = run('write', 'lift', 'ramp_time=2')
+    assert (code, lines) == (1, [])
+    assert errors.startswith(f'bus main: drive lift is used by process {os.getpid()} ')
+
+
+def test_another_master_ends_it(run: Run, tmp_path: Path) -> None:
+    with a_world(tmp_path, conveyor=CONVEYOR, lift=LIFT) as own:
+        timer = threading.Timer(0.4, own.send, [frame('3F2#1E00')])
+        timer.start()
+        code, lines, errors = run('read', 'conveyor', file=own.file)
+        timer.join()
+    assert (code, lines) == (1, [])
+    assert errors == ('bus main: another master talks to drive lift (3F2#1E00); end it first\n')
+
+
+# -- completion -----------------------------------------------------------------------------------
+
+def completions(line: str) -> list[str]:
+    """Return what the shell would propose."""
+    pytest.importorskip('argcomplete')
+    near, far = os.pipe()
+    environment: dict[str, Any] = {
+        **os.environ, '_ARGCOMPLETE': '1', 'COMP_LINE': line, 'COMP_POINT': str(len(line)),
+        '_ARGCOMPLETE_IFS': '\n', '_ARGCOMPLETE_SUPPRESS_SPACE': '1'}
+    script = ('import os; os.dup2({far}, 8); os.dup2(2, 9); '
+              'from drive_can_bridge.cli.main import main; main()').format(far=far)
+    process = subprocess.run([sys.executable, '-c', script], env=environment, pass_fds=[far],
+                             capture_output=True, timeout=60)
+    os.close(far)
+    with open(near, encoding='utf-8') as answer:
+        found = answer.read()
+    assert process.stdout == b''
+    return [word.strip() for word in found.split('\n') if word.strip()]
+
+
+def test_completion(tmp_path: Path) -> None:
+    file = parameter_file(tmp_path, {'conveyor': CONVEYOR, 'lift': LIFT})
+    start = f'drive_can read --params-file {file} '
+    assert {'conveyor', 'lift'} <= set(completions(start))
+    assert completions(f'{start}conveyor ram') == ['ramp_time']
+    assert completions(f'drive_can write --params-file {file} lift maxi') == ['maximum_speed=']
+    assert {'read', 'record'} <= set(completions('drive_can re'))
+    assert completions(f'drive_can read --params-file {file}x conv') == []

@@ -1,0 +1,137 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""The way to drives through a running bridge: the same answers as directly."""
+
+from pathlib import Path
+from typing import Any
+
+from bridges import Bridge, CONVEYOR, HASTY, LIFT, parameters, StartBridge
+from clients import wait_until
+import pytest
+
+from drive_can_bridge.client import find_source, open_drives
+from drive_can_bridge.client.drive import Drive, Enabled, WhichBridge
+from drive_can_bridge.core.errors import DriveCanError
+from drive_can_bridge.core.parameters import Access, Storage
+from drive_can_bridge.core.roles import Role
+
+PUMP: dict[str, Any] = {
+    'bus': 'main', 'protocol': 'canopen_pkw', 'station': 5, 'profile': 'tesys_t_ltmr',
+    'cyclic_response': ['system_status_1'], 'period': 0.1, 'missed_limit': 100}
+MIXER: dict[str, Any] = {
+    'bus': 'main', 'protocol': 'cannord', 'station': 50, 'profile': 'nord_sk500e',
+    'cyclic_request': ['frequency_setpoint'], 'cyclic_response': ['actual_frequency'],
+    'missed_limit': 100, 'parameter_timeout': 2.0}
+
+
+def reasons(outcomes: dict[str, Any]) -> dict[str, str]:
+    return {name: outcome.reason for name, outcome in outcomes.items()}
+
+
+def test_everything_of_four_families(bridge: StartBridge) -> None:
+    one = bridge(parameters(conveyor=CONVEYOR, lift=LIFT, mixer=MIXER, pump=PUMP),
+                 arguments=('-r', '__ns:=/cell'))
+    one.online()
+    source = find_source(namespace='/cell')
+    assert list(source.names) == ['conveyor', 'lift', 'mixer', 'pump']
+    assert 'ramp_time' in source.parameter_names('lift')
+    with source.open(source.names) as drives:
+        for name, drive in drives.items():
+            outcomes = drive.read()
+            assert set(reasons(outcomes).values()) == {''}, name
+            _compare(drive, one)
+        _values(drives['conveyor'], one)
+        _refusals(drives['conveyor'], drives['lift'], one)
+        assert drives['lift'].enabled() is Enabled.NO
+        assert drives['conveyor'].enabled() is Enabled.UNKNOWN
+        assert drives['mixer'].enabled() is Enabled.NO
+        assert drives['pump'].identity().startswith('controller_reference_1=')
+        assert 'actual_frequency' in drives['mixer'].read()     # received as process data
+        assert 'frequency_setpoint' not in drives['mixer'].read()
+
+
+def _compare(drive: Drive, bridge: Bridge) -> None:
+    """Compare what the bridge tells of its drive with what it knows."""
+    configuration = bridge.node.drives[drive.name].drive
+    facts = drive.facts
+    assert (facts.bus, facts.interface, facts.bitrate, facts.through) == (
+        'main', 'virtual', 1_000_000, '/cell/drive_can_bridge')
+    assert (facts.protocol, facts.station, facts.profile, facts.profile_sha256) == (
+        configuration.protocol, configuration.station, configuration.profile_key,
+        configuration.profile.sha256)
+    assert facts.restore == configuration.profile.restore
+    assert list(drive.parameters) == list(configuration.profile.parameters)
+    for mine, known in zip(drive.parameters.values(), configuration.profile.parameters.values()):
+        for key in ('name', 'type', 'number', 'subindex', 'index', 'scale', 'offset', 'unit',
+                    'access', 'storage', 'protected', 'scaled', 'kind', 'address', 'listed'):
+            assert getattr(mine, key) == getattr(known, key), (known.name, key)
+        assert mine.description == known.description
+        assert mine.raw_limits == known.raw_limits or known.raw_limits[0] >= known.raw_limits[1]
+
+
+def _values(conveyor: Drive, bridge: Bridge) -> None:
+    written = conveyor.write({'ramp_time': 3.25, 'p31': 15000})
+    assert set(reasons(written).values()) == {''}
+    assert bridge.played['conveyor'].value('ramp_time') == 3.25
+    outcomes = conveyor.read('ramp_time', 'p30', 'maximum_speed', 'brake_enabled')
+    assert [(each.raw, each.value) for each in outcomes.values()] == [
+        (325, 3.25), (325, 325), (15000, 1500.0), (0, False)]
+    raw = conveyor.find('p30')
+    assert raw is not None
+    assert (raw.listed, raw.access, raw.storage) == (False, Access.READ_WRITE, Storage.EEPROM)
+
+
+def _refusals(conveyor: Drive, lift: Drive, bridge: Bridge) -> None:
+    assert reasons(conveyor.write({
+        'ramp_tim': 1.0, 'actual_speed': 1.0, 'ramp_time': 99.0, 'speed_setpoint': 5.0,
+        'p122': 50})) == {
+        'ramp_tim': 'unknown parameter ramp_tim, did you mean ramp_time?',
+        'actual_speed': 'read-only', 'ramp_time': '99 is out of range: 0.01 to 60 s',
+        'speed_setpoint': 'sent cyclically: publish ~/command/speed_setpoint',
+        'p122': 'mapping parameter: not written while the bridge is active'}
+    assert reasons(lift.write({'control_word': 1})) == {'control_word': 'use ~/enable'}
+    assert conveyor.role('speed_setpoint') is Role.CYCLIC
+    bridge.played['conveyor'].fault('stuck=jog_speed')
+    outcome = conveyor.write({'jog_speed': 12.5})['jog_speed']
+    assert (outcome.ok, outcome.reason) == (False, 'read back -100 instead of 12.5')
+
+
+def test_what_fails_says_why(bridge: StartBridge) -> None:
+    one = bridge(parameters(conveyor={**CONVEYOR, **HASTY}))
+    one.online()
+    with open_drives() as drives:
+        conveyor = drives['conveyor']
+        assert reasons(conveyor.read('p9999', 'ramp_time', 'bogus')) == {
+            'p9999': 'no answer in 0.2 s, 3 attempts', 'ramp_time': '',
+            'bogus': 'unknown parameter bogus'}
+        one.played['conveyor'].fault('silent')
+        wait_until(lambda: not one.node.drives['conveyor'].session.online)
+        assert reasons(conveyor.read('ramp_time', 'maximum_speed')) == {
+            'ramp_time': 'no answer; drive offline', 'maximum_speed': 'no answer; drive offline'}
+        one.node.trigger_deactivate()
+        assert reasons(conveyor.read('ramp_time')) == {'ramp_time': 'bridge inactive'}
+        assert conveyor.write({'ramp_time': 2.0})['ramp_time'].reason == 'bridge inactive'
+
+
+def test_several_bridges_and_none(bridge: StartBridge, tmp_path: Path) -> None:
+    with pytest.raises(DriveCanError, match='^no configured bridge is running in namespace /no'):
+        open_drives(namespace='no')
+    bridge(parameters(), arguments=('-r', '__ns:=/a'))
+    bridge(parameters(), arguments=('-r', '__ns:=/b', '-r', '__node:=other'), key='/**')
+    with pytest.raises(WhichBridge, match='/a/drive_can_bridge, /b/other; choose one with'):
+        open_drives()
+    with open_drives(namespace='b') as drives:
+        assert list(drives) == ['conveyor']
+        assert drives['conveyor'].facts.through == '/b/other'
+
+
+def test_a_second_bridge_with_the_same_drive_does_not_configure(bridge: StartBridge) -> None:
+    first = bridge()
+    text = first.file.read_text()
+    second = bridge(text, autostart=False, simulated=False,
+                          arguments=('-r', '__ns:=/second'))
+    assert second.node.trigger_configure().name == 'FAILURE'
+    first.node.trigger_deactivate()
+    assert second.node.trigger_configure().name == 'FAILURE'    # held until cleanup
+    first.node.trigger_cleanup()
+    assert second.node.trigger_configure().name == 'SUCCESS'
+    second.node.trigger_cleanup()

@@ -1,0 +1,151 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Backups through a running bridge, and restores that are broken off: processes and signals."""
+
+import json
+from pathlib import Path
+import signal
+
+from processes import Client, Process, Processes, Simulator
+import pytest
+
+from drive_can_bridge.backup.reader import read_backup
+from drive_can_bridge.resources import share_directory
+
+BY_HAND = {
+    'conveyor': 'set=ramp_time:4.5 set=maximum_speed:1200 set=brake_enabled:true',
+    'lift': 'set=ramp_time:3 set=maximum_speed:7 set=torque_limit:55',
+    'mixer': 'set=acceleration_time:5 set=minimum_frequency_set_2:3 set=torque_current_limit:7',
+    'pump': 'set=flc1_ratio:50 set=motor_trip_class:10 set=network_fallback:2',
+}
+#: requests to the pump that write register 601, in and out of the configuration mode
+INTO_MODE, OUT_OF_MODE = '^505#5902..[2A]A0100', '^505#5902..[2A]A0000'
+
+
+def write_file(directory: Path) -> Path:
+    """Write the shipped file with one drive of each family, for the simulator's terminal."""
+    text = (share_directory() / 'config' / 'all_families.yaml').read_text()
+    file = directory / 'bridge.yaml'
+    file.write_text(text.replace('interface: virtual', 'interface: slcan').replace(
+        'channel: all_families', f'channel: {directory}/links/main').replace(
+        'period: 0.02', 'period: 0.05\n        missed_limit: 25'))
+    return file
+
+
+def prepare(processes: Processes) -> Simulator:
+    """Start the drives; the pump is not in configuration mode."""
+    simulator = processes.simulator(write_file(processes.directory))
+    simulator.write('pump set=general_configuration:0')
+    simulator.line('pump: fault set=general_configuration')
+    return simulator
+
+
+def ask(processes: Processes, *arguments: str, code: int = 0) -> Process:
+    """Run a command to its end."""
+    process = processes.drive_can(*arguments)
+    assert process.wait() == code, process.dump()
+    return process
+
+
+def documents(process: Process) -> dict[str, dict[str, object]]:
+    """Return the JSON documents of a command by parameter, of several the last."""
+    return {each['parameter']: each for each in map(json.loads, process.lines)}
+
+
+class TestThroughTheBridge:
+
+    @pytest.mark.parametrize('name', BY_HAND)
+    def test_one_drive_of_each_family(self, processes: Processes, client: Client, namespace: str,
+                                      name: str) -> None:
+        simulator = prepare(processes)
+        processes.bridge(write_file(processes.directory), namespace)
+        client.online(f'/{namespace}/{name}')
+        file, way = processes.directory / 'b.yaml', ('--namespace', namespace)
+        ask(processes, 'backup', name, '-o', str(file), *way)
+        backup = read_backup(file)
+        assert backup.node == f'/{namespace}/{name}'
+        # what ros2 param load sends, as rclpy reads the file for it
+        parameter = pytest.importorskip('rclpy.parameter')
+        loaded = {key: parameter.parameter_value_to_python(message.value)
+                  for key, message in parameter.parameter_dict_from_yaml_file(
+                      str(file), use_wildcard=True, target_nodes=[backup.node]).items()}
+        assert loaded == backup.values
+        answers = client.set(f'/{namespace}/{name}', **loaded)
+        assert all(success for success, _ in answers), answers
+        assert ask(processes, 'compare', str(file), name, *way).lines == ['the same']
+        simulator.write(f'{name} {BY_HAND[name]}')
+        changed = {text.partition('=')[2].partition(':')[0] for text in BY_HAND[name].split()}
+        simulator.line(f'{name}: fault {BY_HAND[name].split()[-1]}')
+        found = documents(ask(processes, 'compare', name, str(file), '--json', *way, code=1))
+        assert set(found) == changed
+        shown = documents(ask(processes, 'restore', str(file), '--dry-run', '--json', *way))
+        assert {key: (each['found'], each['wanted']) for key, each in shown.items()} == {
+            key: (each['a'], each['b']) for key, each in found.items()}
+        simulator.write(f'{name}')
+        done = documents(ask(processes, 'restore', str(file), '--yes', '--json', *way))
+        assert {key for key, each in done.items() if each['ok']} == changed
+        assert ask(processes, 'compare', name, str(file), *way).lines == ['the same']
+
+    def test_not_while_it_is_enabled(self, processes: Processes, client: Client,
+                                     namespace: str) -> None:
+        simulator = prepare(processes)
+        processes.bridge(write_file(processes.directory), namespace)
+        client.online(f'/{namespace}/lift')
+        file, way = processes.directory / 'b.yaml', ('--namespace', namespace)
+        ask(processes, 'backup', 'lift', '-o', str(file), *way)
+        simulator.write('lift set=ramp_time:3')
+        assert client.control(f'/{namespace}/lift/enable', True)[0]
+        refused = ask(processes, 'restore', str(file), '--yes', *way, code=1)
+        assert refused.errors[-1].startswith('lift: is enabled: settings are not written')
+        assert client.control(f'/{namespace}/lift/enable', False)[0]
+        ask(processes, 'restore', str(file), '--yes', *way)
+
+    def test_power_cut(self, processes: Processes, client: Client, namespace: str) -> None:
+        simulator = prepare(processes)
+        processes.bridge(write_file(processes.directory), namespace)
+        client.online(f'/{namespace}/pump')
+        file, way = processes.directory / 'b.yaml', ('--namespace', namespace)
+        ask(processes, 'backup', 'pump', '-o', str(file), *way)
+        simulator.write(f'pump {BY_HAND["pump"]} cut_at=2')
+        simulator.line('pump: fault cut_at')
+        broken = ask(processes, 'restore', str(file), '--yes', *way, code=1)
+        assert any('; not as in the file:' in line for line in broken.errors)
+        # it came back, and was taken out of the mode that it kept
+        assert simulator.frames(OUT_OF_MODE)
+        ask(processes, 'restore', str(file), '--yes', *way)
+        assert ask(processes, 'compare', str(file), 'pump', *way).lines == ['the same']
+
+
+class TestBrokenOff:
+
+    @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+    def test_by_a_signal(self, processes: Processes, number: int) -> None:
+        simulator = prepare(processes)
+        file = processes.directory / 'b.yaml'
+        way = ('--params-file', str(processes.directory / 'bridge.yaml'), '--nmt-start')
+        ask(processes, 'backup', 'pump', '-o', str(file), *way)
+        simulator.write(f'pump {BY_HAND["pump"]} late=0.3')
+        simulator.line('pump: fault late')
+        restore = processes.drive_can('restore', str(file), '--yes', *way)
+        simulator.frame(INTO_MODE)
+        restore.send(number)
+        restore.send(number)        # impatience changes nothing
+        assert restore.wait() == 128 + number
+        assert restore.errors[-2:-1] == ['pump: ending after the write under way'], restore.errors
+        assert restore.errors[-1] == (
+            'pump: interrupted. Written: nothing. Not written: motor_trip_class, flc1_ratio, '
+            'network_fallback. Repeat the command to go on')
+        assert simulator.frames(OUT_OF_MODE)
+        simulator.write('pump ok')
+        ask(processes, 'restore', str(file), '--yes', *way)
+        assert ask(processes, 'compare', str(file), 'pump', *way).lines == ['the same']
+
+    def test_while_reading(self, processes: Processes) -> None:
+        simulator = prepare(processes)
+        simulator.write('pump late=0.3')
+        file = processes.directory / 'b.yaml'
+        backup = processes.drive_can('backup', 'pump', '-o', str(file), '--nmt-start',
+                                     '--params-file', str(processes.directory / 'bridge.yaml'))
+        simulator.frame('^505#')
+        assert backup.end(signal.SIGINT) == 130
+        assert backup.errors == ['drive_can: interrupted']
+        assert sorted(each.name for each in processes.directory.glob('*.yaml')) == ['bridge.yaml']

@@ -1,0 +1,168 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""``drive_can read`` and ``write`` as a user starts them: directly and through a bridge."""
+
+import json
+from pathlib import Path
+import signal
+from typing import Any
+
+from parameter_files import bridge_file, CONVEYOR
+from processes import Client, Process, Processes
+import pytest
+from waiting import wait_for
+
+LIFT: dict[str, Any] = {
+    'bus': 'main', 'protocol': 'datamodel_standard', 'station': 2,
+    'profile': 'datamodel_control_example', 'period': 0.1,
+    'cyclic_request': ['control_word', 'speed_setpoint'],
+    'cyclic_response': ['status_word', 'actual_speed'], 'missed_limit': 25,
+    'parameter_timeout': 0.3}
+MIXER: dict[str, Any] = {
+    'bus': 'main', 'protocol': 'cannord', 'station': 50, 'profile': 'nord_sk500e',
+    'cyclic_request': ['frequency_setpoint'], 'cyclic_response': ['actual_frequency'],
+    'missed_limit': 25, 'parameter_timeout': 0.3}
+PUMP: dict[str, Any] = {
+    'bus': 'main', 'protocol': 'canopen_pkw', 'station': 5, 'profile': 'tesys_t_ltmr',
+    'cyclic_response': ['system_status_1'], 'period': 0.2, 'missed_limit': 25}
+ALL = {'conveyor': CONVEYOR, 'lift': LIFT, 'mixer': MIXER, 'pump': PUMP}
+#: what each family is told, and how the value is then written
+WRITES = {'conveyor': ('ramp_time', '2.5'), 'lift': ('ramp_time', '1.5'),
+          'mixer': ('acceleration_time', '4'), 'pump': ('motor_trip_class', '10')}
+
+
+def ended(process: Process, code: int = 0) -> list[str]:
+    """Wait for the end of a command and return its lines."""
+    assert process.wait() == code, process.dump()
+    return process.lines
+
+
+def documents(process: Process, code: int = 0) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in ended(process, code)]
+
+
+def test_both_ways_show_the_same(processes: Processes, client: Client, namespace: str,
+                                 tmp_path: Path) -> None:
+    file = bridge_file(tmp_path, drives=ALL)
+    processes.simulator(file)
+    direct = ('--params-file', str(file), '--nmt-start')
+    for drive, (name, value) in WRITES.items():
+        written, = ended(processes.drive_can('write', drive, f'{name}={value}', *direct))[1:]
+        assert written.endswith('  written')
+    alone = ended(processes.drive_can('read', '*', *direct))
+    assert len(alone) > 150
+    bridge = processes.bridge(file, namespace)
+    for drive in ALL:
+        client.online(f'/{namespace}/{drive}')
+    for drive, (name, value) in WRITES.items():
+        through = ('--namespace', namespace)
+        document, = documents(processes.drive_can('read', drive, name, '--json', *through))
+        assert document['value'] == float(value)
+        words = [drive, f'{name}={value}', *through]
+        assert ended(processes.drive_can('write', *words))[1].endswith('  written')
+        mine = ended(processes.drive_can('read', drive, '--namespace', namespace))
+        # the same rows: only what the motors do differs from one moment to the next
+        names = {line.split()[1] for line in alone if line.split()[0] == drive}
+        assert names <= {line.split()[0] for line in mine}
+        row = next(line for line in mine if line.split()[0] == name)
+        other = next(line for line in alone if line.split()[:2] == [drive, name])
+        assert row.split() == other.split()[1:]
+    # and nobody gets between
+    refused = processes.drive_can('read', 'pump', *direct)
+    assert refused.wait() == 1
+    assert refused.errors == [f'bus main: drive pump is used by process {bridge.pid}; leave '
+                              f'--params-file away to go through it']
+    assert bridge.end() == 0
+
+
+def test_a_second_bridge_names_the_first_and_a_killed_one_leaves_no_lock(
+        processes: Processes, namespace: str, tmp_path: Path) -> None:
+    file = bridge_file(tmp_path)
+    simulator = processes.simulator(file)
+    first = processes.bridge(file, namespace)
+    first.error('active: 1 drive')
+    port = simulator.line('^bus main: slcan ').split()[-1]
+    # the same port by another name
+    second = processes.bridge(file, f'{namespace}_b', '-p', f'buses.main.channel:={port}')
+    assert second.wait() == 1
+    assert any(f'bus main: drive conveyor is used by process {first.pid}; ' in line
+               for line in second.errors), second.errors
+    scan = processes.drive_can('scan', '--interface', 'slcan', '--channel', port, '--listen',
+                               '0.1')
+    assert scan.wait() == 1
+    assert scan.errors == [f'bus main: the serial port {port} is used by process {first.pid}; '
+                           f'end that first']
+    first.kill()
+    third = processes.bridge(file, f'{namespace}_c')
+    third.error('active: 1 drive')
+    assert third.end() == 0
+
+
+@pytest.mark.parametrize('way', ['directly', 'through a bridge'])
+def test_ctrl_c_waits_for_the_write_under_way(processes: Processes, client: Client,
+                                              namespace: str, tmp_path: Path, way: str) -> None:
+    slow = {**CONVEYOR, 'parameter_timeout': 2.0}
+    file = bridge_file(tmp_path, drives={'conveyor': slow})
+    simulator = processes.simulator(file)
+    options = ['--params-file', str(file)]
+    if way != 'directly':
+        processes.bridge(file, namespace)
+        client.online(f'/{namespace}/conveyor')
+        options = ['--namespace', namespace]
+    before = len(simulator.frames())
+    simulator.write('conveyor late=0.5')
+    simulator.line('fault late')
+    write = processes.drive_can('write', 'conveyor', 'ramp_time=7', 'maximum_speed=1000',
+                                *options)
+    # the write frame itself: read, then written, then read back half a second later
+    simulator.frame('#02BC', since=before)
+    write.send(signal.SIGINT)
+    assert write.wait() == 130
+    assert [line.split()[0] for line in write.lines] == ['name', 'ramp_time']
+    assert write.lines[1].endswith('  written')
+    assert write.errors == ['drive_can: interrupted']
+    assert not simulator.frames('#2710', since=before)
+
+
+def test_watching_ends_with_ctrl_c(processes: Processes, tmp_path: Path) -> None:
+    file = bridge_file(tmp_path)
+    processes.simulator(file)
+    watch = processes.drive_can('read', 'motor_current', 'ramp_time', '--watch', '0.05', '--json',
+                                '--params-file', str(file))
+    wait_for(lambda: len(watch.lines) >= 6, 'three rounds')
+    assert watch.end(signal.SIGINT) == 0
+    found = [json.loads(line) for line in watch.lines]
+    assert [each['name'] for each in found[:4]] == ['motor_current', 'ramp_time'] * 2
+    assert found[0]['time'] < found[2]['time']
+    assert watch.errors == []
+
+
+def test_a_read_is_interrupted(processes: Processes, tmp_path: Path) -> None:
+    file = bridge_file(tmp_path)
+    simulator = processes.simulator(file)
+    simulator.write('conveyor silent')
+    simulator.line('fault silent')
+    read = processes.drive_can('read', '--params-file', str(file))
+    simulator.frame('R$')
+    read.send(signal.SIGINT)
+    assert read.wait() in (1, 130)     # 1: it had just given up
+    assert len(read.errors) <= 1
+
+
+def test_an_imported_table_is_read_from_drives_made_of_it(processes: Processes, tmp_path: Path,
+                                                          ) -> None:
+    table = tmp_path / 'table.csv'
+    rows = [f'{number};Wert {number};{"s" if number % 2 else "rpm"};0,1;rw'
+            for number in range(300, 420)]
+    table.write_text('\n'.join(['Nr;Bezeichnung;Einheit;Skalierung;Zugriff', *rows, '']),
+                     encoding='latin-1')
+    profile = tmp_path / 'imported.yaml'
+    made = processes.drive_can('profile', 'import', str(table), '-o', str(profile))
+    assert made.wait() == 0, made.dump()
+    file = bridge_file(tmp_path, drives={'conveyor': {
+        **CONVEYOR, 'profile': str(profile), 'cyclic_request': [],
+        'cyclic_response': ['wert_300']}})
+    processes.simulator(file)
+    found = documents(processes.drive_can('read', '--json', '--params-file', str(file)))
+    assert [each['number'] for each in found] == list(range(300, 420))
+    assert {each['unit'] for each in found} == {'s', 'rpm'}
+    assert all(isinstance(each['raw'], int) for each in found)
