@@ -12,6 +12,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from drive_can_bridge.cli.listening import complain
+from drive_can_bridge.cli.progress import waiting
 from drive_can_bridge.cli.without_ros import what_is_missing
 from drive_can_bridge.client.drive import Drives, Source, WhichBridge
 from drive_can_bridge.client.opening import find_source
@@ -52,8 +53,9 @@ def source_of(args: Namespace) -> Iterator[Source]:
     if args.params_file is None and args.nmt_start:
         raise WrongUsage('--nmt-start goes with --params-file: a bridge starts its nodes itself')
     try:
-        source = find_source(args.params_file, namespace=args.namespace,
-                             nmt_start=args.nmt_start)
+        with waiting('looking for a bridge' if args.params_file is None else 'reading the file'):
+            source = find_source(args.params_file, namespace=args.namespace,
+                                 nmt_start=args.nmt_start)
     except WhichBridge as error:
         raise WrongUsage(str(error)) from None
     except ImportError as error:
@@ -119,7 +121,9 @@ def chosen_one(names: Sequence[str], word: str) -> str:
 @contextmanager
 def opened(source: Source, names: Sequence[str]) -> Iterator[Drives]:
     """Open drives, and say what the user should know."""
-    with source.open(names) as drives:
+    with waiting('listening for another master, and greeting the drives'):
+        drives = source.open(names)
+    with drives:
         for warning in drives.warnings:
             complain(f'warning: {warning}')
         yield drives

@@ -1,6 +1,8 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """A bar on standard error for what takes its time; only in a terminal."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 import sys
 import time
 from types import TracebackType
@@ -10,6 +12,16 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 #: s after which a bar appears
 PATIENCE = 1.0
+
+
+@contextmanager
+def waiting(what: str) -> Iterator[None]:
+    """Say in a terminal what is waited for, as long as that takes."""
+    if not sys.stderr.isatty():
+        yield
+        return
+    with Console(stderr=True).status(f'{what} …'):
+        yield
 
 
 class Bar:

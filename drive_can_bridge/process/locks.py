@@ -13,6 +13,7 @@ everybody.
 """
 
 from collections.abc import Sequence
+import errno
 import hashlib
 import os
 from pathlib import Path
@@ -50,6 +51,7 @@ class HostLock:
     :param key: what is locked; the same on the whole host.
     :param who: what the holder calls itself.
     :raises Held: somebody has it, be it this very process.
+    :raises OSError: nobody can have any (no descriptor is left).
     """
 
     def __init__(self, key: str, who: str) -> None:
@@ -57,8 +59,10 @@ class HostLock:
         self._sockets: list[socket.socket] = []
         try:
             self._bind(f'lock/{digest}')
-        except OSError:
+        except OSError as error:
             self.release()
+            if error.errno != errno.EADDRINUSE:
+                raise
             raise _holder(digest) from None
         words = re.sub(r'[^A-Za-z0-9_]+', '_', who)[:_WHO_MAX]
         try:
