@@ -18,7 +18,7 @@ from typing import Any, ClassVar
 from hypothesis import settings, strategies as st
 from hypothesis.stateful import invariant, precondition, rule, RuleBasedStateMachine
 
-from drive_can_bridge.core.control import ControlAction, ControlCompleted
+from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
 from drive_can_bridge.core.events import Noted, RequestCompleted
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter
@@ -165,7 +165,7 @@ class AnyOrder(RuleBasedStateMachine):
         self.observer = observer
         self.now = 1000.0
         self.open: list[ReadRequest | WriteRequest] = []
-        self.tickets: list[object] = []
+        self.control_requests: list[object] = []
         self.unanswered: list[Frame] = []
         self.fates: deque[bool] = deque()   # of the next frames: whether the bus takes them
         self.refusals = 0
@@ -218,15 +218,15 @@ class AnyOrder(RuleBasedStateMachine):
                 self.open.remove(event.request)
                 assert len(event.outcomes) == len(event.request)
                 self.completed(event)
+            elif isinstance(event, ControlCompleted):
+                assert event.request in self.control_requests, 'one answer per control request'
+                self.control_requests.remove(event.request)
+                self.answered(event)
             else:
                 if isinstance(event, Noted) and event.warning and (
                         'may still be running' in event.text):
                     self.observer.warned = True
                 self.happened(event)
-        for outcome in self.session.take_control_outcomes():
-            assert outcome.ticket in self.tickets, 'one answer per control request'
-            self.tickets.remove(outcome.ticket)
-            self.answered(outcome)
 
     def answered(self, outcome: ControlCompleted) -> None:
         """Take note of the end of a control request."""
@@ -303,12 +303,12 @@ class AnyOrder(RuleBasedStateMachine):
 
     @rule(action=st.sampled_from(ControlAction))
     def control(self, action: ControlAction) -> None:
-        ticket = self.session.request_control(action, self.now)
-        if isinstance(ticket, str):
-            assert ticket
-        else:
+        refusal = self.session.control_refusal(action)
+        request = ControlRequest(action)
+        self.control_requests.append(request)
+        self.session.submit(request, self.now)
+        if not refusal:
             assert self.observer.active
-            self.tickets.append(ticket)
             self.wanted(action)
         self.look()
 
@@ -384,7 +384,7 @@ class AnyOrder(RuleBasedStateMachine):
         self.observer.bus = False
         self.look(silent=True)
         assert not self.open
-        assert not self.tickets
+        assert not self.control_requests
         assert self.session.stopped
         assert self.session.next_timer() == math.inf
 
@@ -417,7 +417,7 @@ class AnyOrder(RuleBasedStateMachine):
             self.look(silent=True)
         assert self.session.stopped
         assert self.session.next_timer() == math.inf
-        assert not self.tickets
+        assert not self.control_requests
         assert not self.session.online
 
     # -- always -----------------------------------------------------------------------------------

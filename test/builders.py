@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
 from drive_can_bridge.core.events import Event, ProcessDataReceived, RequestCompleted
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Access, Parameter, ParameterType, Storage, Value
@@ -114,6 +114,7 @@ class Conversation:
     def __init__(self, configuration: DriveConfiguration) -> None:
         self.session: Session = FAMILIES[configuration.protocol].make_session(configuration)
         self.log: list[Event] = []
+        self.controlled: list[ControlCompleted] = []
         self.now = 0.0
         self.refusing: Callable[[str], bool] = lambda text: False
 
@@ -123,7 +124,7 @@ class Conversation:
         while True:
             texts = [str(entry) for entry in self.session.take_frames()]
             if not texts:
-                self.log += self.session.take_events()
+                self.listen()
                 return found
             refused = [place for place, text in enumerate(texts) if self.refusing(text)]
             found += [text for place, text in enumerate(texts) if place not in refused]
@@ -184,18 +185,25 @@ class Conversation:
     def asks(self, action: ControlAction, now: float) -> list[str]:
         """Ask for a control action, which has to be taken."""
         self.now = now
-        ticket = self.session.request_control(action, now)
-        if isinstance(ticket, str):
-            raise AssertionError(ticket)
+        assert not self.session.control_refusal(action), self.session.control_refusal(action)
+        self.session.submit(ControlRequest(action), now)
         return self.sent()
 
     def commands(self, index: int, value: Value, now: float) -> CommandOutcome:
         self.now = now
         return self.session.command(index, value, now)
 
+    def listen(self) -> None:
+        """Take what the session has to tell; outcomes of control requests are kept apart."""
+        for event in self.session.take_events():
+            if isinstance(event, ControlCompleted):
+                self.controlled.append(event)
+            else:
+                self.log.append(event)
+
     def events(self, *kinds: type) -> list[Any]:
         """Return the events since the last call, or only those of some kinds."""
-        self.log += self.session.take_events()
+        self.listen()
         found, self.log = self.log, []
         return [event for event in found if not kinds or isinstance(event, kinds)]
 
@@ -211,5 +219,6 @@ class Conversation:
 
     def control_outcomes(self) -> list[tuple[str, bool, str]]:
         """Return the control requests that ended since the last call."""
-        return [(done.ticket.action.value, done.success, done.message)
-                for done in self.session.take_control_outcomes()]
+        self.listen()
+        found, self.controlled = self.controlled, []
+        return [(done.request.action.value, done.success, done.message) for done in found]

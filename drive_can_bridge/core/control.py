@@ -91,8 +91,8 @@ _STOPS = (ControlAction.DISABLE, ControlAction.QUICK_STOP)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ControlTicket:
-    """Stands for one request until its outcome is there. Equal only to itself."""
+class ControlRequest:
+    """Somebody asks for something; answered exactly once. Equal only to itself."""
 
     action: ControlAction
 
@@ -100,23 +100,23 @@ class ControlTicket:
 @dataclass(frozen=True, slots=True)
 class ControlCompleted:
     """
-    The outcome of a request; each ticket gets exactly one.
+    The outcome of a request; each gets exactly one.
 
     :param message: the state reached, or why it was not, for the answer of the service.
     """
 
-    ticket: ControlTicket
+    request: ControlRequest
     success: bool
     message: str
 
 
 @dataclass(slots=True)
 class _Operation:
-    """What is under way, and the tickets that wait for it."""
+    """What is under way, and the requests that wait for it."""
 
     action: ControlAction
     deadline: float
-    tickets: list[ControlTicket] = field(default_factory=list)
+    requests: list[ControlRequest] = field(default_factory=list)
     pulsed: bool = False    # the reset word has left as often as it has to
 
 
@@ -254,31 +254,31 @@ class ControlMachine:
 
     # -- inputs -----------------------------------------------------------------------------------
 
-    def request(self, action: ControlAction, now: float) -> ControlTicket:
-        """Ask for something; the outcome may be there when this returns."""
+    def request(self, request: ControlRequest, now: float) -> None:
+        """Take a request; its outcome may be there when this returns."""
         self.handle_timer(now)
-        ticket = ControlTicket(action)
+        action = request.action
         missing = self._reports.missing if action is ControlAction.ENABLE else ()
         if missing:
-            self._complete(ticket, False, f'{", ".join(missing)} offline')
-            return ticket
+            self._complete(request, False, f'{", ".join(missing)} offline')
+            return
         if action not in self._words and self._nothing_to_do(action):
             under_way = self._operation
             if action is ControlAction.QUICK_STOP and under_way is not None and (
                     under_way.action not in _STOPS):
                 self._end(False, 'replaced by quick_stop')  # what stands is to stay so
-            self._complete(ticket, True, self.state)
-            return ticket
+            self._complete(request, True, self.state)
+            return
         refusal = self._refusal(action)
         if refusal is not None:
-            self._complete(ticket, False, refusal)
-            return ticket
+            self._complete(request, False, refusal)
+            return
         under_way = self._operation
         if under_way is None or under_way.action is not action:
             if action is ControlAction.RESET_FAULT and self._nothing_to_do(action) and (
                     under_way is None or under_way.action in _STOPS):
-                self._complete(ticket, True, self.state)
-                return ticket
+                self._complete(request, True, self.state)
+                return
             may_run = self._may_run
             if under_way is not None:
                 self._end(False, f'replaced by {action.value}')
@@ -287,9 +287,8 @@ class ControlMachine:
                 self._send(ControlAction.QUICK_STOP)
             elif action is not ControlAction.ENABLE:    # of an enabled drive: nothing to do
                 self._send(ControlAction.DISABLE)
-        under_way.tickets.append(ticket)
+        under_way.requests.append(request)
         self._advance()
-        return ticket
 
     def word_sent(self, now: float) -> None:
         """
@@ -426,7 +425,7 @@ class ControlMachine:
         elif self._confirmed_off():
             message = self._success_text()
             if table.enabled is None and self._sending is ControlAction.QUICK_STOP:
-                self._answer_tickets(under_way, True, message)      # keeps braking
+                self._answer(under_way, True, message)      # keeps braking
             else:
                 self._end(True, message)
 
@@ -511,18 +510,18 @@ class ControlMachine:
         """Answer what is under way, if anything; only a successful ENABLE keeps its word."""
         under_way, self._operation = self._operation, None
         if under_way is not None:
-            self._answer_tickets(under_way, success, message)
+            self._answer(under_way, success, message)
             if success and under_way.action is ControlAction.ENABLE:
                 return
         self._send(ControlAction.DISABLE)
 
-    def _answer_tickets(self, operation: _Operation, success: bool, message: str) -> None:
-        for ticket in operation.tickets:
-            self._complete(ticket, success, message)
-        operation.tickets.clear()
+    def _answer(self, operation: _Operation, success: bool, message: str) -> None:
+        for request in operation.requests:
+            self._complete(request, success, message)
+        operation.requests.clear()
 
-    def _complete(self, ticket: ControlTicket, success: bool, message: str) -> None:
-        self._completed.append(ControlCompleted(ticket, success, message))
+    def _complete(self, request: ControlRequest, success: bool, message: str) -> None:
+        self._completed.append(ControlCompleted(request, success, message))
 
     # -- words ------------------------------------------------------------------------------------
 

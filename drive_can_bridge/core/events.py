@@ -4,6 +4,7 @@
 from dataclasses import dataclass
 from typing import NamedTuple, Union
 
+from drive_can_bridge.core.control import ControlCompleted
 from drive_can_bridge.core.requests import Outcome, Request
 
 
@@ -90,4 +91,5 @@ class Noted:
 
 
 Event = Union[ProcessDataReceived, StationFound, StationLost, MappingDiffered, MappingWritten,
-              SetpointsExpired, RequestCompleted, FrameRejected, ForeignMasterSeen, Noted]
+              SetpointsExpired, RequestCompleted, ControlCompleted, FrameRejected,
+              ForeignMasterSeen, Noted]

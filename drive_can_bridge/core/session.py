@@ -24,7 +24,7 @@ from enum import Enum
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import (
-    ControlAction, ControlCompleted, ControlMachine, ControlTicket,
+    ControlAction, ControlCompleted, ControlMachine, ControlRequest,
 )
 from drive_can_bridge.core.events import (
     Event, FrameRejected, Noted, RequestCompleted, SetpointsExpired, StationFound, StationLost,
@@ -48,6 +48,7 @@ WAITING_REQUESTS_MAX = 64
 STOP_CYCLES = 3
 #: s of pause between them at most, however long the period is; and between those of a pulse
 STOP_SPACING_MAX = 0.1
+DRIVE_OFFLINE = 'drive offline'
 #: advice until more is known
 LOOKING = 'being looked for'
 
@@ -255,6 +256,8 @@ class Session(ABC):
     def take_events(self) -> list[Event]:
         """Return what happened since the last call."""
         events = self._events
+        if self.control is not None:
+            events += self.control.take_completed()
         if events:
             self._events = []
         return events
@@ -276,9 +279,16 @@ class Session(ABC):
             return CommandOutcome.DISABLED
         return outcome
 
-    def submit(self, request: Request, now: float) -> None:
-        """Take a parameter request. It is answered by exactly one ``RequestCompleted``."""
-        refusal = self._refusal()
+    def submit(self, request: Request | ControlRequest, now: float) -> None:
+        """
+        Take a request of a user.
+
+        It is answered by exactly one ``RequestCompleted``, or ``ControlCompleted``.
+        """
+        if isinstance(request, ControlRequest):
+            self._submit_control(request, now)
+            return
+        refusal = self._refusal(now)
         if refusal:
             self._complete(request, (Failure(refusal),) * len(request))
         elif not len(request):
@@ -287,7 +297,15 @@ class Session(ABC):
             self._open_requests.append(request)
             self._enqueue(request, now)
 
-    def _refusal(self) -> str:
+    def _submit_control(self, request: ControlRequest, now: float) -> None:
+        refusal = self.control_refusal(request.action)
+        if refusal or self.control is None:
+            self._events.append(ControlCompleted(request, False, refusal))
+            return
+        self.control.request(request, now)
+        self._control_changed(now)
+
+    def _refusal(self, now: float) -> str:
         if not self.active:
             return BRIDGE_INACTIVE
         if not self.bus_available:
@@ -382,27 +400,15 @@ class Session(ABC):
 
     # -- control ----------------------------------------------------------------------------------
 
-    def request_control(self, action: ControlAction, now: float) -> ControlTicket | str:
-        """
-        Ask for a control action.
-
-        :return: a ticket whose outcome comes from ``take_control_outcomes``; or why not.
-        """
+    def control_refusal(self, action: ControlAction) -> str:
+        """Say why a control action cannot be asked for now; '' if it can."""
         if self.control is None:
             return 'the profile has no control section'
         if not self.active:
             return BRIDGE_INACTIVE
         if not self.bus_available:
             return BUS_DOWN
-        if not self.online:
-            return 'drive offline'
-        ticket = self.control.request(action, now)
-        self._control_changed(now)
-        return ticket
-
-    def take_control_outcomes(self) -> list[ControlCompleted]:
-        """Return the control requests that ended since the last call."""
-        return self.control.take_completed() if self.control is not None else []
+        return '' if self.online else DRIVE_OFFLINE
 
     def _control_changed(self, now: float) -> None:
         """React to a control word, or a state, that may have changed."""

@@ -20,7 +20,7 @@ import time
 from typing import Any, Protocol
 
 from drive_can_bridge.core.configuration import BusConfiguration
-from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlTicket
+from drive_can_bridge.core.control import ControlRequest
 from drive_can_bridge.core.events import Event, ProcessDataReceived
 from drive_can_bridge.core.frame import bits_on_bus, Frame, Route
 from drive_can_bridge.core.requests import Request
@@ -68,9 +68,6 @@ class DriveListener(Protocol):
 
     def handle_event(self, event: Event) -> None:
         """Publish or log anything else."""
-
-    def control_completed(self, outcome: ControlCompleted) -> None:
-        """Answer a control request."""
 
 
 class BusListener(Protocol):
@@ -254,34 +251,15 @@ class BusExchange:
 
     # -- users, any thread ------------------------------------------------------------------------
 
-    def submit(self, session: Session, request: Request) -> None:
-        """Hand a parameter request to a drive's session; the answer comes as an event."""
+    def submit(self, session: Session, request: Request | ControlRequest) -> None:
+        """Hand a request to a drive's session; the answer comes as an event."""
         member = self._member(session)
         with self.lock:
             now = self._clock()
             session.submit(request, now)
             self._pump(member)
-        if member.due < self._wake_at:
+        if any(each.due < self._wake_at for each in (member, *member.partners)):
             self._alarm.ring()
-
-    def request_control(self, session: Session, action: ControlAction,
-                        register: Callable[[ControlTicket], None]) -> str:
-        """
-        Hand a control request to a drive's session.
-
-        :param register: is given the ticket before its outcome can be delivered.
-        :return: '' when it was taken, else why not.
-        """
-        member = self._member(session)
-        with self.lock:
-            now = self._clock()
-            ticket = session.request_control(action, now)
-            if isinstance(ticket, str):
-                return ticket
-            register(ticket)
-            self._pump(member)
-        self._alarm.ring()
-        return ''
 
     def reconfigure(self, session: Session, **changes: Any) -> None:
         """Change what may change while running (see :meth:`.Session.reconfigure`)."""
@@ -364,7 +342,7 @@ class BusExchange:
                 return
             member.session.receive_frame(frame, now, now - arrived)
             self._pump(member)
-        if member.due < self._wake_at:
+        if any(each.due < self._wake_at for each in (member, *member.partners)):
             self._alarm.ring()
 
     def bus_opened(self) -> None:
@@ -432,7 +410,4 @@ class BusExchange:
                 member.listener.process_data(event)
             else:
                 member.listener.handle_event(event)
-        if session.control is not None:
-            for outcome in session.take_control_outcomes():
-                member.listener.control_completed(outcome)
         member.due = session.next_timer()

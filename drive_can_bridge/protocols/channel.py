@@ -25,7 +25,7 @@ anew.
 """
 
 from collections import deque
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Hashable
 from enum import Enum
 import math
 from typing import Any, Generic
@@ -238,7 +238,8 @@ class Channel(Generic[StepT, ReplyT]):
             return soonest
         for queue in self._order():
             if queue.step is not None:
-                soonest = min(soonest, self._ready_at(queue, queue.step))
+                key = self._key(queue, queue.step)
+                soonest = min(soonest, self._ready_at(queue, queue.step, key))
                 if not self._steps_aside(queue):
                     break
             elif queue.waiting:     # begun only when it can be done: held
@@ -267,15 +268,16 @@ class Channel(Generic[StepT, ReplyT]):
                 courier.express_at(self._held_until) < math.inf)
             return self._awake and now >= self._held_until
         step = queue.step
-        ready_at = self._ready_at(queue, step)
-        if now < ready_at or self._quarantined(queue) and (
-                self._quarantine.holds(courier.key(step), now, now - ready_at)):
+        key = self._key(queue, step)
+        ready_at = self._ready_at(queue, step, key)
+        if now < ready_at or key is not None and (
+                self._quarantine.holds(key, now, now - ready_at)):
             return False
         self._serving = queue
         queue.attempts_left -= 1
         courier.begin(step, now)
         self._deadline = courier.deadline
-        return True
+        return False    # nothing more until it has ended
 
     def _order(self) -> tuple[_Queue[StepT, ReplyT], ...]:
         """Return the queues in the order in which they are served now."""
@@ -294,32 +296,30 @@ class Channel(Generic[StepT, ReplyT]):
                 continue
             if not self._steps_aside(queue):
                 return queue
-            ready_at = self._ready_at(queue, step)
+            ready_at = self._ready_at(queue, step, self._key(queue, step))
             if chosen is None or ready_at < chosen[0]:
                 chosen = ready_at, queue
         return None if chosen is None else chosen[1]
 
-    def _ready_at(self, queue: _Queue[StepT, ReplyT], step: StepT) -> float:
+    def _key(self, queue: _Queue[StepT, ReplyT], step: StepT) -> Hashable | None:
+        """Return which quarantine, if it has begun, concerns the step of a queue."""
+        courier = self._courier
+        return courier.key(step) if courier.anonymous or not queue.repeated else None
+
+    def _ready_at(self, queue: _Queue[StepT, ReplyT], step: StepT,
+                  key: Hashable | None) -> float:
         """Return when the step of a queue may be done."""
         stop = queue is self._stop
         ready = self._courier.ready_at(step, stop=stop)
         if not stop:
             ready = max(ready, self._held_until)
-        if self._quarantined(queue):
-            ready = max(ready, self._quarantine.ready_at(self._courier.key(step)))
-        return ready
-
-    def _quarantined(self, queue: _Queue[StepT, ReplyT]) -> bool:
-        """Tell whether a quarantine, if there is one, concerns the step of a queue."""
-        courier = self._courier
-        return (queue.step is not None and courier.key(queue.step) is not None
-                and (courier.anonymous or not queue.repeated))
+        return ready if key is None else max(ready, self._quarantine.ready_at(key))
 
     def _steps_aside(self, queue: _Queue[StepT, ReplyT]) -> bool:
         """Tell whether others go on while the step of this queue is in quarantine."""
-        if self._courier.anonymous or queue.repeated or queue.step is None:
+        if self._courier.anonymous or queue.step is None:
             return False
-        key = self._courier.key(queue.step)
+        key = self._key(queue, queue.step)
         return key is not None and self._quarantine.ready_at(key) > self.now
 
     def _expect_late(self) -> None:
@@ -350,12 +350,12 @@ class Channel(Generic[StepT, ReplyT]):
         if step is None:
             return
         silent = courier.unanswered(step, reply)
-        key = courier.key(step)
-        if key is not None and silent:
-            self._quarantine.begin(key, self.now + courier.silence)
-        elif key is not None and queue.repeated and not courier.anonymous:
-            # it may be the answer to the attempt before
-            self._quarantine.begin(key, self._deadline + courier.silence)
+        # what answers a repetition may be the answer to the attempt before
+        if silent or queue.repeated and not courier.anonymous:
+            key = courier.key(step)
+            if key is not None:
+                since = self.now if silent else self._deadline
+                self._quarantine.begin(key, since + courier.silence)
         if silent and hurried:  # it had to make room: that was no attempt
             queue.attempts_left += 1
         if silent and queue.attempts_left > 0:

@@ -10,13 +10,13 @@ from rclpy.qos import qos_profile_parameters
 from rclpy.service import Service
 from std_srvs.srv import SetBool, Trigger
 
-from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlTicket
+from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
 from drive_can_bridge.core.requests import BRIDGE_INACTIVE
 from drive_can_bridge.ros.polled_group import PolledGroup
 from drive_can_bridge.ros.service_thread import Answer, ServiceThread
 
-#: hands an action to the session, and its ticket to whoever is to be told; '' or why not
-Ask = Callable[[ControlAction, Callable[[ControlTicket], None]], str]
+#: hands a request to the session; its outcome comes to :meth:`ControlServices.completed`
+Ask = Callable[[ControlRequest], None]
 
 
 class ControlServices:
@@ -29,7 +29,7 @@ class ControlServices:
     def __init__(self, node: Node, thread: ServiceThread, ask: Ask) -> None:
         self._thread = thread
         self._ask = ask
-        self._tickets: dict[ControlTicket, Callable[[bool, str], None]] = {}
+        self._waiting: dict[ControlRequest, Callable[[bool, str], None]] = {}
         self._calls = 0     # that wait for their answer
         self._lock = threading.Lock()
         self._services: dict[Service, Callable[[Any, Answer], None]] = {}
@@ -47,14 +47,14 @@ class ControlServices:
 
     def completed(self, outcome: ControlCompleted) -> None:
         """Answer whoever asked for an action. From any thread."""
-        answer = self._tickets.pop(outcome.ticket, None)
+        answer = self._waiting.pop(outcome.request, None)
         if answer is not None:
             answer(outcome.success, outcome.message)
 
     def answer_all(self) -> bool:
         """Tell whoever still waits that nothing will come of it; True: all have their answer."""
-        while self._tickets:
-            self._tickets.popitem()[1](False, BRIDGE_INACTIVE)
+        while self._waiting:
+            self._waiting.popitem()[1](False, BRIDGE_INACTIVE)
         return not self._calls
 
     def destroy(self) -> None:
@@ -67,14 +67,15 @@ class ControlServices:
 
             def say(success: bool, message: str) -> None:
                 answer(kind.Response(success=success, message=message))
+            asked = ControlRequest(wanted)
             self._count(1)
+            self._waiting[asked] = say      # its outcome may come before the next line
             try:
-                refusal = self._ask(wanted, lambda ticket: self._tickets.update({ticket: say}))
+                self._ask(asked)
             except BaseException:
+                del self._waiting[asked]
                 self._count(-1)
                 raise
-            if refusal:
-                say(False, refusal)
         return callback
 
     def _count(self, change: int) -> None:

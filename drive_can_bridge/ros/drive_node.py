@@ -121,8 +121,8 @@ class DriveNode:
                           active=lambda: session.active, failed=self._parameter_failed)
         if session.control is not None:
             self._control = ControlServices(
-                self.node, control_thread, lambda action, register: self.exchange.request_control(
-                    session, action, register))
+                self.node, control_thread,
+                lambda request: self.exchange.submit(session, request))
 
     @property
     def name(self) -> str:
@@ -226,6 +226,9 @@ class DriveNode:
                                f'{event.text}')
         elif isinstance(event, MappingWritten):
             self._log.warning(f'{self.name}: maps of the drive rewritten: {event.text}')
+        elif isinstance(event, ControlCompleted):
+            if self._control is not None:
+                self._control.completed(event)
         elif isinstance(event, FrameRejected):
             self.rejected_text = event.text
             self.warn('rejected', f'frame rejected: {event.text}')
@@ -237,11 +240,6 @@ class DriveNode:
                 self._warn_now(event.text)
             else:
                 self._inform(event.text)
-
-    def control_completed(self, outcome: ControlCompleted) -> None:
-        """Answer a control request."""
-        if self._control is not None:
-            self._control.completed(outcome)
 
     def _cannot_publish(self, error: Exception) -> None:
         if self.node.context.ok():

@@ -10,7 +10,7 @@ from hypothesis.stateful import initialize, invariant, rule, RuleBasedStateMachi
 import pytest
 
 from drive_can_bridge.core.control import (
-    ControlAction, ControlMachine, ControlTicket)
+    ControlAction, ControlMachine, ControlRequest)
 from drive_can_bridge.core.profile import ControlTable, StatusPattern
 
 ENABLE = ControlAction.ENABLE
@@ -46,8 +46,14 @@ def cycle(control: ControlMachine, raw: int | None, now: float) -> int:
     return word
 
 
+def asked(control: ControlMachine, action: ControlAction, now: float) -> ControlRequest:
+    request = ControlRequest(action)
+    control.request(request, now)
+    return request
+
+
 def outcomes(control: ControlMachine) -> list[tuple[ControlAction, bool, str]]:
-    return [(done.ticket.action, done.success, done.message)
+    return [(done.request.action, done.success, done.message)
             for done in control.take_completed()]
 
 
@@ -55,7 +61,7 @@ def enabled(table: ControlTable = FULL) -> ControlMachine:
     """Return a machine whose drive was enabled at 0.06 s."""
     control = machine(table)
     cycle(control, READY, 0.0)
-    control.request(ENABLE, 0.01)
+    control.request(ControlRequest(ENABLE), 0.01)
     cycle(control, READY, 0.02)
     cycle(control, READY, 0.04)
     cycle(control, ENABLED, 0.06)
@@ -79,20 +85,20 @@ def test_what_is_reached_already_needs_no_word() -> None:
     """Like with a word: a quick stop while disabled and a reset without a fault succeed."""
     control = machine(replace(FULL, quick_stop=None, reset_fault=None))
     cycle(control, READY, 0.0)
-    control.request(QUICK_STOP, 0.1)
-    control.request(RESET_FAULT, 0.1)
+    control.request(ControlRequest(QUICK_STOP), 0.1)
+    control.request(ControlRequest(RESET_FAULT), 0.1)
     assert outcomes(control) == [(QUICK_STOP, True, 'ready'), (RESET_FAULT, True, 'ready')]
-    control.request(ENABLE, 0.2)
+    control.request(ControlRequest(ENABLE), 0.2)
     cycle(control, READY, 0.21)
     cycle(control, ENABLED, 0.3)
     outcomes(control)
-    control.request(QUICK_STOP, 0.4)
+    control.request(ControlRequest(QUICK_STOP), 0.4)
     (action, success, message), = outcomes(control)
     assert (action, success) == (QUICK_STOP, False)
     assert message.startswith('no quick stop: the profile has no quick_stop word')
     assert control.word == RUN
     cycle(control, FAULT, 0.5)
-    control.request(RESET_FAULT, 0.6)
+    control.request(ControlRequest(RESET_FAULT), 0.6)
     assert outcomes(control) == [
         (RESET_FAULT, False, 'no fault reset: the profile has no reset_fault word')]
 
@@ -101,10 +107,10 @@ def test_a_quick_stop_without_a_word_ends_an_enable_that_waits() -> None:
     """What stands, stays: the drive must not start when it becomes ready."""
     control = machine(replace(FULL, quick_stop=None))
     cycle(control, NOT_READY, 0.0)
-    control.request(ENABLE, 0.1)
+    control.request(ControlRequest(ENABLE), 0.1)
     cycle(control, NOT_READY, 0.2)
     assert control.pending
-    control.request(QUICK_STOP, 0.3)
+    control.request(ControlRequest(QUICK_STOP), 0.3)
     assert outcomes(control) == [
         (ENABLE, False, 'replaced by quick_stop'), (QUICK_STOP, True, 'not ready')]
     for step in range(5):
@@ -117,7 +123,7 @@ def test_a_quick_stop_without_a_word_ends_an_enable_that_waits() -> None:
 def test_a_drive_that_has_not_answered_since_is_not_unconfirmed() -> None:
     control = enabled()
     assert not control.unconfirmed
-    control.request(DISABLE, 1.0)
+    control.request(ControlRequest(DISABLE), 1.0)
     assert not control.unconfirmed
     control.status_received(ENABLED, 1.01)      # older than the word
     assert not control.unconfirmed
@@ -135,7 +141,7 @@ def test_a_word_is_unconfirmed_until_the_drive_follows(action: ControlAction, wo
                                                        done: int) -> None:
     control = {ENABLE: machine, QUICK_STOP: enabled}[action]()
     cycle(control, {ENABLE: READY, QUICK_STOP: ENABLED}[action], 0.9)
-    control.request(action, 1.0)
+    control.request(ControlRequest(action), 1.0)
     assert control.word == word
     assert not control.unconfirmed
     cycle(control, raw, 1.01)
@@ -147,7 +153,7 @@ def test_a_word_is_unconfirmed_until_the_drive_follows(action: ControlAction, wo
 def test_nothing_is_unconfirmed_where_nothing_is_reported() -> None:
     control = machine(BARE)
     cycle(control, None, 0.0)
-    control.request(ENABLE, 0.1)
+    control.request(ControlRequest(ENABLE), 0.1)
     cycle(control, None, 0.2)
     assert not control.unconfirmed
 
@@ -155,7 +161,7 @@ def test_nothing_is_unconfirmed_where_nothing_is_reported() -> None:
 def test_running_on_under_disable_is_told_once() -> None:
     """A ramp may take as long as a request; whoever runs on after that takes no notice."""
     control = enabled()
-    control.request(DISABLE, 1.0)
+    control.request(ControlRequest(DISABLE), 1.0)
     for step in range(1, 21):
         cycle(control, ENABLED, 1.0 + 0.1 * step)
         assert control.disregard == ''
@@ -173,7 +179,7 @@ def test_running_on_under_disable_is_told_once() -> None:
 
 def test_a_long_ramp_is_nothing_to_tell() -> None:
     control = enabled()
-    control.request(DISABLE, 1.0)
+    control.request(ControlRequest(DISABLE), 1.0)
     for step in range(19):
         cycle(control, ENABLED, 1.05 + 0.1 * step)
     cycle(control, READY, 2.98)
@@ -193,10 +199,10 @@ def test_a_faulted_drive_is_told_of_as_such() -> None:
 def test_a_quick_stop_that_nothing_can_confirm_is_not_unconfirmed() -> None:
     control = machine(ONLY_FAULT)
     cycle(control, READY, 0.0)
-    control.request(ENABLE, 0.1)
+    control.request(ControlRequest(ENABLE), 0.1)
     cycle(control, READY, 0.2)
     cycle(control, READY, 0.3)
-    control.request(QUICK_STOP, 0.4)
+    control.request(ControlRequest(QUICK_STOP), 0.4)
     assert control.word == STOP
     cycle(control, READY, 0.5)
     assert control.pending
@@ -204,10 +210,10 @@ def test_a_quick_stop_that_nothing_can_confirm_is_not_unconfirmed() -> None:
 
 
 def test_a_new_word_and_a_loss_end_the_running_on() -> None:
-    for end in (lambda control: control.request(QUICK_STOP, 4.0),
+    for end in (lambda control: control.request(ControlRequest(QUICK_STOP), 4.0),
                 lambda control: control.withdraw('gone', 4.0)):
         control = enabled()
-        control.request(DISABLE, 1.0)
+        control.request(ControlRequest(DISABLE), 1.0)
         cycle(control, ENABLED, 1.1)
         cycle(control, ENABLED, 3.9)
         assert control.disregard
@@ -219,7 +225,7 @@ def test_a_new_word_and_a_loss_end_the_running_on() -> None:
 def test_a_refused_word_ends_what_is_under_way(action: ControlAction, word: int) -> None:
     control = machine() if action is ENABLE else enabled()
     cycle(control, READY if action is ENABLE else ENABLED, 0.9)
-    control.request(action, 1.0)
+    control.request(ControlRequest(action), 1.0)
     assert control.word == word
     control.word_refused(word ^ 0x4000, 'not meant', 1.1)
     assert outcomes(control) == []
@@ -257,7 +263,7 @@ def test_no_status_and_no_time_starts_a_drive() -> None:
 
 
 def test_ticket_is_opaque_and_equal_only_to_itself() -> None:
-    ticket, other = ControlTicket(ENABLE), ControlTicket(ENABLE)
+    ticket, other = ControlRequest(ENABLE), ControlRequest(ENABLE)
     assert ticket != other
     assert len({ticket, other}) == 2
     with pytest.raises(FrozenInstanceError):
@@ -294,7 +300,7 @@ def test_state_in_words(table: ControlTable, raw: int | None, state: str) -> Non
 def test_enable_waits_for_ready_then_for_enabled() -> None:
     control = machine()
     cycle(control, NOT_READY, 0.0)
-    ticket = control.request(ENABLE, 0.01)
+    ticket = asked(control, ENABLE, 0.01)
     assert control.pending
     assert control.next_timer() == 2.01
     assert cycle(control, NOT_READY, 0.02) == OFF
@@ -305,7 +311,7 @@ def test_enable_waits_for_ready_then_for_enabled() -> None:
     assert control.take_completed() == []
     assert cycle(control, ENABLED, 0.08) == RUN
     completed, = control.take_completed()
-    assert completed.ticket is ticket
+    assert completed.request is ticket
     assert (completed.success, completed.message) == (True, 'enabled')
     assert (control.word, control.state, control.pending) == (RUN, 'enabled', False)
     assert control.next_timer() == math.inf
@@ -315,14 +321,14 @@ def test_enable_waits_for_ready_then_for_enabled() -> None:
 def test_enable_of_a_drive_that_is_ready_goes_on_at_once() -> None:
     control = machine()
     cycle(control, READY, 0.0)
-    control.request(ENABLE, 0.01)
+    control.request(ControlRequest(ENABLE), 0.01)
     assert control.word == RUN
     assert control.pending
 
 
 def test_status_from_before_the_disable_word_left_confirms_nothing() -> None:
     control = machine()
-    control.request(ENABLE, 0.0)
+    control.request(ControlRequest(ENABLE), 0.0)
     control.status_received(READY, 0.01)
     assert control.word == OFF
     control.word_sent(0.02)
@@ -334,7 +340,7 @@ def test_status_from_before_the_disable_word_left_confirms_nothing() -> None:
 def test_status_from_before_the_enable_word_left_confirms_nothing() -> None:
     control = machine()
     cycle(control, READY, 0.0)
-    control.request(ENABLE, 0.01)
+    control.request(ControlRequest(ENABLE), 0.01)
     control.status_received(ENABLED, 0.02)
     assert control.take_completed() == []
     control.word_sent(0.03)
@@ -345,7 +351,7 @@ def test_status_from_before_the_enable_word_left_confirms_nothing() -> None:
 
 def test_missing_status_word_confirms_nothing() -> None:
     control = machine()
-    control.request(ENABLE, 0.0)
+    control.request(ControlRequest(ENABLE), 0.0)
     assert cycle(control, None, 0.02) == OFF
     assert cycle(control, None, 0.04) == OFF
     assert control.word == OFF
@@ -358,7 +364,7 @@ def test_missing_status_word_confirms_nothing() -> None:
 
 def test_enable_without_a_ready_condition_still_sends_disable_first() -> None:
     control = machine(NO_READY)
-    control.request(ENABLE, 0.0)
+    control.request(ControlRequest(ENABLE), 0.0)
     assert cycle(control, NOT_READY, 0.0) == OFF
     assert cycle(control, ENABLED, 0.02) == RUN
     assert outcomes(control) == [(ENABLE, True, 'enabled')]
@@ -366,20 +372,20 @@ def test_enable_without_a_ready_condition_still_sends_disable_first() -> None:
 
 def test_enable_without_an_enabled_condition_succeeds_when_sent() -> None:
     control = machine(ONLY_READY)
-    control.request(ENABLE, 0.0)
+    control.request(ControlRequest(ENABLE), 0.0)
     cycle(control, READY, 0.0)
     assert (control.word, control.state) == (RUN, 'unknown')
     control.word_sent(0.02)
     message = 'enable sent; the drive does not report its state'
     assert outcomes(control) == [(ENABLE, True, message)]
     assert (control.word, control.state) == (RUN, 'enable sent')
-    control.request(ENABLE, 0.03)
+    control.request(ControlRequest(ENABLE), 0.03)
     assert outcomes(control) == [(ENABLE, True, message)]
 
 
 def test_enable_with_only_a_fault_condition_looks_for_a_fault_first() -> None:
     control = machine(ONLY_FAULT)
-    control.request(ENABLE, 0.0)
+    control.request(ControlRequest(ENABLE), 0.0)
     control.word_sent(0.0)
     assert control.word == OFF
     control.status_received(READY, 0.01)
@@ -389,7 +395,7 @@ def test_enable_with_only_a_fault_condition_looks_for_a_fault_first() -> None:
 @pytest.mark.parametrize('table', [SILENT, BARE])
 def test_enable_without_any_status_succeeds_when_sent(table: ControlTable) -> None:
     control = machine(table)
-    control.request(ENABLE, 0.0)
+    control.request(ControlRequest(ENABLE), 0.0)
     assert cycle(control, None, 0.0) == OFF
     assert control.take_completed() == []
     assert cycle(control, None, 0.02) == RUN
@@ -400,7 +406,7 @@ def test_enable_without_any_status_succeeds_when_sent(table: ControlTable) -> No
 
 def test_enable_of_an_enabled_drive_succeeds_at_once() -> None:
     control = enabled()
-    control.request(ENABLE, 1.0)
+    control.request(ControlRequest(ENABLE), 1.0)
     assert outcomes(control) == [(ENABLE, True, 'enabled')]
     assert (control.word, control.pending) == (RUN, False)
 
@@ -408,12 +414,12 @@ def test_enable_of_an_enabled_drive_succeeds_at_once() -> None:
 def test_enable_of_an_enabled_drive_waits_while_its_status_is_missing() -> None:
     control = enabled()
     cycle(control, None, 1.0)
-    control.request(ENABLE, 1.01)
+    control.request(ControlRequest(ENABLE), 1.01)
     assert (control.take_completed(), control.word) == ([], RUN)
     cycle(control, ENABLED, 1.02)
     assert outcomes(control) == [(ENABLE, True, 'enabled')]
     cycle(control, None, 2.0)
-    control.request(ENABLE, 2.01)
+    control.request(ControlRequest(ENABLE), 2.01)
     cycle(control, READY, 2.02)
     assert outcomes(control) == [
         (ENABLE, False, 'no longer enabled, by itself (status word 0001h)')]
@@ -423,7 +429,7 @@ def test_enable_of_an_enabled_drive_waits_while_its_status_is_missing() -> None:
 def test_enabled_under_the_disable_word_is_outdated_and_not_taken_for_success() -> None:
     control = machine()
     cycle(control, ENABLED, 0.0)
-    control.request(ENABLE, 0.01)
+    control.request(ControlRequest(ENABLE), 0.01)
     assert cycle(control, ENABLED, 0.02) == OFF
     assert control.word == OFF
     assert cycle(control, READY, 0.04) == OFF
@@ -433,7 +439,7 @@ def test_enabled_under_the_disable_word_is_outdated_and_not_taken_for_success() 
 
 def test_enable_is_refused_while_faulted() -> None:
     control = faulted()
-    control.request(ENABLE, 1.0)
+    control.request(ControlRequest(ENABLE), 1.0)
     assert outcomes(control) == [(ENABLE, False, 'fault: reset it first')]
     assert (control.word, control.pending) == (OFF, False)
 
@@ -454,7 +460,7 @@ def test_enable_is_refused_while_faulted() -> None:
 def test_enable_that_is_not_confirmed_is_withdrawn(
         steps: tuple[tuple[int | None, float], ...], text: str) -> None:
     control = machine()
-    control.request(ENABLE, 0.0)
+    control.request(ControlRequest(ENABLE), 0.0)
     for raw, now in steps:
         cycle(control, raw, now)
     control.handle_timer(1.999)
@@ -472,7 +478,7 @@ def test_enable_that_is_not_confirmed_is_withdrawn(
 def test_status_after_the_deadline_comes_too_late() -> None:
     control = machine()
     cycle(control, READY, 0.0)
-    control.request(ENABLE, 0.0)
+    control.request(ControlRequest(ENABLE), 0.0)
     control.word_sent(0.02)
     control.status_received(ENABLED, 2.0)
     (_, success, _), = outcomes(control)
@@ -482,7 +488,7 @@ def test_status_after_the_deadline_comes_too_late() -> None:
 def test_word_that_leaves_after_the_deadline_is_not_taken_for_the_next_one() -> None:
     control = machine()
     cycle(control, READY, 0.0)
-    control.request(ENABLE, 0.0)
+    control.request(ControlRequest(ENABLE), 0.0)
     assert control.word == RUN
     control.word_sent(2.0)
     assert (control.word, control.word_due) == (OFF, True)
@@ -493,23 +499,23 @@ def test_word_that_leaves_after_the_deadline_is_not_taken_for_the_next_one() -> 
 
 def test_request_after_the_deadline_does_not_find_the_old_one() -> None:
     control = machine()
-    control.request(ENABLE, 0.0)
-    control.request(ENABLE, 2.5)
+    control.request(ControlRequest(ENABLE), 0.0)
+    control.request(ControlRequest(ENABLE), 2.5)
     assert [success for _, success, _ in outcomes(control)] == [False]
     assert control.next_timer() == 4.5
 
 
 def test_second_enable_joins_the_first() -> None:
     control = machine()
-    first = control.request(ENABLE, 0.0)
+    first = asked(control, ENABLE, 0.0)
     cycle(control, READY, 0.02)
-    second = control.request(ENABLE, 1.0)
+    second = asked(control, ENABLE, 1.0)
     assert control.word == RUN
     assert control.next_timer() == 2.0
     assert control.take_completed() == []
     cycle(control, ENABLED, 1.02)
     completed = control.take_completed()
-    assert [done.ticket for done in completed] == [first, second]
+    assert [done.request for done in completed] == [first, second]
     assert [done.message for done in completed] == ['enabled', 'enabled']
 
 
@@ -518,7 +524,7 @@ def test_second_enable_joins_the_first() -> None:
 @pytest.mark.parametrize('before', [(), ((READY, 0.02),)])
 def test_fault_while_enabling_ends_it(before: tuple[tuple[int, float], ...]) -> None:
     control = machine()
-    control.request(ENABLE, 0.0)
+    control.request(ControlRequest(ENABLE), 0.0)
     for raw, now in before:
         cycle(control, raw, now)
     control.status_received(FAULT, 0.03)
@@ -575,7 +581,7 @@ def test_enabled_drive_survives_a_missing_status_word() -> None:
 
 def test_dropping_out_needs_a_condition_for_enabled() -> None:
     control = machine(ONLY_READY)
-    control.request(ENABLE, 0.0)
+    control.request(ControlRequest(ENABLE), 0.0)
     cycle(control, READY, 0.0)
     cycle(control, READY, 0.02)
     cycle(control, NOT_READY, 0.04)
@@ -586,7 +592,7 @@ def test_dropping_out_needs_a_condition_for_enabled() -> None:
 
 def test_disable_waits_until_not_enabled() -> None:
     control = enabled()
-    control.request(DISABLE, 1.0)
+    control.request(ControlRequest(DISABLE), 1.0)
     assert control.word == OFF
     control.status_received(READY, 1.01)
     assert control.take_completed() == []
@@ -600,19 +606,19 @@ def test_disable_waits_until_not_enabled() -> None:
 def test_disable_of_a_disabled_drive_succeeds_at_once() -> None:
     control = machine(NO_READY)
     cycle(control, READY, 0.0)
-    control.request(DISABLE, 0.01)
+    control.request(ControlRequest(DISABLE), 0.01)
     assert outcomes(control) == [(DISABLE, True, 'disabled')]
 
 
 def test_disable_of_a_faulted_drive_names_the_fault() -> None:
     control = faulted()
-    control.request(DISABLE, 0.01)
+    control.request(ControlRequest(DISABLE), 0.01)
     assert outcomes(control) == [(DISABLE, True, 'fault')]
 
 
 def test_disable_that_is_not_confirmed_fails_and_stays() -> None:
     control = enabled()
-    control.request(DISABLE, 1.0)
+    control.request(ControlRequest(DISABLE), 1.0)
     cycle(control, ENABLED, 1.02)
     control.handle_timer(3.0)
     assert outcomes(control) == [(
@@ -623,7 +629,7 @@ def test_disable_that_is_not_confirmed_fails_and_stays() -> None:
 
 def test_disable_without_a_status_succeeds_when_sent() -> None:
     control = machine(BARE)
-    control.request(DISABLE, 0.0)
+    control.request(ControlRequest(DISABLE), 0.0)
     assert control.take_completed() == []
     control.word_sent(0.02)
     message = 'disable sent; the drive does not report its state'
@@ -633,10 +639,10 @@ def test_disable_without_a_status_succeeds_when_sent() -> None:
 @pytest.mark.parametrize('steps', [(), ((READY, 0.02),)])
 def test_disable_wins_over_enable(steps: tuple[tuple[int, float], ...]) -> None:
     control = machine()
-    control.request(ENABLE, 0.0)
+    control.request(ControlRequest(ENABLE), 0.0)
     for raw, now in steps:
         cycle(control, raw, now)
-    control.request(DISABLE, 0.1)
+    control.request(ControlRequest(DISABLE), 0.1)
     assert control.word == OFF
     cycle(control, READY, 0.12)
     assert outcomes(control) == [(ENABLE, False, 'replaced by disable'), (DISABLE, True, 'ready')]
@@ -646,17 +652,17 @@ def test_disable_wins_over_enable(steps: tuple[tuple[int, float], ...]) -> None:
 
 def test_disable_wins_over_a_quick_stop() -> None:
     control = enabled()
-    control.request(QUICK_STOP, 1.0)
-    control.request(DISABLE, 1.01)
+    control.request(ControlRequest(QUICK_STOP), 1.0)
+    control.request(ControlRequest(DISABLE), 1.01)
     assert control.word == OFF
     assert outcomes(control) == [(QUICK_STOP, False, 'replaced by disable')]
 
 
 def test_disable_wins_over_a_fault_reset() -> None:
     control = faulted()
-    control.request(RESET_FAULT, 0.01)
+    control.request(ControlRequest(RESET_FAULT), 0.01)
     control.word_sent(0.02)
-    control.request(DISABLE, 0.03)
+    control.request(ControlRequest(DISABLE), 0.03)
     assert control.word == OFF
     cycle(control, FAULT, 0.04)
     assert outcomes(control) == [
@@ -667,7 +673,7 @@ def test_disable_wins_over_a_fault_reset() -> None:
 
 def test_quick_stop_brakes_until_not_enabled_then_disables() -> None:
     control = enabled()
-    control.request(QUICK_STOP, 1.0)
+    control.request(ControlRequest(QUICK_STOP), 1.0)
     assert control.word == STOP
     control.status_received(READY, 1.01)
     assert control.word == STOP
@@ -682,7 +688,7 @@ def test_quick_stop_brakes_until_not_enabled_then_disables() -> None:
 def test_quick_stop_of_a_disabled_drive_succeeds_at_once() -> None:
     control = machine()
     cycle(control, READY, 0.0)
-    control.request(QUICK_STOP, 0.01)
+    control.request(ControlRequest(QUICK_STOP), 0.01)
     assert outcomes(control) == [(QUICK_STOP, True, 'ready')]
     assert (control.word, control.pending) == (OFF, False)
 
@@ -691,10 +697,10 @@ def test_quick_stop_of_a_disabled_drive_succeeds_at_once() -> None:
 def test_quick_stop_of_a_drive_that_is_about_to_run_brakes(sent: bool) -> None:
     control = machine()
     cycle(control, READY, 0.0)
-    control.request(ENABLE, 0.01)
+    control.request(ControlRequest(ENABLE), 0.01)
     if sent:
         cycle(control, READY, 0.02)
-    control.request(QUICK_STOP, 0.03)
+    control.request(ControlRequest(QUICK_STOP), 0.03)
     assert control.word == STOP
     assert outcomes(control) == [(ENABLE, False, 'replaced by quick_stop')]
 
@@ -702,8 +708,8 @@ def test_quick_stop_of_a_drive_that_is_about_to_run_brakes(sent: bool) -> None:
 def test_quick_stop_before_the_enable_word_needs_no_braking() -> None:
     control = machine()
     cycle(control, NOT_READY, 0.0)
-    control.request(ENABLE, 0.01)
-    control.request(QUICK_STOP, 0.02)
+    control.request(ControlRequest(ENABLE), 0.01)
+    control.request(ControlRequest(QUICK_STOP), 0.02)
     assert outcomes(control) == [
         (ENABLE, False, 'replaced by quick_stop'), (QUICK_STOP, True, 'not ready')]
     assert control.word == OFF
@@ -711,19 +717,19 @@ def test_quick_stop_before_the_enable_word_needs_no_braking() -> None:
 
 def test_quick_stop_of_a_drive_that_still_runs_under_disable_brakes() -> None:
     control = enabled()
-    control.request(DISABLE, 1.0)
-    control.request(QUICK_STOP, 1.01)
+    control.request(ControlRequest(DISABLE), 1.0)
+    control.request(ControlRequest(QUICK_STOP), 1.01)
     assert control.word == STOP
     assert outcomes(control) == [(DISABLE, False, 'replaced by quick_stop')]
-    control.request(DISABLE, 1.02)
+    control.request(ControlRequest(DISABLE), 1.02)
     cycle(control, ENABLED, 1.03)
-    control.request(QUICK_STOP, 1.04)
+    control.request(ControlRequest(QUICK_STOP), 1.04)
     assert control.word == STOP
 
 
 def test_quick_stop_of_a_drive_nobody_knows_brakes() -> None:
     control = machine()
-    control.request(QUICK_STOP, 0.0)
+    control.request(ControlRequest(QUICK_STOP), 0.0)
     assert control.word == STOP
     cycle(control, READY, 0.02)
     assert outcomes(control) == [(QUICK_STOP, True, 'ready')]
@@ -731,7 +737,7 @@ def test_quick_stop_of_a_drive_nobody_knows_brakes() -> None:
 
 def test_quick_stop_that_is_not_confirmed_fails_and_disables() -> None:
     control = enabled()
-    control.request(QUICK_STOP, 1.0)
+    control.request(ControlRequest(QUICK_STOP), 1.0)
     cycle(control, ENABLED, 1.02)
     control.handle_timer(3.0)
     assert outcomes(control) == [(
@@ -742,7 +748,7 @@ def test_quick_stop_that_is_not_confirmed_fails_and_disables() -> None:
 
 def test_fault_during_a_quick_stop_disables_and_the_stop_is_still_watched() -> None:
     control = enabled()
-    control.request(QUICK_STOP, 1.0)
+    control.request(ControlRequest(QUICK_STOP), 1.0)
     cycle(control, FAULT | ENABLED, 1.02)
     assert (control.word, control.pending) == (OFF, True)
     cycle(control, FAULT, 1.04)
@@ -751,8 +757,8 @@ def test_fault_during_a_quick_stop_disables_and_the_stop_is_still_watched() -> N
 
 def test_second_quick_stop_joins_the_first() -> None:
     control = enabled()
-    control.request(QUICK_STOP, 1.0)
-    control.request(QUICK_STOP, 1.5)
+    control.request(ControlRequest(QUICK_STOP), 1.0)
+    control.request(ControlRequest(QUICK_STOP), 1.5)
     assert control.next_timer() == 3.0
     cycle(control, READY, 1.52)
     assert outcomes(control) == [(QUICK_STOP, True, 'ready')] * 2
@@ -760,10 +766,10 @@ def test_second_quick_stop_joins_the_first() -> None:
 
 def test_quick_stop_ends_a_fault_reset() -> None:
     control = faulted()
-    control.request(RESET_FAULT, 0.01)
+    control.request(ControlRequest(RESET_FAULT), 0.01)
     cycle(control, FAULT, 0.02)
     assert control.word == RESET
-    control.request(QUICK_STOP, 0.03)
+    control.request(ControlRequest(QUICK_STOP), 0.03)
     assert control.word == OFF
     cycle(control, FAULT, 0.04)
     assert outcomes(control) == [
@@ -773,7 +779,7 @@ def test_quick_stop_ends_a_fault_reset() -> None:
 def test_quick_stop_of_a_faulted_drive_that_still_runs_is_a_disable() -> None:
     control = machine()
     cycle(control, FAULT | ENABLED, 0.0)
-    control.request(QUICK_STOP, 0.01)
+    control.request(ControlRequest(QUICK_STOP), 0.01)
     assert (control.word, control.pending) == (OFF, True)
     cycle(control, FAULT, 0.02)
     assert outcomes(control) == [(QUICK_STOP, True, 'fault')]
@@ -781,7 +787,7 @@ def test_quick_stop_of_a_faulted_drive_that_still_runs_is_a_disable() -> None:
 
 def test_quick_stop_without_a_word_is_refused_and_disturbs_nothing() -> None:
     control = enabled(replace(FULL, quick_stop=None))
-    control.request(QUICK_STOP, 1.0)
+    control.request(ControlRequest(QUICK_STOP), 1.0)
     assert outcomes(control) == [(
         QUICK_STOP, False, 'no quick stop: the profile has no quick_stop word; '
         '~/enable false disables the drive')]
@@ -790,20 +796,20 @@ def test_quick_stop_without_a_word_is_refused_and_disturbs_nothing() -> None:
 
 def test_quick_stop_without_a_status_is_answered_when_sent_and_keeps_braking() -> None:
     control = machine(SILENT)
-    control.request(ENABLE, 0.0)
+    control.request(ControlRequest(ENABLE), 0.0)
     cycle(control, None, 0.0)
     cycle(control, None, 0.02)
     control.take_completed()
-    control.request(QUICK_STOP, 1.0)
+    control.request(ControlRequest(QUICK_STOP), 1.0)
     assert control.take_completed() == []
     assert cycle(control, None, 1.02) == STOP
     message = 'quick_stop sent; the drive does not report its state'
     assert outcomes(control) == [(QUICK_STOP, True, message)]
     assert (control.word, control.pending, control.next_timer()) == (STOP, True, 3.0)
     assert control.state == 'quick_stop sent'
-    control.request(QUICK_STOP, 1.5)
+    control.request(ControlRequest(QUICK_STOP), 1.5)
     assert outcomes(control) == [(QUICK_STOP, True, message)]
-    control.request(ENABLE, 1.6)
+    control.request(ControlRequest(ENABLE), 1.6)
     assert outcomes(control) == [
         (ENABLE, False, 'quick_stop under way: try enable again when it has ended')]
     control.handle_timer(3.0)
@@ -814,7 +820,7 @@ def test_quick_stop_without_a_status_is_answered_when_sent_and_keeps_braking() -
 def test_quick_stop_without_a_status_after_disable_was_sent_succeeds_at_once() -> None:
     control = machine(SILENT)
     control.word_sent(0.0)
-    control.request(QUICK_STOP, 0.01)
+    control.request(ControlRequest(QUICK_STOP), 0.01)
     message = 'disable sent; the drive does not report its state'
     assert outcomes(control) == [(QUICK_STOP, True, message)]
     assert (control.word, control.pending) == (OFF, False)
@@ -822,7 +828,7 @@ def test_quick_stop_without_a_status_after_disable_was_sent_succeeds_at_once() -
 
 def test_fault_ends_the_braking_of_a_drive_that_reports_only_faults() -> None:
     control = machine(ONLY_FAULT)
-    control.request(QUICK_STOP, 0.0)
+    control.request(ControlRequest(QUICK_STOP), 0.0)
     cycle(control, READY, 0.0)
     assert (control.word, control.pending) == (STOP, True)
     control.take_completed()
@@ -835,7 +841,7 @@ def test_fault_ends_the_braking_of_a_drive_that_reports_only_faults() -> None:
 
 def test_quick_stop_whose_word_is_the_disable_word() -> None:
     control = enabled(replace(FULL, quick_stop=OFF))
-    control.request(QUICK_STOP, 1.0)
+    control.request(ControlRequest(QUICK_STOP), 1.0)
     assert cycle(control, ENABLED, 1.02) == OFF
     assert cycle(control, READY, 1.04) == OFF
     assert outcomes(control) == [(QUICK_STOP, True, 'ready')]
@@ -846,9 +852,9 @@ def test_quick_stop_whose_word_is_the_disable_word() -> None:
 @pytest.mark.parametrize('start', [ENABLE, RESET_FAULT])
 def test_no_start_cuts_a_stop_short(stop: ControlAction, start: ControlAction) -> None:
     control = enabled(NO_FAULT)
-    control.request(stop, 1.0)
+    control.request(ControlRequest(stop), 1.0)
     word = control.word
-    control.request(start, 1.01)
+    control.request(ControlRequest(start), 1.01)
     assert outcomes(control) == [(
         start, False, f'{stop.value} under way: try {start.value} again when it has ended')]
     assert control.word == word
@@ -859,12 +865,12 @@ def test_no_start_cuts_a_stop_short(stop: ControlAction, start: ControlAction) -
 
 def test_fault_reset_with_nothing_to_reset_does_not_disturb_a_stop() -> None:
     control = enabled()
-    control.request(QUICK_STOP, 1.0)
-    control.request(RESET_FAULT, 1.01)
+    control.request(ControlRequest(QUICK_STOP), 1.0)
+    control.request(ControlRequest(RESET_FAULT), 1.01)
     assert outcomes(control) == [(RESET_FAULT, True, 'enabled')]
     assert (control.word, control.pending) == (STOP, True)
     cycle(control, FAULT | ENABLED, 1.02)
-    control.request(RESET_FAULT, 1.03)
+    control.request(ControlRequest(RESET_FAULT), 1.03)
     assert outcomes(control) == [(
         RESET_FAULT, False, 'quick_stop under way: try reset_fault again when it has ended')]
 
@@ -873,7 +879,7 @@ def test_fault_reset_with_nothing_to_reset_does_not_disturb_a_stop() -> None:
 
 def test_reset_pulses_then_disables_and_waits_for_the_status() -> None:
     control = faulted()
-    control.request(RESET_FAULT, 0.01)
+    control.request(ControlRequest(RESET_FAULT), 0.01)
     assert control.word == RESET
     assert [cycle(control, FAULT, 0.02 * n) for n in range(1, 4)] == [RESET] * 3
     assert not control.pulsing
@@ -883,14 +889,14 @@ def test_reset_pulses_then_disables_and_waits_for_the_status() -> None:
     assert outcomes(control) == [(RESET_FAULT, True, 'ready')]
     assert control.take_notes() == ['fault gone (status word 0001h)']
     assert (control.word, control.pending) == (OFF, False)
-    control.request(ENABLE, 0.15)
+    control.request(ControlRequest(ENABLE), 0.15)
     assert control.word == RUN
 
 
 def test_pulse_is_one_word_where_that_is_acknowledged() -> None:
     control = ControlMachine(FULL, timeout=2.0, pulse=1)
     cycle(control, FAULT, 0.0)
-    control.request(RESET_FAULT, 0.01)
+    control.request(ControlRequest(RESET_FAULT), 0.01)
     assert [cycle(control, FAULT, 0.02), cycle(control, READY, 0.04)] == [RESET, OFF]
     assert outcomes(control) == [(RESET_FAULT, True, 'ready')]
 
@@ -899,7 +905,7 @@ def test_pulse_is_one_word_where_that_is_acknowledged() -> None:
 def test_pulse_is_the_same_when_the_fault_goes_meanwhile(gone: int) -> None:
     """What counts is a status that came after the pulse was over."""
     control = faulted()
-    control.request(RESET_FAULT, 0.01)
+    control.request(ControlRequest(RESET_FAULT), 0.01)
     if gone == 0:
         control.status_received(READY, 0.02)
     assert [cycle(control, READY if n >= gone else FAULT, 0.02 + 0.02 * n)
@@ -915,14 +921,14 @@ def test_reset_without_a_fault_succeeds_and_changes_nothing(
     control = build()
     cycle(control, raw, 1.0)
     word, state = control.word, control.state
-    control.request(RESET_FAULT, 1.01)
+    control.request(ControlRequest(RESET_FAULT), 1.01)
     assert outcomes(control) == [(RESET_FAULT, True, state)]
     assert (control.word, control.pending) == (word, False)
 
 
 def test_reset_that_does_not_help_fails_and_disables() -> None:
     control = faulted()
-    control.request(RESET_FAULT, 0.0)
+    control.request(ControlRequest(RESET_FAULT), 0.0)
     assert [cycle(control, FAULT, 0.1 * n) for n in range(1, 5)] == [RESET] * 3 + [OFF]
     control.handle_timer(2.0)
     assert outcomes(control) == [
@@ -932,7 +938,7 @@ def test_reset_that_does_not_help_fails_and_disables() -> None:
 
 def test_reset_that_could_not_be_sent_says_so() -> None:
     control = faulted()
-    control.request(RESET_FAULT, 0.0)
+    control.request(ControlRequest(RESET_FAULT), 0.0)
     control.handle_timer(2.0)
     assert outcomes(control) == [(
         RESET_FAULT, False, 'no confirmation in 2 s: stuck in state fault (status word 0008h); '
@@ -941,13 +947,13 @@ def test_reset_that_could_not_be_sent_says_so() -> None:
 
 def test_each_reset_is_one_rising_edge() -> None:
     control = faulted()
-    control.request(RESET_FAULT, 0.0)
+    control.request(ControlRequest(RESET_FAULT), 0.0)
     cycle(control, FAULT, 0.02)
-    control.request(RESET_FAULT, 1.0)
+    control.request(ControlRequest(RESET_FAULT), 1.0)
     assert cycle(control, FAULT, 1.02) == RESET
     control.handle_timer(2.0)
     assert [success for _, success, _ in outcomes(control)] == [False, False]
-    control.request(RESET_FAULT, 2.01)
+    control.request(ControlRequest(RESET_FAULT), 2.01)
     assert control.word == OFF
     control.status_received(FAULT, 2.02)
     assert control.word == OFF
@@ -957,20 +963,20 @@ def test_each_reset_is_one_rising_edge() -> None:
 
 def test_reset_of_a_drive_nobody_knows_looks_first() -> None:
     control = machine()
-    control.request(RESET_FAULT, 0.0)
+    control.request(ControlRequest(RESET_FAULT), 0.0)
     control.word_sent(0.0)
     assert control.word == OFF
     control.status_received(READY, 0.01)
     assert outcomes(control) == [(RESET_FAULT, True, 'ready')]
     control = machine()
-    control.request(RESET_FAULT, 0.0)
+    control.request(ControlRequest(RESET_FAULT), 0.0)
     cycle(control, FAULT, 0.0)
     assert control.word == RESET
 
 
 def test_reset_without_a_word_is_refused() -> None:
     control = faulted(replace(FULL, reset_fault=None))
-    control.request(RESET_FAULT, 0.01)
+    control.request(ControlRequest(RESET_FAULT), 0.01)
     assert outcomes(control) == [
         (RESET_FAULT, False, 'no fault reset: the profile has no reset_fault word')]
     assert (control.word, control.pending) == (OFF, False)
@@ -979,7 +985,7 @@ def test_reset_without_a_word_is_refused() -> None:
 @pytest.mark.parametrize('table', [SILENT, NO_FAULT])
 def test_reset_of_a_drive_that_reports_no_faults_is_one_pulse(table: ControlTable) -> None:
     control = machine(table)
-    control.request(RESET_FAULT, 0.0)
+    control.request(ControlRequest(RESET_FAULT), 0.0)
     assert cycle(control, READY, 0.0) == OFF
     assert [cycle(control, READY, 0.02 * n) for n in range(1, 4)] == [RESET] * 3
     assert control.take_completed() == []
@@ -991,7 +997,7 @@ def test_reset_of_a_drive_that_reports_no_faults_is_one_pulse(table: ControlTabl
 
 def test_reset_of_an_enabled_drive_that_reports_no_faults_disables_it() -> None:
     control = enabled(NO_FAULT)
-    control.request(RESET_FAULT, 1.0)
+    control.request(ControlRequest(RESET_FAULT), 1.0)
     assert [cycle(control, READY, 1.0 + 0.1 * n) for n in range(5)] == [
         OFF, RESET, RESET, RESET, OFF]
 
@@ -999,9 +1005,9 @@ def test_reset_of_an_enabled_drive_that_reports_no_faults_disables_it() -> None:
 def test_reset_replaces_an_enable() -> None:
     control = machine()
     cycle(control, READY, 0.0)
-    control.request(ENABLE, 0.01)
+    control.request(ControlRequest(ENABLE), 0.01)
     cycle(control, READY, 0.02)
-    control.request(RESET_FAULT, 0.03)
+    control.request(ControlRequest(RESET_FAULT), 0.03)
     assert control.word == OFF
     cycle(control, READY, 0.04)
     assert outcomes(control) == [
@@ -1012,18 +1018,18 @@ def test_reset_replaces_an_enable() -> None:
 
 def test_enable_is_refused_during_a_reset_and_does_not_disturb_it() -> None:
     control = faulted()
-    control.request(RESET_FAULT, 0.01)
-    control.request(ENABLE, 0.02)
+    control.request(ControlRequest(RESET_FAULT), 0.01)
+    control.request(ControlRequest(ENABLE), 0.02)
     assert outcomes(control) == [(ENABLE, False, 'fault: reset it first')]
     assert (control.word, control.pending) == (RESET, True)
 
 
 def test_enable_replaces_a_reset_where_no_fault_is_known() -> None:
     control = machine(NO_FAULT)
-    control.request(RESET_FAULT, 0.0)
+    control.request(ControlRequest(RESET_FAULT), 0.0)
     cycle(control, READY, 0.0)
     assert control.word == RESET
-    control.request(ENABLE, 0.01)
+    control.request(ControlRequest(ENABLE), 0.01)
     assert control.word == OFF
     assert outcomes(control) == [(RESET_FAULT, False, 'replaced by enable')]
     cycle(control, READY, 0.02)
@@ -1049,8 +1055,8 @@ def test_withdraw_puts_an_enabled_drive_back() -> None:
 @pytest.mark.parametrize('action', [ENABLE, DISABLE, QUICK_STOP])
 def test_withdraw_fails_what_is_under_way(action: ControlAction) -> None:
     control = machine()
-    control.request(action, 0.0)
-    control.request(action, 0.01)
+    control.request(ControlRequest(action), 0.0)
+    control.request(ControlRequest(action), 0.01)
     control.withdraw('drive offline', 1.0)
     assert outcomes(control) == [(action, False, 'drive offline')] * 2
     assert (control.word, control.pending, control.next_timer()) == (OFF, False, math.inf)
@@ -1059,11 +1065,11 @@ def test_withdraw_fails_what_is_under_way(action: ControlAction) -> None:
 
 def test_withdraw_fails_a_reset_and_remembers_the_fault() -> None:
     control = faulted()
-    control.request(RESET_FAULT, 0.01)
+    control.request(ControlRequest(RESET_FAULT), 0.01)
     control.withdraw('drive offline', 1.0)
     assert outcomes(control) == [(RESET_FAULT, False, 'drive offline')]
     assert (control.word, control.fault) == (OFF, True)
-    control.request(ENABLE, 2.0)
+    control.request(ControlRequest(ENABLE), 2.0)
     assert outcomes(control) == [(ENABLE, False, 'fault: reset it first')]
     cycle(control, FAULT, 3.0)
     assert control.take_notes() == []
@@ -1075,13 +1081,13 @@ def test_withdraw_forgets_that_there_was_no_fault() -> None:
     control = machine()
     cycle(control, READY, 0.0)
     control.withdraw('drive offline', 1.0)
-    control.request(RESET_FAULT, 2.0)
+    control.request(ControlRequest(RESET_FAULT), 2.0)
     assert (control.take_completed(), control.word, control.pending) == ([], OFF, True)
 
 
 def test_withdraw_after_the_deadline_names_the_deadline() -> None:
     control = machine()
-    control.request(ENABLE, 0.0)
+    control.request(ControlRequest(ENABLE), 0.0)
     control.withdraw('drive offline', 2.0)
     (_, _, message), = outcomes(control)
     assert message.startswith('no confirmation in 2 s')
@@ -1091,7 +1097,7 @@ def test_status_from_before_a_withdrawal_confirms_nothing() -> None:
     control = machine()
     cycle(control, READY, 0.0)
     control.withdraw('drive offline', 1.0)
-    control.request(ENABLE, 1.01)
+    control.request(ControlRequest(ENABLE), 1.01)
     assert control.word == OFF
     control.status_received(READY, 1.02)
     control.word_sent(1.025)
@@ -1102,7 +1108,7 @@ def test_status_from_before_a_withdrawal_confirms_nothing() -> None:
 
 def test_withdraw_ends_the_braking_of_a_drive_that_does_not_report() -> None:
     control = machine(SILENT)
-    control.request(QUICK_STOP, 0.0)
+    control.request(ControlRequest(QUICK_STOP), 0.0)
     control.word_sent(0.02)
     control.take_completed()
     control.withdraw('bridge stops', 0.03)
@@ -1121,18 +1127,18 @@ class AnyConversation(RuleBasedStateMachine):
         self.table = table
         self.control = ControlMachine(table, timeout=2.0)
         self.now = 0.0
-        self.open: dict[ControlTicket, float] = {}
-        self.closed: set[ControlTicket] = set()
+        self.open: dict[ControlRequest, float] = {}
+        self.closed: set[ControlRequest] = set()
         self.may_enable = False     # an ENABLE that nothing has ended since
         self.last_sent: int | None = None
 
     def collect(self) -> None:
         for done in self.control.take_completed():
-            assert done.ticket in self.open, 'no outcome without request, none twice'
+            assert done.request in self.open, 'no outcome without request, none twice'
             assert done.message
-            del self.open[done.ticket]
-            self.closed.add(done.ticket)
-            if done.ticket.action is ENABLE and not done.success and not self.refused:
+            del self.open[done.request]
+            self.closed.add(done.request)
+            if done.request.action is ENABLE and not done.success and not self.refused:
                 self.may_enable = False
         self.refused = False
 
@@ -1145,10 +1151,10 @@ class AnyConversation(RuleBasedStateMachine):
         running = word == self.table.enable
         stopping = pending and not self.open or any(
             ticket.action in (DISABLE, QUICK_STOP) for ticket in self.open)
-        ticket = self.control.request(action, self.now)
+        ticket = asked(self.control, action, self.now)
         self.open[ticket] = self.now + 2.0
         completed = self.control.take_completed()
-        by_ticket = {done.ticket: done for done in completed}
+        by_ticket = {done.request: done for done in completed}
         assert len(by_ticket) == len(completed), 'no outcome twice'
         mine = by_ticket.get(ticket)
         refused = mine is not None and not mine.success
@@ -1166,9 +1172,9 @@ class AnyConversation(RuleBasedStateMachine):
                 assert self.control.word == self.table.quick_stop
             self.may_enable = False
         for done in completed:
-            assert done.ticket in self.open
-            del self.open[done.ticket]
-            self.closed.add(done.ticket)
+            assert done.request in self.open
+            del self.open[done.request]
+            self.closed.add(done.request)
             if done.message.startswith('replaced by'):
                 assert not refused
                 self.may_enable = action is ENABLE
@@ -1228,8 +1234,8 @@ class AnyConversation(RuleBasedStateMachine):
             completed = self.control.take_completed()
             for done in completed:
                 assert done.success, done.message
-                assert done.ticket in self.open
-                del self.open[done.ticket]
+                assert done.request in self.open
+                del self.open[done.request]
         assert not self.open
         if ENABLE in wanted:
             assert self.control.word == RUN

@@ -7,7 +7,9 @@ from typing import Any
 from builders import CONTROL, drive, GAIN, parameter, read, SPEED, STATUS, WORD
 import pytest
 
-from drive_can_bridge.core.control import ControlAction, ControlMachine, ControlTicket
+from drive_can_bridge.core.control import (
+    ControlAction, ControlCompleted, ControlMachine, ControlRequest,
+)
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.events import RequestCompleted, StationLost
 from drive_can_bridge.core.frame import Frame
@@ -137,7 +139,7 @@ def test_states() -> None:
     assert made.control is not None
     made.activate(0.5)
     made.bus_available = True
-    made.request_control(ControlAction.ENABLE, 1.0)
+    made.submit(ControlRequest(ControlAction.ENABLE), 1.0)
     for raw in (1, 3):
         assert made.command(0, 1.0, 1.0) is CommandOutcome.DISABLED
         made.control.word_sent(1.0)
@@ -191,6 +193,10 @@ def test_reconfigure_changes_what_is_named() -> None:
 def test_control_requests_need_a_drive() -> None:
     made = session(control=CONTROL)
     made.active = made.bus_available = made.online = True
-    assert isinstance(made.request_control(ControlAction.DISABLE, 1.0), ControlTicket)
-    assert made.take_control_outcomes() == []
-    assert session().take_control_outcomes() == []
+    made.submit(ControlRequest(ControlAction.DISABLE), 1.0)
+    assert made.take_events() == [], 'it waits for the drive'
+    request = ControlRequest(ControlAction.DISABLE)
+    without = session()
+    without.submit(request, 1.0)
+    assert without.take_events() == [
+        ControlCompleted(request, False, 'the profile has no control section')]

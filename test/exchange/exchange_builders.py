@@ -8,7 +8,6 @@ from typing import Any
 from builders import drive, frame
 
 from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration
-from drive_can_bridge.core.control import ControlCompleted
 from drive_can_bridge.core.events import Event, ProcessDataReceived
 from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.core.session import Session
@@ -48,7 +47,6 @@ class DriveNotes:
         self.session = session
         self.samples: list[ProcessDataReceived] = []
         self.events: list[Event] = []
-        self.outcomes: list[ControlCompleted] = []
         self.commands: list[tuple[int, float]] = []
         self.told: list[float] = []
         self.discarded = 0
@@ -73,9 +71,6 @@ class DriveNotes:
 
     def handle_event(self, event: Event) -> None:
         self.events.append(event)
-
-    def control_completed(self, outcome: ControlCompleted) -> None:
-        self.outcomes.append(outcome)
 
 
 class BusNotes:

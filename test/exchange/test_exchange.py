@@ -11,7 +11,7 @@ import pytest
 from waiting import wait_for
 
 from drive_can_bridge.core.configuration import BusConfiguration
-from drive_can_bridge.core.control import ControlAction, ControlTicket
+from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
 from drive_can_bridge.core.events import Noted, RequestCompleted, StationFound, StationLost
 from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.core.requests import Failure, ReadValue
@@ -303,7 +303,7 @@ def test_request_to_an_inactive_bridge() -> None:
     assert event.outcomes == (Failure('bridge inactive'),)
 
 
-def test_ticket_is_registered_before_its_outcome_comes() -> None:
+def test_control_request_is_answered_by_an_event() -> None:
     bench = Bench(drive(control=CONTROL, request=(WORD, SPEED), mapping='assume'))
     bench.exchange.bus_opened()
     bench.exchange.activate()
@@ -311,24 +311,19 @@ def test_ticket_is_registered_before_its_outcome_comes() -> None:
     bench.hears(ANSWER, 10.002)
     bench.at(10.02)
     bench.hears(ANSWER, 10.022)
-    tickets: list[ControlTicket] = []
-
-    def register(ticket: ControlTicket) -> None:
-        assert bench.notes[0].outcomes == []
-        tickets.append(ticket)
-
-    assert bench.exchange.request_control(
-        bench.sessions[0], ControlAction.DISABLE, register) == ''
-    outcome, = bench.notes[0].outcomes
-    assert [outcome.ticket] == tickets
+    request = ControlRequest(ControlAction.DISABLE)
+    bench.exchange.submit(bench.sessions[0], request)
+    outcome, = [event for event in bench.notes[0].events if isinstance(event, ControlCompleted)]
+    assert outcome.request is request
     assert outcome.success
 
 
 def test_control_request_that_is_not_taken() -> None:
     bench = Bench(drive())
-    reason = bench.exchange.request_control(
-        bench.sessions[0], ControlAction.ENABLE, lambda ticket: None)
-    assert reason == 'the profile has no control section'
+    request = ControlRequest(ControlAction.ENABLE)
+    bench.exchange.submit(bench.sessions[0], request)
+    assert bench.notes[0].events == [
+        ControlCompleted(request, False, 'the profile has no control section')]
 
 
 def test_reconfigure() -> None:

@@ -18,7 +18,7 @@ from drive_can_bridge.configuration.profiles import read_profile
 from drive_can_bridge.core.configuration import (
     BridgeConfiguration, BusConfiguration, DriveConfiguration,
 )
-from drive_can_bridge.core.control import ControlAction, ControlCompleted
+from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
 from drive_can_bridge.core.events import Event, ProcessDataReceived, RequestCompleted
 from drive_can_bridge.core.requests import Request
 from drive_can_bridge.core.session import Session
@@ -314,10 +314,10 @@ class Bridge:
         self.samples.append(event.raws)
 
     def handle_event(self, event: Event) -> None:
-        self.events.append(event)
-
-    def control_completed(self, outcome: ControlCompleted) -> None:
-        self.controlled.append(outcome)
+        if isinstance(event, ControlCompleted):
+            self.controlled.append(event)
+        else:
+            self.events.append(event)
 
     def bus_opened(self, bus: str) -> None:
         """Take note of the bus: it was to be expected."""
@@ -352,7 +352,7 @@ class Bridge:
     def control(self, action: ControlAction) -> tuple[bool, str]:
         """Ask for a control action; return its outcome."""
         done = len(self.controlled)
-        assert self.exchange.request_control(self.session, action, lambda ticket: None) == ''
+        self.exchange.submit(self.session, ControlRequest(action))
         wait_for(lambda: len(self.controlled) > done, f'{action.value} to end')
         outcome = self.controlled[done]
         return outcome.success, outcome.message

@@ -12,7 +12,7 @@ from hypothesis import given, Phase, settings, strategies as st
 from ltmr_builders import LTMR, names, NODE
 import pytest
 
-from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
 from drive_can_bridge.core.events import (
     Event, FrameRejected, ProcessDataReceived, RequestCompleted, StationFound, StationLost,
 )
@@ -104,13 +104,15 @@ class Line:
 
     def control(self, action: ControlAction, patience: float = 20.0) -> tuple[bool, str]:
         """Ask for a control action; let time pass until it has its outcome."""
-        ticket = self.session.request_control(action, self.now)
-        assert not isinstance(ticket, str), ticket
+        request = ControlRequest(action)
+        assert not self.session.control_refusal(action)
+        self.session.submit(request, self.now)
         self._collect()
         limit = self.now + patience
         while True:
-            for done in self.session.take_control_outcomes():
-                return done.success, done.message
+            for done in self.found(ControlCompleted):
+                if done.request is request:
+                    return done.success, done.message
             assert self.now < limit, 'no outcome'
             self.run(self.now + 0.05)
 
@@ -342,7 +344,7 @@ def test_whatever_happens_answers_are_true_and_the_drive_comes_back(
         if what == 'fault':
             line.fault(value)
         elif what == 'control':
-            line.session.request_control(value, line.now)
+            line.session.submit(ControlRequest(value), line.now)
             line._collect()
         else:
             request: Any = read(RATIO)
@@ -365,7 +367,6 @@ def test_whatever_happens_answers_are_true_and_the_drive_comes_back(
     line.run(line.now + 10.0)
     assert line.session.online
     # settings are taken while the motor is off
-    line.session.take_control_outcomes()
     assert line.control(ControlAction.DISABLE)[0]
     assert line.outcome(write((RATIO, 42))) == ['written']
     assert line.ltmr.value('flc1_ratio') == 42.0

@@ -17,11 +17,11 @@ from collections.abc import Sequence
 import math
 
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.control import ControlAction, ControlMachine, ControlTicket
+from drive_can_bridge.core.control import ControlAction, ControlMachine
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.requests import BRIDGE_INACTIVE
-from drive_can_bridge.core.session import STOP_CYCLES
+from drive_can_bridge.core.session import DRIVE_OFFLINE, STOP_CYCLES
 from drive_can_bridge.core.setpoints import Setpoints
 from drive_can_bridge.protocols.cannord.broadcast import broadcast_identifier
 from drive_can_bridge.protocols.cannord.control import make_control
@@ -129,13 +129,11 @@ class LeaderSession(GroupSession):
     def _take_status(self, word: int, now: float) -> None:
         self.member_status(self.drive.name, word, now)
 
-    def request_control(self, action: ControlAction, now: float) -> ControlTicket | str:
-        if (self.active and self.bus_available and not self.online
-                and any(member.online for member in self.members)):
-            ticket = self._group.request(action, now)   # a stop is good for those that are there
-            self._control_changed(now)
-            return ticket
-        return super().request_control(action, now)
+    def control_refusal(self, action: ControlAction) -> str:
+        refusal = super().control_refusal(action)
+        # a stop is good for those that are there
+        there = any(member.online for member in self.members)
+        return '' if refusal == DRIVE_OFFLINE and there else refusal
 
     def facts(self) -> dict[str, str]:
         names = ', '.join(member.drive.name for member in self.members[1:]) or 'nobody else'
@@ -179,7 +177,7 @@ class MemberSession(GroupSession):
 
     # -- what the leader does for all -------------------------------------------------------------
 
-    def request_control(self, action: ControlAction, now: float) -> ControlTicket | str:
+    def control_refusal(self, action: ControlAction) -> str:
         return (f'{self._leader.drive.name} leads the broadcast group: call ~/{_SERVICES[action]} '
                 f'of {self._leader.drive.name}')
 

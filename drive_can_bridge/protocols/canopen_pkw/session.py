@@ -33,7 +33,7 @@ from drive_can_bridge.core.events import (
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.core.requests import BRIDGE_INACTIVE, Failure, Request
+from drive_can_bridge.core.requests import BRIDGE_INACTIVE, Request
 from drive_can_bridge.core.roles import Cells
 from drive_can_bridge.core.session import LOOKING, Session
 from drive_can_bridge.core.told import MAY_RUN
@@ -475,13 +475,9 @@ class PkwSession(Session):
 
     # -- users ------------------------------------------------------------------------------------
 
-    def submit(self, request: Request, now: float) -> None:
-        supervised = self._phase is Phase.RUNNING or self.serving
-        blocked = self._node.refusal(now) if supervised else ''
-        if blocked and len(request):
-            self._complete(request, (Failure(f'drive offline: {blocked}'),) * len(request))
-        else:
-            super().submit(request, now)
+    def _refusal(self, now: float) -> str:
+        blocked = self._node.refusal(now) if self._phase is Phase.RUNNING else ''
+        return f'drive offline: {blocked}' if blocked else super()._refusal(now)
 
     def _enqueue(self, request: Request, now: float) -> None:
         self._channel.run(

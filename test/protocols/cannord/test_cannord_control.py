@@ -221,6 +221,6 @@ def test_stop_disables() -> None:
 def test_refused_while_offline_or_inactive() -> None:
     talk = online()
     talk.until(10.2)
-    assert talk.session.request_control(ENABLE, 10.2) == 'drive offline'
+    assert talk.session.control_refusal(ENABLE) == 'drive offline'
     talk.deactivate(10.2)
-    assert talk.session.request_control(ENABLE, 10.2) == 'bridge inactive'
+    assert talk.session.control_refusal(ENABLE) == 'bridge inactive'

@@ -13,7 +13,7 @@ from cannord_session_builders import (
 import pytest
 
 from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration
-from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
 from drive_can_bridge.core.events import (
     Event, ForeignMasterSeen, Noted, ProcessDataReceived, RequestCompleted, StationFound,
     StationLost,
@@ -38,6 +38,7 @@ class Bus:
         self.sessions = make_sessions(drives)
         self.now = 10.0
         self.log: list[tuple[str, Event]] = []
+        self.controlled: list[tuple[str, ControlCompleted]] = []
         #: tells of a frame whether the bus refuses it
         self.refusing: Callable[[str], bool] = lambda text: False
         #: station -> what it answers to its process frame; a missing one is silent
@@ -61,7 +62,11 @@ class Bus:
                 session.frames_left(self.now, refused)
                 texts = [str(entry) for entry in session.take_frames()]
         for session in self.sessions:   # a partner's events may have come after its turn
-            self.log += [(session.drive.name, event) for event in session.take_events()]
+            for event in session.take_events():
+                if isinstance(event, ControlCompleted):
+                    self.controlled.append((session.drive.name, event))
+                else:
+                    self.log.append((session.drive.name, event))
         return sent
 
     def hears(self, text: str) -> list[str]:
@@ -100,13 +105,14 @@ class Bus:
         return [(name, event) for name, event in found if isinstance(event, kinds)]
 
     def asks(self, action: ControlAction, name: str = 'lift') -> None:
-        ticket = self.session(name).request_control(action, self.now)
-        assert not isinstance(ticket, str), ticket
+        assert not self.session(name).control_refusal(action)
+        self.session(name).submit(ControlRequest(action), self.now)
         self.pump()
 
     def outcomes(self, name: str = 'lift') -> list[tuple[str, bool, str]]:
-        return [(done.ticket.action.value, done.success, done.message)
-                for done in self.session(name).take_control_outcomes()]
+        found = [done for of, done in self.controlled if of == name]
+        self.controlled = [entry for entry in self.controlled if entry[0] != name]
+        return [(done.request.action.value, done.success, done.message) for done in found]
 
 
 def members(count: int = 3, **options: Any) -> list[DriveConfiguration]:
@@ -466,7 +472,7 @@ def test_a_member_that_is_lost_stops_all(station: int) -> None:
     assert words(bus.live(0.02)) == ['7E04']
     if station == 1:        # who commands is not there: neutral, too
         assert not lift.setpoints.enabled
-        assert lift.request_control(ENABLE, bus.now) != 'drive offline'
+        bus.asks(ENABLE)
         (_, success, message), = bus.outcomes()
         assert (success, message) == (False, 'lift offline')
         bus.answers = {2: READY, 3: READY}
@@ -478,7 +484,7 @@ def test_a_member_that_is_lost_stops_all(station: int) -> None:
 
 def test_members_name_their_leader() -> None:
     bus = three()
-    texts = [bus.session('hoist').request_control(action, bus.now) for action in ControlAction]
+    texts = [bus.session('hoist').control_refusal(action) for action in ControlAction]
     assert texts == [f'lift leads the broadcast group: call ~/{name} of lift'
                      for name in ('enable', 'enable', 'quick_stop', 'reset_fault')]
     control = bus.session('hoist').control
@@ -491,7 +497,7 @@ def test_refused_when_nobody_is_there() -> None:
     bus = Bus(*members())
     bus.answers = {}
     bus.live(0.5)
-    assert bus.session('lift').request_control(ENABLE, bus.now) == 'drive offline'
+    assert bus.session('lift').control_refusal(ENABLE) == 'drive offline'
 
 
 # -- stops ----------------------------------------------------------------------------------------

@@ -306,7 +306,7 @@ class SessionMachine(AnyOrder):
 
     def answered(self, outcome: ControlCompleted) -> None:
         if outcome.success:
-            self.succeeded.append(outcome.ticket.action)
+            self.succeeded.append(outcome.request.action)
 
     def wanted(self, action: ControlAction) -> None:
         if action is ControlAction.ENABLE:

@@ -105,7 +105,7 @@ def test_enabling_while_tripped_is_refused() -> None:
 
 def test_offline_drive_is_not_enabled() -> None:
     talk = started(control=CONTROL)
-    assert talk.session.request_control(ControlAction.ENABLE, 10.01) == 'drive offline'
+    assert talk.session.control_refusal(ControlAction.ENABLE) == 'drive offline'
 
 
 # -- lost answers ---------------------------------------------------------------------------------

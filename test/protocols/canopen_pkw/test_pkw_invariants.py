@@ -322,7 +322,7 @@ class SessionMachine(AnyOrder):
 
     def answered(self, outcome: ControlCompleted) -> None:
         if outcome.success:
-            self.succeeded.append(outcome.ticket.action)
+            self.succeeded.append(outcome.request.action)
 
     def drive_is_well(self) -> None:
         self.fates.clear()

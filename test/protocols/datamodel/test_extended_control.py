@@ -198,15 +198,15 @@ def test_time_out_of_a_request() -> None:
 
 def test_refusals() -> None:
     plain = online()
-    assert plain.session.request_control(ControlAction.ENABLE, 10.003) == (
+    assert plain.session.control_refusal(ControlAction.ENABLE) == (
         'the profile has no control section')
-    assert plain.session.take_control_outcomes() == []
+    assert plain.control_outcomes() == []
     talk = Conversation(drive(control=CONTROL))
-    assert talk.session.request_control(ControlAction.ENABLE, 1.0) == 'bridge inactive'
+    assert talk.session.control_refusal(ControlAction.ENABLE) == 'bridge inactive'
     talk.activate(2.0)
-    assert talk.session.request_control(ControlAction.ENABLE, 2.0) == 'bus down'
+    assert talk.session.control_refusal(ControlAction.ENABLE) == 'bus down'
     talk.bus_up(3.0)
-    assert talk.session.request_control(ControlAction.ENABLE, 3.0) == 'drive offline'
+    assert talk.session.control_refusal(ControlAction.ENABLE) == 'drive offline'
 
 
 # -- written --------------------------------------------------------------------------------------

@@ -376,7 +376,7 @@ class SessionMachine(AnyOrder):
 
     def deactivate(self) -> None:
         super().deactivate()
-        assert not self.tickets
+        assert not self.control_requests
 
     @invariant()
     def polling_goes_on(self) -> None:

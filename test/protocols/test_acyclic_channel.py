@@ -1,0 +1,165 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""What the channel of all families does with any courier; a drive with one request at a time."""
+
+from collections.abc import Callable, Generator, Hashable
+import math
+
+import pytest
+
+from drive_can_bridge.protocols.channel import Channel, Lane, STOP_PATIENCE
+from drive_can_bridge.protocols.courier import Courier
+
+TIMEOUT = 0.1
+Asking = Generator[str, 'str | None', list['str | None']]
+
+
+class Postman(Courier[str, 'str | None']):
+    """Steps and replies are words; None: nobody answered. Capitals are asked once."""
+
+    busy = False
+    deadline = math.inf
+
+    def __init__(self) -> None:
+        self.sent: list[str] = []
+
+    @property
+    def silence(self) -> float:
+        return TIMEOUT
+
+    def begin(self, step: str, now: float) -> None:
+        self.sent.append(step)
+        self.busy, self.deadline = True, now + TIMEOUT
+
+    def handle_timer(self, now: float) -> str | bool | None:
+        if now < self.deadline:
+            return False
+        self.forget()
+        return None
+
+    def forget(self) -> None:
+        self.busy, self.deadline = False, math.inf
+
+    def abandon(self, until: float) -> None:
+        self.deadline = min(self.deadline, until)
+
+    def attempts(self, step: str) -> int:
+        return 1 if step.isupper() else 2
+
+    def unanswered(self, step: str, reply: str | None) -> bool:
+        return reply is None
+
+    def key(self, step: str) -> Hashable:
+        return step
+
+
+class Line:
+    def __init__(self) -> None:
+        self.postman = Postman()
+        self.channel = Channel(self.postman)
+        self.results: list[object] = []
+
+    def asks(self, *steps: str, now: float, lane: Lane = Lane.OWN) -> list[str]:
+        def asking() -> Asking:
+            found = []
+            for step in steps:
+                found.append((yield step))
+            return found
+        self.channel.run(asking(), self.results.append, now, lane)
+        return self.sent()
+
+    def sent(self) -> list[str]:
+        sent, self.postman.sent = self.postman.sent, []
+        return sent
+
+    def answer(self, reply: str, now: float) -> list[str]:
+        self.postman.forget()
+        self.channel.ended(reply, now)
+        return self.sent()
+
+    def at(self, now: float) -> list[str]:
+        self.channel.advance(now)
+        return self.sent()
+
+
+def test_lanes_come_in_their_order() -> None:
+    line = Line()
+    assert line.asks('a', now=1.0) == ['a']
+    for lane in reversed(Lane):
+        line.asks(lane.name.lower(), now=1.0, lane=lane)
+    assert [line.answer('', 1.01 + 0.01 * step) for step in range(6)] == [
+        ['stop'], ['control'], ['setpoints'], ['users'], ['own'], []]
+
+
+def test_what_is_held_back_is_begun_as_late_as_possible() -> None:
+    """So that it tells what is true then; a stop is not held back."""
+    line = Line()
+    line.channel.hold(2.0)
+    begun: list[float] = []
+
+    def asking() -> Asking:
+        begun.append(line.channel.now)
+        return [(yield 'word')]
+    line.channel.run(asking(), line.results.append, 1.0, Lane.CONTROL)
+    assert line.channel.next_timer() == 2.0
+    assert line.asks('stop', now=1.1, lane=Lane.STOP) == ['stop']
+    assert line.answer('', 1.2) == []
+    assert begun == []
+    assert line.at(2.0) == ['word']
+    assert begun == [2.0]
+
+
+def test_a_stop_has_the_exchange_under_way_make_room_which_was_no_attempt() -> None:
+    line = Line()
+    assert line.asks('read', now=1.0) == ['read']
+    line.asks('stop', now=1.01, lane=Lane.STOP)
+    line.channel.make_room(1.01)
+    assert line.channel.next_timer() == pytest.approx(1.01 + STOP_PATIENCE)
+    assert line.at(1.0601) == ['stop']
+    assert line.answer('', 1.07) == ['read'], 'its own late answer is as good'
+    assert line.at(1.1701) == ['read'], 'it has its second attempt all the same'
+    assert line.at(1.2702) == []
+    assert line.results == [[''], [None]]
+
+
+def test_cancelled_exchange_is_waited_for_and_tells_nobody() -> None:
+    line = Line()
+    line.asks('a', 'b', now=1.0)
+    line.channel.cancel(Lane.OWN)
+    assert line.asks('c', now=1.01) == [], 'one at a time'
+    assert line.answer('late', 1.02) == ['c']
+    assert line.answer('there', 1.03) == []
+    assert line.results == [['there']]
+
+
+@pytest.mark.parametrize('forget', [
+    lambda line, now: line.channel.clear(), lambda line, now: line.channel.cancel(Lane.OWN)])
+def test_forgotten_question_is_not_asked_again_before_its_answer_would_have_come(
+        forget: Callable[[Line, float], None]) -> None:
+    line = Line()
+    line.asks('A', now=1.0)
+    forget(line, 1.05)
+    line.postman.forget()
+    assert line.asks('A', now=1.06) == []
+    assert line.asks('B', now=1.06, lane=Lane.USERS) == ['B'], 'others go on'
+    line.answer('', 1.07)
+    assert line.channel.next_timer() == pytest.approx(1.2)
+    assert line.at(1.2001) == ['A']
+
+
+def test_after_a_stall_the_silence_begins_anew() -> None:
+    line = Line()
+    line.asks('A', now=1.0)
+    line.channel.time_lost(5.0)
+    line.channel.clear()
+    assert line.asks('A', now=5.0) == []
+    assert line.at(5.0999) == []
+    assert line.at(5.1) == ['A']
+
+
+def test_quarantine_that_nobody_listened_through_is_prolonged() -> None:
+    line = Line()
+    line.asks('A', now=1.0)
+    assert line.at(1.1) == []
+    line.channel.time_lost(1.2002)      # just at its end
+    assert line.asks('A', now=1.2002) == []
+    assert line.at(1.2103) == ['A']
