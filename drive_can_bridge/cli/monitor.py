@@ -35,7 +35,7 @@ def add_parser(subparsers: Any) -> None:
         description='Show all bridges and their drives, live, until SIGINT or SIGTERM. Needs ROS, '
                     'and nothing of a bridge but its topics and services. In a terminal its last '
                     'line names the keys; elsewhere one line per drive and second.')
-    parser.add_argument('--namespace', metavar='NS', default='', type=_namespace,
+    parser.add_argument('--namespace', metavar='NS', default='', type=namespace,
                         help='only bridges in this namespace, or below it')
     # how drive_can demo runs it
     parser.add_argument('--title', default='drive_can monitor', help=argparse.SUPPRESS)
@@ -108,7 +108,8 @@ def _print_lines(source: Source, model: Model, watcher: SignalWatcher) -> int:
     return 0
 
 
-def _namespace(text: str) -> str:
+def namespace(text: str) -> str:
+    """Read the argument of ``--namespace``."""
     name = f'/{text.strip("/")}'
     if name != '/' and not is_ros_name(name):
         raise argparse.ArgumentTypeError(f'{text!r} is no namespace, write /cell1')
