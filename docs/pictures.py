@@ -3,7 +3,8 @@
 The pictures of README and docs, in one style: ``make pictures``.
 
 Each is a function in ``PICTURES`` that writes one file. Nothing is drawn by hand: the live view is
-that of a demo which really runs, exported by rich, and so is the diagram of the architecture.
+that of a demo which really runs, exported by rich, and so is the diagram of the architecture. The
+panel is seen in a real browser; where none is installed its pictures are left out.
 """
 
 import argparse
@@ -25,6 +26,8 @@ from rich.console import Console, Group, RenderableType
 from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
+
+import panel_pictures
 
 from drive_can_bridge.monitor.model import Model
 from drive_can_bridge.ros.monitor.client import MonitorClient
@@ -157,6 +160,7 @@ def _save(body: RenderableType, path: Path, title: str, width: int, height: int)
 PICTURES: dict[str, Callable[[Path], None]] = {
     'monitor.svg': live_view,
     'architecture.svg': architecture,
+    **panel_pictures.PICTURES,
 }
 
 
@@ -171,6 +175,10 @@ def main() -> int:
         parser.error(f'{", ".join(unknown)}: allowed are {", ".join(PICTURES)}')
     options.directory.mkdir(parents=True, exist_ok=True)
     for name in options.names or PICTURES:
+        reason = panel_pictures.missing() if name in panel_pictures.PICTURES else ''
+        if reason:
+            print(f'not {name}: {reason}', file=sys.stderr)
+            continue
         path = options.directory / name
         PICTURES[name](path)
         print(path)

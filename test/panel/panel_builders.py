@@ -7,7 +7,6 @@ from http.client import HTTPConnection, HTTPResponse
 import json
 from pathlib import Path
 import re
-import subprocess
 from typing import Any
 
 from running import Running
@@ -91,8 +90,10 @@ class Site:
         self._file.write_text(FILE.format(directory=directory), encoding='utf-8')
         (directory / 'hostile.yaml').write_text(PROFILE.format(script=SCRIPT), encoding='utf-8')
         self._links = directory / 'links'
+        #: as candump writes it
+        self.frame_log = directory / 'frames.log'
         self.drives = run('drive_can', 'simulate', '--params-file', str(self._file), '--pty-link',
-                          str(self._links), stdin=subprocess.PIPE)
+                          str(self._links), '--log-frames', str(self.frame_log))
         wait_for((self._links / 'main').is_symlink, 'the drives')
         self.bridge = self.start_bridge()
         self.panel = run('drive_can', 'panel', '--port', '0', *arguments)
