@@ -23,8 +23,9 @@ VIEWS = {'panel.webp': ('/', False, 3.0), 'panel_drive.webp': ('/drive/lift', Fa
 def missing() -> str:
     """Say why there can be no pictures; '' if there can."""
     try:
-        from panel_browser import browser_missing
         import nicegui  # noqa: F401
+        from panel_browser import browser_missing
+        import selenium  # noqa: F401
     except ImportError as error:
         return f'no Python module {error.name}'
     return browser_missing()

@@ -21,13 +21,12 @@ import time
 os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
 os.environ.setdefault('ROS_DOMAIN_ID', '96')
 
+import panel_pictures
 from rich import box
 from rich.console import Console, Group, RenderableType
 from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
-
-import panel_pictures
 
 from drive_can_bridge.monitor.model import Model
 from drive_can_bridge.ros.monitor.client import MonitorClient

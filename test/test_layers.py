@@ -39,6 +39,7 @@ INTERNAL: dict[str, set[str]] = {
     'view': {'', 'core', 'monitor'},
     # what it asks of drives comes from whoever starts it: it knows no ROS
     'panel': {'', 'core', 'monitor'},
+    'security': {'', 'core', 'protocols'},
     'ros.monitor': {'', 'core', 'monitor'},
     'ros.demo': {'', 'core', 'configuration', 'simulation', 'monitor', 'ros', 'ros.monitor'},
     'demo': {'', 'core', 'configuration', 'process'},
@@ -50,8 +51,8 @@ INTERNAL: dict[str, set[str]] = {
     'backup': {'', 'core', 'configuration', 'client.drive'},
     'cli': {
         '', 'core', 'configuration', 'protocols', 'resources', 'transport', 'exchange', 'process',
-        'profiles', 'simulation', 'trace', 'monitor', 'view', 'panel', 'demo', 'client',
-        'client.drive', 'backup', 'ros', 'ros.monitor', 'ros.demo'},
+        'profiles', 'simulation', 'trace', 'monitor', 'view', 'panel', 'security', 'demo',
+        'client', 'client.drive', 'backup', 'ros', 'ros.monitor', 'ros.demo'},
 }
 
 ROS_PACKAGES = {

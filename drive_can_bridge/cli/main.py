@@ -35,6 +35,7 @@ SUBCOMMANDS: dict[str, tuple[str, str]] = {
                 'show all bridges and their drives, live'),
     'panel': ('drive_can_bridge.cli.panel',
               'show all bridges and their drives in a browser'),
+    'security': ('drive_can_bridge.cli.security', 'write who may talk to a bridge'),
     'profile': ('drive_can_bridge.cli.profile',
                 'list, show, check and import parameter tables'),
     'scan': ('drive_can_bridge.cli.scan', 'find the drives on a bus'),

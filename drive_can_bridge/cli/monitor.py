@@ -12,12 +12,12 @@ import sys
 import time
 from typing import Any
 
+from drive_can_bridge.cli.namespaces import namespace
 from drive_can_bridge.cli.without_ros import what_is_missing
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.monitor.lines import balance, line
 from drive_can_bridge.monitor.model import Model
 from drive_can_bridge.monitor.source import Source
-from drive_can_bridge.monitor.text import is_ros_name
 from drive_can_bridge.process import environment
 from drive_can_bridge.process.signals import leave, SignalWatcher
 
@@ -106,11 +106,3 @@ def _print_lines(source: Source, model: Model, watcher: SignalWatcher) -> int:
         if lines:
             print('\n'.join(lines), flush=True)
     return 0
-
-
-def namespace(text: str) -> str:
-    """Read the argument of ``--namespace``."""
-    name = f'/{text.strip("/")}'
-    if name != '/' and not is_ros_name(name):
-        raise argparse.ArgumentTypeError(f'{text!r} is no namespace, write /cell1')
-    return name if name != '/' else ''

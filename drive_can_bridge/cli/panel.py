@@ -9,7 +9,7 @@ import argparse
 import sys
 from typing import Any
 
-from drive_can_bridge.cli.monitor import namespace
+from drive_can_bridge.cli.namespaces import namespace
 from drive_can_bridge.cli.without_ros import what_is_missing
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.monitor.model import Model

@@ -9,12 +9,6 @@ import re
 import shutil
 from typing import Any
 
-from selenium import webdriver
-from selenium.common.exceptions import StaleElementReferenceException
-from selenium.webdriver.chrome.service import Service
-from selenium.webdriver.common.by import By
-from selenium.webdriver.common.keys import Keys
-from selenium.webdriver.remote.webelement import WebElement
 from waiting import wait_for
 
 #: columns and lines
@@ -38,6 +32,9 @@ class Browser:
     """
 
     def __init__(self, directory: Path, *, phone: bool = False) -> None:
+        # imported late: whoever finds it missing can say so
+        from selenium import webdriver
+        from selenium.webdriver.chrome.service import Service
         options = webdriver.ChromeOptions()
         options.binary_location = str(shutil.which('chromium'))
         for argument in (
@@ -92,13 +89,15 @@ class Browser:
         """Run a script in the page."""
         return self._driver.execute_script(script)
 
-    def find_all(self, selector: str) -> list[WebElement]:
+    def find_all(self, selector: str) -> list[Any]:
         """Find elements."""
-        found: list[WebElement] = self._driver.find_elements(By.CSS_SELECTOR, selector)
+        found: list[Any] = self._driver.find_elements('css selector', selector)
         return found
 
     def click(self, selector: str, text: str) -> None:
         """Click what has a text, as soon as it is there."""
+        from selenium.common.exceptions import StaleElementReferenceException
+
         def clicked() -> bool:
             try:
                 for element in self.find_all(selector):
@@ -132,6 +131,7 @@ class Browser:
 
     def write(self, name: str, text: str) -> None:
         """Type a value and press Enter."""
+        from selenium.webdriver.common.keys import Keys
         field = self.find_all(f'[data-parameter="{name}"] input')[0]
         field.send_keys(Keys.CONTROL, 'a')
         field.send_keys(text, Keys.ENTER)

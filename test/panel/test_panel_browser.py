@@ -7,15 +7,14 @@ import signal
 import time
 from urllib.parse import urlsplit
 
+from panel_browser import Browser, browser_missing
 from panel_builders import SCRIPT, Site
+from panel_somebody import Somebody
 import pytest
 from waiting import wait_for
 
-pytest.importorskip('rclpy')
 pytest.importorskip('nicegui', reason="needs the extra 'panel'")
 pytest.importorskip('selenium', reason='.ci/browser brings it')
-from panel_browser import Browser, browser_missing  # noqa: E402
-from panel_somebody import Somebody  # noqa: E402
 
 pytestmark = [pytest.mark.browser, pytest.mark.skipif(browser_missing() != '',
                                                       reason=browser_missing())]
@@ -84,7 +83,7 @@ def test_an_edit_reaches_the_drive_and_its_refusal_is_shown(site: Site, browser:
     browser.shows('ramp_time')
     browser.search('ramp_time')
     browser.shows('1 of 6 parameters')
-    wait_for(lambda: browser.field('ramp_time') not in ('', None), 'its value, read from the drive')
+    wait_for(lambda: browser.field('ramp_time') not in ('', None), 'its value, as read')
     browser.write('ramp_time', '2.5')
     browser.shows('written')
     answer = site.do('write', 'operator',
