@@ -12,7 +12,7 @@ from typing import Any
 from waiting import wait_for
 
 #: columns and lines
-DESKTOP, PHONE = (1280, 900), (390, 844)
+DESKTOP, PHONE = (1280, 1020), (390, 844)
 _CHART = 'getElement(document.querySelector(".chart").id.slice(1)).chart.getOption()'
 
 

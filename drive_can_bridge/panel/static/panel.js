@@ -49,7 +49,9 @@ const panel = (() => {
 
   async function stop(action, drive, name) {
     const answer = await send(action, {drive});
-    tell(answer.success, `${name}: ${answer.text || action.replace('_', ' ') + ' done'}`);
+    const text = answer.text || `${action.replace('_', ' ')} done`;
+    // of all drives, each is named in the answer
+    tell(answer.success, drive === '*' ? text : `${name}: ${text}`);
   }
 
   async function write(drive, name, row) {
@@ -120,13 +122,18 @@ const panel = (() => {
       const restore = document.createElement('button');
       restore.textContent = 'Restore: write what differs to the drive';
       restore.className = 'danger';
+      const warning = document.createElement('p');
+      warning.textContent = 'Restoring writes settings at once. Make sure that the drive stands '
+        + 'still: the panel does not ask again, also where nobody knows whether it is enabled.';
       restore.addEventListener('click', async () => {
         restore.disabled = true;
         box.querySelector('pre').textContent = 'restoring …';
         const answer = await carry('restore', drive, file);
         box.querySelector('pre').textContent = answer.text;
         restore.remove();
+        warning.remove();
       });
+      box.insertBefore(warning, box.querySelector('button'));
       box.append(restore);
     });
     document.body.append(chooser);
