@@ -48,6 +48,7 @@ setup(
     package_data={
         PACKAGE: ['py.typed'],
         f'{PACKAGE}.configuration': ['schemas/*.json'],
+        f'{PACKAGE}.panel': ['static/*'],
     },
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{PACKAGE}']),
@@ -75,6 +76,8 @@ setup(
         'eds': ['canopen>=2.3'],
         # completion in the shell
         'completion': ['argcomplete'],
+        # drive_can panel: the drives in a browser. No rosdep key either.
+        'panel': ['nicegui>=3,<4'],
         # pictures of drive_can decode --plot
         'plot': [
             'matplotlib',

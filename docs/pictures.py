@@ -3,7 +3,8 @@
 The pictures of README and docs, in one style: ``make pictures``.
 
 Each is a function in ``PICTURES`` that writes one file. Nothing is drawn by hand: the live view is
-that of a demo which really runs, exported by rich, and so is the diagram of the architecture.
+that of a demo which really runs, exported by rich, and so is the diagram of the architecture. The
+panel is seen in a real browser; where none is installed its pictures are left out.
 """
 
 import argparse
@@ -20,6 +21,7 @@ import time
 os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
 os.environ.setdefault('ROS_DOMAIN_ID', '96')
 
+import panel_pictures
 from rich import box
 from rich.console import Console, Group, RenderableType
 from rich.panel import Panel
@@ -157,6 +159,7 @@ def _save(body: RenderableType, path: Path, title: str, width: int, height: int)
 PICTURES: dict[str, Callable[[Path], None]] = {
     'monitor.svg': live_view,
     'architecture.svg': architecture,
+    **panel_pictures.PICTURES,
 }
 
 
@@ -171,6 +174,10 @@ def main() -> int:
         parser.error(f'{", ".join(unknown)}: allowed are {", ".join(PICTURES)}')
     options.directory.mkdir(parents=True, exist_ok=True)
     for name in options.names or PICTURES:
+        reason = panel_pictures.missing() if name in panel_pictures.PICTURES else ''
+        if reason:
+            print(f'not {name}: {reason}', file=sys.stderr)
+            continue
         path = options.directory / name
         PICTURES[name](path)
         print(path)

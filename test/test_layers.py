@@ -37,6 +37,9 @@ INTERNAL: dict[str, set[str]] = {
         'process'},
     'monitor': {'', 'core'},
     'view': {'', 'core', 'monitor'},
+    # what it asks of drives comes from whoever starts it: it knows no ROS
+    'panel': {'', 'core', 'monitor'},
+    'security': {'', 'core', 'protocols'},
     'ros.monitor': {'', 'core', 'monitor'},
     'ros.demo': {'', 'core', 'configuration', 'simulation', 'monitor', 'ros', 'ros.monitor'},
     'demo': {'', 'core', 'configuration', 'process'},
@@ -48,8 +51,8 @@ INTERNAL: dict[str, set[str]] = {
     'backup': {'', 'core', 'configuration', 'client.drive'},
     'cli': {
         '', 'core', 'configuration', 'protocols', 'resources', 'transport', 'exchange', 'process',
-        'profiles', 'simulation', 'trace', 'monitor', 'view', 'demo', 'client', 'client.drive',
-        'backup', 'ros', 'ros.monitor', 'ros.demo'},
+        'profiles', 'simulation', 'trace', 'monitor', 'view', 'panel', 'security', 'demo',
+        'client', 'client.drive', 'backup', 'ros', 'ros.monitor', 'ros.demo'},
 }
 
 ROS_PACKAGES = {
@@ -72,6 +75,8 @@ EXTERNAL: dict[str, set[str]] = {
     'ros.client': ROS_PACKAGES,
     'ros.demo': ROS_PACKAGES,
     'view': {'rich'},
+    # an optional extra
+    'panel': {'fastapi', 'nicegui', 'starlette', 'uvicorn'},
     'demo': {'yaml'},
     # argcomplete: an optional extra
     'cli': {'argcomplete', 'rich'},
@@ -80,7 +85,7 @@ EXTERNAL: dict[str, set[str]] = {
 #: Layer: edges that may be used inside functions only, so that importing the layer stays cheap and
 #: works where the other side is missing.
 LAZY = {('cli', 'ros'), ('cli', 'ros.monitor'), ('cli', 'ros.demo'), ('cli', 'view'),
-        ('cli', 'demo'), ('client', 'ros.client')}
+        ('cli', 'panel'), ('cli', 'demo'), ('client', 'ros.client')}
 
 #: No clock, no thread, no log, no input or output in here: time and frames are arguments.
 SANS_IO = {'core', 'protocols', 'monitor'}

@@ -33,6 +33,9 @@ SUBCOMMANDS: dict[str, tuple[str, str]] = {
              'run a bridge, simulated drives and the live view of them'),
     'monitor': ('drive_can_bridge.cli.monitor',
                 'show all bridges and their drives, live'),
+    'panel': ('drive_can_bridge.cli.panel',
+              'show all bridges and their drives in a browser'),
+    'security': ('drive_can_bridge.cli.security', 'write who may talk to a bridge'),
     'profile': ('drive_can_bridge.cli.profile',
                 'list, show, check and import parameter tables'),
     'scan': ('drive_can_bridge.cli.scan', 'find the drives on a bus'),
@@ -52,7 +55,7 @@ SUBCOMMANDS: dict[str, tuple[str, str]] = {
                'say what the frames of a trace, or of a bus, mean'),
 }
 #: what runs until a signal comes: that is no failure
-ENDLESS = ('simulate', 'demo', 'record', 'monitor')
+ENDLESS = ('simulate', 'demo', 'record', 'monitor', 'panel')
 #: options that make a subcommand one of these
 ENDLESS_OPTIONS = ('--live', '--watch')
 #: exit code of what is interrupted before it is done

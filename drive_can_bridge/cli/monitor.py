@@ -12,12 +12,12 @@ import sys
 import time
 from typing import Any
 
+from drive_can_bridge.cli.namespaces import namespace
 from drive_can_bridge.cli.without_ros import what_is_missing
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.monitor.lines import balance, line
 from drive_can_bridge.monitor.model import Model
 from drive_can_bridge.monitor.source import Source
-from drive_can_bridge.monitor.text import is_ros_name
 from drive_can_bridge.process import environment
 from drive_can_bridge.process.signals import leave, SignalWatcher
 
@@ -35,7 +35,7 @@ def add_parser(subparsers: Any) -> None:
         description='Show all bridges and their drives, live, until SIGINT or SIGTERM. Needs ROS, '
                     'and nothing of a bridge but its topics and services. In a terminal its last '
                     'line names the keys; elsewhere one line per drive and second.')
-    parser.add_argument('--namespace', metavar='NS', default='', type=_namespace,
+    parser.add_argument('--namespace', metavar='NS', default='', type=namespace,
                         help='only bridges in this namespace, or below it')
     # how drive_can demo runs it
     parser.add_argument('--title', default='drive_can monitor', help=argparse.SUPPRESS)
@@ -106,10 +106,3 @@ def _print_lines(source: Source, model: Model, watcher: SignalWatcher) -> int:
         if lines:
             print('\n'.join(lines), flush=True)
     return 0
-
-
-def _namespace(text: str) -> str:
-    name = f'/{text.strip("/")}'
-    if name != '/' and not is_ros_name(name):
-        raise argparse.ArgumentTypeError(f'{text!r} is no namespace, write /cell1')
-    return name if name != '/' else ''

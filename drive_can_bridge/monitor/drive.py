@@ -11,6 +11,8 @@ from drive_can_bridge.monitor.snapshot import DriveSnapshot, Place, Reading, Sho
 from drive_can_bridge.monitor.values import ParameterInfo
 
 OFFLINE, ONLINE = 'offline', 'online'
+#: key of diagnostics; there for drives with a control word only
+CONTROL_STATE = 'control_state'
 #: of a drive that exchanges nothing
 _SILENT_STATES = (OFFLINE, 'mapping differs', '')
 #: s after which a drive that is sampled all the time, and said to be online, has lost its bridge
@@ -115,7 +117,7 @@ class DriveRecord:
         return DriveSnapshot(
             name=self.name, label=label, bridge=report.bridge, state=state, level=level,
             online=online, advice=advice,
-            control=report.facts.get('control_state', '') if online else '',
+            control=report.facts.get(CONTROL_STATE, '') if online else '',
             setpoints=requests.shown(self.parameters, now, current=online),
             values=responses.shown(self.parameters, now, current=online),
             bits=self.bits if online else {}, rate=self.rate if online else 0.0,

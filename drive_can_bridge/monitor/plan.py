@@ -7,7 +7,7 @@ are no burden; fifteen with 200 exchanges a second each are. So there is a budge
 at closely is always sampled, the others take turns.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 #: messages per second
 BUDGET = 1000.0
@@ -24,14 +24,15 @@ class SamplingPlan:
         self._next = 0
         self._chosen: frozenset[str] = frozenset()
 
-    def choose(self, rates: Mapping[str, float], focus: str | None, now: float) -> frozenset[str]:
+    def choose(self, rates: Mapping[str, float], focus: Collection[str], now: float,
+               ) -> frozenset[str]:
         """
         Return the drives to be sampled.
 
         :param rates: exchanges per second of all drives; 0 while unknown, or offline.
-        :param focus: the drive that is looked at closely.
+        :param focus: drives that are looked at closely.
         """
-        known = {name for name in rates if name == focus}
+        known = {name for name in rates if name in focus}
         if now < self._turn_ends and known <= self._chosen <= rates.keys():
             return self._chosen
         self._turn_ends = now + TURN

@@ -5,13 +5,19 @@ from dataclasses import dataclass, field
 import math
 import re
 
+from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import ParameterType, Value, ValueKind
+from drive_can_bridge.monitor.text import printable
 
 _DECIMALS_MAX = 6
 #: columns for a value of which nothing is known
 _WIDTH = 8
 #: what a drive says about its states is read in hexadecimal
 _WORD_SUFFIX = 'word'
+_BOOLS = {'true': True, '1': True, 'on': True, 'false': False, '0': False, 'off': False}
+_KIND_WORDS = {ValueKind.BOOL: 'write true or false',
+               ValueKind.INTEGER: 'write an integer, such as 12 or 0x0C',
+               ValueKind.DOUBLE: 'write a number, such as 12.5'}
 _PAIR = re.compile(r'(\w+)=(?:"([^"]*)"|(\S+))')
 
 
@@ -100,6 +106,30 @@ class ParameterInfo:
         text = (str(value) if isinstance(value, int) and not isinstance(value, bool)
                 else self.text(value))
         return f'{self.name}={text}{f" {self.unit}" if self.unit else ""}'
+
+    def parse(self, text: str) -> Value:
+        """
+        Read what a person has typed; whether it is allowed is for the bridge to say.
+
+        :raises ValueRefused: not a value of this kind; says what is.
+        """
+        word = text.strip()
+        try:
+            if self.kind is ValueKind.BOOL:
+                return _BOOLS[word.lower()]
+            if self.kind is ValueKind.INTEGER:
+                return int(word, 0)
+            value = float(word)
+        except (KeyError, ValueError):
+            value = math.nan
+        if not math.isfinite(value):
+            raise ValueRefused(f'{printable(word)!r} is no value: {_KIND_WORDS[self.kind]}')
+        return value
+
+    @property
+    def settable(self) -> bool:
+        """Can be written by a service, as far as is told."""
+        return not self.read_only and self.facts.get('role') is None
 
     def _number(self, fact: str, default: float) -> float:
         try:

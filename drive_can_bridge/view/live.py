@@ -52,7 +52,8 @@ def look(source: Source, model: Model, choice: Choice, read: Wish | None, *,
     :param read: what was read last, and need not be read again.
     :return: what was read last now.
     """
-    source.focus(closely(choice))
+    drive = closely(choice)
+    source.focus(*([] if drive is None else [drive]))
     source.poll(now)
     wanted = to_read(model.look(now, 0.0), choice, width=size[0], height=size[1])
     if wanted is None or wanted == read:

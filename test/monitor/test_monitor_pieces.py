@@ -102,7 +102,7 @@ def test_rates_begin_anew_when_a_counter_does() -> None:
 def test_few_drives_are_all_sampled_all_the_time() -> None:
     plan = SamplingPlan()
     rates = {'/a': 50.0, '/b': 50.0, '/c': 0.0}
-    assert all(plan.choose(rates, None, 0.1 * step) == {'/a', '/b', '/c'} for step in range(100))
+    assert all(plan.choose(rates, (), 0.1 * step) == {'/a', '/b', '/c'} for step in range(100))
 
 
 def test_many_fast_drives_take_turns_within_the_budget() -> None:
@@ -110,7 +110,7 @@ def test_many_fast_drives_take_turns_within_the_budget() -> None:
     rates = {f'/d{number}': 200.0 for number in range(15)}
     seen_at: dict[str, float] = {}
     for step in range(100):
-        chosen = plan.choose(rates, '/d3', 0.25 * step)
+        chosen = plan.choose(rates, ['/d3'], 0.25 * step)
         assert '/d3' in chosen
         assert sum(rates[name] for name in chosen) <= 1000.0
         seen_at.update(dict.fromkeys(chosen, 0.25 * step))
@@ -122,16 +122,16 @@ def test_many_fast_drives_take_turns_within_the_budget() -> None:
 def test_a_drive_beyond_the_budget_gets_its_turn_too() -> None:
     plan = SamplingPlan(budget=100.0)
     rates = {'/a': 5000.0, '/b': 5000.0}
-    chosen = [plan.choose(rates, None, 2.0 * step) for step in range(4)]
+    chosen = [plan.choose(rates, (), 2.0 * step) for step in range(4)]
     assert chosen == [{'/a'}, {'/b'}, {'/a'}, {'/b'}]
 
 
 def test_what_is_looked_at_closely_counts_at_once() -> None:
     plan = SamplingPlan(budget=100.0)
     rates = {'/a': 100.0, '/b': 100.0}
-    assert plan.choose(rates, None, 0.0) == {'/a'}
-    assert '/b' in plan.choose(rates, '/b', 0.1)
-    assert plan.choose({}, '/b', 0.2) == set()
+    assert plan.choose(rates, (), 0.0) == {'/a'}
+    assert '/b' in plan.choose(rates, ['/b'], 0.1)
+    assert plan.choose({}, ['/b'], 0.2) == set()
 
 
 # -- hints ----------------------------------------------------------------------------------------

@@ -23,7 +23,7 @@ from std_msgs.msg import Bool
 
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.monitor.model import Model
-from drive_can_bridge.monitor.plan import SamplingPlan
+from drive_can_bridge.monitor.plan import BUDGET, SamplingPlan
 from drive_can_bridge.monitor.snapshot import Place
 from drive_can_bridge.monitor.text import is_ros_name, printable
 from drive_can_bridge.monitor.values import ParameterInfo
@@ -48,10 +48,13 @@ class MonitorClient:
     """
     Fills a model.
 
+    :param command: who this is, for errors.
+    :param budget: messages per second to be sampled.
     :raises DriveCanError: ROS does not start.
     """
 
-    def __init__(self, model: Model) -> None:
+    def __init__(self, model: Model, *, command: str = 'drive_can monitor',
+                 budget: float = BUDGET) -> None:
         self._model = model
         self._context = Context()
         try:
@@ -62,9 +65,9 @@ class MonitorClient:
                               start_parameter_services=False)
         except Exception as error:  # rcl fails in several types
             reason = str(error).partition(', at ')[0]
-            raise DriveCanError(f'drive_can monitor: ROS does not start: {reason}') from error
+            raise DriveCanError(f'{command}: ROS does not start: {reason}') from error
         self._now = 0.0
-        self._plan = SamplingPlan()
+        self._plan = SamplingPlan(budget)
         self._inboxes = [
             Inbox(self._node, DiagnosticArray, '/diagnostics', QoSProfile(depth=50),
                   self._take_diagnostics),
@@ -72,21 +75,36 @@ class MonitorClient:
         self._online: dict[str, Inbox] = {}
         self._samples: dict[str, tuple[Inbox, Inbox]] = {}
         self._bits: dict[str, Inbox] = {}
-        self._focus: str | None = None
+        self._focus: frozenset[str] = frozenset()
+        self._watched = True
         self._graph_at = 0.0
         self._calls: dict[tuple[str, str], Call] = {}
         self._asked: set[str] = set()
 
     # -- for the view -----------------------------------------------------------------------------
 
-    def focus(self, drive: str | None) -> None:
-        """Look at one drive closely: all of its samples, and its bits."""
-        if drive != self._focus:
-            self._focus = drive
+    @property
+    def node(self) -> Node:
+        """The node, for whoever asks more of drives than this."""
+        return self._node
+
+    @property
+    def busy(self) -> bool:
+        """Wait for an answer to something: polling soon is worth it."""
+        return bool(self._calls)
+
+    def focus(self, *drives: str) -> None:
+        """Look at drives closely: all of their samples, and their bits."""
+        if self._focus != set(drives):
+            self._focus = frozenset(drives)
             self._graph_at = 0.0
-            for inbox in self._bits.values():
-                inbox.close()
-            self._bits = {}
+            for topic in [topic for topic in self._bits
+                          if not any(topic.startswith(f'{drive}/') for drive in drives)]:
+                self._bits.pop(topic).close()
+
+    def watch(self, wanted: bool) -> None:
+        """Ask for samples, or for none: nobody looks at them."""
+        self._watched = wanted
 
     def read(self, drive: str, names: list[str]) -> None:
         """Read parameters of a drive over its bus. The last wish counts."""
@@ -112,6 +130,13 @@ class MonitorClient:
                 del self._calls[key]
         self._follow()
 
+    def glance(self, now: float) -> None:
+        """Take the samples of what is looked at closely, and nothing else."""
+        self._now = now
+        for drive in self._focus & self._samples.keys():
+            for inbox in self._samples[drive]:
+                inbox.look()
+
     def close(self) -> None:
         """Leave the graph."""
         self._node.destroy_node()
@@ -131,7 +156,8 @@ class MonitorClient:
         """Subscribe to what there is to be seen now, and to nothing else."""
         model, now = self._model, self._now
         _keep(self._online, model.drives, self._subscribe_online, Inbox.close)
-        wanted = self._plan.choose(model.rates(), self._focus, now)
+        wanted = (self._plan.choose(model.rates(), self._focus, now) if self._watched
+                  else frozenset())
         model.sampled(wanted, now)
         _keep(self._samples, wanted, self._subscribe_samples, _close_all)
         self._asked &= {*model.drives, *model.bridges} - set(model.silent(now))
@@ -141,9 +167,9 @@ class MonitorClient:
         for drive in model.drives:
             if drive not in self._asked:
                 self._ask_names(drive)
-        if self._focus is not None and now >= self._graph_at:
+        if self._focus and now >= self._graph_at:
             self._graph_at = now + _GRAPH_PERIOD
-            self._find_bits(self._focus)
+            self._find_bits()
 
     def _subscribe_online(self, drive: str) -> Inbox:
         def take(message: Bool) -> None:
@@ -161,14 +187,15 @@ class MonitorClient:
                 Inbox(self._node, ParameterEvent, f'{drive}/request', newest_quality(),
                       take_request))
 
-    def _find_bits(self, drive: str) -> None:
-        """Subscribe to the bits of a drive: ``~/<parameter>/<bit>``."""
+    def _find_bits(self) -> None:
+        """Subscribe to the bits of drives: ``~/<parameter>/<bit>``."""
         for topic, types in self._node.get_topic_names_and_types():
-            below = topic.removeprefix(f'{drive}/').split('/')
-            if (topic.startswith(f'{drive}/') and len(below) == 2 and below[0] != 'command'
+            drive, _, below = topic.rpartition('/')
+            drive, _, parameter = drive.rpartition('/')
+            if (drive in self._focus and parameter != 'command'
                     and types == ['std_msgs/msg/Bool'] and topic not in self._bits
                     and len(self._bits) < _BITS_MAX):
-                self._bits[topic] = self._subscribe_bit(drive, *below)
+                self._bits[topic] = self._subscribe_bit(drive, parameter, below)
 
     def _subscribe_bit(self, drive: str, parameter: str, bit: str) -> Inbox:
         def take(message: Bool) -> None:

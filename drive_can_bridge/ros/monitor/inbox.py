@@ -12,7 +12,9 @@ from typing import Any
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import (
+    DurabilityPolicy, qos_profile_parameters, QoSProfile, ReliabilityPolicy,
+)
 
 RCLError = rclpy_implementation.RCLError
 
@@ -73,6 +75,64 @@ class Inbox:
         self._node.destroy_subscription(self._subscription)
 
 
+class Service:
+    """
+    A service that may be asked again and again, by several at once.
+
+    :param timeout: s after which an answer is not waited for any more.
+    """
+
+    def __init__(self, node: Node, service_type: Any, name: str,
+                 timeout: float = CALL_TIMEOUT) -> None:
+        self._node = node
+        self._type = service_type
+        self._timeout = timeout
+        self._client = node.create_client(service_type, name,
+                                          qos_profile=qos_profile_parameters)
+        self._waiting: dict[int, tuple[float, Callable[[Any], None]]] = {}
+
+    @property
+    def ready(self) -> bool:
+        """Somebody offers it."""
+        return self._client.service_is_ready()
+
+    @property
+    def busy(self) -> bool:
+        """Somebody waits for an answer."""
+        return bool(self._waiting)
+
+    def send(self, request: Any, done: Callable[[Any], None], now: float) -> None:
+        """
+        Ask.
+
+        :param done: takes the response, or None: nobody answered in time.
+        """
+        handle = self._client.handle
+        with handle:
+            number = handle.send_request(request)
+        self._waiting[number] = (now + self._timeout, done)
+
+    def look(self, now: float) -> None:
+        """Hand over the answers that have arrived."""
+        handle = self._client.handle
+        while self._waiting:
+            with handle:
+                header, response = handle.take_response(self._type.Response)
+            if response is None:
+                break
+            _, done = self._waiting.pop(header.request_id.sequence_number, (0.0, None))
+            if done is not None:
+                done(response)
+        for number, (deadline, done) in list(self._waiting.items()):
+            if now >= deadline:
+                del self._waiting[number]
+                done(None)
+
+    def close(self) -> None:
+        """Wait for no answer."""
+        self._node.destroy_client(self._client)
+
+
 class Call:
     """
     One request to a service, sent as soon as somebody offers it.
@@ -81,35 +141,30 @@ class Call:
     """
 
     def __init__(self, node: Node, service_type: Any, name: str, request: Any,
-                 done: Callable[[Any], None], now: float) -> None:
-        self._node = node
-        self._type = service_type
+                 done: Callable[[Any], None], now: float, timeout: float = CALL_TIMEOUT) -> None:
+        self._service = Service(node, service_type, name, timeout)
         self._request = request
         self._done = done
-        self._deadline = now + CALL_TIMEOUT
-        self._client = node.create_client(service_type, name)
+        self._deadline = now + timeout
         self._sent = False
+        self._answers: list[Any] = []
 
     def look(self, now: float) -> bool:
         """Do what can be done now; return whether the call is over."""
-        handle = self._client.handle
-        if not self._sent and self._client.service_is_ready():
-            with handle:
-                handle.send_request(self._request)
+        service = self._service
+        if not self._sent and service.ready:
+            service.send(self._request, self._answers.append, now)
             self._sent = True
-        response = None
-        if self._sent:
-            with handle:
-                _, response = handle.take_response(self._type.Response)
-        if response is None and now < self._deadline:
+        service.look(now)
+        if not self._answers and now < self._deadline:
             return False
-        self.close()
-        self._done(response)
+        service.close()
+        self._done(self._answers[0] if self._answers else None)
         return True
 
     def close(self) -> None:
         """Wait for no answer."""
-        self._node.destroy_client(self._client)
+        self._service.close()
 
 
 def _never(_: Any) -> None:

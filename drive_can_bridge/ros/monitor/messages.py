@@ -4,7 +4,7 @@
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from rcl_interfaces.msg import Log, ParameterDescriptor, ParameterEvent, ParameterType
+from rcl_interfaces.msg import Log, Parameter, ParameterDescriptor, ParameterEvent, ParameterType
 from rcl_interfaces.msg import ParameterValue
 
 from drive_can_bridge.core.parameters import Value, ValueKind
@@ -18,6 +18,8 @@ _FIELDS = {ParameterType.PARAMETER_BOOL: 'bool_value',
            ParameterType.PARAMETER_STRING: 'string_value'}
 _KINDS = {ParameterType.PARAMETER_BOOL: ValueKind.BOOL,
           ParameterType.PARAMETER_INTEGER: ValueKind.INTEGER}
+_TYPES = {bool: ParameterType.PARAMETER_BOOL, int: ParameterType.PARAMETER_INTEGER,
+          float: ParameterType.PARAMETER_DOUBLE}
 _LEVELS = {getattr(Log, name): name
            for name in ('DEBUG', 'INFO', 'WARN', 'ERROR', 'FATAL')}
 
@@ -50,6 +52,12 @@ def values(message: ParameterEvent) -> list[tuple[str, Value]]:
     """Return names and values of a sample."""
     pairs = ((entry.name, drive_value(entry.value)) for entry in message.changed_parameters)
     return [(name, value) for name, value in pairs if value is not None]
+
+
+def parameter_message(name: str, value: Value) -> Parameter:
+    """Make the message that sets a parameter."""
+    kind = _TYPES[type(value)]
+    return Parameter(name=name, value=ParameterValue(type=kind, **{_FIELDS[kind]: value}))
 
 
 def log_level(message: Log) -> str:

@@ -1,0 +1,90 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+``drive_can panel``: the drives in a browser.
+
+A ROS client and a web server, nothing of a bridge. It never moves anything.
+"""
+
+import argparse
+import sys
+from typing import Any
+
+from drive_can_bridge.cli.namespaces import namespace
+from drive_can_bridge.cli.without_ros import what_is_missing
+from drive_can_bridge.core.errors import DriveCanError
+from drive_can_bridge.monitor.model import Model
+from drive_can_bridge.process import environment
+from drive_can_bridge.process.signals import leave, SignalWatcher
+
+COMMAND = 'drive_can panel'
+#: messages per second to be sampled for all drives that nobody looks at closely
+BUDGET = 300.0
+_MISSING = (f"{COMMAND}: the Python module {{module}} is not installed: it comes with the extra "
+            f"'panel' of this package (pip install 'drive_can_bridge[panel]')")
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add the subcommand to the parser of ``drive_can``."""
+    parser = subparsers.add_parser(
+        'panel', help='show all bridges and their drives in a browser',
+        description='Show all bridges and their drives in a browser, until SIGINT or SIGTERM. '
+                    'Prints an address for each role: a viewer looks, an operator may stop '
+                    'drives, too. Never moves anything.')
+    parser.add_argument('--host', default='127.0.0.1',
+                        help='address to listen on; anything but the loopback lets others on the '
+                             'network in who have a token (default: %(default)s)')
+    parser.add_argument('--port', type=_port, default=8080, help='0: any (default: %(default)s)')
+    parser.add_argument('--allow-writes', action='store_true',
+                        help='operators may write parameters and restore backups')
+    parser.add_argument('--namespace', metavar='NS', default='', type=namespace,
+                        help='only bridges in this namespace, or below it')
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """
+    Serve the pages.
+
+    :return: 0 after SIGINT or SIGTERM.
+    :raises DriveCanError: no ROS, no NiceGUI, the port is taken.
+    """
+    with SignalWatcher(keep=True) as watcher:
+        try:
+            from drive_can_bridge.ros.monitor.client import MonitorClient
+            from drive_can_bridge.ros.monitor.operations import Operations
+        except ImportError as error:
+            raise DriveCanError(what_is_missing(COMMAND, error)) from error
+        try:
+            from drive_can_bridge.panel.access import Access, is_loopback, Role
+            from drive_can_bridge.panel.feed import Feed
+            from drive_can_bridge.panel.pages import application, Setting
+            from drive_can_bridge.panel.server import address, listen, serve
+        except ImportError as error:
+            raise DriveCanError(_MISSING.format(module=error.name)) from error
+        listener = listen(args.host, args.port)
+        access = Access(host=args.host, port=listener.getsockname()[1])
+        model = Model(args.namespace)
+        source = MonitorClient(model, command=COMMAND, budget=BUDGET)
+        place = environment.in_words()
+
+        def ready() -> None:
+            print(f'{COMMAND}: {place}', file=sys.stderr)
+            if not is_loopback(args.host):
+                print(f'{COMMAND}: listens on {args.host}: whoever reaches this machine and has a '
+                      f'token gets in, and whoever sees the traffic sees the token (no TLS); '
+                      f'docs/security.md says how to do better', file=sys.stderr)
+            for role in (Role.OPERATOR, Role.VIEWER):
+                print(f'{role.value}: {address(listener, access.tokens[role])}', flush=True)
+        try:
+            app = application(Feed(source, Operations(source.node), model), access,
+                              Setting(place, args.allow_writes))
+            serve(app, listener, ended=lambda: watcher.signalled, ready=ready)
+        finally:
+            source.close()
+        leave(watcher.exit_code(0))
+
+
+def _port(text: str) -> int:
+    if not (text.isdecimal() and int(text) <= 65535):
+        raise argparse.ArgumentTypeError(f'{text}: allowed are 0 to 65535')
+    return int(text)

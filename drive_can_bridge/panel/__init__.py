@@ -1,0 +1,13 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The drives in a browser: pages on the model of :mod:`drive_can_bridge.monitor`.
+
+Who may come in is decided at one place, for every request and every WebSocket: :mod:`.gate`, by
+the rules of :mod:`.access`. What reaches a drive is a POST to one of :mod:`.actions`, where the
+role counts; pages and their WebSocket only show.
+"""
+
+import sys
+
+# The web framework would load it for a client of Socket.IO, which nobody is here: 9 MB.
+sys.modules.setdefault('aiohttp', None)  # type: ignore[arg-type]

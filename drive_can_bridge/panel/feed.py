@@ -1,0 +1,141 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The heartbeat of the panel: one model for all browsers, looked at a few times a second.
+
+Everything happens in the thread of the web server, between two of its requests: no locks.
+"""
+
+import asyncio
+from collections.abc import Callable, Iterable, Sequence
+import time
+from typing import TypeVar
+
+from drive_can_bridge.core.parameters import Value
+from drive_can_bridge.monitor.drive import CONTROL_STATE
+from drive_can_bridge.monitor.model import Model
+from drive_can_bridge.monitor.snapshot import DriveSnapshot, Snapshot
+from drive_can_bridge.monitor.source import Operations, Outcome, Source, Stop
+
+#: s between two looks, and while somebody waits for an answer
+PERIOD = 0.5
+_WAITING_PERIOD = 0.02
+#: between two samples of what a chart may show
+_GLANCE_PERIOD = 0.1
+
+Result = TypeVar('Result')
+
+
+class View:
+    """
+    A page in a browser.
+
+    :param update: shows a snapshot.
+    :param focus: drives that it shows closely.
+    """
+
+    def __init__(self, update: Callable[[Snapshot], None], focus: Iterable[str] = ()) -> None:
+        self.update = update
+        self.focus = frozenset(focus)
+
+
+class Feed:
+    """
+    Looks, and lets pages show it.
+
+    :param model: what ``source`` fills.
+    """
+
+    def __init__(self, source: Source, operations: Operations, model: Model) -> None:
+        self._source = source
+        self._operations = operations
+        self._model = model
+        self._views: set[View] = set()
+        self._wake = asyncio.Event()
+        self.snapshot = Snapshot()
+
+    async def run(self) -> None:
+        """Look for ever."""
+        due = 0.0
+        while True:
+            now = time.monotonic()
+            self._source.watch(bool(self._views))
+            closely = frozenset().union(*(view.focus for view in self._views))
+            self._source.focus(*closely)
+            waiting = self._operations.poll(
+                (drive.name for drive in self.snapshot.drives if has_control(drive)), now)
+            if now >= due:
+                due = now + PERIOD
+                self._look(now)
+            elif self._source.busy:
+                self._source.poll(now)
+            elif closely:
+                self._source.glance(now)
+            pause = max(0.0, due - time.monotonic())
+            if closely or self._source.busy:
+                pause = min(pause, _GLANCE_PERIOD)
+            if waiting:
+                pause = _WAITING_PERIOD
+            self._wake.clear()
+            try:
+                await asyncio.wait_for(self._wake.wait(), pause)
+            except (asyncio.TimeoutError, TimeoutError):
+                continue
+            due = min(due, time.monotonic() + _WAITING_PERIOD)
+
+    def _look(self, now: float) -> None:
+        self._source.poll(now)
+        self.snapshot = self._model.look(now, time.time())
+        for view in list(self._views):
+            view.update(self.snapshot)
+
+    def show(self, view: View) -> None:
+        """Let a page take part, at once."""
+        self._views.add(view)
+        self._wake.set()
+
+    def hide(self, view: View) -> None:
+        """Leave a page alone from now on."""
+        self._views.discard(view)
+
+    # -- for those who act ------------------------------------------------------------------------
+
+    def drive(self, name: str) -> DriveSnapshot | None:
+        """Return a drive by its full name."""
+        return self.snapshot.drive(name)
+
+    def offered(self, drive: str) -> frozenset[Stop]:
+        """Tell which stops a drive offers now."""
+        return self._operations.offered(drive)
+
+    async def stop(self, drive: str, stop: Stop) -> Outcome:
+        """Stop a drive; return what became of it."""
+        return await self._told(lambda done: self._operations.stop(
+            drive, stop, done, time.monotonic()))
+
+    async def write(self, drive: str, name: str, value: Value) -> Outcome:
+        """Write a parameter; return what became of it."""
+        return await self._told(lambda done: self._operations.write(
+            drive, name, value, done, time.monotonic()))
+
+    async def read(self, drive: str, names: Sequence[str]) -> None:
+        """Read parameters of a drive into the model."""
+        found: Sequence[Value | None] = await self._told(lambda done: self._operations.read(
+            drive, names, done, time.monotonic()))
+        now = time.monotonic()
+        self._model.read(drive, zip(names, found), now)
+        self.snapshot = self._model.look(now, time.time())
+
+    async def _told(self, ask: Callable[[Callable[[Result], None]], None]) -> Result:
+        future: asyncio.Future[Result] = asyncio.get_running_loop().create_future()
+
+        def done(result: Result) -> None:
+            if not future.done():
+                future.set_result(result)
+        ask(done)
+        self._wake.set()
+        return await future
+
+
+def has_control(drive: DriveSnapshot) -> bool:
+    """Tell whether a drive has a control word."""
+    return CONTROL_STATE in drive.facts

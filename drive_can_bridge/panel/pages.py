@@ -1,0 +1,135 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""The web application: pages in one frame, files, actions, and the gate in front of all."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from fastapi import FastAPI
+from nicegui import ui
+from nicegui.client import Client
+from nicegui.element import Element
+from starlette.requests import Request
+from starlette.responses import PlainTextResponse, Response
+from starlette.staticfiles import StaticFiles
+from starlette.types import ASGIApp
+
+from drive_can_bridge import __version__
+from drive_can_bridge.panel.access import Access, Role
+from drive_can_bridge.panel.actions import Actions, ALL
+from drive_can_bridge.panel.backups import Backups
+from drive_can_bridge.panel.drive_page import DrivePage
+from drive_can_bridge.panel.feed import Feed, View
+from drive_can_bridge.panel.gate import Gate, ROLE
+from drive_can_bridge.panel.log_page import LogPage
+from drive_can_bridge.panel.overview import Overview
+from drive_can_bridge.panel.parts import box, button, in_script, words
+
+_STATIC = Path(__file__).parent / 'static'
+_HEAD = ''.join((
+    f'<link rel="stylesheet" href="/panel/panel.css?{__version__}">',
+    f'<script src="/panel/panel.js?{__version__}"></script>'))
+_TITLE = 'drive_can panel'
+_PAGES = {'/': 'Drives', '/log': 'Log'}
+#: pages at once: each takes memory until its browser has gone for a while
+PAGES_MAX = 40
+
+
+@dataclass(frozen=True)
+class Setting:
+    """
+    What holds for the whole panel.
+
+    :param place: where bridges are looked for, in words.
+    :param allow_writes: parameters may be written and backups restored.
+    """
+
+    place: str
+    allow_writes: bool = False
+
+
+def application(feed: Feed, access: Access, setting: Setting) -> ASGIApp:
+    """Make the web application; it runs the feed."""
+    @asynccontextmanager
+    async def lifespan(_: FastAPI) -> AsyncIterator[None]:
+        task = asyncio.create_task(feed.run())
+        yield
+        task.cancel()
+
+    web = FastAPI(lifespan=lifespan, openapi_url=None, docs_url=None, redoc_url=None)
+    web.router.routes.extend(
+        Actions(feed, Backups(), allow_writes=setting.allow_writes).routes())
+    web.mount('/panel', StaticFiles(directory=_STATIC))
+    _add_pages(feed, setting)
+    ui.run_with(web, title=_TITLE, dark=None, tailwind=False, show_welcome_message=False,
+                favicon=_STATIC / 'icon.svg', reconnect_timeout=10.0,
+                binding_refresh_interval=None)
+    return Gate(web, access)
+
+
+def _add_pages(feed: Feed, setting: Setting) -> None:
+    @ui.page('/')
+    def overview(request: Request) -> Response | None:
+        if _full():
+            return _too_many()
+        role = request.scope[ROLE]
+        with _frame('/', role):
+            page = Overview(role, setting.place)
+        _live(feed, View(page.show))
+        return None
+
+    @ui.page('/drive/{name:path}')
+    def drive(request: Request, name: str) -> Response | None:
+        if _full():
+            return _too_many()
+        role = request.scope[ROLE]
+        ui.page_title(f'{name} · {_TITLE}')
+        with _frame('', role):
+            page = DrivePage(feed, f'/{name}', role, allow_writes=setting.allow_writes)
+        _live(feed, page.view)
+        return None
+
+    @ui.page('/log')
+    def log(request: Request) -> Response | None:
+        if _full():
+            return _too_many()
+        with _frame('/log', request.scope[ROLE]):
+            page = LogPage()
+        _live(feed, View(page.show))
+        return None
+
+
+def _full() -> bool:
+    return len(Client.instances) > PAGES_MAX
+
+
+def _too_many() -> Response:
+    return PlainTextResponse(f'{PAGES_MAX} pages are open already: close some, or wait a minute\n',
+                             503)
+
+
+def _frame(here: str, role: Role) -> Element:
+    """Make what all pages have; return where the page goes."""
+    ui.add_head_html(_HEAD)
+    with box('bar'):
+        words('drive_can', 'brand')
+        for path, name in _PAGES.items():
+            ui.link(name, path).classes('here' if path == here else '')
+        words(role.value, 'role')
+        box('space')
+        if role is Role.OPERATOR:
+            button('Quick stop all', 'stop',
+                   f"panel.stop('quick_stop', {in_script(ALL)}, 'all drives')")
+    return box('page')
+
+
+def _live(feed: Feed, view: View) -> None:
+    """Show what is known, and all that follows while the page is looked at."""
+    view.update(feed.snapshot)
+    client = ui.context.client
+    client.on_connect(lambda: feed.show(view))
+    client.on_disconnect(lambda: feed.hide(view))
+    client.on_delete(lambda: feed.hide(view))
+

@@ -1,0 +1,138 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+Small pieces of pages. What has not changed is not sent: nothing flickers, little is spent.
+
+Text goes in as text, never as HTML: descriptions and log lines come from anybody.
+"""
+
+from collections.abc import Callable, Hashable, Sequence
+import json
+import math
+from typing import Any
+
+from nicegui import ui
+from nicegui.element import Element
+
+from drive_can_bridge.monitor.reports import Level
+from drive_can_bridge.monitor.snapshot import DriveSnapshot, Shown
+from drive_can_bridge.monitor.source import Stop
+from drive_can_bridge.panel.access import Role
+
+_STOPS = {Stop.QUICK_STOP: ('Quick stop', 'stop'), Stop.DISABLE: ('Disable', 'danger')}
+
+
+def box(classes: str = '', tag: str = 'div') -> Element:
+    """Make a container."""
+    return ui.element(tag).classes(classes)
+
+
+def words(text: str = '', classes: str = '') -> ui.label:
+    """Make a piece of text."""
+    return ui.label(text).classes(classes)
+
+
+class Look:
+    """What an element looks like: its classes, sent on change only."""
+
+    def __init__(self, element: Element, base: str) -> None:
+        self._element = element
+        self._base = base
+        self._now = ''
+
+    def set(self, more: str) -> None:
+        """Add classes to those it always has, in place of what was added before."""
+        if more != self._now:
+            self._now = more
+            self._element.classes(replace=f'{self._base} {more}')
+
+
+class Changing:
+    """
+    A container whose content is made anew when what it is made of changes.
+
+    :param make: makes the content from the key and returns what updates it.
+    """
+
+    def __init__(self, container: Element, make: Callable[[Any], Any]) -> None:
+        self._container = container
+        self._make = make
+        self._key: Hashable = None
+        self._content: Any = None
+
+    def of(self, key: Hashable) -> Any:
+        """Return the content for a key."""
+        if key != self._key:
+            self._key = key
+            self._container.clear()
+            with self._container:
+                self._content = self._make(key)
+        return self._content
+
+
+def level_class(level: Level) -> str:
+    """Return the class of a level."""
+    return level.name.lower()
+
+
+def button(text: str, classes: str, script: str) -> Element:
+    """
+    Make a button that does something in the browser.
+
+    :param script: JavaScript; ``button`` is the button. Quote what is inserted by
+        :func:`in_script`.
+    """
+    made = box(classes, 'button').props('type=button').on(
+        'click', js_handler=f'(event) => {{ const button = event.currentTarget; {script} }}')
+    with made:
+        ui.label(text)
+    return made
+
+
+def in_script(value: Any) -> str:
+    """Write a value into a script."""
+    return json.dumps(value).replace('<', '\\u003c')
+
+
+def stop_buttons(drive: DriveSnapshot, role: Role) -> None:
+    """Make the buttons that stop a drive, for an operator."""
+    if role is Role.OPERATOR:
+        for stop, (text, classes) in _STOPS.items():
+            button(text, classes, f'panel.stop({in_script(stop.value)}, {in_script(drive.name)}, '
+                                  f'{in_script(drive.label)})')
+
+
+class Values:
+    """A table of setpoints and values."""
+
+    def __init__(self) -> None:
+        self._table = Changing(box('values'), _make_values)
+
+    def show(self, drive: DriveSnapshot) -> None:
+        """Show those of a drive."""
+        shown = [*drive.setpoints, *drive.values]
+        key = (len(drive.setpoints), *((each.name, each.unit, each.width) for each in shown))
+        for label, each in zip(self._table.of(key), shown):
+            label.set_text(each.text or '–')
+
+
+def _make_values(key: tuple[Any, ...]) -> Sequence[ui.label]:
+    setpoints, labels = key[0], []
+    for place, (name, unit, width) in enumerate(key[1:]):
+        words(name, 'what setpoint' if place < setpoints else 'what')
+        labels.append(words('', 'number').style(f'min-width: {width}ch'))
+        words(unit, 'unit')
+    return labels
+
+
+def place_in_words(drive: DriveSnapshot) -> str:
+    """Say where a drive is."""
+    place = drive.place
+    parts = [f'bus {place.bus}' if place.bus else '',
+             f'station {place.station}' if place.station else '', place.protocol,
+             '' if math.isnan(place.period) else f'every {1e3 * place.period:g} ms']
+    return ' · '.join(part for part in parts if part)
+
+
+def series_name(drive: DriveSnapshot, shown: Shown) -> str:
+    """Name a value among those of all drives."""
+    return f'{drive.label}.{shown.name}'

@@ -1,0 +1,150 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""The web server: uvicorn, with an upper limit to everything, and ended by whoever runs it."""
+
+import asyncio
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+import logging
+import resource
+import socket
+from typing import Any
+
+from starlette.types import ASGIApp
+import uvicorn
+from uvicorn.protocols.http.h11_impl import H11Protocol
+
+from drive_can_bridge.core.errors import DriveCanError
+
+#: connections at once; a browser takes a handful
+CONNECTIONS_MAX = 200
+#: file descriptors that this takes, beside those of ROS
+_DESCRIPTORS = 1024
+#: s that a connection may take for its first request, and bytes of the request's head
+_FIRST_REQUEST = 10.0
+_HEAD_MAX = 16_384
+#: bytes of one message from a browser: clicks
+_MESSAGE_MAX = 262_144
+#: s between two looks for the end, and for what is under way then
+_LOOK_PERIOD = 0.1
+_GRACE = 1
+
+
+_FULL_WORDS = f'{CONNECTIONS_MAX} connections are open already: try again in a while\n'
+_FULL = ('HTTP/1.1 503 Service Unavailable\r\nContent-Type: text/plain\r\nConnection: close\r\n'
+         f'Content-Length: {len(_FULL_WORDS)}\r\n\r\n{_FULL_WORDS}').encode()
+
+
+class _Connection(H11Protocol):
+    """A connection that is closed at once when there are too many, or when nothing comes."""
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        if len(self.connections) >= CONNECTIONS_MAX:
+            transport.write(_FULL)
+            transport.close()
+            return
+        super().connection_made(transport)
+        self.loop.call_later(_FIRST_REQUEST, self._first_request_due)
+
+    def connection_lost(self, exception: Exception | None) -> None:
+        if self.transport is not None:
+            super().connection_lost(exception)
+
+    def data_received(self, data: bytes) -> None:
+        if self.transport is not None:
+            super().data_received(data)
+
+    def _first_request_due(self) -> None:
+        request: object = self.cycle
+        if request is None and self in self.connections:
+            self.transport.abort()
+
+
+class _Server(uvicorn.Server):
+    @contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        """Leave signals to whoever runs this."""
+        yield
+
+
+class _OneLine(logging.Formatter):
+    """No traceback reaches a user."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        text = record.getMessage()
+        if record.exc_info and record.exc_info[1] is not None:
+            error = record.exc_info[1]
+            text = f'{text} ({type(error).__name__}: {error})'
+        return f'drive_can panel: {" ".join(text.split())[:500]}'
+
+
+def listen(host: str, port: int) -> socket.socket:
+    """
+    Open the port.
+
+    :param port: 0: any that is free.
+    :raises DriveCanError: it cannot be had.
+    """
+    try:
+        family, _, _, _, address = socket.getaddrinfo(
+            host.strip('[]'), port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)[0]
+        listener = socket.socket(family, socket.SOCK_STREAM)
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind(address)
+        listener.listen(128)
+    except OSError as error:
+        raise DriveCanError(f'drive_can panel: {host}, port {port}: {error.strerror or error}; '
+                            f'--port chooses another') from error
+    return listener
+
+
+def serve(app: ASGIApp, listener: socket.socket, *, ended: Callable[[], bool],
+          ready: Callable[[], None]) -> None:
+    """
+    Serve until the end.
+
+    :param ready: is told when the first request can come.
+    """
+    _make_room()
+    handler = logging.StreamHandler()
+    handler.setFormatter(_OneLine())
+    for name, level in (('uvicorn', logging.CRITICAL), ('nicegui', logging.ERROR),
+                        ('asyncio', logging.ERROR)):
+        logger = logging.getLogger(name)
+        logger.handlers, logger.propagate = [handler], False
+        logger.setLevel(level)
+    config = uvicorn.Config(
+        app, http=_Connection, ws='auto', loop='asyncio', lifespan='on', log_config=None,
+        access_log=False, ws_max_size=_MESSAGE_MAX, h11_max_incomplete_event_size=_HEAD_MAX,
+        timeout_keep_alive=20, timeout_graceful_shutdown=_GRACE, server_header=False,
+        proxy_headers=False, backlog=128)
+    server = _Server(config)
+
+    async def run() -> None:
+        task = asyncio.create_task(server.serve(sockets=[listener]))
+        told = False
+        while not task.done():
+            await asyncio.sleep(_LOOK_PERIOD)
+            if server.started and not told:
+                told = True
+                ready()
+            if ended():
+                server.should_exit = True
+        await task
+    asyncio.run(run())
+
+
+def _make_room() -> None:
+    """Let connections not use up the file descriptors."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = _DESCRIPTORS if hard == resource.RLIM_INFINITY else min(_DESCRIPTORS, hard)
+    if soft != resource.RLIM_INFINITY and soft < wanted:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
+
+
+def address(listener: socket.socket, token: str) -> str:
+    """Return the address to be opened in a browser."""
+    name: Any = listener.getsockname()
+    host = str(name[0])
+    if host in ('0.0.0.0', '::'):
+        host = socket.gethostname()
+    return f'http://{f"[{host}]" if ":" in host else host}:{name[1]}/?token={token}'

@@ -1,0 +1,102 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""What a person may ask of a drive: reads, writes, stops. Nothing here can move one."""
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+from rcl_interfaces.srv import GetParameters, SetParameters
+from rclpy.node import Node
+from std_srvs.srv import SetBool, Trigger
+
+from drive_can_bridge.core.parameters import Value
+from drive_can_bridge.monitor.source import Outcome, Stop
+from drive_can_bridge.monitor.text import is_ros_name, printable
+from drive_can_bridge.ros.monitor.inbox import Call, Service
+from drive_can_bridge.ros.monitor.messages import drive_value, parameter_message
+
+#: s for a stop, which answers when the drive's status says so, and for a read or write
+STOP_TIMEOUT = 10.0
+PARAMETER_TIMEOUT = 15.0
+
+#: service and request of each; ``enable`` is asked for its false only
+_STOPS: dict[Stop, tuple[str, Any, Callable[[], Any]]] = {
+    Stop.QUICK_STOP: ('quick_stop', Trigger, Trigger.Request),
+    Stop.DISABLE: ('enable', SetBool, lambda: SetBool.Request(data=False)),
+}
+_SILENCE = Outcome(False, 'nobody answered: is its bridge still running?')
+
+
+class Operations:
+    """
+    Services of drives, for those who see them through a monitor's node.
+
+    :param node: of the monitor.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._stops: dict[str, dict[Stop, Service]] = {}
+        self._calls: list[Call] = []
+
+    def poll(self, controlled: Iterable[str], now: float) -> bool:
+        """Take the answers that have arrived; return whether somebody still waits for one."""
+        wanted = set(controlled)
+        for drive in self._stops.keys() - wanted:
+            if not any(service.busy for service in self._stops[drive].values()):
+                for service in self._stops.pop(drive).values():
+                    service.close()
+        for drive in wanted - self._stops.keys():
+            self._stops[drive] = {
+                stop: Service(self._node, kind, f'{drive}/{name}', STOP_TIMEOUT)
+                for stop, (name, kind, _) in _STOPS.items()}
+        for services in self._stops.values():
+            for service in services.values():
+                if service.busy:
+                    service.look(now)
+        self._calls = [call for call in self._calls if not call.look(now)]
+        return bool(self._calls) or any(
+            service.busy for services in self._stops.values() for service in services.values())
+
+    def offered(self, drive: str) -> frozenset[Stop]:
+        """Tell which stops a drive has, and its bridge offers now."""
+        return frozenset(stop for stop, service in self._stops.get(drive, {}).items()
+                         if service.ready)
+
+    def stop(self, drive: str, stop: Stop, done: Callable[[Outcome], None], now: float) -> None:
+        """Stop a drive."""
+        def take(response: Any) -> None:
+            done(_SILENCE if response is None
+                 else Outcome(response.success, printable(response.message)))
+        service = self._stops.get(drive, {}).get(stop)
+        if service is None or not service.ready:
+            done(Outcome(False, f'nobody offers {drive}/{_STOPS[stop][0]}: no control word, or '
+                                f'its bridge does not run'))
+        else:
+            service.send(_STOPS[stop][2](), take, now)
+
+    def write(self, drive: str, name: str, value: Value, done: Callable[[Outcome], None],
+              now: float) -> None:
+        """Write a parameter of a drive."""
+        def take(response: SetParameters.Response | None) -> None:
+            results = [] if response is None else response.results
+            done(Outcome(results[0].successful, printable(results[0].reason)) if results
+                 else _SILENCE)
+        self._call(drive, SetParameters, 'set_parameters',
+                   SetParameters.Request(parameters=[parameter_message(name, value)]), take, now)
+
+    def read(self, drive: str, names: Sequence[str],
+             done: Callable[[Sequence[Value | None]], None], now: float) -> None:
+        """Read parameters of a drive; None: could not be read."""
+        def take(response: GetParameters.Response | None) -> None:
+            answers = [] if response is None else [drive_value(v) for v in response.values]
+            done((answers + [None] * len(names))[:len(names)])
+        self._call(drive, GetParameters, 'get_parameters',
+                   GetParameters.Request(names=list(names)), take, now)
+
+    def _call(self, drive: str, kind: Any, service: str, request: Any,
+              take: Callable[[Any], None], now: float) -> None:
+        if is_ros_name(drive):
+            self._calls.append(Call(self._node, kind, f'{drive}/{service}', request, take, now,
+                                    PARAMETER_TIMEOUT))
+        else:
+            take(None)

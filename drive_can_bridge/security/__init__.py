@@ -1,0 +1,7 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+Who may talk: the SROS2 policy of a bridge, and TLS between hosts.
+
+:mod:`.names` lists what a bridge offers, :mod:`.policy` says who may use it, :mod:`.tls` writes
+profiles for Fast DDS. Nothing here is needed by a bridge that runs.
+"""

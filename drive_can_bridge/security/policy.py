@@ -1,0 +1,106 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The SROS2 policy of a bridge: three enclaves, and what each may do. Everything else is denied.
+
+``/bridge``
+    the process of the bridge: its own topics and services, and nothing of anybody else's.
+``/operator``
+    whoever moves drives: commands, ``~/enable``, parameters; and all that a viewer may.
+``/viewer``
+    whoever looks: topics of drives, diagnostics, the log, reading parameters. Nothing that moves
+    or changes anything.
+
+Access control of DDS knows topics, not what is in them: whoever may call ``~/enable`` may call it
+with true and with false.
+"""
+
+from collections.abc import Iterable
+from xml.etree import ElementTree
+
+from drive_can_bridge.core.configuration import BridgeConfiguration
+from drive_can_bridge.security.names import (
+    bridge_names, drive_names, NodeNames, TYPE_DESCRIPTION,
+)
+
+VERSION = '0.2.0'
+BRIDGE, OPERATOR, VIEWER = '/bridge', '/operator', '/viewer'
+#: nodes of clients that come with ROS and with this package; patterns as DDS has them
+_TOOLS = ('_drive_can_*', '_ros2cli_*')
+_LOG, _EVENTS, _DIAGNOSTICS, _CLOCK = '/rosout', '/parameter_events', '/diagnostics', '/clock'
+
+
+def policy(configuration: BridgeConfiguration, *, node: str = 'drive_can_bridge',
+           namespace: str = '/') -> str:
+    """
+    Write the policy as XML.
+
+    :param node: name of the bridge's node.
+    :param namespace: in which the bridge runs, ``/`` or ``/cell``.
+    """
+    own = bridge_names(configuration, node)
+    drives = [drive_names(drive) for drive in configuration.drives.values()]
+    root = ElementTree.Element('policy', version=VERSION)
+    enclaves = ElementTree.SubElement(root, 'enclaves')
+    _add_bridge(_enclave(enclaves, BRIDGE), [own, *drives], namespace)
+    _add_client(_enclave(enclaves, OPERATOR), [own, *drives], namespace, acts=True)
+    _add_client(_enclave(enclaves, VIEWER), [own, *drives], namespace, acts=False)
+    ElementTree.indent(root)
+    return ('<?xml version="1.0" encoding="UTF-8"?>\n'
+            f'{ElementTree.tostring(root, encoding="unicode")}\n')
+
+
+def _enclave(parent: ElementTree.Element, path: str) -> ElementTree.Element:
+    enclave = ElementTree.SubElement(parent, 'enclave', path=path)
+    return ElementTree.SubElement(enclave, 'profiles')
+
+
+def _add_bridge(profiles: ElementTree.Element, nodes: list[NodeNames], namespace: str) -> None:
+    for number, node in enumerate(nodes):
+        profile = _profile(profiles, namespace, node.node)
+        shared = [_EVENTS, _LOG, _DIAGNOSTICS] if number == 0 else [_EVENTS]
+        _rule(profile, 'topics', 'publish', [*shared, *_own(node.shown)])
+        _rule(profile, 'topics', 'subscribe', [_CLOCK, _EVENTS, *_own(node.taken)])
+        _rule(profile, 'services', 'reply', _own((*node.asked, *node.obeyed)))
+
+
+def _add_client(profiles: ElementTree.Element, nodes: list[NodeNames], namespace: str, *,
+                acts: bool) -> None:
+    place = namespace.rstrip('/')
+    seen = [_DIAGNOSTICS, _LOG, _EVENTS, _CLOCK]
+    used: dict[str, list[str]] = {'publish': [], 'request': []}
+    for node in nodes:
+        seen += _absolute(place, node, node.shown)
+        used['request'] += _absolute(place, node, node.asked)
+        if acts:
+            used['publish'] += _absolute(place, node, node.taken)
+            used['request'] += _absolute(place, node, node.obeyed)
+    # access goes by enclave: what one of its nodes may use, all of them may
+    profile = _profile(profiles, '/', OPERATOR[1:] if acts else VIEWER[1:])
+    _rule(profile, 'topics', 'publish', used['publish'])
+    _rule(profile, 'topics', 'subscribe', seen)
+    _rule(profile, 'services', 'request', used['request'])
+    for node_name in (profile.attrib['node'], *_TOOLS):
+        # every node announces its parameters, writes to the log, and has this service
+        profile = _profile(profiles, '/', node_name)
+        _rule(profile, 'topics', 'publish', [_EVENTS, _LOG])
+        _rule(profile, 'services', 'reply', [f'~/{TYPE_DESCRIPTION}'])
+
+
+def _profile(parent: ElementTree.Element, namespace: str, node: str) -> ElementTree.Element:
+    return ElementTree.SubElement(parent, 'profile', ns=namespace, node=node)
+
+
+def _rule(profile: ElementTree.Element, kind: str, verb: str, names: Iterable[str]) -> None:
+    listed = list(dict.fromkeys(names))
+    if listed:
+        rule = ElementTree.SubElement(profile, kind, {verb: 'ALLOW'})
+        for name in listed:
+            ElementTree.SubElement(rule, kind[:-1]).text = name
+
+
+def _own(names: Iterable[str]) -> list[str]:
+    return [f'~/{name}' for name in names]
+
+
+def _absolute(place: str, node: NodeNames, names: Iterable[str]) -> list[str]:
+    return [f'{place}/{node.node}/{name}' for name in names]

@@ -1,0 +1,51 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Backups through the panel: the commands that a person would use, run by it."""
+
+from panel_builders import Site
+import pytest
+from waiting import wait_for
+
+pytest.importorskip('rclpy')
+pytest.importorskip('nicegui', reason="needs the extra 'panel'")
+
+
+def test_a_backup_is_made_compared_and_restored(site: Site) -> None:
+    wait_for(lambda: write(site, 'ramp_time', '1.5'), 'its parameters')
+    backup = site.get('/do/backup?drive=/conveyor', 'viewer')
+    assert backup.status == 200, backup.text
+    assert backup.headers['content-disposition'] == 'attachment; filename="conveyor.yaml"'
+    assert 'ramp_time: 1.5' in backup.text
+
+    same = carry(site, 'compare', 'viewer', backup.body)
+    assert same['success'] is True
+    assert write(site, 'ramp_time', '2.5')
+    differs = carry(site, 'compare', 'viewer', backup.body)
+    assert differs['success'] is True
+    assert 'ramp_time' in differs['text']
+
+    restored = carry(site, 'restore', 'operator', backup.body)
+    assert restored['success'] is True, restored['text']
+    assert 'ramp_time' not in carry(site, 'compare', 'viewer', backup.body)['text']
+
+
+@pytest.mark.parametrize('body', [b'', b'\xff\xfe', b'[1, 2]', b'/conveyor: {ros__parameters: 7}'])
+def test_what_is_no_backup_is_refused_in_words(site: Site, body: bytes) -> None:
+    answer = carry(site, 'restore', 'operator', body)
+    assert answer['success'] is False
+    assert answer['text']
+    assert 'Traceback' not in answer['text']
+    site.check_alive()
+
+
+def write(site: Site, name: str, value: str) -> bool:
+    """Write a parameter."""
+    answer = site.do('write', 'operator', {'drive': '/conveyor', 'name': name, 'value': value})
+    return bool(answer.said['success'])
+
+
+def carry(site: Site, action: str, role: str, backup: bytes) -> dict[str, object]:
+    """Upload a backup."""
+    answer = site.ask('POST', f'/do/{action}?drive=/conveyor', role, {
+        'Content-Type': 'application/yaml', 'Origin': f'http://{site.host}'}, backup)
+    said: dict[str, object] = answer.said
+    return said
