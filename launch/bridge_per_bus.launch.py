@@ -15,12 +15,13 @@ and the ``~/joint_states`` of its own drives only. On Ctrl-C each of them stops 
 from pathlib import Path
 import tempfile
 
-from drive_can_bridge.configuration.load import configuration_from_file
-from drive_can_bridge.configuration.writing import of_one_bus, write_parameter_file
 from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import LifecycleNode
+
+from drive_can_bridge.configuration.load import configuration_from_file
+from drive_can_bridge.configuration.writing import of_one_bus, write_parameter_file
 
 
 def generate_launch_description() -> LaunchDescription:
