@@ -12,7 +12,6 @@ import threading
 import time
 
 from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration
-from drive_can_bridge.core.control import ControlCompleted
 from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, DriveCanError
 from drive_can_bridge.core.events import Event, ProcessDataReceived, RequestCompleted
 from drive_can_bridge.core.frame import Frame, Route
@@ -181,6 +180,3 @@ class _Ears:
         """Hand on what became of a request."""
         if isinstance(event, RequestCompleted):
             self._conversation.completed(event.request, event.outcomes)
-
-    def control_completed(self, outcome: ControlCompleted) -> None:
-        """Nobody asked."""

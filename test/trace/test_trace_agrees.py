@@ -44,7 +44,7 @@ class Listener:
     def nothing(self, *_: object, **__: object) -> None:
         """Take no notice."""
 
-    take_commands = discard_commands = process_data = control_completed = nothing
+    take_commands = discard_commands = process_data = nothing
     bus_opened = bus_lost = fatal = nothing
     request_sent = nothing
 
