@@ -24,8 +24,6 @@ from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.parameters import Value
 from drive_can_bridge.core.profile import RestoreStep
 
-#: settings in a row that can neither be written nor read, after which the drive is given up
-SILENT_MAX = 2
 #: s that a drive which has gone away is waited for, so that it is not left in a mode
 PATIENCE = 10.0
 _PATIENCE_STEP = 0.5
@@ -75,23 +73,26 @@ class Restorer:
     Restores one drive.
 
     :param stopped: tells whether the user wants it to end.
+    :param clock: s.
     :param wait: waits for so many seconds.
     :param told: is told each outcome of a write.
     :param hint: takes what the user should know while it goes on.
     """
 
     def __init__(self, drive: Drive, plan: RestorePlan, *, stopped: Callable[[], bool],
-                 wait: Callable[[float], object],
+                 clock: Callable[[], float], wait: Callable[[float], object],
                  told: Callable[[WriteOutcome], object] = lambda outcome: None,
                  hint: Callable[[str], object] = lambda text: None) -> None:
         self._drive = drive
         self._plan = plan
+        self._clock = clock
         self._wait = wait
         self._told = told
         self._hint = hint
         self._is_stopped = stopped
         self._interrupted = False
         self._lost = False
+        self._attempted = False
         self._reasons: dict[str, str] = {}
         self._result = RestoreResult()
         table = drive.facts.restore
@@ -128,6 +129,11 @@ class Restorer:
 
     # -- the settings -----------------------------------------------------------------------------
 
+    @property
+    def _complete(self) -> bool:
+        """All settings have been attempted, nothing has come between."""
+        return self._attempted and not self._stopped
+
     def _rounds(self) -> None:
         pending: Sequence[Change] = self._pending
         while pending and not self._stopped:
@@ -136,17 +142,17 @@ class Restorer:
                 return
             left = self._differing(pending)
             if len(left) == len(pending):
-                return
+                break
             pending = left
+        self._attempted = True
 
     def _write_all(self, changes: Sequence[Change]) -> None:
-        silent = 0
         for change in changes:
             if self._stopped:
                 return
             outcome = self._write(change.name, change.value)
-            silent = 0 if outcome.ok or self._answers(change.name) else silent + 1
-            if silent == SILENT_MAX:
+            # what could be read before, and cannot now: no refusal, the drive has gone
+            if not (outcome.ok or self._drive.read(change.name)[change.name].ok):
                 self._lost = True
                 return
 
@@ -167,9 +173,6 @@ class Restorer:
         self._told(outcome)
         return outcome
 
-    def _answers(self, name: str) -> bool:
-        return self._drive.read(name)[name].ok
-
     def _differing(self, changes: Sequence[Change]) -> list[Change]:
         outcomes = self._drive.read(*(change.name for change in changes))
         return [change for change in changes
@@ -179,30 +182,28 @@ class Restorer:
 
     def _finish(self) -> None:
         """Take the steps afterwards; a drive that has gone away may come back."""
+        if not self._after:
+            return
         failed = self._result.steps
         already = len(failed)
-        waited = 0.0
+        end: float | None = None
         while True:
+            self._lost = False
             try:
                 self._steps(self._after)
-                if len(failed) == already or waited >= PATIENCE or self._is_there():
+                if not self._lost or (end is not None and self._clock() >= end):
                     return
             except DriveCanError as error:
                 self._result.trouble = self._result.trouble or error
                 failed.extend(f'{step.parameter}: not set back' for step in self._after)
                 return
-            if not waited:
+            if end is None:
+                end = self._clock() + PATIENCE
                 names = ', '.join(dict.fromkeys(step.parameter for step in self._after))
                 self._hint(f'{self._drive.name}: answers no more; waiting up to {PATIENCE:g} s '
                            f'for it, so that {names} is set back')
             del failed[already:]
             self._wait(_PATIENCE_STEP)
-            waited += _PATIENCE_STEP
-
-    def _is_there(self) -> bool:
-        """Tell whether the drive answers at all."""
-        readable = [step.parameter for step in self._after] + [*self._plan.words]
-        return any(self._answers(name) for name in readable[:SILENT_MAX])
 
     def _steps(self, steps: Sequence[RestoreStep]) -> None:
         for step in steps:
@@ -217,12 +218,12 @@ class Restorer:
         if parameter is None:
             return 'the drive has no such parameter'
         # its other bits are a setting of the file, unless this is no more than leaving the mode
-        wanted = None if self._stopped or self._lost or self._result.steps or step in \
-            self._before else self._plan.words.get(name)
+        wanted = self._plan.words.get(name) if self._complete else None
         word: int | None = None
         if parameter.readable:
             outcome = self._drive.read(name)[name]
             if outcome.raw is None:
+                self._lost = True
                 return outcome.reason
             word = parameter.word_from_raw(outcome.raw)
         elif not is_whole(step, parameter):
@@ -230,8 +231,11 @@ class Restorer:
         new = ((word or 0) if wanted is None else wanted) & ~step.mask | step.bits
         if new == word:
             return ''
-        outcome_of_write = self._write_step(name, value_of_word(parameter, new))
-        return '' if outcome_of_write.ok else outcome_of_write.reason
+        written = self._write_step(name, value_of_word(parameter, new))
+        if written.ok:
+            return ''
+        self._lost = parameter.readable and not self._drive.read(name)[name].ok
+        return written.reason
 
     def _write_step(self, name: str, value: Value) -> WriteOutcome:
         heard: list[WriteOutcome] = []
@@ -247,7 +251,7 @@ class Restorer:
 
     def _compare(self) -> None:
         names = tuple(self._plan.words)
-        if self._lost and not self._is_there():
+        if self._lost:
             self._result.wrong += [
                 NotAsInFile(change.name, change.value, None,
                             self._reasons.get(change.name, 'the drive answers no more'))

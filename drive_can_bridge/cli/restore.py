@@ -129,7 +129,8 @@ def _restore(args: Namespace, backup: Backup, drive: Drive) -> int:
     with Bar(f'writing {drive.name}', len(plan.changes)) as bar, \
             postponed(lambda: complain(f'{drive.name}: ending after the write under way')) \
             as interrupted:
-        result = Restorer(drive, plan, stopped=lambda: bool(interrupted), wait=time.sleep,
+        result = Restorer(drive, plan, stopped=lambda: bool(interrupted),
+                          clock=time.monotonic, wait=time.sleep,
                           told=bar.step, hint=complain).run()
     return _report(args, drive, plan, result, interrupted)
 

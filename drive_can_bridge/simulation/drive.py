@@ -118,7 +118,7 @@ class SimulatedDrive(ABC):
             self.receive(frame, now)
             if self._cut_at is not None and self.registers.settings_written >= self._cut_at:
                 self._cut_at = None
-                self._lose_power(now, now + _POWER_CUTS[FaultKind.POWER_CUT])
+                self._lose_power(now, math.inf)
 
     def next_timer(self) -> float:
         """Return when :meth:`handle_timer` wants to be called; infinity: never."""

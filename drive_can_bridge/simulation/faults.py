@@ -61,8 +61,8 @@ class FaultKind(Enum):
     RESTART = ('restart[=SECONDS]', 'power is lost and back; deaf for 0.5 s, or as long as it '
                'says', _seconds)
     POWER_CUT = 'power_cut[=SECONDS]', 'the same for 5 s, or as long as it says', _seconds
-    CUT_AT = ('cut_at=N', 'the Nth write of a setting from now on is obeyed, and power is cut for '
-              '5 s before the answer', _integer(1, None))
+    CUT_AT = ('cut_at=N', 'the Nth write of a setting from now on is obeyed; before its answer '
+              'power is cut, until ok or restart', _integer(1, None))
     FORGET = 'forget[=SECONDS]', 'restart with empty maps', _seconds
     OFF = 'off', 'no power, until ok or restart'
     OK = 'ok', 'all faults end'

@@ -85,6 +85,8 @@ class TestOneDriveOfEachFamily:
             f'all/{name}.yaml' for name in shop.drives]
         assert [each['settings'] for each in said.documents] == [
             len(read_backup(Path(f'all/{name}.yaml')).values) for name in shop.drives]
+        # it has a bit of a mode, and is to be written last by whoever takes the file as it is
+        assert list(read_backup(Path('all/pump.yaml')).values)[-1] == 'general_configuration'
         head = read_backup(Path('all/pump.yaml')).head
         assert head.protocol == 'canopen_pkw'
         assert head.station == '5'

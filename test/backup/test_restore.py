@@ -27,9 +27,10 @@ def planned(drive: Drive, file: Path, *, include_protected: bool = False) -> Res
 
 def restored(drive: Drive, file: Path, *, stopped: Callable[[], bool] = lambda: False,
              wait: Callable[[float], object] = lambda seconds: None,
-             hints: list[str] | None = None, **options: bool) -> RestoreResult:
-    return Restorer(drive, planned(drive, file, **options), stopped=stopped, wait=wait,
-                    hint=(hints if hints is not None else []).append).run()
+             clock: Callable[[], float] = time.monotonic, hints: list[str] | None = None,
+             **options: bool) -> RestoreResult:
+    return Restorer(drive, planned(drive, file, **options), stopped=stopped, clock=clock,
+                    wait=wait, hint=(hints if hints is not None else []).append).run()
 
 
 class TestSettings:
@@ -203,12 +204,10 @@ class TestMode:
         pump.fault('cut_at=2')
         waited: list[float] = []
 
-        def wait(seconds: float) -> None:
-            waited.append(seconds)
-            pump.fault('off')
         with shop.reached('pump') as drive:
-            result = restored(drive, file, wait=wait)
-        assert sum(waited) == 10.0
+            # each attempt takes 5 s
+            result = restored(drive, file, wait=waited.append, clock=lambda: 5.0 * len(waited))
+        assert waited == [0.5, 0.5]
         assert result.steps[0].startswith(('general_configuration: no answer',
                                            'general_configuration: drive offline'))
         assert {each.name for each in result.wrong} >= {'flc2_ratio', 'network_fallback'}

@@ -224,7 +224,8 @@ class TestDrive:
         ask(made, '003001E1#012C000000000000', 1.0)                 # obeyed …
         assert made.value('ramp_time') == 3.0
         assert ask(made, POLL, 1.1) == []                           # … and off it goes
-        assert ask(made, POLL, 5.99) == []
+        assert made.faults_text == 'off'
+        made.fault('restart=0', 6.0)
         assert ask(made, POLL, 6.0) == [ANSWER]
         ask(made, '003001E1#0190000000000000', 7.0)                 # once only
         assert ask(made, POLL, 7.1) == [ANSWER]

@@ -107,7 +107,10 @@ class TestThroughTheBridge:
         ask(processes, 'backup', 'pump', '-o', str(file), *way)
         simulator.write(f'pump {BY_HAND["pump"]} cut_at=2')
         simulator.line('pump: fault cut_at')
-        broken = ask(processes, 'restore', str(file), '--yes', *way, code=1)
+        broken = processes.drive_can('restore', str(file), '--yes', *way)
+        broken.error('pump: answers no more; waiting up to 10 s for it')
+        simulator.write('pump restart=0')
+        assert broken.wait() == 1
         assert any('; not as in the file:' in line for line in broken.errors)
         # it came back, and was taken out of the mode that it kept
         assert simulator.frames(OUT_OF_MODE)
