@@ -1,5 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""``drive_can panel`` as a command: what it prints, how it ends, what it says if it cannot."""
+"""``drive_can panel`` as a command: what it prints, how it ends, what it says when it cannot."""
 
 from pathlib import Path
 import signal
