@@ -70,9 +70,6 @@ class Operations(Protocol):
         :return: somebody still waits for an answer.
         """
 
-    def offered(self, drive: str) -> frozenset[Stop]:
-        """Tell which stops a drive has, and its bridge offers now."""
-
     def stop(self, drive: str, stop: Stop, done: Callable[[Outcome], None], now: float) -> None:
         """Stop a drive."""
 

@@ -20,7 +20,7 @@ from drive_can_bridge.monitor.source import Outcome, Stop
 from drive_can_bridge.monitor.text import printable
 from drive_can_bridge.panel.access import Role
 from drive_can_bridge.panel.backups import Backups
-from drive_can_bridge.panel.feed import Feed
+from drive_can_bridge.panel.feed import Feed, has_control
 from drive_can_bridge.panel.gate import ROLE
 
 ALL = '*'
@@ -61,10 +61,10 @@ class Actions:
             _operator(request, stop.value.replace('_', ' '))
             wanted = (await _fields(request)).get('drive')
             names = ([drive.name for drive in self._feed.snapshot.drives
-                      if stop in self._feed.offered(drive.name)]
+                      if has_control(drive)]
                      if wanted == ALL else [self._drive(wanted).name])
             if not names:
-                return _said(Outcome(False, 'no drive here has that'))
+                return _said(Outcome(False, 'no drive here has a control word'))
             outcomes = await asyncio.gather(*(self._feed.stop(name, stop) for name in names))
             if wanted != ALL:
                 return _said(outcomes[0])

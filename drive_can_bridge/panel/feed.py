@@ -7,6 +7,7 @@ Everything happens in the thread of the web server, between two of its requests:
 
 import asyncio
 from collections.abc import Callable, Iterable, Sequence
+import logging
 import time
 from typing import TypeVar
 
@@ -22,6 +23,7 @@ _WAITING_PERIOD = 0.02
 #: between two samples of what a chart may show
 _GLANCE_PERIOD = 0.1
 
+_LOG = logging.getLogger('drive_can_panel')
 Result = TypeVar('Result')
 
 
@@ -51,42 +53,52 @@ class Feed:
         self._model = model
         self._views: set[View] = set()
         self._wake = asyncio.Event()
+        self._due = 0.0
         self.snapshot = Snapshot()
 
     async def run(self) -> None:
         """Look for ever."""
-        due = 0.0
         while True:
-            now = time.monotonic()
-            self._source.watch(bool(self._views))
-            closely = frozenset().union(*(view.focus for view in self._views))
-            self._source.focus(*closely)
-            waiting = self._operations.poll(
-                (drive.name for drive in self.snapshot.drives if has_control(drive)), now)
-            if now >= due:
-                due = now + PERIOD
-                self._look(now)
-            elif self._source.busy:
-                self._source.poll(now)
-            elif closely:
-                self._source.glance(now)
-            pause = max(0.0, due - time.monotonic())
-            if closely or self._source.busy:
-                pause = min(pause, _GLANCE_PERIOD)
-            if waiting:
-                pause = _WAITING_PERIOD
+            pause = PERIOD
+            try:
+                pause = self._turn(time.monotonic())
+            except Exception as error:  # noqa: BLE001  whatever it is, others want to see and stop
+                _LOG.error('%s: %s', type(error).__name__, error)
             self._wake.clear()
             try:
                 await asyncio.wait_for(self._wake.wait(), pause)
             except (asyncio.TimeoutError, TimeoutError):
                 continue
-            due = min(due, time.monotonic() + _WAITING_PERIOD)
+            self._due = min(self._due, time.monotonic() + _WAITING_PERIOD)
+
+    def _turn(self, now: float) -> float:
+        """Do what is due; return s until the next time."""
+        self._source.watch(bool(self._views))
+        closely = frozenset().union(*(view.focus for view in self._views))
+        self._source.focus(*closely)
+        waiting = self._operations.poll(
+            (drive.name for drive in self.snapshot.drives if has_control(drive)), now)
+        if now >= self._due:
+            self._due = now + PERIOD
+            self._look(now)
+        elif self._source.busy:
+            self._source.poll(now)
+        elif closely:
+            self._source.glance(now)
+        if waiting:
+            return _WAITING_PERIOD
+        pause = max(0.0, self._due - time.monotonic())
+        return min(pause, _GLANCE_PERIOD) if closely or self._source.busy else pause
 
     def _look(self, now: float) -> None:
         self._source.poll(now)
         self.snapshot = self._model.look(now, time.time())
         for view in list(self._views):
-            view.update(self.snapshot)
+            try:
+                view.update(self.snapshot)
+            except Exception as error:  # noqa: BLE001  a page that cannot be shown is no other's
+                self.hide(view)
+                _LOG.error('a page was given up: %s: %s', type(error).__name__, error)
 
     def show(self, view: View) -> None:
         """Let a page take part, at once."""
@@ -102,10 +114,6 @@ class Feed:
     def drive(self, name: str) -> DriveSnapshot | None:
         """Return a drive by its full name."""
         return self.snapshot.drive(name)
-
-    def offered(self, drive: str) -> frozenset[Stop]:
-        """Tell which stops a drive offers now."""
-        return self._operations.offered(drive)
 
     async def stop(self, drive: str, stop: Stop) -> Outcome:
         """Stop a drive; return what became of it."""

@@ -108,6 +108,7 @@ def serve(app: ASGIApp, listener: socket.socket, *, ended: Callable[[], bool],
     handler = logging.StreamHandler()
     handler.setFormatter(_OneLine())
     for name, level in (('uvicorn', logging.CRITICAL), ('nicegui', logging.ERROR),
+                        ('drive_can_panel', logging.ERROR),
                         ('asyncio', logging.ERROR)):
         logger = logging.getLogger(name)
         logger.handlers, logger.propagate = [handler], False

@@ -57,11 +57,6 @@ class Operations:
         return bool(self._calls) or any(
             service.busy for services in self._stops.values() for service in services.values())
 
-    def offered(self, drive: str) -> frozenset[Stop]:
-        """Tell which stops a drive has, and its bridge offers now."""
-        return frozenset(stop for stop, service in self._stops.get(drive, {}).items()
-                         if service.ready)
-
     def stop(self, drive: str, stop: Stop, done: Callable[[Outcome], None], now: float) -> None:
         """Stop a drive."""
         def take(response: Any) -> None:

@@ -1,0 +1,35 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""A panel without ``--allow-writes``; and stops that reach nobody."""
+
+from pathlib import Path
+import signal
+
+from panel_builders import Run, Site
+import pytest
+from waiting import wait_for
+
+pytest.importorskip('rclpy')
+pytest.importorskip('nicegui', reason="needs the extra 'panel'")
+
+
+def test_nothing_is_written_and_stops_are_always_there(run: Run, tmp_path: Path) -> None:
+    site = Site(run, tmp_path)
+    for action in ('write', 'restore?drive=/lift'):
+        answer = site.do(action, 'operator', {'drive': '/lift', 'name': 'ramp_time',
+                                              'value': '2'})
+        assert answer.status == 403
+        assert 'without --allow-writes' in answer.said['text']
+    for action in ('quick_stop', 'disable'):
+        for drive in ('/lift', '*'):
+            assert site.do(action, 'operator', {'drive': drive}).said['success'] is True
+
+    # what reaches nobody is said, of one drive and of all
+    assert site.bridge.end(signal.SIGKILL) == -signal.SIGKILL
+    for drive in ('/lift', '*'):
+        said = site.do('quick_stop', 'operator', {'drive': drive}).said
+        assert said['success'] is False
+        assert 'nobody' in said['text']
+    site.bridge = site.start_bridge()
+    wait_for(lambda: site.do('disable', 'operator', {'drive': '/lift'}).said['success'],
+             'the bridge that is back')
+    site.check_alive()
