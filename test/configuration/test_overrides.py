@@ -73,7 +73,7 @@ def test_good(good: dict[str, Any]) -> None:
      ["drives: has a value, and 'conveyor' below it; allowed is one of them",
       'drives: an empty list, allowed is a mapping']),
     ('unknown.key', 5,
-     ['unknown: unknown key, allowed: autostart, diagnostics_period, profile_directories, buses, '
+     ['unknown: unknown key, allowed: autostart, diagnostics_period, joint_state_rate, profile_directories, buses, '
       'drives, use_sim_time, start_type_description_service']),
 ])
 def test_problem(good: dict[str, Any], name: str, value: object, expected: list[str]) -> None:
