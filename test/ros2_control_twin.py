@@ -8,8 +8,8 @@ installed here. This does what they do with messages, traps included:
 * states come with the quality of sensor data, and only the latest message is kept;
 * arrays may be empty; one that is shorter than the names ends the process, and so does a finite
   value for an interface that the joint lacks; what is not finite is skipped;
-* commands go with a queue of one; each kind of interface is one array, without gaps for joints that
-  lack it; nothing is sent while all commands together differ from the states by no more than
+* commands go with a queue of one; each kind of interface is one array, without gaps for joints
+  that lack it; nothing is sent while all commands together differ from the states by no more than
   ``trigger_joint_command_threshold``.
 
 ``robot_state_publisher`` and MoveIt take a message only if it has a position for each name.

@@ -125,7 +125,7 @@ class Setpoints:
             if not taken:
                 self.disarm()
 
-    # -- axes that stay where they are --------------------------------------------------------------
+    # -- axes that stay where they are ------------------------------------------------------------
 
     @property
     def known(self) -> bool:

@@ -45,8 +45,8 @@ def test_there_are_no_others() -> None:
 @pytest.mark.parametrize('robot', ROBOTS)
 def test_interfaces_are_those_of_the_bridge(robot: str) -> None:
     joints = joints_of(robot)
-    described = {str(joint.get('name'))
-                 for joint in ElementTree.parse(FOLDER / f'{robot}.urdf').getroot().findall('joint')}
+    root = ElementTree.parse(FOLDER / f'{robot}.urdf').getroot()
+    described = {str(joint.get('name')) for joint in root.findall('joint')}
     assert described == set(joints)
     for system in systems_of(robot):
         commanded = [interfaces(joint, 'command_interface') for joint in system.findall('joint')]

@@ -9,7 +9,7 @@ the position is known first, and what is sent until then and after a loss. 70 is
 from typing import Any
 
 from builders import (
-    Conversation, CONTROL, drive, INT16, parameter, RAM, RO, STATUS, TABLE, WORD,
+    CONTROL, Conversation, drive, INT16, parameter, RAM, RO, STATUS, TABLE, WORD,
 )
 
 from drive_can_bridge.core.control import ControlAction

@@ -9,7 +9,7 @@ ready 1, enabled 2, fault 8), 212 (position). The position is limited to ±10 de
 from typing import Any
 
 from builders import (
-    ACTUAL, Conversation, CONTROL, drive, INT16, parameter, RAM, RO, STATUS, TABLE, WORD,
+    ACTUAL, CONTROL, Conversation, drive, INT16, parameter, RAM, RO, STATUS, TABLE, WORD,
 )
 import pytest
 
