@@ -9,7 +9,7 @@ rate of its own the newest sample of each is taken together, under the stamp of 
 A joint whose drive is not online is left out: nobody is told a position that nobody has measured.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 import math
 from typing import Any, NamedTuple
@@ -20,12 +20,10 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
 from drive_can_bridge.core.configuration import JointConfiguration
-from drive_can_bridge.core.parameters import Value
 from drive_can_bridge.ros.drive_node import DriveNode
 from drive_can_bridge.ros.prepared import PreparedMessage
 from drive_can_bridge.ros.quality import overriding, state_quality
 from drive_can_bridge.ros.stamps import Stamps
-from drive_can_bridge.ros.values import converters
 
 RCLError = rclpy_implementation.RCLError
 
@@ -34,10 +32,11 @@ QUANTITIES = ('position', 'velocity', 'effort')
 
 
 class _Value(NamedTuple):
-    """One quantity of one joint: the slot in a sample, and the way to its SI value."""
+    """One quantity of one joint: its slot in a sample, and the way to its SI value."""
 
     slot: int
-    convert: Callable[[int], Value]
+    scale: float
+    offset: float
     factor: float
 
 
@@ -52,19 +51,28 @@ class _Joint:
                  quantities: Sequence[str]) -> None:
         self.drive = drive
         self.name = joint.name
-        parameters = drive.session.sample_parameters
-        slots = {parameter.name: slot for slot, parameter in enumerate(parameters)}
-        to_value = converters(parameters)
+        parameters = {parameter.name: (slot, parameter) for slot, parameter
+                      in enumerate(drive.session.sample_parameters)}
         self.values: list[_Value | None] = []
         for quantity in quantities:
             name = getattr(joint, quantity)
-            self.values.append(None if name is None else _Value(
-                slots[name], to_value[slots[name]], joint.factors[name]))
+            if name is None:
+                self.values.append(None)
+                continue
+            slot, parameter = parameters[name]
+            linear = (parameter.scale, parameter.offset) if parameter.scaled else (1.0, 0.0)
+            self.values.append(_Value(slot, *linear, joint.factors[name]))
 
     def measured(self, raws: tuple[int, ...]) -> list[float]:
         """Return what a sample says, NaN where it says nothing."""
-        return [math.nan if value is None or value.slot >= len(raws)
-                else value.convert(raws[value.slot]) * value.factor for value in self.values]
+        found = []
+        for value in self.values:
+            if value is None or value[0] >= len(raws):
+                found.append(math.nan)
+            else:
+                slot, scale, offset, factor = value
+                found.append((raws[slot] * scale + offset) * factor)
+        return found
 
 
 class JointStates:
@@ -118,15 +126,14 @@ class JointStates:
             return
         if names != self._names:
             self._prepare(names)
-        numbers: list[Any] = [*self._stamps.at(oldest)]
-        for column in zip(*rows):
-            numbers += column
+        columns = list(zip(*rows))
+        numbers: list[Any] = [*self._stamps.at(oldest), *columns]
         if self._prepared is not None:
             self._prepared.publish(numbers)
             return
         message = self._message
         message.header.stamp.sec, message.header.stamp.nanosec = numbers[:2]
-        for quantity, column in zip(self._quantities, zip(*rows)):
+        for quantity, column in zip(self._quantities, columns):
             setattr(message, quantity, column)
         self.publisher.publish(message)
 
@@ -137,8 +144,6 @@ class JointStates:
         stamp = message.header.stamp
         numbers: list[Any] = [('i', partial(setattr, stamp, 'sec')),
                               ('I', partial(setattr, stamp, 'nanosec'))]
-        for quantity in self._quantities:
-            setattr(message, quantity, [0.0] * len(names))
-            values = getattr(message, quantity)
-            numbers += [('d', partial(values.__setitem__, place)) for place in range(len(names))]
+        numbers += [(f'{len(names)}d', partial(setattr, message, quantity))
+                    for quantity in self._quantities]
         self._prepared = PreparedMessage.find(self.publisher, message, numbers)
