@@ -35,7 +35,9 @@ class AxisObserver(Observer):
     """
     Keeps books of positions.
 
-    :ivar reported: the position that the drive said last; None: not since it was lost.
+    :ivar reported: the position that a cyclic answer said last; None: none since it was lost.
+    :ivar read: positions that were read by number since it was lost, by us or by users.
+    :ivar old: what was reported before it was lost.
     :ivar anew: since it was lost, no position was sent that it has reported since.
     """
 
@@ -48,10 +50,15 @@ class AxisObserver(Observer):
         self.command: int | None = None
         self.commanded_at = -math.inf
         self.anew = True
+        self.read: set[int] = set()
+        self.old: set[int] = set()
 
     def lost(self) -> None:
         """Take note that the axis may be anywhere."""
+        if self.controlled:     # beside ``disable``, what was known goes on, sent or refused
+            self.old |= self.read | ({self.reported} if self.reported is not None else set())
         self.reported, self.running_said, self.command, self.anew = None, False, None, True
+        self.read.clear()
 
     def doubt(self) -> None:
         super().doubt()
@@ -78,7 +85,7 @@ class AxisObserver(Observer):
             self.sees_position(position, now)
             self.tells('cycle', runs=bool(word))
         elif identifier & 0x100000 and number == 60:
-            assert words[0] in (self.last, self.reported), 'a stop repeats what is there'
+            assert words[0] in {self.last, self.reported, *self.read}, 'a stop repeats what is'
         elif identifier & 0x100000 and number == 52:
             self.tells('cycle', runs=any(words))
 
@@ -90,10 +97,15 @@ class AxisObserver(Observer):
         allowed = {self.last, self.command}
         if self.reported is not None and (self.anew or not self.running_said):
             allowed.add(self.reported)
-            self.anew = False
+        if self.anew:
+            allowed |= self.read | self.old
         if not self.controlled:
-            assert self.reported is not None, 'where it is, nobody knows'
+            assert self.reported is not None or self.read, 'where it is, nobody knows'
         assert position in allowed, f'{position} is none of {allowed}: the axis jumps'
+        # a read of users does not make it known; one of ours shows by what is sent
+        if self.reported is not None or position in self.read - {self.last}:
+            self.anew = False
+            self.old.clear()
         self.last = position
 
 
@@ -157,7 +169,7 @@ class AxisMachine(AnyOrder):
             if not observer.running_said and observer.controlled:
                 observer.command = None
         elif heard.identifier == 0x10200D41:
-            observer.reported = words[0]
+            observer.read.add(words[0])
         exchanges = session.statistics.exchanges
         session.receive_frame(heard, self.now)
         if heard.identifier == 0x103FFFF0 and session.statistics.exchanges == exchanges:
