@@ -200,11 +200,13 @@ def test_fault_reset_and_enabling_anew() -> None:
     assert cycle(talk, 6, 8, 60) == request(0, 70)
     talk.asks(ControlAction.RESET_FAULT, 10.125)
     assert cycle(talk, 7, 1, 55) == request(0x80, 60)
-    assert cycle(talk, 8, 1, 55) == request(0, 55)
-    talk.asks(ControlAction.ENABLE, 10.165)
-    assert cycle(talk, 9, 3, 55) == request(1, 55)
-    assert talk.commands(0, 9.0, 10.183) is CommandOutcome.NOT_ARMED    # left standing
-    assert cycle(talk, 10, 3, 54) == request(1, 55)
+    assert cycle(talk, 8, 1, 55) == request(0x80, 55)
+    assert cycle(talk, 9, 1, 55) == request(0x80, 55)
+    assert cycle(talk, 10, 1, 55) == request(0, 55)
+    talk.asks(ControlAction.ENABLE, 10.205)
+    assert cycle(talk, 11, 3, 55) == request(1, 55)
+    assert talk.commands(0, 9.0, 10.223) is CommandOutcome.NOT_ARMED    # left standing
+    assert cycle(talk, 12, 3, 54) == request(1, 55)
 
 
 def test_deactivation_repeats_it() -> None:
