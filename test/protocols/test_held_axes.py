@@ -273,3 +273,15 @@ def test_pkw_without_control_is_told_nothing_after_a_loss() -> None:
     warnings = [event.text for event in talk.events(Noted) if event.warning]
     assert 'where its axis is, nobody knows, so that it is told nothing: it may still be running' \
         in warnings
+
+
+def test_pkw_does_not_enable_what_refuses_its_position() -> None:
+    talk = pkw()
+    sent = talk.hears('485#C70100A641004600', 10.053)
+    assert sent == ['505#C002002A00000000']
+    sent = talk.hears('485#C002002A00000000', 10.054)
+    assert sent == ['505#C60200AA46000000']
+    talk.hears('485#C60200CE22000008', 10.055)      # 0800 0022h: not in the present state
+    answer = talk.session.request_control(ControlAction.ENABLE, 10.056)
+    assert isinstance(answer, str)
+    assert answer.startswith('it would jump: write of position_setpoint refused')

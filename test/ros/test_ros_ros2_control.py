@@ -261,6 +261,12 @@ def test_nothing_creeps_for_a_long_time(arm: Arm) -> None:
         assert len(positions) == 1, 'held, whatever the encoder says'
 
 
+def test_rearm_stays_neutral(arm: Arm) -> None:
+    (answer,) = arm.client.set('/drive_can_bridge', **{'drives.wrist.rearm': 'immediate'})
+    assert answer == (False, 'position_setpoint would jump: it has neutral_from, which needs '
+                             'rearm: neutral')
+
+
 def test_base_with_wheels(bridge: StartBridge, client: Client) -> None:
     """Velocity interfaces: both wheels forward, of which one is mounted the other way."""
     one = bridge(content('base'), arguments=REMAPS)
