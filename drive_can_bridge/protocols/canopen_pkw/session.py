@@ -25,7 +25,7 @@ from enum import Enum
 import math
 
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.control import ControlAction, ControlMachine, ControlTicket
+from drive_can_bridge.core.control import ControlAction, ControlMachine
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.events import (
     ForeignMasterSeen, ProcessDataReceived,
@@ -473,13 +473,13 @@ class PkwSession(Session):
 
     # -- control ----------------------------------------------------------------------------------
 
-    def request_control(self, action: ControlAction, now: float) -> ControlTicket | str:
+    def control_refusal(self, action: ControlAction) -> str:
         if action is ControlAction.ENABLE:
             for setpoint in self.setpoints.held:    # the drive has another position than this
                 refusal = self._setpoint_writer.refusals.get(setpoint.parameter.name)
                 if refusal:
                     return f'it would jump: write of {refusal}'
-        return super().request_control(action, now)
+        return super().control_refusal(action)
 
     def _see_to_control_word(self, now: float) -> None:
         if not self.online:
