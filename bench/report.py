@@ -211,6 +211,18 @@ def flight_figures(found: dict[str, Any]) -> list[Figure]:
     ]
 
 
+def joints_figures(found: dict[str, Any]) -> list[Figure]:
+    """Compare a bridge with and without the message of all joints."""
+    shares = [found[name]['cpu'] / found[name]['elapsed'] for name in ('with', 'without')]
+    return [
+        Figure('CPU with all joints in one message, 100 Hz',
+               f'{100 * shares[0]:.1f} % ({found["received"] / found["with"]["elapsed"]:.0f} '
+               f'messages/s, {found["with"]["missed"]} missed)',
+               f'without {100 * shares[1]:.1f} % ({found["without"]["missed"]} missed)',
+               shares[0] / shares[1], 1.05),
+    ]
+
+
 def start_figures(found: dict[str, Any]) -> list[Figure]:
     """Start and memory."""
     memory = found['resident_mb']
@@ -233,7 +245,7 @@ FIGURES: dict[str, Callable[[Any], list[Figure]]] = {
     'latency': latency_figures, 'service': service_figures,
     'flood': flood_figures, 'stop': stop_figures, 'monitor': monitor_figures,
     'backup': backup_figures, 'drives': drives_figures, 'decode': decode_figures,
-    'flight': flight_figures, 'start': start_figures,
+    'flight': flight_figures, 'joints': joints_figures, 'start': start_figures,
 }
 
 

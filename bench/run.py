@@ -44,6 +44,8 @@ def plan(options: argparse.Namespace) -> dict[str, Callable[[], Any]]:
             for number in sorted({1, 4, 8, drives})},
         'flight': lambda: scenarios.flight(
             Load(drives, period, subscribed=False, trace=2 * duration), duration),
+        'joints': lambda: scenarios.joints(
+            Load(drives, period, subscribed=False), duration, 100.0),
         'decode': lambda: scenarios.decode(options.frames),
         'start': lambda: scenarios.start(drives, options.memory_duration),
     }

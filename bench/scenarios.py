@@ -49,6 +49,7 @@ class Load:
     :param stuck: nobody reads the bridge's standard error.
     :param buses: among which the drives are shared out.
     :param settings: parameters of each drive that a backup has, none beside another.
+    :param joints: Hz of the message with all joints; 0: there is none; None: drives have no joint.
     """
 
     drives: int
@@ -61,6 +62,7 @@ class Load:
     stuck: bool = False
     buses: int = 1
     settings: int = 0
+    joints: float | None = None
 
     @property
     def how(self) -> tuple[str, ...]:
@@ -86,7 +88,7 @@ class Bus:
                       f'        channel: {channel}', '        bitrate: 1000000',
                       f'        trace_seconds: {load.trace}',
                       f'        trace_directory: {folder}']
-        lines.append('    drives:')
+        lines += [f'    joint_state_rate: {load.joints or 0.0}', '    drives:']
         profile, requests, responses = HERE / 'profile.yaml', REQUESTS, RESPONSES
         if load.control:
             profile = HERE / 'profile_control.yaml'
@@ -104,6 +106,9 @@ class Bus:
                       f'        profile: {profile}', '        rearm: immediate',
                       f'        period: {load.period}', f'        cyclic_request: [{requests}]',
                       f'        cyclic_response: [{responses}]']
+            if load.joints is not None:
+                lines += [f'        joint: {{name: joint{number}, position: actual_position, '
+                          'velocity: actual_speed, effort: motor_current}']
         self.file.write_text('\n'.join(lines) + '\n', encoding='utf-8')
         self.drives, *_ = [stack.enter_context(child('drives.py', channel, *pace))
                            for channel in self.channels]
@@ -377,6 +382,29 @@ def flight(load: Load, duration: float) -> dict[str, Any]:
                 else:
                     time.sleep(duration)
                 found[name] = bridge.ask('result')
+    return found
+
+
+def joints(load: Load, duration: float, rate: float, rounds: int = 3) -> dict[str, Any]:
+    """Measure the CPU time of a bridge with and without the message of all joints, in turn."""
+    found: dict[str, Any] = {name: {'cpu': 0.0, 'elapsed': 0.0, 'exchanges': 0, 'missed': 0}
+                             for name in ('without', 'with')}
+    found['received'] = 0
+    for _ in range(rounds):
+        for name, each in (('without', 0.0), ('with', rate)):
+            with ExitStack() as stack:
+                bus = Bus(stack, replace(load, joints=each))
+                listener = stack.enter_context(child('subscriber.py', 'joints'))
+                bridge = stack.enter_context(bridge_under(load, bus))
+                time.sleep(SETTLE)
+                bridge.ask('clear')
+                listener.ask('clear')
+                time.sleep(duration)
+                result = bridge.ask('result')
+                found['received'] += listener.ask('count')
+                found[name]['cpu'] += result['process_cpu']
+                for key in ('elapsed', 'exchanges', 'missed'):
+                    found[name][key] += result[key]
     return found
 
 

@@ -6,6 +6,8 @@ Other processes that subscribe.
 its middleware receives and acknowledges everything, as any subscriber's does, but no Python runs,
 which would not keep up with 15,000 messages a second and starve the bench on a small machine.
 
+``subscriber.py joints`` counts messages with all joints.
+
 ``subscriber.py listen NAME …`` measures from the stamp of ``/NAME/response`` to the callback.
 """
 
@@ -18,6 +20,7 @@ from rcl_interfaces.msg import ParameterEvent
 import rclpy  # isort: skip
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from sensor_msgs.msg import JointState
 from topics import TYPES
 
 
@@ -46,6 +49,22 @@ class Listener:
         return {name: list(found) for name, found in self._latencies.items()}
 
 
+class Counter:
+    """Counts messages with all joints."""
+
+    def __init__(self, node: Node) -> None:
+        self.number = 0
+        node.create_subscription(JointState, '/drive_can_bridge/joint_states', self._received, 10)
+
+    def _received(self, _: JointState) -> None:
+        self.number += 1
+
+    def clear(self) -> bool:
+        """Begin anew."""
+        self.number = 0
+        return True
+
+
 def main() -> None:
     """Subscribe."""
     rclpy.init(args=[])
@@ -58,6 +77,12 @@ def main() -> None:
                     node.create_subscription(message_type, f'/{prefix}{number}/{topic}',
                                              lambda _: None, 10)
         serve({})
+    elif sys.argv[1] == 'joints':
+        counter = Counter(node)
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        threading.Thread(target=executor.spin, daemon=True).start()
+        serve({'clear': counter.clear, 'count': lambda: counter.number})
         return
     listener = Listener(node, sys.argv[2:])
     executor = SingleThreadedExecutor()

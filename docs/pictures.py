@@ -3,8 +3,9 @@
 The pictures of README and docs, in one style: ``make pictures``.
 
 Each is a function in ``PICTURES`` that writes one file. Nothing is drawn by hand: the live view is
-that of a demo which really runs, exported by rich, and so is the diagram of the architecture. The
-panel is seen in a real browser; where none is installed its pictures are left out.
+that of a demo which really runs, exported by rich, and so is the diagram of the architecture; the
+arm is a record of simulated axes. The panel is seen in a real browser; where none is installed its
+pictures are left out.
 """
 
 import argparse
@@ -15,6 +16,7 @@ import re
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 
 # before rclpy is imported: nothing leaves this machine, nor meets a demo that runs here
@@ -118,6 +120,19 @@ def architecture(path: Path) -> None:
     _save(Group(picture, clients), path, 'drive_can_bridge: what goes where', 128, 23)
 
 
+def arm(path: Path) -> None:
+    """Draw what an axis does, and is told, through all that may come between."""
+    with tempfile.TemporaryDirectory() as folder:
+        trace = Path(folder, 'arm.log')
+        subprocess.run([sys.executable, HERE / 'ros2_control_run.py', trace], check=True)
+        subprocess.run(
+            [sys.executable, '-m', 'drive_can_bridge.cli.main', 'decode', trace, '--params-file',
+             HERE.parent / 'config' / 'ros2_control' / 'arm.yaml', '--plot', path,
+             *(f'shoulder.{name}' for name in ('position_setpoint', 'actual_position',
+                                               'status_word'))],
+            check=True)
+
+
 def _lines(lines: Sequence[str], justify: str = 'left', style: str = '') -> Text:
     return Text('\n'.join(lines), justify=justify, style=style)  # type: ignore[arg-type]
 
@@ -159,6 +174,7 @@ def _save(body: RenderableType, path: Path, title: str, width: int, height: int)
 PICTURES: dict[str, Callable[[Path], None]] = {
     'monitor.svg': live_view,
     'architecture.svg': architecture,
+    'ros2_control.png': arm,
     **panel_pictures.PICTURES,
 }
 

@@ -147,6 +147,10 @@ class DriveChecker:
         control = drive.profile.control
         for position, parameter in enumerate(drive.cyclic_request):
             is_word = control is not None and control.parameter == parameter.name
+            if parameter.neutral_from:
+                self._check_held(drive, parameter, is_word=is_word, at=(
+                    *self._path, 'cyclic_request', position))
+                continue
             if is_word or not parameter.listed or parameter.neutral is not None:
                 continue
             if _direction_problem('cyclic_request', parameter):
@@ -157,6 +161,24 @@ class DriveChecker:
                             'and raw 0 is out of its range, allowed is a neutral of '
                             f'{parameter.range_text}',
                             at=(*self._path, 'cyclic_request', position))
+
+    def _check_held(self, drive: DriveConfiguration, parameter: Parameter, *, is_word: bool,
+                    at: Path) -> None:
+        """Check what an axis needs that has to stay where it is (``neutral_from``)."""
+        name, measured = show(parameter.name), show(parameter.neutral_from)
+        if is_word:
+            self._wrong(('cyclic_request',), f'{name} is the control word, which has no '
+                        'neutral_from; allowed in setpoints', at=at)
+        if not self._is_damaged('cyclic_response') and all(
+                other.name != parameter.neutral_from for other in drive.cyclic_response):
+            self._wrong(('cyclic_request',), f'{name} is neutral at {measured}, which is not in '
+                        'cyclic_response, allowed is to add it there', at=at)
+        if drive.rearm_immediate:
+            self._wrong(('rearm',), f"'immediate' would let {name} jump from {measured}, allowed "
+                        "with neutral_from is 'neutral'")
+        if getattr(drive.options, 'broadcast', 'none') != 'none':
+            self._wrong(('broadcast',), f'{show(drive.options.broadcast)} sends the same '
+                        f'{name} to several axes, allowed with neutral_from is none')
 
     def _check_status(self, drive: DriveConfiguration) -> None:
         control = drive.profile.control

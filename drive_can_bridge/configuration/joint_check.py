@@ -1,6 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The ``joint`` section of a drive: its parameters are exchanged, and their units convert."""
 
+from collections.abc import Iterable
 from typing import Any
 
 from drive_can_bridge.configuration.problems import Path, Tree
@@ -20,6 +21,17 @@ def check_joint(tree: Tree, drive: DriveConfiguration) -> JointConfiguration | N
     """Return the joint of a drive; None where it has none, or a wrong one."""
     entry = tree.data['drives'][drive.name].get('joint')
     return None if entry is None else _JointChecker(tree, drive).check(entry)
+
+
+def check_joint_names(tree: Tree, drives: Iterable[DriveConfiguration]) -> None:
+    """Check that no two drives have joints of one name: they share messages."""
+    owners: dict[str, str] = {}
+    for drive in drives:
+        if drive.joint is not None and owners.setdefault(
+                drive.joint.name, drive.name) != drive.name:
+            tree.wrong(('drives', drive.name, 'joint', 'name'),
+                       f'{show(drive.joint.name)} is the joint of drives.'
+                       f'{owners[drive.joint.name]} already, allowed is a name of its own')
 
 
 class _JointChecker:
@@ -58,6 +70,11 @@ class _JointChecker:
             if factor is not None:
                 factors[name] = factor
                 units.add(parameter.unit)
+            if key == 'position_command' and not parameter.neutral_from:
+                self._tree.suspicious(
+                    (*self._path, key), f'{show(name)} has no neutral_from: without a command '
+                    f'the axis goes to {show(parameter.value_from_raw(parameter.neutral_raw))} '
+                    f'{parameter.unit}, wherever it stands')
         if not self._tree.is_sound(self._path):
             return None
         if values['pole_pairs'] != 1 and ELECTRICAL_FREQUENCY not in units:

@@ -13,6 +13,7 @@ from typing import Any
 from drive_can_bridge.configuration.bus_check import Adapters, check_buses
 from drive_can_bridge.configuration.declare import check_dynamic, declared_parameters
 from drive_can_bridge.configuration.drive_check import DriveChecker, LISTS
+from drive_can_bridge.configuration.joint_check import check_joint_names
 from drive_can_bridge.configuration.overrides import tree_from_overrides
 from drive_can_bridge.configuration.parameter_file import read_parameter_file
 from drive_can_bridge.configuration.problems import Path, report, Tree
@@ -103,6 +104,7 @@ def _check_together(tree: Tree, buses: Mapping[str, BusConfiguration],
     paced = [drive for name, drive in drives.items()
              if checkers[name].is_sound('bus', 'protocol', 'period', *LISTS)]
     check_identifiers(tree, placed.values())
+    check_joint_names(tree, drives.values())
     for bus in buses.values():
         here = [drive for drive in paced if drive.bus == bus.name]
         if ('buses', bus.name, 'bitrate') not in tree.damaged:

@@ -17,8 +17,8 @@ def tree_from_overrides(overrides: Mapping[str, object]) -> Tree:
     """
     tree = Tree({})
     holders: dict[Path, str | int] = {}
-    # A name sorts before those that begin with it: a value is met before what it would hold.
-    for name in sorted(overrides):
+    # In the order of the file, but a value is met before what it would hold.
+    for name in sorted(overrides, key=lambda name: name.count('.')):
         parts = name.split('.')
         # Topic names in QoS overrides may have dots; they are not ours to take apart.
         path: Path = (name,) if parts[0] == 'qos_overrides' else tuple(parts)

@@ -24,7 +24,7 @@ from drive_can_bridge.core.parameters import (
     Access, Parameter, ParameterType, STEP_TOLERANCE, Storage, Value,
 )
 from drive_can_bridge.core.profile import Profile
-from drive_can_bridge.core.words import show
+from drive_can_bridge.core.words import show, suggestion
 
 #: names that a drive's node uses itself
 RESERVED = frozenset((
@@ -36,7 +36,7 @@ RESERVED = frozenset((
 _MADE: dict[str, Callable[[Any], Any]] = {
     'type': ParameterType, 'access': Access, 'storage': Storage,
     'bits': lambda bits: tuple(bits.items()),
-    **dict.fromkeys(('scale', 'offset', 'minimum', 'maximum'), float)}
+    **dict.fromkeys(('scale', 'offset', 'minimum', 'maximum', 'arming_tolerance'), float)}
 _RAW_NAME = re.compile(r'p[0-9]+|x[0-9a-f]+', re.ASCII)
 
 
@@ -76,9 +76,11 @@ def profile_from_tree(tree: Tree) -> LoadedProfile:
         parameter = _parameter(name, entry)
         _check_names(tree, path, parameter)
         _check_parameter(tree, path, parameter, entry)
+        _check_neutral_from(tree, path, parameter, entry)
         # An entry of which a part was cut out would be checked with values it never had.
         if tree.is_sound(path):
             parameters[name] = _narrowed(tree, path, parameter)
+    _check_measured(tree, parameters, names)
     control = None
     if isinstance(tree.data.get('control'), dict):
         check_control(tree, parameters, names)
@@ -125,7 +127,8 @@ def _check_parameter(tree: Tree, path: Path, parameter: Parameter, entry: dict[s
     width = parameter.type.bits
     if parameter.type is ParameterType.BOOL:
         width = 1
-        for key in ('scale', 'offset', 'unit', 'minimum', 'maximum'):
+        for key in ('scale', 'offset', 'unit', 'minimum', 'maximum', 'neutral_from',
+                    'arming_tolerance'):
             if key in entry:
                 tree.wrong((*path, key), f'a bool has no {key}, allowed is to leave it out')
         if 'neutral' in entry and not isinstance(entry['neutral'], bool):
@@ -140,6 +143,48 @@ def _check_parameter(tree: Tree, path: Path, parameter: Parameter, entry: dict[s
     if parameter.word_order is not None and parameter.type.bits != 32:
         tree.wrong((*path, 'word_order'), f'{parameter.type.value} has one word, allowed in int32 '
                                           'and uint32')
+
+
+def _check_neutral_from(tree: Tree, path: Path, parameter: Parameter,
+                        entry: dict[str, Any]) -> None:
+    """Check what a setpoint says that stays where the axis is."""
+    if not parameter.neutral_from or not tree.is_sound((*path, 'neutral_from')):
+        return
+    if 'neutral' in entry:
+        tree.wrong((*path, 'neutral'), 'stands beside neutral_from, allowed is one of them')
+    if 'arming_tolerance' not in entry and not tree.is_damaged((*path, 'arming_tolerance')):
+        tree.wrong((*path, 'neutral_from'), 'needs arming_tolerance: how far a command may be '
+                                            'from where the axis is and still arm, allowed is '
+                                            'to give it too')
+    if not parameter.writable:
+        tree.wrong((*path, 'neutral_from'), f'{show(parameter.name)} is read-only, allowed in '
+                                            'parameters with access rw or wo')
+
+
+def _check_measured(tree: Tree, parameters: dict[str, Parameter], names: tuple[str, ...]) -> None:
+    """Check that ``neutral_from`` names actual values that a setpoint can be compared with."""
+    for parameter in list(parameters.values()):
+        name, path = parameter.neutral_from, ('parameters', parameter.name, 'neutral_from')
+        measured = parameters.get(name)
+        if not name or (measured is None and name in names):     # wrong itself
+            continue
+        message = ''
+        if measured is None:
+            message = f'{show(name)} is not in the profile, {suggestion(name, names)}'
+        elif measured is parameter or not measured.readable:
+            message = f'{show(name)} is no actual value, allowed is one that can be read'
+        elif measured.type is ParameterType.BOOL:
+            message = f'{show(name)} is a bool, allowed is a number'
+        elif measured.unit != parameter.unit:
+            message = (f'{show(name)} has {_unit_text(measured)}, allowed is an actual value with '
+                       f'{_unit_text(parameter)}, that of {show(parameter.name)}')
+        if message:
+            tree.wrong(path, message)
+            del parameters[parameter.name]
+
+
+def _unit_text(parameter: Parameter) -> str:
+    return f'the unit {show(parameter.unit)}' if parameter.unit else 'no unit'
 
 
 def _check_limits(tree: Tree, path: Path, parameter: Parameter, entry: dict[str, Any]) -> None:

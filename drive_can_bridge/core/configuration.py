@@ -97,12 +97,14 @@ class BridgeConfiguration:
     """
     Everything one bridge process does.
 
+    :param joint_state_rate: Hz of the message with all joints; 0: there is none.
     :param warnings: readable lines about what is allowed but suspicious (bus load over 70 %,
         a key that the adapter does not know).
     """
 
     autostart: bool = True
     diagnostics_period: float = 1.0
+    joint_state_rate: float = 50.0
     buses: dict[str, BusConfiguration] = field(default_factory=dict)
     drives: dict[str, DriveConfiguration] = field(default_factory=dict)
     profile_directories: tuple[str, ...] = ('',)

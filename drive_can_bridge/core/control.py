@@ -188,6 +188,13 @@ class ControlMachine:
         return self._reached
 
     @property
+    def off(self) -> bool:
+        """The drive reports that it does not drive anything, or cannot and was told so."""
+        if self._table.enabled is None:
+            return self._sending is ControlAction.DISABLE and self._sent
+        return self._reports.off
+
+    @property
     def word_due(self) -> bool:
         """The current word has not left since it changed, or since :meth:`withdraw`."""
         return not self._sent

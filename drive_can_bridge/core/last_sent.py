@@ -13,13 +13,15 @@ class LastSent:
     :ivar parameters: all that a drive can be told, in the order of its frames.
     :ivar raws: the raw integer of each; None: not sent since activation. Another tuple after each
         change, and the same one as long as nothing changes.
+    :ivar times: how often frames with new contents have carried each, for whoever waits for one.
     """
 
-    __slots__ = ('parameters', 'raws')
+    __slots__ = ('parameters', 'raws', 'times')
 
     def __init__(self, parameters: Sequence[Parameter]) -> None:
         self.parameters = tuple(parameters)
         self.raws: tuple[int | None, ...] = ()
+        self.times = [0] * len(self.parameters)
         self.clear()
 
     def clear(self) -> None:
@@ -37,5 +39,7 @@ class LastSent:
         raws = (*self.raws[:first], *(
             parameter.raw_from_word(parameter.word_from_raw(word))
             for parameter, word in zip(self.parameters[first:end], words)), *self.raws[end:])
+        for place in range(first, min(end, len(self.times))):
+            self.times[place] += 1
         if raws != self.raws:
             self.raws = raws

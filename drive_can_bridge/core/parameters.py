@@ -95,6 +95,9 @@ class Parameter:
     :param minimum: smallest allowed physical value.
     :param maximum: largest allowed physical value.
     :param neutral: value sent while there is no fresh command; None means what encodes to raw 0.
+    :param neutral_from: name of the actual value that is sent instead of it: the axis stays where
+        it is; '': ``neutral`` holds.
+    :param arming_tolerance: how far from neutral a command may be and still arm.
     :param bits: named bits, (name, bit number).
     :param subindex: array index (CANnord) or CANopen sub-index.
     :param index: CANopen index.
@@ -117,6 +120,8 @@ class Parameter:
     minimum: float | None = None
     maximum: float | None = None
     neutral: float | None = None
+    neutral_from: str = ''
+    arming_tolerance: float = 0.0
     description: str = ''
     bits: tuple[tuple[str, int], ...] = ()
     subindex: int | None = None
@@ -219,6 +224,17 @@ class Parameter:
                 f'{value_text(value)} is not representable: {self.type.value} has no value in '
                 f'{self.range_text}')
         return min(max(raw, low), high)
+
+    def raw_nearest(self, value: Value) -> int | None:
+        """
+        Return the raw integer nearest to a physical value, whatever ``minimum..maximum`` say.
+
+        :return: None where the type cannot represent it.
+        """
+        steps = self._steps(value) if self.scaled else float(value)
+        raw = math.floor(steps + 0.5)
+        low, high = self.type.raw_range
+        return raw if low <= raw <= high else None
 
     @cached_property
     def raw_limits(self) -> tuple[int, int]:

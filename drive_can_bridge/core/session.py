@@ -30,6 +30,7 @@ from drive_can_bridge.core.events import (
     Event, FrameRejected, Noted, RequestCompleted, SetpointsExpired, StationFound, StationLost,
 )
 from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.holding import HeldSetpoint
 from drive_can_bridge.core.last_sent import LastSent
 from drive_can_bridge.core.outbox import Outbox
 from drive_can_bridge.core.parameters import Parameter, Value
@@ -64,6 +65,14 @@ class DriveState(Enum):
     FAULT = 'fault'
 
 
+def untold_text(untold: Sequence[HeldSetpoint]) -> str:
+    """Say why an axis cannot be driven yet: the drive does not have its position."""
+    texts = [f'{setpoint.parameter.name} does not have the value of {setpoint.measured.name} yet'
+             + ('' if setpoint.known else ', which is not known or which it cannot carry')
+             for setpoint in untold]
+    return f'it would jump: {"; ".join(texts)}'
+
+
 class Session(ABC):
     """
     What all families share: setpoints, statistics, the outboxes, the life cycle.
@@ -90,11 +99,15 @@ class Session(ABC):
         self.control = control
         control_table = drive.profile.control
         self._control_name = control_table.parameter if control_table and control else ''
+        self.sent = LastSent(self.request_parameters)
         self.setpoints = Setpoints(
             tuple(parameter for parameter in drive.cyclic_request
                   if parameter.name != self._control_name),
-            timeout=drive.command_timeout, rearm_immediate=drive.rearm_immediate)
-        self.sent = LastSent(self.request_parameters)
+            timeout=drive.command_timeout, rearm_immediate=drive.rearm_immediate,
+            sample=self.sample_parameters, sent=self.sent)
+        self._status_in_sample = control is not None and any(
+            parameter.name == control.table.status_parameter
+            for parameter in self.sample_parameters)
         self.roles = Roles(
             self.cells, control=drive.profile.parameters.get(self._control_name),
             cyclic=drive.cyclic_request, maps=self.map_cells)
@@ -143,6 +156,7 @@ class Session(ABC):
         self.active = True
         self.ever_online = False
         self.sent.clear()
+        self.setpoints.reset()
         self.told.stopped()  # what an activation before this one told is not ours to undo
         if self.bus_available:
             self._advice = LOOKING
@@ -209,6 +223,7 @@ class Session(ABC):
     def _lose(self, reason: str, now: float) -> None:
         """Make the drive offline, if it is not."""
         self._withdraw(reason, now)
+        self._forget_positions()
         self._advice = reason
         self._be_offline(reason)
 
@@ -408,7 +423,10 @@ class Session(ABC):
             return BRIDGE_INACTIVE
         if not self.bus_available:
             return BUS_DOWN
-        return '' if self.online else DRIVE_OFFLINE
+        if not self.online:
+            return DRIVE_OFFLINE
+        untold = self.setpoints.untold if action is ControlAction.ENABLE else []
+        return untold_text(untold) if untold else ''
 
     def _control_changed(self, now: float) -> None:
         """React to a control word, or a state, that may have changed."""
@@ -418,6 +436,28 @@ class Session(ABC):
 
     def _see_to_control_word(self, now: float) -> None:  # noqa: B027  optional hook
         """Have a control word sent that has changed."""
+
+    def _forget_positions(self) -> None:
+        """Take note that axes may be anywhere, because the drive was lost."""
+        self.setpoints.forget()
+        if self._mute and self.told.owed and self.online:
+            self._warn(f'where its axis is, nobody knows, so that it is told nothing: {MAY_RUN}')
+
+    def _measured(self, raws: Sequence[int | None]) -> None:
+        """Take a sample, for setpoints that stay where the axis is; after its status word."""
+        if not self.setpoints.held:
+            return
+        control = self.control
+        # once the word may have started the drive, only a status as new as the position tells
+        free = control is not None and control.off and (
+            control.at_rest or self._status_in_sample)
+        if self.setpoints.measure(raws, driven=not free):
+            self._let_commands_through()
+
+    @property
+    def _mute(self) -> bool:
+        """Tell whether nothing may be sent: where the axis is, nobody knows, and it would go."""
+        return self.control is None and not self.setpoints.known
 
     def _let_commands_through(self) -> None:
         """Take commands while they may move the drive, and only then: otherwise it is neutral."""

@@ -6,16 +6,17 @@ A setpoint is *armed* when commands go through, and then it is *fresh* for ``com
 seconds after each accepted command. Whatever is not armed or not fresh is sent as its neutral
 value. After start, after a time-out, after every reconnection and while the drive is not enabled a
 setpoint is not armed; with ``rearm: neutral`` only a command that equals neutral arms it, so that
-no motor jumps to a setpoint that was left standing somewhere.
+no motor jumps to a setpoint that was left standing somewhere. What is neutral for an axis that has
+to stay where it is: :mod:`.holding`.
 """
 
+from collections.abc import Sequence
 from enum import Enum
 import math
 
-from drive_can_bridge.core.parameters import Parameter, Value, ValueKind
-
-#: relative error of a difference of two values, far below anything that matters
-_ROUNDING = 1e-9
+from drive_can_bridge.core.holding import HeldSetpoint, make_setpoint, Setpoint
+from drive_can_bridge.core.last_sent import LastSent
+from drive_can_bridge.core.parameters import Parameter, Value
 
 
 class CommandOutcome(Enum):
@@ -27,49 +28,16 @@ class CommandOutcome(Enum):
     DISABLED = 'disabled'
 
 
-class Setpoint:
-    """
-    One commanded parameter.
-
-    :ivar raw: raw integer to be sent now; neutral unless armed and fresh.
-    :ivar armed: commands go through.
-    :ivar commanded_at: ``now`` of the last accepted command, or None.
-    """
-
-    __slots__ = ('armed', 'commanded_at', 'neutral', 'parameter', 'raw')
-
-    def __init__(self, parameter: Parameter) -> None:
-        self.parameter = parameter
-        self.neutral = parameter.neutral_raw
-        self.raw = self.neutral
-        self.armed = False
-        self.commanded_at: float | None = None
-
-    def armed_by(self, value: Value) -> bool:
-        """
-        Tell whether a command of this (valid) value arms: it equals neutral.
-
-        A double does within one raw step, compared as values; a bool or an integer exactly.
-        """
-        parameter = self.parameter
-        neutral = parameter.value_from_raw(self.neutral)
-        if parameter.kind is not ValueKind.DOUBLE:
-            return value == neutral
-        return abs(value - neutral) <= abs(parameter.scale) * (1.0 + _ROUNDING)
-
-    def disarm(self) -> None:
-        """Send neutral until armed again."""
-        self.raw = self.neutral
-        self.armed = False
-        self.commanded_at = None
-
-
 class Setpoints:
     """
     All setpoints of a drive, in slot order.
 
     :param timeout: s without a fresh command until a setpoint goes neutral; 0: never.
     :param rearm_immediate: any valid command arms, not only a neutral one.
+    :param sample: what is measured, in the order of samples.
+    :param sent: what the drive was told last.
+    :ivar held: those that stay where the axis is.
+    :ivar forgotten: how often all that was known of positions became void.
     :ivar changed: some ``raw`` is not what it was; whoever encodes the telegram clears it.
     :ivar enabled: commands are taken at all: the drive is online, nothing is stopping, and a drive
         with control is enabled.
@@ -77,10 +45,13 @@ class Setpoints:
     """
 
     def __init__(self, parameters: tuple[Parameter, ...], *, timeout: float,
-                 rearm_immediate: bool) -> None:
-        self.items = tuple(Setpoint(parameter) for parameter in parameters)
+                 rearm_immediate: bool, sample: tuple[Parameter, ...] = (),
+                 sent: LastSent | None = None) -> None:
+        self.items = tuple(make_setpoint(parameter, sample, sent) for parameter in parameters)
+        self.held = tuple(item for item in self.items if isinstance(item, HeldSetpoint))
         self.timeout = timeout
         self.rearm_immediate = rearm_immediate
+        self.forgotten = 0
         self.changed = True
         self.enabled = False
         self.ignored_at = -math.inf
@@ -105,7 +76,7 @@ class Setpoints:
             self.changed = True
         outcome = CommandOutcome.ACCEPTED
         if not setpoint.armed:
-            if not self.rearm_immediate and not setpoint.armed_by(value):
+            if not (self.rearm_immediate and not self.held) and not setpoint.armed_by(value):
                 return CommandOutcome.NOT_ARMED
             setpoint.armed = True
             outcome = CommandOutcome.ARMED
@@ -142,12 +113,65 @@ class Setpoints:
                 and 0.0 < self.timeout < now - setpoint.commanded_at)
 
     def allow(self, taken: bool) -> None:
-        """Take commands from now on, or not; while they are not taken, everything is neutral."""
+        """
+        Take commands from now on, or not; while they are not taken, everything is neutral.
+
+        They are not taken before all neutral values are known, either.
+        """
+        taken = taken and self.known
         if taken is not self.enabled:
             self.enabled = taken
             self.ignored_at = -math.inf
             if not taken:
                 self.disarm()
+
+    # -- axes that stay where they are ------------------------------------------------------------
+
+    @property
+    def known(self) -> bool:
+        """All neutral values are known."""
+        return all(setpoint.known for setpoint in self.held)
+
+    @property
+    def unknown(self) -> list[str]:
+        """Names of those whose neutral value is not known: they are not to be written."""
+        return [setpoint.parameter.name for setpoint in self.held if not setpoint.known]
+
+    @property
+    def ever_known(self) -> bool:
+        """All neutral values were known at least once since the last ``reset``."""
+        return all(setpoint.ever_known for setpoint in self.held)
+
+    @property
+    def untold(self) -> list[HeldSetpoint]:
+        """Those of which the drive does not have the present position."""
+        return [setpoint for setpoint in self.held if not setpoint.told]
+
+    def reset(self) -> None:
+        """Take note that nothing was ever measured."""
+        for setpoint in self.held:
+            setpoint.reset()
+
+    def forget(self) -> None:
+        """Take note that the axes may be anywhere by now: the drive was lost."""
+        self.forgotten += 1
+        for setpoint in self.held:
+            setpoint.forget()
+
+    def measure(self, raws: Sequence[int | None], *, driven: bool) -> bool:
+        """
+        Take the positions of a sample; None: of those that are missing.
+
+        :param driven: the drive may be holding its axes: what is known stays as it is.
+        :return: something else is to be sent, or may be sent now.
+        """
+        moved = False
+        for setpoint in self.held:
+            raw = raws[setpoint.place] if setpoint.place < len(raws) else None
+            if raw is not None and not (driven and setpoint.known):
+                moved |= setpoint.measure(raw)
+        self.changed |= moved
+        return moved
 
     @property
     def at_rest(self) -> bool:

@@ -127,6 +127,14 @@ class StatusReports:
         return self._running is not None and self.confirmed(self._running, False)
 
     @property
+    def off(self) -> bool:
+        """All of them report that they do not run, whatever word they know."""
+        running = self._running
+        return running is not None and all(
+            member.raw is not None and not running.matches(member.raw)
+            for member in self._present.values())
+
+    @property
     def running_on(self) -> bool:
         """One of them, knowing the current word, reports that it runs."""
         # they may answer in turn: who has not answered yet says nothing

@@ -106,15 +106,16 @@ class WriteSchedule:
         self._written = [None] * len(self._written)
         self._due.clear()
 
-    def look(self, raws: Sequence[int], now: float, *, hold: int | None = None) -> None:
+    def look(self, raws: Sequence[int], now: float, *,
+             hold: Container[int | None] = ()) -> None:
         """
         Find out what is due, once a period.
 
         :param raws: what the setpoints are now.
-        :param hold: index of one that is not to be written now.
+        :param hold: indices of those that are not to be written now.
         """
         for index, raw in enumerate(raws):
-            if index not in self._due and index != hold and (
+            if index not in self._due and index not in hold and (
                     raw != self._written[index]
                     or 0.0 < self._refresh <= now - self._written_at[index] + _TOLERANCE):
                 self._due.append(index)

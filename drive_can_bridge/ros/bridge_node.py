@@ -38,6 +38,7 @@ from drive_can_bridge.protocols.families import FAMILIES, make_sessions
 from drive_can_bridge.ros.diagnostics import Diagnostics
 from drive_can_bridge.ros.drive_node import DriveNode
 from drive_can_bridge.ros.flight_watch import FlightWatch
+from drive_can_bridge.ros.joints import Joints
 from drive_can_bridge.ros.log import Log
 from drive_can_bridge.ros.mailbox import Mailbox
 from drive_can_bridge.ros.node_parameters import NodeParameters
@@ -80,6 +81,7 @@ class BridgeNode(LifecycleNode):
                                              raise_priority)
         self._diagnostics: Diagnostics | None = None
         self._flight: FlightWatch | None = None
+        self._joints: Joints | None = None
         self._diagnostics_thread: PeriodicThread | None = None
         self._configuring = False
         self._ending = False
@@ -90,7 +92,8 @@ class BridgeNode(LifecycleNode):
         self.configuration: BridgeConfiguration | None = None
         self.exchanges: dict[str, BusExchange] = {}
         self.drives: dict[str, DriveNode] = {}
-        self._node_parameters = NodeParameters(self, self._parameter_changed)
+        self._node_parameters = NodeParameters(self, self._parameter_changed,
+                                               self._parameter_refusal)
         guard_transitions(self, self.log.warning, self._transition_lock,
                           lambda: 'the bridge is being stopped' if self._ending else '')
         executor.add_node(self)
@@ -112,12 +115,22 @@ class BridgeNode(LifecycleNode):
         """No parameter file reached this node: neither buses nor drives."""
         return not any(name.startswith(('buses.', 'drives.')) for name in self.overrides)
 
+    def _parameter_refusal(self, name: str, value: Any) -> str:
+        drive = self._drive_of(name)
+        if drive is not None and name.endswith('.rearm') and value == 'immediate':
+            for setpoint in drive.session.setpoints.held:
+                return (f'{setpoint.parameter.name} would jump: it has neutral_from, which needs '
+                        f'rearm: neutral')
+        return ''
+
+    def _drive_of(self, name: str) -> DriveNode | None:
+        return self.drives.get(name.rpartition('.')[0].removeprefix('drives.'))
+
     def _parameter_changed(self, name: str, value: Any) -> None:
         if name == 'diagnostics_period' and self._diagnostics_thread is not None:
             self._diagnostics_thread.set_period(float(value))
             return
-        prefix, _, key = name.rpartition('.')
-        drive = self.drives.get(prefix.removeprefix('drives.'))
+        drive, key = self._drive_of(name), name.rpartition('.')[2]
         if drive is None:
             return
         if key == 'rearm':
@@ -237,6 +250,8 @@ class BridgeNode(LifecycleNode):
                 self.drives[drive.name] = node
                 exchange.attach(session, node)
                 node.serve()
+        if any(drive.joint is not None for drive in configuration.drives.values()):
+            self._joints = Joints(self, self.log, configuration, self.drives)
 
     def _open(self, configuration: BridgeConfiguration) -> None:
         for exchange in self.exchanges.values():
@@ -257,6 +272,8 @@ class BridgeNode(LifecycleNode):
             'diagnostics', configuration.diagnostics_period, self._diagnostics.publish,
             lambda text: self.log.error(f'diagnostics: {text}'))
         self._diagnostics_thread.start()
+        if self._joints is not None:
+            self._joints.start()
 
     def _activate(self) -> None:
         for exchange in self.exchanges.values():
@@ -292,11 +309,16 @@ class BridgeNode(LifecycleNode):
         if self._diagnostics is not None:
             self._diagnostics.destroy()
             self._diagnostics = None
+        if self._joints is not None:
+            self._joints.stop()
         for exchange in self.exchanges.values():
             exchange.close()
         if self._ownership is not None:
             self._ownership.release()
             self._ownership = None
+        if self._joints is not None:
+            self._joints.destroy()
+            self._joints = None
         if self._flight is not None:
             self._flight.close()
             self._flight = None

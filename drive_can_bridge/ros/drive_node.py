@@ -39,6 +39,7 @@ from drive_can_bridge.ros.identity import IdentityReader
 from drive_can_bridge.ros.log import Log
 from drive_can_bridge.ros.mailbox import Mailbox
 from drive_can_bridge.ros.parameter_services import ParameterServices
+from drive_can_bridge.ros.polled_topics import PolledTopics
 from drive_can_bridge.ros.quality import latched_quality, overriding, quality_overrides
 from drive_can_bridge.ros.samples import SamplePublisher
 from drive_can_bridge.ros.service_thread import ServiceThread
@@ -56,6 +57,8 @@ class DriveNode:
     :param log: of the bridge.
     :param control_thread: serves ``~/enable`` and its like.
     :param identified: takes the drive's identity in words whenever it changes.
+    :ivar joint_commands: the commands for all joints of its bus, which whichever of its drives is
+        served next takes for all of them; None: there are none.
     """
 
     def __init__(self, bridge: Node, drive: DriveConfiguration, session: Session, family: Family,
@@ -64,6 +67,7 @@ class DriveNode:
         self.drive = drive
         self.session = session
         self.exchange = exchange
+        self.joint_commands: PolledTopics | None = None
         self._mailbox = mailbox
         self._executor = executor
         self._log = log
@@ -174,10 +178,14 @@ class DriveNode:
     def take_commands(self, now: float) -> None:
         """Hand the newest commands to the session."""
         self.commands.take(now)
+        if self.joint_commands is not None:
+            self.joint_commands.take(now)
 
     def discard_commands(self, why: str) -> None:
         """Throw waiting commands away."""
         self.commands.discard(why)
+        if self.joint_commands is not None:
+            self.commands.discarded(self.joint_commands.discard(), why)
 
     def process_data(self, event: ProcessDataReceived) -> None:
         """Publish a sample."""

@@ -26,11 +26,14 @@ class NodeParameters:
     Declares, checks and passes on.
 
     :param changed: takes (name, value) of each parameter that was changed.
+    :param refusal: says why a value that is allowed in itself cannot be set now; '' if it can.
     """
 
-    def __init__(self, node: Node, changed: Callable[[str, Any], None]) -> None:
+    def __init__(self, node: Node, changed: Callable[[str, Any], None],
+                 refusal: Callable[[str, Any], str]) -> None:
         self._node = node
         self._changed = changed
+        self._refusal = refusal
         self._dynamic: list[str] = []
         self._announcing = False
         node.add_on_set_parameters_callback(self._check)
@@ -80,7 +83,8 @@ class NodeParameters:
             return SetParametersResult(successful=True)
         for parameter in parameters:
             if parameter.name.startswith(_OURS) or parameter.name in _OURS_ALONE:
-                problem = check_dynamic(parameter.name, parameter.value)
+                problem = (check_dynamic(parameter.name, parameter.value)
+                           or self._refusal(parameter.name, parameter.value))
                 if problem and self._node.has_parameter(parameter.name):
                     return SetParametersResult(successful=False, reason=problem)
         return SetParametersResult(successful=True)

@@ -28,9 +28,12 @@ _MARKERS = {
     'I': 0x2C6BD8F3,
 }
 
+#: distance between the markers of two rows
+ROW = 1000
 #: how a number of each kind stands in a message; a bool is no number
 NUMBER_CODES = {ValueKind.DOUBLE: 'd', ValueKind.INTEGER: 'q'}
-#: struct code of a number, and what puts it into the message
+#: struct code of a number, and what puts it into the message; ``15d`` is that many in a row, which
+#: are put and published as a list
 Number = tuple[str, Callable[[Any], object]]
 
 
@@ -59,17 +62,16 @@ class PreparedMessage:
 
         The message is left with arbitrary numbers in it.
         """
-        markers = [_MARKERS[code] + type(_MARKERS[code])(index)
-                   for index, (code, _) in enumerate(numbers)]
+        markers = [_marker(code, index) for index, (code, _) in enumerate(numbers)]
         for (_, put), marker in zip(numbers, markers):
             put(marker)
         data = serialize_message(message)
         for order in '<>':
-            wanted = [struct.pack(order + code, marker)
+            wanted = [_packer(order + code)(marker)
                       for (code, _), marker in zip(numbers, markers)]
             if all(data.count(part) == 1 for part in wanted):
                 return cls(publisher, bytearray(data), [
-                    (struct.Struct(order + code).pack_into, data.index(part))
+                    (_filler(order + code), data.index(part))
                     for (code, _), part in zip(numbers, wanted)])
         return None
 
@@ -83,3 +85,23 @@ class PreparedMessage:
         for (pack_into, offset), number in zip(self._places, numbers):
             pack_into(buffer, offset, number)
         self._publish(bytes(buffer))
+
+
+def _marker(code: str, index: int) -> Any:
+    if len(code) > 1:
+        return [_marker(code[-1], ROW * (1 + index) + place) for place in range(int(code[:-1]))]
+    return _MARKERS[code] + type(_MARKERS[code])(index)
+
+
+def _packer(code: str) -> Callable[[Any], bytes]:
+    """Return what packs a number, or a row of them."""
+    pack = struct.Struct(code).pack
+    return (lambda row: pack(*row)) if len(code) > 2 else pack
+
+
+def _filler(code: str) -> Callable[..., None]:
+    """Return what packs a number, or a row of them, into a buffer at an offset."""
+    pack_into = struct.Struct(code).pack_into
+    if len(code) == 2:
+        return pack_into
+    return lambda buffer, offset, row: pack_into(buffer, offset, *row)

@@ -7,6 +7,9 @@ from rclpy.clock import Clock, ROSClock
 
 from drive_can_bridge.transport.clock import steady_now
 
+#: s that two looks at clocks may be apart, and how often it is tried
+APART_MAX = 0.0001
+ATTEMPTS = 3
 #: seconds and nanoseconds, as ``builtin_interfaces/Time`` has them
 Stamp = tuple[int, int]
 
@@ -22,5 +25,13 @@ class Stamps:
         if isinstance(self._clock, ROSClock) and self._clock.ros_time_is_active:
             nanoseconds = self._clock.now().nanoseconds
         else:
-            nanoseconds = time.time_ns() - int((steady_now() - received_at) * 1e9)
+            nanoseconds = self._at(received_at)
         return divmod(nanoseconds, 1_000_000_000)
+
+    @staticmethod
+    def _at(received_at: float) -> int:
+        for _ in range(ATTEMPTS):
+            before, nanoseconds, now = steady_now(), time.time_ns(), steady_now()
+            if now - before < APART_MAX:    # else another thread had the interpreter in between
+                break
+        return nanoseconds - int((now - received_at) * 1e9)

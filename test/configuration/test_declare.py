@@ -22,6 +22,7 @@ def test_all_effective_values(tmp_path: Path) -> None:
     assert [(name, value) for name, value, _, _ in declared] == [
         ('autostart', True),
         ('diagnostics_period', 1.0),
+        ('joint_state_rate', 50.0),
         ('profile_directories', [str(tmp_path)]),
         ('buses.main.interface', 'virtual'),
         ('buses.main.channel', 'demo'),

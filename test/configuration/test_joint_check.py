@@ -105,7 +105,9 @@ def test_factors(tmp_path: Path) -> None:
         'gear_ratio: -4, pole_pairs: 3}'))
     configuration = load(tmp_path, text)
     joint = configuration.drives['conveyor'].joint
-    assert configuration.warnings == ()
+    assert [line.partition('f.yaml:')[2] for line in configuration.warnings] == [
+        "18: drives.conveyor.joint.position_command: 'angle' has no neutral_from: without a "
+        'command the axis goes to 0.0 deg, wherever it stands']
     assert joint is not None
     assert (joint.name, joint.gear_ratio, joint.pole_pairs) == ('arm', -4.0, 3)
     assert (joint.position, joint.velocity_command) == ('position', 'speed')
@@ -117,6 +119,16 @@ def test_factors(tmp_path: Path) -> None:
         'speed': -2 * math.pi / 60 / 4,
         'limit': 1.0,
     })
+
+
+def test_two_joints_of_one_name(tmp_path: Path) -> None:
+    text = changed(FILE, 'rearm: neutral', 'joint: {name: a, velocity: actual}')
+    text += '        joint: {name: a, velocity: actual}\n'
+    assert problems(tmp_path, text) == [
+        "f.yaml:26: drives.lift.joint.name: 'a' is the joint of drives.conveyor already, allowed "
+        'is a name of its own']
+    assert problems(tmp_path, text[:-len('{name: a, velocity: actual}\n')]
+                    + '{name: b, velocity: actual}\n') == []
 
 
 def test_pole_pairs_without_a_frequency(tmp_path: Path) -> None:

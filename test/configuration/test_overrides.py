@@ -73,7 +73,8 @@ def test_good(good: dict[str, Any]) -> None:
      ["drives: has a value, and 'conveyor' below it; allowed is one of them",
       'drives: an empty list, allowed is a mapping']),
     ('unknown.key', 5,
-     ['unknown: unknown key, allowed: autostart, diagnostics_period, profile_directories, buses, '
+     ['unknown: unknown key, allowed: autostart, diagnostics_period, joint_state_rate, '
+      'profile_directories, buses, '
       'drives, use_sim_time, start_type_description_service']),
 ])
 def test_problem(good: dict[str, Any], name: str, value: object, expected: list[str]) -> None:
@@ -109,3 +110,9 @@ def test_numbers(good: dict[str, Any]) -> None:
 def test_topic_names_keep_their_dots() -> None:
     tree = tree_from_overrides({'qos_overrides./a.b.c': 1, 'x.y': 2})
     assert tree.data == {'qos_overrides./a.b.c': 1, 'x': {'y': 2}}
+
+
+def test_drives_keep_the_order_of_the_file() -> None:
+    overrides = {f'drives.{name}.{key}': 1 for name in ('west', 'north', 'east')
+                 for key in ('joint.name', 'bus')}
+    assert list(tree_from_overrides(overrides).data['drives']) == ['west', 'north', 'east']

@@ -15,12 +15,14 @@ ARGUMENTS = {
     'bridge_per_bus.launch.py': ['params_file', 'namespace', 'log_level'],
     'demo.launch.py': ['params_file', 'drive', 'fault', 'log_frames'],
     'managed.launch.py': ['params_file', 'namespace', 'name', 'log_level', 'activate'],
+    'ros2_control.launch.py': ['robot', 'directory', 'params_file', 'controller', 'log_level'],
     'two_bridges.launch.py': ['first_params_file', 'second_params_file', 'first_namespace',
                               'second_namespace', 'log_level'],
 }
 #: arguments without a default: launch refuses to start without them
 REQUIRED = {'bridge.launch.py': ['params_file'], 'bridge_per_bus.launch.py': ['params_file'],
             'demo.launch.py': [], 'managed.launch.py': ['params_file'],
+            'ros2_control.launch.py': [],
             'two_bridges.launch.py': ['first_params_file', 'second_params_file']}
 #: files whose work is done by others
 INCLUDED = {'two_bridges.launch.py': ['bridge.launch.py']}
@@ -75,8 +77,10 @@ def test_arguments_are_declared_described_and_used(file: Path) -> None:
 
 def test_the_executables_exist(file: Path) -> None:
     tree = ast.parse(file.read_text(encoding='utf-8'), file.name)
-    named = [text(keyword.value) for node in ast.walk(tree) if isinstance(node, ast.Call)
-             for keyword in node.keywords if keyword.arg == 'executable']
+    named = [text(given['executable']) for given in (
+        {keyword.arg: keyword.value for keyword in node.keywords}
+        for node in ast.walk(tree) if isinstance(node, ast.Call))
+        if 'executable' in given and text(given['package']) == 'drive_can_bridge']
     included = [name for name in texts(tree) if name.endswith('.launch.py')]
     assert included == INCLUDED.get(file.name, [])
     assert all((LAUNCH / name).is_file() for name in included)
@@ -88,7 +92,8 @@ def test_the_executables_exist(file: Path) -> None:
 # -- with launch ----------------------------------------------------------------------------------
 
 GIVEN = {'namespace': 'cell', 'log_level': 'debug', 'drive': 'true', 'fault': 'a:silent b:off',
-         'activate': 'true'}
+         'activate': 'true', 'robot': 'base', 'controller': 'base_controller',
+         'directory': str(LAUNCH.parent / 'config' / 'ros2_control')}
 
 
 TWO_BUSES = """
@@ -190,6 +195,18 @@ def test_each_bus_has_a_bridge_of_its_own(tmp_path: Path) -> None:
         ['--ros-args', '--log-level', 'debug']] * 2
     assert [process._Node__node_name for process in launched.processes] == [
         'drive_can_bridge_left', 'drive_can_bridge_right']
+
+
+def test_ros2_control_gets_the_bridge_and_its_description(tmp_path: Path) -> None:
+    launched = Launched(LAUNCH / 'ros2_control.launch.py', tmp_path)
+    bridge, publisher, manager, broadcaster, controller = launched.processes
+    assert bridge.words[:3] == ['--ros-args', '--log-level', 'debug']
+    assert {'~/joint_states:=/robot_joint_states',
+            '~/joint_commands:=/robot_joint_commands'} <= set(bridge.words)
+    assert [process.node_package for process in (publisher, manager)] == [
+        'robot_state_publisher', 'controller_manager']
+    assert broadcaster.words[0] == 'joint_state_broadcaster'
+    assert controller.words[:2] == ['base_controller', '--inactive']
 
 
 @pytest.mark.parametrize('activate', ['true', 'false'])

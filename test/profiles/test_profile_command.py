@@ -42,8 +42,9 @@ class TestList:
         lines = out.splitlines()
         assert lines[0].split() == ['name', 'parameters', 'verified', 'protocols', 'description']
         assert [line.split()[0] for line in lines[1:]] == [
-            'datamodel_control_example', 'datamodel_example', 'nord_sk500e', 'tesys_t_ltmr']
-        assert lines[4].endswith('Motor management controller TeSys T LTMR with CANopen')
+            'datamodel_axis_example', 'datamodel_control_example', 'datamodel_example',
+            'nord_sk500e', 'tesys_t_ltmr']
+        assert lines[5].endswith('Motor management controller TeSys T LTMR with CANopen')
         assert err == ''
 
     def test_those_of_a_directory_come_first(self, tmp_path: Path,
@@ -58,7 +59,7 @@ class TestList:
             'protocols': ['cannord'], 'parameters': 1, 'verified': 0, 'unverified': 0,
             'problems': 0}
         assert found['broken']['problems'] == 3
-        assert len(found) == 5
+        assert len(found) == 6
 
     def test_no_such_directory(self, capsys: pytest.CaptureFixture[str]) -> None:
         assert main(['profile', 'list', '--directory', '/nowhere']) == 1
@@ -83,7 +84,8 @@ class TestShow:
             'name': 'flc1_ratio', 'address': 'P652', 'number': 652, 'index': 0x2007,
             'subindex': 3, 'type': 'uint16', 'scale': 1.0, 'offset': 0.0, 'unit': '%',
             'access': 'rw', 'storage': 'eeprom', 'minimum': 5.0, 'maximum': 100.0,
-            'neutral': None, 'bits': {}, 'word_order': None, 'protected': False,
+            'neutral': None, 'neutral_from': None, 'arming_tolerance': 0.0,
+            'bits': {}, 'word_order': None, 'protected': False,
             'description': 'Full load current in percent of the largest one of the controller; a '
                            'small contactor rating raises the minimum',
             'source': 'installation_guide (unit, step, limits), memory (number)',

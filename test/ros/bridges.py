@@ -22,6 +22,7 @@ import yaml
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.ros.bridge_node import BridgeNode
 from drive_can_bridge.ros.executor_thread import ExecutorThread
+from drive_can_bridge.simulation.plant import Mechanics
 from drive_can_bridge.simulation.simulation import PlayedDrive, Simulation
 
 _COUNTER = itertools.count(1)
@@ -64,11 +65,13 @@ class Bridge:
     :param simulated: play the drives.
     :param autostart: configure and activate.
     :param key: to whom the parameter file is addressed.
+    :param mechanics: what simulated motors carry, by drive.
     """
 
     def __init__(self, directory: Path, content: Any = None, *, arguments: tuple[str, ...] = (),
                  simulated: bool = True, autostart: bool = True,
-                 key: str = '/**/drive_can_bridge') -> None:
+                 key: str = '/**/drive_can_bridge',
+                 mechanics: dict[str, Mechanics] | None = None) -> None:
         number = next(_COUNTER)
         self.file = directory / f'bridge_{number}.yaml'
         if not isinstance(content, str):
@@ -80,6 +83,7 @@ class Bridge:
         self.file.write_text(content, encoding='utf-8')
         self._simulated = simulated
         self._autostart = autostart
+        self._mechanics = mechanics
         self.fatal: list[str] = []
         self.errors: list[str] = []
         self.simulation: Simulation | None = None
@@ -94,7 +98,8 @@ class Bridge:
         """Start the simulation and the bridge."""
         if self._simulated:
             self.simulation = Simulation(configuration_from_file(self.file),
-                                         complain=self.errors.append)
+                                         complain=self.errors.append,
+                                         mechanics=self._mechanics)
             self.simulation.start()
         self.spinner.start()
         if self._autostart:

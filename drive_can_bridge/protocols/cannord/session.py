@@ -158,6 +158,7 @@ class CannordSession(Session):
     def _begin(self, now: float) -> None:
         """Start over: nothing is known of the inverter."""
         (self._lose if self.online else self._withdraw)('the drive is being reconnected', now)
+        self.setpoints.forget()
         self._stopping = False
         self._stop_awaiting()
         self._missed_in_row = 0
@@ -390,6 +391,7 @@ class CannordSession(Session):
             self._publish(held)
 
     def _publish(self, sample: ProcessDataReceived) -> None:
+        self._measured(sample.raws)
         self._last_sample = (*sample.raws, *self._last_sample[len(sample.raws):])
         self._events.append(sample)
 

@@ -20,12 +20,12 @@ Setpoints and the control word are written while the drive is online: when they 
 setpoints again after ``refresh_interval``.
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from enum import Enum
 import math
 
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.control import ControlMachine
+from drive_can_bridge.core.control import ControlAction, ControlMachine
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.events import (
     ForeignMasterSeen, ProcessDataReceived,
@@ -154,7 +154,8 @@ class PkwSession(Session):
 
     def _stop_ended(self, failed: list[str]) -> None:
         if not failed:
-            self.told.stopped()
+            if not self._mute:
+                self.told.stopped()
         elif self._owed or self._phase is Phase.STOPPING:
             tail = f': {MAY_RUN}' if self._owed else ''
             self._warn(f'told to stop, but {"; ".join(failed)}{tail}')
@@ -220,6 +221,7 @@ class PkwSession(Session):
     def _lose(self, reason: str, now: float) -> None:
         """Make the drive offline, if it is not."""
         self._withdraw(reason, now)
+        self._forget_positions()
         self._advice = reason
         self._channel.cancel(Lane.OWN)
         self._channel.cancel(Lane.SETPOINTS)
@@ -320,24 +322,31 @@ class PkwSession(Session):
             self._miss(now)
             return
         self._missed_in_row = 0
+        raws = self._raws(words)
         if not self.online:
             if self._node.heartbeat_lost:
                 return
+            self._measured(raws)   # before anything is written
             self._found(now)
             self._take_status(words)
             self._control_changed(now)
             self._status_known = False
-        if any(address not in words for span in self._response_spans
-               for address in span.addresses):
+        self._measured(raws)
+        if None in raws:
             return  # something was refused: there is no complete sample
         statistics = self.statistics
         statistics.exchanges += 1
         statistics.latency.add(max(0.0, self._received_at - self._round_began))
-        raws = tuple(
+        self._events.append(ProcessDataReceived(
+            tuple(raw for raw in raws if raw is not None), self._received_at))
+
+    def _raws(self, words: Mapping[Address, int]) -> list[int | None]:
+        """Return the values that a round has brought; None for what was refused."""
+        return [
             addresses.raw_from_words(parameter, [words[address] for address in span.addresses],
                                      self._word_order)
-            for parameter, span in zip(self.drive.cyclic_response, self._response_spans))
-        self._events.append(ProcessDataReceived(raws, self._received_at))
+            if all(address in words for address in span.addresses) else None
+            for parameter, span in zip(self.drive.cyclic_response, self._response_spans)]
 
     def _miss(self, now: float) -> None:
         self.statistics.missed += 1
@@ -463,6 +472,14 @@ class PkwSession(Session):
         return soonest if self.control is None else min(soonest, self.control.next_timer())
 
     # -- control ----------------------------------------------------------------------------------
+
+    def control_refusal(self, action: ControlAction) -> str:
+        if action is ControlAction.ENABLE:
+            for setpoint in self.setpoints.held:    # the drive has another position than this
+                refusal = self._setpoint_writer.refusals.get(setpoint.parameter.name)
+                if refusal:
+                    return f'it would jump: write of {refusal}'
+        return super().control_refusal(action)
 
     def _see_to_control_word(self, now: float) -> None:
         if not self.online:

@@ -50,15 +50,19 @@ class SetpointWriter:
         self._setpoints.changed = False
         if not self._setpoints.items:
             return
-        self._schedule.look([setpoint.raw for setpoint in self._setpoints.items], now)
+        self._schedule.look(
+            [setpoint.raw for setpoint in self._setpoints.items], now,
+            hold=[index for index, setpoint in enumerate(self._setpoints.items)
+                  if not setpoint.known])
         if self._schedule.waiting and self._channel.is_idle(Lane.SETPOINTS):
             self._channel.run(self._write(), lambda _: None, now, Lane.SETPOINTS)
 
     def neutral_writes(self) -> list[LastWrite]:
-        """Return what writes the neutral value of every setpoint."""
+        """Return what writes the neutral value of every setpoint of which it is known."""
         return [LastWrite(setpoint.parameter.name, span, addresses.words_from_raw(
                     setpoint.parameter, setpoint.neutral, self._word_order))
-                for setpoint, span in zip(self._setpoints.items, self._spans)]
+                for setpoint, span in zip(self._setpoints.items, self._spans)
+                if setpoint.known]
 
     def _write(self) -> Generator[Step, Reply, None]:
         while self._schedule.waiting:
@@ -67,8 +71,9 @@ class SetpointWriter:
             parameter, raw = setpoint.parameter, setpoint.raw
             # at once: a look while the answer is awaited must not find it due again
             self._schedule.written(index, raw, self._channel.now)
-            before = self._told.runs(index)
-            if raw != setpoint.neutral:
+            # now: a neutral value that follows the axis is another one when the answer comes
+            before, runs = self._told.runs(index), raw != setpoint.neutral
+            if runs:
                 self._told.note(index, runs=True)
             reply = yield Write(self._spans[index].address, addresses.words_from_raw(
                 parameter, raw, self._word_order))
@@ -77,7 +82,7 @@ class SetpointWriter:
                 if not reply.sent:
                     self._told.note(index, runs=before)
             elif isinstance(reply, Answered):
-                self._told.note(index, runs=raw != setpoint.neutral)
+                self._told.note(index, runs=runs)
                 self.refusals.pop(parameter.name, None)
             else:
                 self._take_refusal(parameter, f'{parameter.name} {reply.text}')

@@ -15,7 +15,9 @@ from drive_can_bridge.core.told import MAY_RUN
 from drive_can_bridge.protocols.channel import Lane
 from drive_can_bridge.protocols.datamodel import procedures
 from drive_can_bridge.protocols.datamodel.acyclic_control import control_by_hand, CONTROL_WORD
-from drive_can_bridge.protocols.datamodel.channel import AcyclicChannel, Polling, Words, Write
+from drive_can_bridge.protocols.datamodel.channel import (
+    AcyclicChannel, Polling, Procedure, Read, Words, Write,
+)
 from drive_can_bridge.protocols.datamodel.extended import SLOTS
 from drive_can_bridge.protocols.datamodel.process_words import slot_of
 from drive_can_bridge.protocols.datamodel.safe_stop import SafeStop, StopWrite
@@ -63,6 +65,7 @@ class DataModelSession(Session):
         self._safe_stop = SafeStop(self._channel, self._safe_stop_ended)
         self._owed = False  # there was something to be stopped when the stop began
         self._stops_all = False  # setpoints, too
+        self._positions_asked = -1  # ``setpoints.forgotten`` when they were; -1: they are not
 
     def _note_write(self, write: Write) -> None:
         """Take note of a write that left."""
@@ -91,6 +94,7 @@ class DataModelSession(Session):
         """Forget everything acyclic, and whatever waits for its outcome."""
         self._channel.clear()
         self._channel.hold(-math.inf)
+        self._positions_asked = -1
         self._safe_stop.forget()
         if self._by_hand is not None:
             self._by_hand.stop()
@@ -147,14 +151,45 @@ class DataModelSession(Session):
         if self.control is not None and (setpoints or self._control_slot is None):
             word = self.drive.profile.parameters[self._control_name]
             writes.append(self._stop_write(word, self.control.word))
-        if setpoints:
+        if setpoints:   # but no position where the axis may not be any more
             writes += [self._stop_write(setpoint.parameter, setpoint.neutral)
-                       for setpoint in self.setpoints.items]
+                       for setpoint in self.setpoints.items if setpoint.known]
+            setpoints = self.control is not None or self.setpoints.known
         # what is kept in RAM does not wait until an EEPROM is done
         writes.sort(key=lambda each: each.write.eeprom)
         if writes and not self._safe_stop.running:
             self._owed, self._stops_all = self.told.owed, setpoints
             self._safe_stop.begin(writes, now)
+
+    # -- axes that stay where they are ------------------------------------------------------------
+
+    def _read_positions(self, now: float) -> None:
+        """Read by number where the axes are; ends with :meth:`_positions_read`."""
+        asked = self.setpoints.forgotten
+        if self._positions_asked != asked:
+            self._positions_asked = asked
+            self._channel.run(self._positions(), lambda raws: self._take_positions(asked, raws),
+                              now)
+
+    def _positions(self) -> Procedure:
+        raws: list[int] = []
+        for setpoint in self.setpoints.held:
+            words = yield Read((setpoint.measured.number or 0) + self._offset)
+            if words is None:
+                return None
+            raws.append(setpoint.measured.raw_from_word(words[0]))
+        return raws
+
+    def _take_positions(self, asked: int, raws: list[int] | None) -> None:
+        if asked != self.setpoints.forgotten:   # the drive was lost since
+            return
+        self._positions_asked = -1
+        for setpoint, raw in zip(self.setpoints.held, raws or ()):
+            self.setpoints.changed |= setpoint.measure(raw)
+        self._positions_read(raws is not None, self._channel.now)
+
+    def _positions_read(self, answered: bool, now: float) -> None:
+        """Go on when it was read where the axes are, or nobody answered."""
 
     def _stop_write(self, parameter: Parameter, raw: int) -> StopWrite:
         return StopWrite(parameter, (parameter.number or 0) + self._offset, raw)

@@ -29,7 +29,7 @@ from drive_can_bridge.core.events import (
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.requests import BRIDGE_INACTIVE
 from drive_can_bridge.core.session import (
-    DriveState, STOP_CYCLES,
+    DriveState, STOP_CYCLES, untold_text,
 )
 from drive_can_bridge.protocols.cycle_timer import CycleTimer
 from drive_can_bridge.protocols.datamodel import extended
@@ -42,6 +42,8 @@ from drive_can_bridge.protocols.datamodel.safe_stop import ANSWER_TIME, ATTEMPTS
 SILENT_LOOKS = 3
 #: what the drive is told by cyclic requests, for the books of what it was told
 CYCLE = 'cycle'
+#: s until a position that a setpoint cannot carry is read again
+POSITION_PAUSE = 0.1
 #: direction and station of an identifier
 FROM_WHOM = extended.DIR | extended.STATION_MASK
 
@@ -94,6 +96,7 @@ class ExtendedSession(DataModelSession):
         self._awaiting = False
         self._forgiven = False
         self._timer = CycleTimer(drive.period)
+        self._positions_at = math.inf   # when positions are to be read again
         self._missed_in_row = 0
 
     # -- life cycle -------------------------------------------------------------------------------
@@ -112,8 +115,8 @@ class ExtendedSession(DataModelSession):
         elif self._stopping:
             self._phase = Phase.STOPPING
             self._stop_by_writes(now)
-        else:
-            if not self.bus_available:
+        if not cycling and not self._safe_stop.running:
+            if self._stopping or not self.bus_available:
                 self._leave_owing()
             self._go_idle('deactivated')
 
@@ -135,6 +138,7 @@ class ExtendedSession(DataModelSession):
     def _begin(self, now: float) -> None:
         """Start over: nothing is known of the drive."""
         (self._lose if self.online else self._withdraw)('the drive is being reconnected', now)
+        self.setpoints.forget()
         self._stopping = False
         self._stop_awaiting()
         self._missed_in_row = 0
@@ -146,7 +150,7 @@ class ExtendedSession(DataModelSession):
             self._timer.stop()
             self._maps.look_afresh(now)
         else:
-            self._start_cycling(now)
+            self._begin_cycles(now)
 
     def _go_idle(self, advice: str) -> None:
         self._phase = Phase.IDLE
@@ -161,6 +165,7 @@ class ExtendedSession(DataModelSession):
 
     def _clear_channel(self) -> None:
         super()._clear_channel()
+        self._positions_at = math.inf
         self._maps.stop()
 
     # -- maps -------------------------------------------------------------------------------------
@@ -170,14 +175,14 @@ class ExtendedSession(DataModelSession):
         if verdict is Verdict.AGREE:
             self._differs = False
             if self._phase is not Phase.CYCLIC:
-                self._start_cycling(now)
+                self._begin_cycles(now)
         elif verdict is Verdict.DIFFER:
             self._differs = True
             owed = self.told.owed
             self._lose(f'mapping differs: {text}', now)
             self._stop_awaiting()
             # a request map that is right still takes neutral cycles, unless it is to be rewritten
-            by_cycles = owed and self._maps.request_agrees
+            by_cycles = owed and self._maps.request_agrees and not self._mute
             if owed:
                 self._stop_by_writes(now, setpoints=not by_cycles)
             if by_cycles:
@@ -203,6 +208,31 @@ class ExtendedSession(DataModelSession):
         self._events.append(event)
 
     # -- cyclic exchange --------------------------------------------------------------------------
+
+    def _begin_cycles(self, now: float) -> None:
+        """Begin to cycle, as soon as it is known where axes are that have to stay there."""
+        if self.setpoints.held and self._phase is Phase.LEAVING:
+            return  # a stop takes its course
+        # a drive that was told to run has to be told ``disable``, whatever is known of its axes
+        at_once = self.setpoints.ever_known and not self._verify and not self._mute
+        if self.setpoints.known or at_once:
+            self._start_cycling(now)
+        else:
+            self._phase = Phase.CHECKING
+            self._timer.stop()
+            self._read_positions(now)
+
+    def _positions_read(self, answered: bool, now: float) -> None:
+        if self.setpoints.known:
+            self._start_cycling(now)
+            return
+        self._advice = untold_text(self.setpoints.untold)
+        if answered:    # but the setpoint cannot carry it
+            self._positions_at = now + POSITION_PAUSE
+        elif self._verify:  # it may have started anew meanwhile, with other maps
+            self._maps.look_afresh(now)
+        else:
+            self._read_positions(now)   # paced by the time-out of the read
 
     def _start_cycling(self, now: float) -> None:
         self._phase = Phase.CYCLIC
@@ -301,7 +331,9 @@ class ExtendedSession(DataModelSession):
         self._lose(reason, now)
         if owed:  # of the word that has no slot; setpoints go neutral with the next cycles
             self._stop_by_writes(now, setpoints=False)
-        if self._verify:  # it may still be listening, before it is left alone
+        if self._mute:
+            self._begin(now)
+        elif self._verify:  # it may still be listening, before it is left alone
             self._start_leaving(self._timer.due)
 
     def _stop_awaiting(self) -> None:
@@ -362,6 +394,7 @@ class ExtendedSession(DataModelSession):
             slot = self._status_slot
             self.control.status_received(raws[slot] if slot < len(raws) else None, now)
             self._control_changed(now)
+        self._measured(raws)
         self._events.append(ProcessDataReceived(raws, received_at))
         self._channel.release(now)
 
@@ -378,13 +411,17 @@ class ExtendedSession(DataModelSession):
             self._cycle(now)
         if now >= self._maps.look_at:
             self._maps.look(now)
+        if now >= self._positions_at:
+            self._positions_at = math.inf
+            if self._phase is Phase.CHECKING:
+                self._begin_cycles(now)
         self._serve_control(now)
         if now >= self._channel.next_timer():
             self._channel.advance(now)
 
     def next_timer(self) -> float:
         return min(self._timer.due, self._channel.next_timer(), self._maps.look_at,
-                   self._control_timer())
+                   self._positions_at, self._control_timer())
 
     def _see_to_control_word(self, now: float) -> None:
         control = self.control

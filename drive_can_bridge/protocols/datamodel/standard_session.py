@@ -193,11 +193,20 @@ class StandardSession(DataModelSession):
             raws.insert(self._control_slot, self.control.word)
         return raws
 
+    def _neutral_raws(self) -> list[int]:
+        raws = [setpoint.neutral for setpoint in self.setpoints.items]
+        if self.control is not None and self._control_slot is not None:
+            raws.insert(self._control_slot, self.control.table.disable)
+        return raws
+
     def _look(self, now: float) -> None:
         """Find out what is to be written."""
         # nobody knows whether the drive was off meanwhile: it is not started by a repetition
         starts = self.control is not None and not self.control.at_rest and self._doubt
-        self._writes.look(self._raws(), now, hold=self._control_slot if starts else None)
+        hold = [self._control_slot] if starts else []
+        hold += [index for index, parameter in enumerate(self.drive.cyclic_request)
+                 if parameter.name in self.setpoints.unknown]
+        self._writes.look(self._raws(), now, hold=hold)
 
     def _write_setpoint(self, now: float) -> None:
         """Write one that is due, if there is one, with the value that it has now."""
@@ -205,23 +214,24 @@ class StandardSession(DataModelSession):
             return
         index = self._writes.next()
         parameter, raw = self.drive.cyclic_request[index], self._raws()[index]
+        # now: a neutral value that follows the axis may be another one when the frame leaves
+        runs = raw != self._neutral_raws()[index]
         # What is sent cyclically is volatile: EEPROM parameters are refused by the configuration.
         self._channel.courier.write(
             Write((parameter.number or 0) + self._offset, (parameter.word_from_raw(raw),),
                   eeprom=False),
-            lambda sent, then: self._written(index, raw, sent, then), now)
+            lambda sent, then: self._written(index, raw, sent, then, runs=runs), now)
         self._writes.written(index, raw, now)  # at once: a look meanwhile must not find it due
 
-    def _written(self, index: int, raw: int, sent: bool, now: float) -> None:
+    def _written(self, index: int, raw: int, sent: bool, now: float, *, runs: bool) -> None:
         """Take note of a setpoint, or control word, that left; the refused ones are due again."""
         if not sent:
             self._writes.failed(index)
             return
+        self.told.note(index, runs=runs)
         control = self.control
         if index != self._control_slot or control is None:
-            self.told.note(index, runs=raw != self.drive.cyclic_request[index].neutral_raw)
             return
-        self.told.note(index, runs=raw != control.table.disable)
         self._word_written_at = now
         if raw == control.word:
             control.word_sent(now)
@@ -235,7 +245,8 @@ class StandardSession(DataModelSession):
         if self._control_slot is not None:
             # a stop does not wait for the next period, nor for setpoints
             self._look(now)
-            self._writes.hurry(self._control_slot)
+            if self.control.stopping or not self.setpoints.held:
+                self._writes.hurry(self._control_slot)
             self._write_setpoint(now)
         elif self._by_hand is not None:
             self._by_hand.update(now)
@@ -279,12 +290,14 @@ class StandardSession(DataModelSession):
         statistics.exchanges += 1
         statistics.latency.add(max(0.0, self._received_at - self._round_began))
         if not self.online:
+            self._measured(raws)    # before anything is written
             self._found(now)
         # a status that was asked for before the word left says nothing about the word
         if (self.control is not None and self._status_slot is not None
                 and self._status_asked_at > self._word_written_at):
             self.control.status_received(raws[self._status_slot], now)
             self._control_changed(now)
+        self._measured(raws)
         self._events.append(ProcessDataReceived(raws, self._received_at))
 
     def _found(self, now: float) -> None:

@@ -1,0 +1,168 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+What docs/ros2_control.md shows: the arm of the example, with everything that may come between.
+
+Simulated drives and the bridge are processes of their own, as in real life; the controllers are
+those of ``test/ros2_control_twin.py``. Every frame of the bus is recorded.
+"""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+import math
+from pathlib import Path
+import signal
+import subprocess
+import sys
+import threading
+import time
+from typing import Any, IO
+
+HERE = Path(__file__).resolve().parent
+sys.path.append(str(HERE.parent / 'test'))
+
+import rclpy  # noqa: E402
+from rclpy.executors import SingleThreadedExecutor  # noqa: E402
+from ros2_control_twin import HardwareTwin, run, System, TrajectoryTwin  # noqa: E402
+from std_srvs.srv import SetBool, Trigger  # noqa: E402
+
+FOLDER = HERE.parent / 'config' / 'ros2_control'
+AXES = ('shoulder', 'elbow', 'wrist')
+#: rad
+HOME = {f'{name}_joint': 0.0 for name in AXES}
+OUT = {'shoulder_joint': 0.6, 'elbow_joint': -0.4, 'wrist_joint': 0.3}
+#: s of a cycle of the controllers, and of a wait that only a failure exceeds
+PERIOD, PATIENCE = 0.01, 60.0
+
+
+class Arm:
+    """The arm, as whoever commands it sees it."""
+
+    def __init__(self, node: Any, executor: SingleThreadedExecutor) -> None:
+        self._node, self._executor = node, executor
+        self.hardware = HardwareTwin(node, System(FOLDER / 'arm.urdf'))
+        self.controller = TrajectoryTwin(self.hardware, list(HOME))
+
+    def pass_time(self, seconds: float) -> None:
+        """Run the controllers for some time."""
+        end = time.monotonic() + seconds
+        self.wait(lambda: time.monotonic() >= end)
+
+    def wait(self, condition: Callable[[], Any]) -> None:
+        """Run the controllers until something is true."""
+        begun = due = time.monotonic()
+        while not condition():
+            if time.monotonic() > begun + PATIENCE:
+                raise SystemExit('ros2_control: the arm does not do what it should')
+            run(self.hardware, lambda: self.controller.update(time.monotonic()))
+            due += PERIOD
+            while (left := due - time.monotonic()) > 0.0:
+                self._executor.spin_once(timeout_sec=left)
+
+    def call(self, name: str, kind: Any, **request: Any) -> None:
+        """Call a service of a drive, while the controllers go on."""
+        client = self._node.create_client(kind, name)
+        self.wait(client.service_is_ready)
+        future = client.call_async(kind.Request(**request))
+        self.wait(future.done)
+        if not future.result().success:
+            raise SystemExit(f'ros2_control: {name}: {future.result().message}')
+        self._node.destroy_client(client)
+
+    def enable(self, *names: str, wanted: bool = True) -> None:
+        """Enable or disable drives."""
+        for name in names:
+            self.call(f'/{name}/enable', SetBool, data=wanted)
+
+    def go(self, goal: dict[str, float], duration: float) -> None:
+        """Begin a trajectory."""
+        self.controller.go(goal, duration, time.monotonic())
+
+    def online(self, joint: str) -> bool:
+        """Tell whether a joint is in the last message."""
+        return joint in self.hardware.latest.name
+
+    def reactivate(self) -> None:
+        """Deactivate and activate the controller: it holds what it finds."""
+        self.controller.deactivate()
+        self.pass_time(0.3)
+        self.controller.activate()
+        self.pass_time(0.3)
+
+
+def play(arm: Arm, drives: 'IO[str]') -> None:
+    """Let happen what may happen."""
+    arm.wait(lambda: all(math.isfinite(arm.hardware.state[joint, 'position']) for joint in HOME))
+    arm.pass_time(0.5)
+    arm.enable(*AXES)
+    arm.controller.activate()
+    arm.pass_time(0.5)
+    arm.go(OUT, 2.0)
+    arm.pass_time(2.5)
+    arm.go(HOME, 3.0)                   # stopped on the way
+    arm.pass_time(1.0)
+    arm.enable(*AXES, wanted=False)
+    arm.pass_time(0.7)
+    arm.enable(*AXES)
+    arm.pass_time(0.5)                  # the trajectory is over by now, and commands its goal
+    arm.reactivate()
+    arm.go(OUT, 2.0)                    # a fault on the way
+    arm.pass_time(0.7)
+    drives.write('shoulder trip\n')
+    drives.flush()
+    arm.pass_time(1.0)
+    arm.call('/shoulder/reset_fault', Trigger)
+    arm.enable('shoulder')
+    arm.reactivate()
+    arm.go(HOME, 2.0)                   # a lost drive on the way
+    arm.pass_time(0.7)
+    drives.write('shoulder power_cut=1\n')
+    drives.flush()
+    arm.wait(lambda: not arm.online('shoulder_joint'))
+    arm.wait(lambda: arm.online('shoulder_joint'))
+    arm.pass_time(0.3)
+    arm.enable('shoulder')
+    arm.reactivate()
+    arm.go(HOME, 2.0)
+    arm.pass_time(2.5)
+
+
+@contextmanager
+def process(*command: str, **options: Any) -> 'Iterator[subprocess.Popen[str]]':
+    """Run one of our executables."""
+    with subprocess.Popen([sys.executable, '-m', *command], text=True, **options) as child:
+        try:
+            yield child
+        finally:
+            child.send_signal(signal.SIGINT)
+            child.wait(timeout=20.0)
+
+
+def record(trace: Path) -> None:
+    """Play it all, and record the bus."""
+    parameters = str(FOLDER / 'arm.yaml')
+    axes = [text for name in AXES for text in ('--axis', f'{name}:load=0.3,noise=1,brake=1')]
+    with process('drive_can_bridge.cli.main', 'simulate', '--params-file', parameters, '--pty',
+                 '--log-frames', str(trace), *axes, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                 stderr=subprocess.DEVNULL) as drives:
+        assert drives.stdin is not None and drives.stdout is not None
+        channel = drives.stdout.readline().split()[-1]
+        threading.Thread(target=drives.stdout.read, daemon=True).start()
+        with process('drive_can_bridge.ros.main', '--ros-args', '--params-file', parameters,
+                     '-p', 'buses.main.interface:=slcan', '-p', f'buses.main.channel:={channel}',
+                     '-r', '~/joint_states:=/robot_joint_states',
+                     '-r', '~/joint_commands:=/robot_joint_commands',
+                     stderr=subprocess.DEVNULL):
+            rclpy.init(args=[])
+            node = rclpy.create_node('controllers')
+            executor = SingleThreadedExecutor()
+            executor.add_node(node)
+            try:
+                play(Arm(node, executor), drives.stdin)
+            finally:
+                node.destroy_node()
+                rclpy.shutdown()
+        drives.stdin.close()
+
+
+if __name__ == '__main__':
+    record(Path(sys.argv[1]))

@@ -1,0 +1,146 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+All joints of a bridge, for whoever wants one message for all of them.
+
+``~/joint_states`` is :mod:`.joint_states`. ``~/joint_commands`` has a subscription for each bus,
+because each bus has a thread that takes commands just before its cycles; what concerns the drives
+of other buses is left to theirs.
+"""
+
+from collections.abc import Callable, Collection, Mapping
+
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+
+from drive_can_bridge.core.configuration import BridgeConfiguration
+from drive_can_bridge.core.text import printable
+from drive_can_bridge.ros.commands import CommandIntake
+from drive_can_bridge.ros.drive_node import DriveNode
+from drive_can_bridge.ros.joint_states import JointStates, QUANTITIES
+from drive_can_bridge.ros.log import Log
+from drive_can_bridge.ros.periodic_thread import PeriodicThread
+from drive_can_bridge.ros.polled_topics import PolledTopics
+from drive_can_bridge.ros.throttle import Throttle
+
+COMMANDS = '~/joint_commands'
+#: so many joints of others are told of
+STRANGERS_MAX = 100
+
+
+class Joints:
+    """
+    The topics for all joints of a bridge.
+
+    :param drives: by name.
+    """
+
+    def __init__(self, node: Node, log: Log, configuration: BridgeConfiguration,
+                 drives: Mapping[str, DriveNode]) -> None:
+        self._throttle = Throttle(log.warning)
+        self._taken: list[PolledTopics] = []
+        self._states: JointStates | None = None
+        self._thread: PeriodicThread | None = None
+        ordered = [drives[name] for name in configuration.drives]
+        known = {drive.drive.joint.name for drive in ordered if drive.drive.joint is not None}
+        for bus in configuration.buses:
+            here = [drive for drive in ordered if drive.drive.bus == bus]
+            joints = {drive.drive.joint.name: drive.commands for drive in here
+                      if drive.drive.joint is not None}
+            if not joints:
+                continue
+            first = not self._taken     # the others hear the same, and need not tell it again
+            taken = PolledTopics(
+                node, self._throttle, _refusing(joints, self._throttle if first else None))
+            self._taken.append(taken)
+            taken.subscribe(JointState, COMMANDS, _Taker(
+                joints, known, self._throttle if first else None, log.info))
+            for drive in here:
+                drive.joint_commands = taken
+        if configuration.joint_state_rate > 0.0:
+            self._states = JointStates(node, ordered)
+            self._thread = PeriodicThread(
+                'joint states', 1.0 / configuration.joint_state_rate, self._states.publish,
+                lambda text: log.error(f'joint_states: {text}'))
+
+    def start(self) -> None:
+        """Begin to publish."""
+        if self._thread is not None:
+            self._thread.start()
+
+    def stop(self) -> None:
+        """Publish nothing any more."""
+        if self._thread is not None:
+            self._thread.stop()
+
+    def destroy(self) -> None:
+        """Take the topics out of the node. Nobody may take commands any more."""
+        while self._taken:
+            self._taken.pop().unsubscribe()
+        if self._states is not None:
+            self._states.destroy()
+            self._states = None
+
+
+def _refusing(joints: Mapping[str, CommandIntake], warn: Throttle | None,
+              ) -> Callable[[str, str], None]:
+    """Return what counts a message that is thrown away, for all that it might have moved."""
+    def refuse(topic: str, text: str) -> None:
+        for intake in joints.values():
+            intake.count_refused()
+        if warn is not None:
+            warn(topic, text)
+    return refuse
+
+
+class _Taker:
+    """
+    Takes messages for the joints of one bus.
+
+    :param joints: who takes what concerns a joint, by its name.
+    :param known: the names of all joints of the bridge.
+    :param warn: None: somebody else tells what is wrong with a message.
+    """
+
+    def __init__(self, joints: Mapping[str, CommandIntake], known: Collection[str],
+                 warn: Throttle | None, inform: Callable[[str], None]) -> None:
+        self._joints = joints
+        self._known = known
+        self._warn = warn
+        self._inform = inform
+        self._strangers: set[str] = set()
+
+    def __call__(self, message: JointState, now: float) -> None:
+        """Hand each joint its part."""
+        names = list(message.name)
+        wrong = self._problem(names, message)
+        if wrong:
+            for name in self._joints.keys() & set(names):
+                self._joints[name].count_refused()
+            if self._warn is not None:
+                self._warn('joint commands', f'joint_commands refused: {wrong}')
+            return
+        for entry, name in enumerate(names):
+            intake = self._joints.get(name)
+            if intake is not None:
+                intake.take_entry(message, entry, now)
+            elif name not in self._known and self._warn is not None:
+                self._tell_stranger(name)
+
+    @staticmethod
+    def _problem(names: list[str], message: JointState) -> str:
+        for quantity in QUANTITIES:
+            count = len(getattr(message, quantity))
+            if count not in (0, len(names)):
+                return (f'{count} {quantity} values for {len(names)} names; allowed are as many '
+                        f'as names, with NaN for joints that are to be left alone, or none')
+        if len(set(names)) != len(names):
+            twice = next(name for name in names if names.count(name) > 1)
+            return f'{printable(twice)} stands twice, allowed is once'
+        return ''
+
+    def _tell_stranger(self, name: str) -> None:
+        """Say once that a joint is none of this bridge; there may be any number of them."""
+        if name not in self._strangers and len(self._strangers) < STRANGERS_MAX:
+            self._strangers.add(name)
+            self._inform(f'joint_commands name {printable(name)}, which is no joint of this '
+                         f'bridge: ignored')

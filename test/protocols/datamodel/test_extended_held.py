@@ -1,0 +1,365 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+Axes that stay where they are (``neutral_from``), 29-bit identifiers, in hex.
+
+Station 1, request map 52 (control word), 60 (position, 0.1 deg), response map 211 (status word:
+ready 1, enabled 2, fault 8), 212 (position). The position is limited to ±10 deg.
+"""
+
+from typing import Any
+
+from builders import (
+    ACTUAL, CONTROL, Conversation, drive, INT16, parameter, RAM, RO, STATUS, TABLE, WORD,
+)
+import pytest
+
+from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.errors import ValueRefused
+from drive_can_bridge.core.events import Noted
+from drive_can_bridge.core.setpoints import CommandOutcome
+
+ZEROS = '0000000000000000'
+ASK_MAPS = [f'002007A4#{ZEROS}', f'002007E4#{ZEROS}']
+MAPS = ['102007A4#0034003C00000000', '102007E4#00D300D400000000']
+#: read of 212 alone
+ASK_POSITION = f'00200D41#{ZEROS}'
+
+POSITION = parameter(
+    'position_setpoint', 60, type=INT16, scale=0.1, unit='deg', minimum=-10.0, maximum=10.0,
+    storage=RAM, neutral_from='actual_position', arming_tolerance=0.5)
+MEASURED = parameter('actual_position', 212, type=INT16, scale=0.1, unit='deg', access=RO)
+
+
+def axis(**options: Any) -> Conversation:
+    """Return a conversation with an axis of which nothing is known yet, bus up."""
+    talk = Conversation(drive(**{
+        'table': (*TABLE, POSITION, MEASURED), 'control': CONTROL, 'request': (WORD, POSITION),
+        'response': (STATUS, MEASURED), **options}))
+    assert talk.bus_up(9.0) == []
+    return talk
+
+
+def checking(**options: Any) -> Conversation:
+    """Return one whose maps were read: its position is asked for at 9.992 s."""
+    talk = axis(**options)
+    assert talk.activate(9.99) == ASK_MAPS[:1]
+    assert talk.hears(MAPS[0], 9.991) == ASK_MAPS[1:]
+    assert talk.hears(MAPS[1], 9.992) == [ASK_POSITION]
+    return talk
+
+
+def request(word: int, position: int) -> str:
+    """Return the cyclic request with these words."""
+    return f'003FFFF0#{word:04X}{position & 0xFFFF:04X}00000000'
+
+
+def cycle(talk: Conversation, number: int, status: int, position: int) -> str:
+    """Let a cycle pass, 20 ms after the one before; return its request. The drive answers."""
+    (_, sent), = talk.until(10.0 + 0.02 * number + 1e-6)
+    assert talk.hears(f'103FFFF0#{status:04X}{position & 0xFFFF:04X}00000000',
+                      10.002 + 0.02 * number) == []
+    return sent
+
+
+def standing(position: int = 70, **options: Any) -> Conversation:
+    """Return one that stands at this position, disabled, with two cycles behind it."""
+    talk = checking(**options)
+    assert talk.hears(f'10200D41#{position & 0xFFFF:04X}000000000000', 10.0) == []
+    assert cycle(talk, 0, 1, position) == request(0, position)
+    assert cycle(talk, 1, 1, position) == request(0, position)
+    assert talk.session.online
+    talk.events()
+    return talk
+
+
+def enabled(position: int = 70, **options: Any) -> Conversation:
+    """Return one that was enabled in cycle 2."""
+    talk = standing(position, **options)
+    assert talk.asks(ControlAction.ENABLE, 10.025) == []
+    assert cycle(talk, 2, 3, position) == request(1, position)
+    assert talk.control_outcomes() == [('enable', True, 'enabled')]
+    return talk
+
+
+def test_first_position_is_read_before_the_first_cycle() -> None:
+    talk = checking()
+    assert talk.until(10.08) == []      # however long that takes
+    assert talk.hears('10200D41#0046000000000000', 10.085) == []
+    assert cycle(talk, 4.25, 1, 70) == request(0, 70)
+
+
+def test_no_cycle_without_a_position() -> None:
+    """Nobody answers the read: the maps are looked at again, and then the position."""
+    talk = checking()
+    sent = [text for _, text in talk.until(10.35)]
+    assert sent == [ASK_POSITION, ASK_POSITION, ASK_MAPS[0]]
+    assert talk.hears(MAPS[0], 10.36) == ASK_MAPS[1:]
+    assert talk.hears(MAPS[1], 10.361) == []    # the read is in quarantine
+    assert talk.until(10.5)[0][1] == ASK_POSITION
+    assert talk.session.offline_advice == (
+        'it would jump: position_setpoint does not have the value of actual_position yet, which '
+        'is not known or which it cannot carry')
+
+
+def test_limits_do_not_bound_where_the_axis_is() -> None:
+    talk = standing(-300)
+    assert cycle(talk, 2, 1, -300) == '003FFFF0#0000FED400000000'
+
+
+def test_follows_while_it_is_disabled_and_is_latched_when_it_is_enabled() -> None:
+    talk = standing(70)
+    assert cycle(talk, 2, 1, 68) == request(0, 70)      # somebody pushes it
+    assert cycle(talk, 3, 1, 66) == request(0, 68)
+    talk.asks(ControlAction.ENABLE, 10.065)
+    assert cycle(talk, 4, 1, 65) == request(1, 66)      # does not run yet: it is still followed
+    assert cycle(talk, 5, 3, 64) == request(1, 65)      # runs from here on: with 65
+    assert cycle(talk, 6, 3, 63) == request(1, 65)      # whatever the load and the noise say
+    assert cycle(talk, 7, 3, 67) == request(1, 65)
+    assert cycle(talk, 8, 3, 65) == request(1, 65)
+
+
+def test_command_near_it_arms() -> None:
+    talk = enabled(70)
+    assert talk.commands(0, 0.0, 10.043) is CommandOutcome.NOT_ARMED
+    assert talk.commands(0, 7.6, 10.043) is CommandOutcome.NOT_ARMED
+    assert talk.commands(0, 6.4, 10.043) is CommandOutcome.NOT_ARMED
+    assert cycle(talk, 3, 3, 71) == request(1, 70)
+    assert talk.commands(0, 7.5, 10.063) is CommandOutcome.ARMED
+    assert cycle(talk, 4, 3, 71) == request(1, 75)
+    assert talk.commands(0, 9.9, 10.083) is CommandOutcome.ACCEPTED
+    assert cycle(talk, 5, 3, 76) == request(1, 99)
+    with pytest.raises(ValueRefused):       # of commands, the limits are those of the profile
+        talk.commands(0, 10.1, 10.103)
+
+
+def test_rearm_immediate_never_moves_it() -> None:
+    """The configuration refuses that; should it happen while running, nothing comes of it."""
+    talk = enabled(70)
+    talk.session.reconfigure(rearm_immediate=True)
+    assert talk.commands(0, 0.0, 10.043) is CommandOutcome.NOT_ARMED
+    assert cycle(talk, 3, 3, 70) == request(1, 70)
+
+
+def test_after_a_command_time_out_it_stays_where_it_was_sent() -> None:
+    talk = enabled(70, command_timeout=0.05)
+    talk.commands(0, 7.0, 10.043)
+    talk.commands(0, 8.0, 10.043)
+    assert cycle(talk, 3, 3, 71) == request(1, 80)
+    assert cycle(talk, 4, 3, 73) == request(1, 80)
+    assert cycle(talk, 5, 3, 75) == request(1, 80)      # 57 ms: expired
+    assert not talk.session.setpoints.items[0].armed
+    assert cycle(talk, 6, 3, 77) == request(1, 80)
+    assert talk.commands(0, 7.0, 10.123) is CommandOutcome.NOT_ARMED
+    assert talk.commands(0, 8.2, 10.123) is CommandOutcome.ARMED
+
+
+def test_command_that_never_left_is_no_place_to_stay_at() -> None:
+    """The cycle came later than the command may be old: it is not sent, and leaves no trace."""
+    talk = enabled(70, command_timeout=0.01)
+    talk.commands(0, 7.1, 10.055)
+    assert cycle(talk, 3, 3, 70) == request(1, 71)
+    talk.commands(0, 7.1, 10.0625)
+    talk.commands(0, 9.0, 10.0630)
+    assert cycle(talk, 4, 3, 71) == request(1, 71)
+    assert cycle(talk, 5, 3, 71) == request(1, 71)
+
+
+def test_frame_that_the_bus_refused_was_not_sent() -> None:
+    talk = enabled(70, command_timeout=0.03)
+    talk.commands(0, 7.0, 10.055)
+    assert cycle(talk, 3, 3, 70) == request(1, 70)
+    talk.commands(0, 9.0, 10.079)
+    talk.refusing = lambda text: True
+    assert talk.until(10.08 + 1e-6) == []
+    talk.refusing = lambda text: False
+    talk.session.setpoints.expire(10.12)
+    assert talk.until(10.12)[0][1] == request(1, 70)
+
+
+@pytest.mark.parametrize(('action', 'word'), [
+    (ControlAction.DISABLE, 0), (ControlAction.QUICK_STOP, 2)])
+def test_stop_keeps_what_was_sent_until_it_is_disabled(action: ControlAction, word: int) -> None:
+    talk = enabled(70)
+    talk.commands(0, 7.0, 10.043)
+    talk.commands(0, 9.0, 10.043)
+    assert cycle(talk, 3, 3, 72) == request(1, 90)
+    talk.asks(action, 10.065)
+    assert cycle(talk, 4, 3, 75) == request(word, 90)       # brakes
+    assert cycle(talk, 5, 1, 77) == request(word, 90)
+    assert cycle(talk, 6, 1, 76) == request(0, 77)          # stands, and is followed
+    assert cycle(talk, 7, 1, 76) == request(0, 76)
+
+
+def test_fault_reset_and_enabling_anew() -> None:
+    talk = enabled(70)
+    talk.commands(0, 7.0, 10.043)
+    talk.commands(0, 9.0, 10.043)
+    assert cycle(talk, 3, 3, 75) == request(1, 90)
+    assert cycle(talk, 4, 8, 76) == request(1, 90)          # trips, and sinks
+    assert cycle(talk, 5, 8, 70) == request(0, 76)
+    assert cycle(talk, 6, 8, 60) == request(0, 70)
+    talk.asks(ControlAction.RESET_FAULT, 10.125)
+    assert cycle(talk, 7, 1, 55) == request(0x80, 60)
+    assert cycle(talk, 8, 1, 55) == request(0x80, 55)
+    assert cycle(talk, 9, 1, 55) == request(0x80, 55)
+    assert cycle(talk, 10, 1, 55) == request(0, 55)
+    talk.asks(ControlAction.ENABLE, 10.205)
+    assert cycle(talk, 11, 3, 55) == request(1, 55)
+    assert talk.commands(0, 9.0, 10.223) is CommandOutcome.NOT_ARMED    # left standing
+    assert cycle(talk, 12, 3, 54) == request(1, 55)
+
+
+def test_deactivation_repeats_it() -> None:
+    talk = enabled(70)
+    talk.commands(0, 7.0, 10.043)
+    talk.commands(0, 9.0, 10.043)
+    assert cycle(talk, 3, 3, 75) == request(1, 90)
+    assert talk.deactivate(10.07) == []
+    assert talk.until(10.08 + 1e-6)[-1][1] == request(0, 90)
+    talk.hears('103FFFF0#0003004D00000000', 10.082)         # still enabled
+    assert talk.until(10.1 + 1e-6)[-1][1] == request(0, 90)
+    talk.hears('103FFFF0#0001004E00000000', 10.102)
+    assert talk.until(10.12 + 1e-6)[-1][1] == request(0, 78)
+    assert talk.until(11.0) == []
+
+
+def test_lost_with_control_it_is_read_anew() -> None:
+    talk = enabled(70)
+    talk.commands(0, 7.0, 10.043)
+    talk.commands(0, 9.0, 10.043)
+    assert cycle(talk, 3, 3, 75) == request(1, 90)
+    sent = [text for _, text in talk.until(10.18 + 1e-6)]
+    assert sent == [request(1, 90)] * 3 + [request(0, 90)] * 3      # three missed, three to stop
+    talk.events()
+    while (now := talk.session.next_timer()) < 10.3:
+        sent = talk.at(now)
+    assert sent == ASK_MAPS[:1]
+    assert talk.hears(MAPS[0], 10.31) == ASK_MAPS[1:]
+    assert talk.hears(MAPS[1], 10.311) == [ASK_POSITION]
+    assert talk.until(10.35) == []
+    assert talk.hears('10200D41#0021000000000000', 10.36) == []     # it sank meanwhile
+    assert talk.until(10.36 + 1e-6)[0][1] == request(0, 33)
+    assert talk.hears('103FFFF0#0001002100000000', 10.362) == []
+    assert talk.commands(0, 9.0, 10.363) is CommandOutcome.DISABLED
+
+
+def bare(**options: Any) -> Conversation:
+    """Return a drive without control that is online, at 7.0 deg."""
+    talk = axis(control=None, request=(POSITION,), response=(MEASURED, STATUS), **options)
+    maps = ['102007A4#003C000000000000', '102007E4#00D400D300000000']
+    if options.get('mapping') == 'assume':
+        assert talk.activate(9.992) == [ASK_POSITION]
+    else:
+        assert talk.activate(9.99) == ASK_MAPS[:1]
+        assert talk.hears(maps[0], 9.991) == ASK_MAPS[1:]
+        assert talk.hears(maps[1], 9.992) == [ASK_POSITION]
+    assert talk.hears('10200D41#0046000000000000', 10.0) == []
+    assert talk.until(10.0 + 1e-6)[0][1] == '003FFFF0#0046000000000000'
+    talk.hears('103FFFF0#0045000100000000', 10.002)
+    assert talk.session.online
+    talk.events()
+    return talk
+
+
+def test_without_control_it_is_latched_from_the_beginning() -> None:
+    talk = bare()
+    assert talk.until(10.02 + 1e-6)[0][1] == '003FFFF0#0046000000000000'
+    talk.hears('103FFFF0#0044000100000000', 10.022)
+    assert talk.until(10.04 + 1e-6)[0][1] == '003FFFF0#0046000000000000'
+    talk.hears('103FFFF0#0044000100000000', 10.042)
+    assert talk.commands(0, 7.2, 10.05) is CommandOutcome.ARMED
+    assert talk.until(10.06 + 1e-6)[0][1] == '003FFFF0#0048000000000000'
+    talk.hears('103FFFF0#0044000100000000', 10.062)
+    talk.deactivate(10.07)
+    assert [text for _, text in talk.until(11.0)] == ['003FFFF0#0048000000000000'] * 3
+
+
+@pytest.mark.parametrize('mapping', ['verify', 'assume'])
+def test_without_control_a_lost_drive_is_sent_nothing(mapping: str) -> None:
+    """It may have been switched off, and stand elsewhere by now."""
+    talk = bare(mapping=mapping)
+    talk.commands(0, 7.0, 10.01)
+    talk.commands(0, 9.0, 10.01)
+    cyclic = [text for _, text in talk.until(10.4) if text.startswith('003FFFF0')]
+    assert cyclic == ['003FFFF0#005A000000000000'] * 3
+    assert [event.text for event in talk.events(Noted) if event.warning] == [
+        'where its axis is, nobody knows, so that it is told nothing: it may still be running']
+    assert not [text for _, text in talk.until(15.0) if not text.endswith(ZEROS)]   # reads only
+    talk.deactivate(15.0)
+    assert talk.sent() == []
+    assert talk.session.stopped
+    assert [event.text for event in talk.events(Noted) if event.warning] == [
+        'could not be told to stop: it may still be running']
+
+
+def test_stall_reads_it_anew_and_believes_no_older_answer() -> None:
+    talk = bare(mapping='assume')
+    assert talk.time_lost(12.0) == [ASK_POSITION]
+    assert talk.time_lost(12.05) == []      # waits behind the first one, whose answer is old
+    assert talk.hears('10200D41#0050000000000000', 12.06) == [ASK_POSITION]
+    assert talk.until(12.07) == []
+    talk.hears('10200D41#0021000000000000', 12.08)
+    assert talk.until(12.09)[0][1] == '003FFFF0#0021000000000000'
+
+
+def test_enable_waits_for_the_position() -> None:
+    """With maps that are not looked at, the drive can be online before its position is known."""
+    talk = axis(mapping='assume', response=(STATUS, ACTUAL, MEASURED))
+    assert talk.activate(9.992) == [ASK_POSITION]
+    talk.hears('10200D41#0046000000000000', 10.0)
+    assert talk.until(10.0 + 1e-6)[0][1] == request(0, 70)
+    talk.hears('103FFFF0#0001000000460000', 10.002)
+    for _ in range(4):      # lost: cycles go on, with what was known
+        assert talk.at(talk.session.next_timer()) == [request(0, 70)]
+    assert not talk.session.online
+    talk.hears('103FFFF0#00010000', 10.081)     # too short for the position
+    assert talk.session.online
+    assert talk.session.control_refusal(ControlAction.ENABLE) == (
+        'it would jump: position_setpoint does not have the value of actual_position yet, which '
+        'is not known or which it cannot carry')
+    assert talk.until(10.1 + 1e-6)[-1][1] == request(0, 70)
+    talk.hears('103FFFF0#0001000000210000', 10.102)
+    assert talk.session.control_refusal(ControlAction.ENABLE) == (
+        'it would jump: position_setpoint does not have the value of actual_position yet')
+    assert talk.until(10.12 + 1e-6)[-1][1] == request(0, 33)
+    talk.hears('103FFFF0#0001000000210000', 10.122)
+    assert talk.asks(ControlAction.ENABLE, 10.123) == []
+
+
+def test_position_that_the_setpoint_cannot_carry() -> None:
+    coarse = parameter('coarse', 60, type=INT16, scale=0.001, unit='deg', storage=RAM,
+                       neutral_from='actual_position', arming_tolerance=0.5)
+    talk = axis(table=(*TABLE, coarse, MEASURED), request=(WORD, coarse))
+    talk.activate(9.99)
+    talk.hears(MAPS[0], 9.991)
+    talk.hears(MAPS[1], 9.992)
+    assert talk.hears('10200D41#0190000000000000', 9.993) == []     # 40.0 deg, 32.767 at most
+    assert talk.until(10.09) == []
+    assert talk.until(10.0931) == [(10.093, ASK_POSITION)]
+    talk.hears('10200D41#0140000000000000', 10.1)                   # 32.0 deg
+    assert talk.until(10.1 + 1e-6)[0][1] == request(0, 32000)
+
+
+def test_status_by_hand_latches_with_the_word() -> None:
+    """A status word that comes seldom does not say from when on the axis is driven."""
+    talk = axis(response=(ACTUAL, MEASURED), request=(WORD, POSITION))
+    talk.activate(9.99)
+    talk.hears(MAPS[0], 9.991)
+    talk.hears('102007E4#00D100D400000000', 9.992)
+    talk.hears('10200D41#0046000000000000', 10.0)
+    talk.until(10.0 + 1e-6)
+    talk.hears('103FFFF0#0000004600000000', 10.002)
+    assert talk.at(10.003) == [f'00200D31#{ZEROS}']
+    talk.hears('10200D31#0001000000000000', 10.004)
+    sent = []
+    for number in range(1, 12):
+        now = 10.0 + 0.02 * number
+        sent += [text for _, text in talk.until(now + 1e-6) if text.startswith('003FFFF0')]
+        for text in talk.hears(f'103FFFF0#0000{70 - number:04X}00000000', now + 0.002):
+            assert text == f'00200D31#{ZEROS}'
+            talk.hears('10200D31#0001000000000000', now + 0.003)    # not enabled yet
+        if number == 4:
+            talk.asks(ControlAction.ENABLE, now + 0.01)
+    assert sent[:4] == [request(0, 70), request(0, 69), request(0, 68), request(0, 67)]
+    assert len(set(sent[4:])) == 1
+    assert sent[4] == request(1, 66)

@@ -1,0 +1,229 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""All joints of a bridge in one message, both ways."""
+
+import math
+import time
+from typing import Any
+
+from bridges import Bridge, CONVEYOR, parameters, StartBridge
+from clients import Client, wait_until
+import pytest
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import JointState
+
+STATES, COMMANDS = '/drive_can_bridge/joint_states', '/drive_can_bridge/joint_commands'
+RPM = 2 * math.pi / 60
+BUS = {'interface': 'virtual', 'bitrate': 1_000_000, 'reconnect_period': 0.1}
+
+
+def wheel(station: int, joint: dict[str, Any] | None, **keys: Any) -> dict[str, Any]:
+    """Return a drive with speed and position that goes offline soon."""
+    return {**CONVEYOR, 'station': station, 'missed_limit': 20, 'parameter_timeout': 0.2,
+            'cyclic_response': ['actual_speed', 'actual_position', 'motor_current'],
+            **({} if joint is None else {'joint': joint}), **keys}
+
+
+def two(**further: Any) -> dict[str, Any]:
+    """Return two joints on one bus, of which the second is no speed, and one on another bus."""
+    return {**parameters(
+        buses={'main': dict(BUS), 'side': dict(BUS)},
+        # not in the order of the alphabet, nor of the buses
+        west=wheel(1, {'name': 'wj', 'velocity': 'actual_speed', 'position': 'actual_position',
+                       'velocity_command': 'speed_setpoint', 'gear_ratio': 2.0}),
+        north=wheel(2, {'name': 'nj', 'effort': 'motor_current',
+                        'velocity_command': 'speed_setpoint'}, bus='side'),
+        east=wheel(3, {'name': 'ej', 'position': 'actual_position',
+                       'velocity_command': 'speed_setpoint'}),
+        south=wheel(4, {'name': 'sj', 'velocity_command': 'speed_setpoint'}),
+        plain=wheel(5, None)), **further}
+
+
+def same(values: Any, expected: list[float]) -> bool:
+    return list(values) == pytest.approx(expected, nan_ok=True)
+
+
+def speeds(one: Bridge) -> dict[str, int]:
+    """Return the speed setpoints as they were sent last, by drive."""
+    return {name: drive.session.sent.raws[0] or 0 for name, drive in one.node.drives.items()}
+
+
+def test_all_joints_in_the_order_of_the_drives(bridge: StartBridge, client: Client) -> None:
+    one = bridge(two())
+    one.online()
+    for name, speed, position in (('west', 600.0, 90.0), ('east', 1.0, 45.0)):
+        one.played[name].set_value('actual_speed', speed)
+        one.played[name].set_value('actual_position', position)
+    one.played['north'].set_value('motor_current', 2.5)
+    topic = client.topic(STATES, JointState)
+    message = topic.wait(lambda m: list(m.name) == ['wj', 'nj', 'ej'] and same(m.position, [
+        math.pi / 4, math.nan, math.pi / 4]) and same(m.effort, [math.nan, 2.5, math.nan]))
+    assert same(message.velocity, [300 * RPM, math.nan, math.nan])
+    assert abs(message.header.stamp.sec - time.time()) < 60
+
+
+def test_a_drive_that_is_gone_is_left_out(bridge: StartBridge, client: Client) -> None:
+    one = bridge(two())
+    one.online()
+    topic = client.topic(STATES, JointState)
+    topic.wait(lambda m: list(m.name) == ['wj', 'nj', 'ej'])
+    one.played['north'].fault('off')
+    message = topic.wait(lambda m: list(m.name) == ['wj', 'ej'])
+    assert len(message.position) == len(message.velocity) == len(message.effort) == 2
+    one.played['north'].fault('ok')
+    topic.wait(lambda m: list(m.name) == ['wj', 'nj', 'ej'])
+    for name in ('west', 'north', 'east'):
+        one.played[name].fault('off')
+    wait_until(lambda: not any(one.node.drives[name].session.online
+                               for name in ('west', 'north', 'east')))
+    time.sleep(0.1)     # what was on its way
+    count = len(topic.messages)
+    time.sleep(0.3)
+    assert len(topic.messages) == count, 'nothing is published without a joint'
+
+
+def test_the_stamp_is_that_of_the_oldest_sample(bridge: StartBridge, client: Client) -> None:
+    """A drive that answers no more, but is not given up yet, makes the whole message old."""
+    content = two()
+    content['drives']['east']['missed_limit'] = 1000
+    one = bridge(content)
+    one.online()
+    topic = client.topic(STATES, JointState)
+    topic.wait()
+    one.played['east'].fault('silent')
+    statistics = one.node.drives['east'].session.statistics
+    wait_until(lambda: statistics.missed > 5)
+
+    def stamp(message: JointState) -> float:
+        return float(message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec)
+    first = topic.wait(lambda m: 'ej' in m.name)
+    missed = statistics.missed
+    wait_until(lambda: statistics.missed > missed + 25)     # half a second
+    later = topic.wait(lambda m: 'ej' in m.name)
+    assert abs(stamp(later) - stamp(first)) < 0.05, 'of one and the same sample'
+    one.played['east'].fault('ok')
+    topic.wait(lambda m: stamp(m) > stamp(first))
+
+
+def test_empty_without_anybody_who_has_it(bridge: StartBridge, client: Client) -> None:
+    one = bridge(parameters(
+        left=wheel(1, {'name': 'l', 'velocity': 'actual_speed'}),
+        right=wheel(2, {'name': 'r', 'velocity': 'actual_speed'})))
+    one.online()
+    message = client.topic(STATES, JointState).wait(lambda m: len(m.name) == 2)
+    assert (len(message.position), len(message.velocity), len(message.effort)) == (0, 2, 0)
+
+
+def test_rate_and_quality(bridge: StartBridge, client: Client) -> None:
+    one = bridge(two(joint_state_rate=20.0))
+    one.online()
+    topic = client.topic(STATES, JointState)
+    (info,) = client.node.get_publishers_info_by_topic(STATES)
+    assert info.qos_profile.reliability is ReliabilityPolicy.RELIABLE
+    topic.wait()
+    count, began = len(topic.messages), time.monotonic()
+    wait_until(lambda: len(topic.messages) >= count + 30)
+    assert time.monotonic() - began > 1.2, '30 messages at 20 Hz take 1.5 s'
+
+
+@pytest.mark.parametrize('content', [
+    two(joint_state_rate=0.0), parameters(conveyor=CONVEYOR)], ids=['rate 0', 'no joint'])
+def test_there_is_none(bridge: StartBridge, client: Client, content: dict[str, Any]) -> None:
+    one = bridge(content)
+    one.online()
+    client.find(one.node, 'drive_can_bridge')
+    assert not client.node.count_publishers(STATES)
+    joints = any('joint' in drive for drive in content['drives'].values())
+    assert bool(client.node.count_subscribers(COMMANDS)) is joints
+
+
+def test_commands_for_all_of_them(bridge: StartBridge, client: Client) -> None:
+    one = bridge(two())
+    one.online()
+    names = ['nj', 'wj', 'sj']
+
+    def send(*velocity: float, **kinds: list[float]) -> None:
+        client.publish(COMMANDS, JointState(name=names, velocity=list(velocity), **kinds))
+    send(0.0, 0.0, 0.0)
+    send(100 * RPM, 100 * RPM, math.nan)        # NaN: left alone
+    wait_until(lambda: speeds(one) == {'west': 2000, 'north': 1000, 'east': 0, 'south': 0,
+                                       'plain': 0})
+    ages = {name: one.node.drives[name].session.setpoints.items[0].commanded_at
+            for name in one.node.drives}
+    assert ages['east'] is ages['plain'] is None
+    send(math.nan, math.nan, 50 * RPM)          # armed before: goes through, the others stay
+    wait_until(lambda: speeds(one) == {'west': 2000, 'north': 1000, 'east': 0, 'south': 500,
+                                       'plain': 0})
+    assert ages['west'] == one.node.drives['west'].session.setpoints.items[0].commanded_at
+    # a joint that is not named is left alone, too
+    client.publish(COMMANDS, JointState(name=['wj'], velocity=[10 * RPM]))
+    wait_until(lambda: speeds(one)['west'] == 200)
+    assert speeds(one)['north'] == 1000
+
+
+def test_array_of_another_length_is_refused_whole(bridge: StartBridge, client: Client) -> None:
+    one = bridge(two())
+    one.online()
+    client.listen()
+    client.publish(COMMANDS, JointState(name=['wj', 'nj'], velocity=[0.0, 0.0]))
+    wait_until(lambda: one.node.drives['north'].session.setpoints.items[0].armed)
+    client.publish(COMMANDS, JointState(name=['wj', 'nj'], velocity=[RPM]))
+    client.wait_logged('joint_commands refused: 1 velocity values for 2 names; allowed are as '
+                       'many as names, with NaN for joints that are to be left alone, or none')
+    client.publish(COMMANDS, JointState(name=['wj', 'nj'], velocity=[RPM, RPM],
+                                        effort=[1.0, 1.0, 1.0]))
+    client.publish(COMMANDS, JointState(name=['wj', 'wj'], velocity=[RPM, RPM]))
+    wait_until(lambda: one.node.drives['west'].session.statistics.commands_refused == 3)
+    wait_until(lambda: one.node.drives['north'].session.statistics.commands_refused == 2)
+    assert set(speeds(one).values()) == {0}
+    assert one.node.drives['east'].session.statistics.commands_refused == 0
+
+
+def test_joints_of_others_are_told_once(bridge: StartBridge, client: Client) -> None:
+    one = bridge(two())
+    one.online()
+    client.listen()
+    for _ in range(3):
+        client.publish(COMMANDS, JointState(name=['head', 'wj'], velocity=[1.0, 0.0]))
+    client.wait_logged('joint_commands name head, which is no joint of this bridge: ignored')
+    wait_until(lambda: one.node.drives['west'].session.setpoints.items[0].armed)
+    assert sum('head' in text for text in client.logged(0)) == 1
+    assert one.node.drives['west'].session.statistics.commands_refused == 0
+
+
+def test_quantity_without_a_command(bridge: StartBridge, client: Client) -> None:
+    one = bridge(two())
+    one.online()
+    client.listen()
+    client.publish(COMMANDS, JointState(name=['wj', 'nj'], velocity=[0.0, 0.0],
+                                        position=[1.0, math.nan]))
+    client.wait_logged('west: joint_command has a position, which is ignored: '
+                       'joint.position_command is not configured')
+    wait_until(lambda: one.node.drives['north'].session.setpoints.items[0].armed)
+    assert not any('north' in text for text in client.logged(0) if 'position' in text)
+
+
+def test_it_matches_a_queue_of_one(bridge: StartBridge, client: Client) -> None:
+    """Reliable or best effort, any depth: the hardware interface asks for a depth of 1."""
+    one = bridge(two())
+    one.online()
+    for reliability in (ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT):
+        publisher = client.node.create_publisher(
+            JointState, COMMANDS, QoSProfile(depth=1, reliability=reliability))
+        wait_until(lambda publisher=publisher: publisher.get_subscription_count() == 2)
+        client.node.destroy_publisher(publisher)
+
+
+def test_cleaned_up_and_configured_anew(bridge: StartBridge, client: Client) -> None:
+    one = bridge(two())
+    one.online()
+    topic = client.topic(STATES, JointState)
+    topic.wait(lambda m: len(m.name) == 3)
+    for label in ('deactivate', 'cleanup'):
+        client.transition(label=label)
+    wait_until(lambda: not client.node.count_publishers(STATES)
+               and not client.node.count_subscribers(COMMANDS))
+    for label in ('configure', 'activate'):
+        client.transition(label=label)
+    topic.wait(lambda m: len(m.name) == 3)
+    client.publish(COMMANDS, JointState(name=['wj'], velocity=[0.0]))
+    wait_until(lambda: one.node.drives['west'].session.setpoints.items[0].armed)

@@ -1,0 +1,294 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The example for ros2_control, with the hardware interface's twin, over three simulated axes.
+
+The axes carry a load and their encoders are noisy. Whatever happens, no setpoint jumps, and no
+axis moves by more than an encoder step unless a trajectory moves it.
+"""
+
+from collections.abc import Callable, Iterator
+import math
+from pathlib import Path
+import struct
+import threading
+import time
+from typing import Any
+
+from bridges import Bridge, cyclic_identifier, Recorder, StartBridge
+from clients import Client, wait_until
+import pytest
+from ros2_control_twin import HardwareTwin, run, System, takes_positions, TrajectoryTwin
+from sensor_msgs.msg import JointState
+from std_srvs.srv import SetBool, Trigger
+import yaml
+
+from drive_can_bridge.simulation.plant import Mechanics
+
+FOLDER = Path(__file__).parents[2] / 'config' / 'ros2_control'
+AXES = {'shoulder': 1, 'elbow': 2, 'wrist': 3}
+REMAPS = ('-r', '~/joint_states:=/robot_joint_states',
+          '-r', '~/joint_commands:=/robot_joint_commands')
+#: rad of each joint; what its drive measures then, in steps of 0.01 deg
+GOAL = {'shoulder_joint': 0.5, 'elbow_joint': -0.4, 'wrist_joint': 0.3}
+GEAR = {'shoulder': 1.0, 'elbow': -1.0, 'wrist': 2.0}
+#: a vertical axis has a brake; the encoder is off by one step now and then
+MECHANICS = Mechanics(load=0.3, noise=1, brake=1)
+#: words of the control word
+DISABLE, ENABLE = 0, 1
+
+
+def content(robot: str) -> dict[str, Any]:
+    """Return the example's parameters with a virtual bus, and patience with a busy machine."""
+    text = (FOLDER / f'{robot}.yaml').read_text(encoding='utf-8')
+    parameters: dict[str, Any] = yaml.safe_load(text)['/**/drive_can_bridge']['ros__parameters']
+    parameters['buses']['main'] = {'interface': 'virtual', 'bitrate': 1_000_000,
+                                   'reconnect_period': 0.1}
+    parameters['diagnostics_period'] = 0.1
+    for drive in parameters['drives'].values():
+        drive.update(command_timeout=5.0, missed_limit=40, parameter_timeout=0.5,
+                     control_timeout=20.0)
+    return parameters
+
+
+class Manager:
+    """The controller manager: a cycle every 10 ms, in a thread of its own."""
+
+    def __init__(self, client: Client, robot: str) -> None:
+        self.system = System(FOLDER / f'{robot}.urdf')
+        self.hardware = HardwareTwin(client.node, self.system)
+        self.update: Callable[[], None] = lambda: None
+        self.crash = ''
+        self._ending = threading.Event()
+        self._thread = threading.Thread(target=self._run, name='controllers')
+        self._thread.start()
+
+    def _run(self) -> None:
+        while not self._ending.wait(0.01):
+            try:
+                run(self.hardware, self.update)
+            except Exception as error:  # noqa: BLE001  outermost loop of a thread
+                self.crash = f'{type(error).__name__}: {error}'
+                return
+
+    def close(self) -> None:
+        self._ending.set()
+        self._thread.join()
+        assert not self.crash
+
+
+class Arm:
+    """The whole arm: bridge, drives, manager, controller, and a record of the bus."""
+
+    def __init__(self, one: Bridge, client: Client, manager: Manager, recorder: Recorder) -> None:
+        self.one, self.client, self.manager, self.recorder = one, client, manager, recorder
+        self.controller = TrajectoryTwin(manager.hardware, list(GOAL))
+        manager.update = lambda: self.controller.update(time.monotonic())
+
+    def steps(self, name: str) -> int:
+        """Return where an axis really is, in steps; the encoder's noise is not in it."""
+        axes: Any = self.one.played[name].drive.plant
+        (travel,) = (travel for _, travel in axes.axes._travels.values())
+        return round(100 * travel.position)
+
+    def enable(self, name: str, wanted: bool = True) -> None:
+        answer = self.client.call(f'/{name}/enable', SetBool, SetBool.Request(data=wanted))
+        assert answer.success, answer.message
+
+    def activate(self) -> None:
+        """Activate the controller once states are there; wait until it has armed all axes."""
+        wait_until(lambda: all(math.isfinite(self.manager.hardware.state[joint, 'position'])
+                               for joint in GOAL))
+        self.controller.activate()
+        wait_until(lambda: all(self.armed(name) for name in AXES), what='armed axes')
+
+    def armed(self, name: str) -> bool:
+        return all(item.armed for item in self.one.node.drives[name].session.setpoints.items)
+
+    def go(self, goal: dict[str, float], duration: float = 1.0) -> None:
+        self.controller.go(goal, duration, time.monotonic())
+
+    def arrived(self, goal: dict[str, float]) -> bool:
+        return all(abs(self.steps(name) - wanted(goal, name)) <= 1 for name in AXES)
+
+    def exchanges(self, name: str, count: int = 10) -> None:
+        """Wait until so many further exchanges are over."""
+        statistics = self.one.node.drives[name].session.statistics
+        start = statistics.exchanges
+        wait_until(lambda: statistics.exchanges >= start + count)
+
+    def requests(self, name: str) -> list[tuple[int, int]]:
+        """Return control word and position of all cyclic requests so far."""
+        self.recorder.catch_up()
+        return [struct.unpack('>Hh', data[:4])
+                for _, data in self.recorder.frames(cyclic_identifier(AXES[name]))]
+
+
+def wanted(goal: dict[str, float], name: str) -> int:
+    return round(100 * math.degrees(goal[f'{name}_joint']) * GEAR[name])
+
+
+@pytest.fixture
+def arm(bridge: StartBridge, client: Client) -> Iterator[Arm]:
+    """Return the arm, online and disabled, standing where nobody would guess."""
+    one = bridge(content('arm'), arguments=REMAPS,
+                 mechanics=dict.fromkeys(AXES, MECHANICS))
+    one.online()
+    manager = Manager(client, 'arm')
+    with one.record() as recorder:
+        try:
+            yield Arm(one, client, manager, recorder)
+        finally:
+            manager.close()
+
+
+def no_jump(requests: list[tuple[int, int]], start: int) -> None:
+    """Check that without a trajectory no setpoint is more than a step (and noise) away."""
+    assert requests
+    for word, position in requests:
+        assert abs(position - start) <= 2, (word, position, start)
+
+
+def moved(arm: Arm) -> None:
+    """Enable all axes and move them to the goal."""
+    for name in AXES:
+        arm.enable(name)
+    arm.activate()
+    arm.go(GOAL)
+    wait_until(lambda: arm.arrived(GOAL), what='the goal')
+
+
+def test_moves_along_a_trajectory(arm: Arm) -> None:
+    before = {name: arm.steps(name) for name in AXES}
+    for name in AXES:
+        arm.enable(name)
+    arm.activate()
+    for name in AXES:
+        assert abs(arm.steps(name) - before[name]) <= 1, 'enabling and arming move nothing'
+        no_jump(arm.requests(name), before[name])
+    arm.go(GOAL)
+    wait_until(lambda: arm.arrived(GOAL), what='the goal')
+    for joint, goal in GOAL.items():
+        wait_until(lambda joint=joint, goal=goal: arm.manager.hardware.state[
+            joint, 'position'] == pytest.approx(goal, abs=0.0005))
+    message = arm.manager.hardware.latest
+    assert takes_positions(message)
+    assert list(message.name) == list(GOAL)
+
+
+def test_stop_and_enable_again(arm: Arm) -> None:
+    moved(arm)
+    arm.go(dict.fromkeys(GOAL, -0.6), 2.0)
+    wait_until(lambda: arm.steps('shoulder') < wanted(GOAL, 'shoulder') - 500, what='on its way')
+    arm.enable('shoulder', False)
+    arm.controller.deactivate()
+    arm.exchanges('shoulder')
+    stood = arm.steps('shoulder')
+    arm.recorder.clear()
+    arm.exchanges('shoulder', 50)
+    assert abs(arm.steps('shoulder') - stood) <= 1, 'the brake holds'
+    # the controller's last command is still sent: it is far away, and does not count
+    arm.enable('shoulder')
+    arm.exchanges('shoulder', 50)
+    assert not arm.armed('shoulder')
+    assert abs(arm.steps('shoulder') - stood) <= 1, 'no jump, and no sagging under the load'
+    no_jump(arm.requests('shoulder'), stood)
+    arm.activate()
+    arm.exchanges('shoulder', 20)
+    assert abs(arm.steps('shoulder') - stood) <= 2
+    arm.go(GOAL)
+    wait_until(lambda: arm.arrived(GOAL), what='the goal again')
+
+
+def test_fault_reset_and_enable_again(arm: Arm) -> None:
+    moved(arm)
+    arm.go(dict.fromkeys(GOAL, -0.6), 2.0)
+    wait_until(lambda: arm.steps('elbow') > wanted(GOAL, 'elbow') + 500, what='on its way')
+    arm.one.played['elbow'].fault('trip')
+    arm.client.diagnostics('drive_can_bridge: drive elbow',
+                           lambda facts: facts['state'] == 'fault')
+    arm.exchanges('elbow')
+    stood = arm.steps('elbow')
+    arm.recorder.clear()
+    assert arm.client.call('/elbow/reset_fault', Trigger).success
+    arm.enable('elbow')
+    arm.exchanges('elbow', 50)
+    assert abs(arm.steps('elbow') - stood) <= 1
+    assert not arm.armed('elbow'), 'the trajectory went on without it'
+    no_jump(arm.requests('elbow'), stood)
+    arm.controller.deactivate()
+    arm.activate()
+    arm.go(GOAL)
+    wait_until(lambda: arm.arrived(GOAL), what='the goal again')
+
+
+@pytest.mark.parametrize('fault', ['silent', 'power_cut=1.5'])
+def test_lost_drive(arm: Arm, fault: str) -> None:
+    """Silent, or without power for a while: it is where it was, or where it was left."""
+    moved(arm)
+    drive = arm.one.node.drives['wrist']
+    stood = arm.steps('wrist')
+    arm.recorder.clear()
+    arm.one.played['wrist'].fault(fault)
+    wait_until(lambda: not drive.session.online, what='offline')
+    arm.client.topic('/robot_joint_states', JointState).wait(
+        lambda message: list(message.name) == ['shoulder_joint', 'elbow_joint'])
+    if fault == 'silent':
+        arm.one.played['wrist'].fault('ok')
+    arm.one.online('wrist')
+    arm.enable('wrist')
+    arm.activate()
+    arm.exchanges('wrist', 50)
+    assert abs(arm.steps('wrist') - stood) <= 2
+    no_jump(arm.requests('wrist'), stood)
+    arm.go(dict.fromkeys(GOAL, 0.0))
+    wait_until(lambda: arm.arrived(dict.fromkeys(GOAL, 0.0)), what='back')
+
+
+def test_nothing_creeps_for_a_long_time(arm: Arm) -> None:
+    moved(arm)
+    arm.controller.deactivate()     # its command interfaces keep what was in them
+    stood = {name: arm.steps(name) for name in AXES}
+    arm.recorder.clear()
+    for name in AXES:
+        for _ in range(3):
+            arm.enable(name, False)
+            arm.enable(name)
+        arm.exchanges(name, 100)
+    for name in AXES:
+        # each enabling may take a step of noise into the setpoint, and none of them adds up
+        assert abs(arm.steps(name) - stood[name]) <= 3
+        positions = {position for _, position in arm.requests(name)[-100:]}
+        assert len(positions) == 1, 'held, whatever the encoder says'
+
+
+def test_rearm_stays_neutral(arm: Arm) -> None:
+    (answer,) = arm.client.set('/drive_can_bridge', **{'drives.wrist.rearm': 'immediate'})
+    assert answer == (False, 'position_setpoint would jump: it has neutral_from, which needs '
+                             'rearm: neutral')
+
+
+def test_base_with_wheels(bridge: StartBridge, client: Client) -> None:
+    """Velocity interfaces: both wheels forward, of which one is mounted the other way."""
+    one = bridge(content('base'), arguments=REMAPS)
+    one.online()
+    manager = Manager(client, 'base')
+    try:
+        for name in ('left_wheel', 'right_wheel'):
+            assert client.call(f'/{name}/enable', SetBool, SetBool.Request(data=True)).success
+        command = manager.hardware.command
+        command.update({('left_wheel_joint', 'velocity'): 0.0,
+                        ('right_wheel_joint', 'velocity'): 0.0})
+        wait_until(lambda: all(drive.session.setpoints.items[0].armed
+                               for drive in one.node.drives.values()))
+        command.update({('left_wheel_joint', 'velocity'): 2.0,
+                        ('right_wheel_joint', 'velocity'): 3.0})
+        state = manager.hardware.state
+        wait_until(lambda: state['left_wheel_joint', 'velocity'] == pytest.approx(2.0, abs=0.01)
+                   and state['right_wheel_joint', 'velocity'] == pytest.approx(3.0, abs=0.01))
+        assert one.played['left_wheel'].value('actual_speed') == pytest.approx(382.0, abs=0.1)
+        assert one.played['right_wheel'].value('actual_speed') == pytest.approx(-573.0, abs=0.1)
+        message = manager.hardware.latest
+        assert not len(message.position)
+        assert not takes_positions(message), 'so transforms come from joint_state_broadcaster'
+    finally:
+        manager.close()
