@@ -152,7 +152,10 @@ def test_nonsense(bench: Bench) -> None:
     # each is refused; 5e-324 is a speed like any other
     facts = client.diagnostics(status_of(drive), commands_refused='^[1-9]')
     least = int(str(sent['refused']))
-    assert least <= int(facts['commands_refused']) <= least + int(str(sent['repeated']))
+    assert least <= int(facts['commands_refused'])
+    # what came too late for a busy machine counts, too, and is told
+    if not any('thrown away' in line for line in bench.bridge.errors):
+        assert int(facts['commands_refused']) <= least + int(str(sent['repeated']))
     bench.bridge.error('conveyor: command speed_setpoint refused: ')
     words = {frame[9:13] for frame in bench.simulator.frames('^003FFFF0.* R$')}
     assert words <= {'0000', '05DC'}
