@@ -133,6 +133,19 @@ def arm(path: Path) -> None:
             check=True)
 
 
+def step_response(path: Path) -> None:
+    """Draw how a drive follows its setpoint, from what ``drive_can record`` has heard."""
+    with tempfile.TemporaryDirectory() as folder:
+        trace, file = Path(folder, 'steps.log'), Path(folder, 'steps.yaml')
+        subprocess.run([sys.executable, HERE / 'step_response_run.py', trace, file], check=True)
+        subprocess.run(
+            [sys.executable, '-m', 'drive_can_bridge.cli.main', 'decode', trace, '--params-file',
+             file, '--plot', path,
+             *(f'conveyor.{name}' for name in ('speed_setpoint', 'actual_speed',
+                                               'motor_current'))],
+            check=True)
+
+
 def _lines(lines: Sequence[str], justify: str = 'left', style: str = '') -> Text:
     return Text('\n'.join(lines), justify=justify, style=style)  # type: ignore[arg-type]
 
@@ -175,6 +188,7 @@ PICTURES: dict[str, Callable[[Path], None]] = {
     'monitor.svg': live_view,
     'architecture.svg': architecture,
     'ros2_control.png': arm,
+    'step_response.png': step_response,
     **panel_pictures.PICTURES,
 }
 
