@@ -273,8 +273,10 @@ def test_any_order_during_traffic(bridge: StartBridge, client: Client) -> None:
         for transition in {'unconfigured': (CONFIGURE, ACTIVATE), 'inactive': (ACTIVATE,),
                            'active': ()}[state]:
             assert client.transition(transition)
-        # and it still works
+        # and it still works, ~/enable included
         wait_until(lambda: client.get('/conveyor', 'actual_speed') != [None])
+        wait_until(lambda: any(getattr(future.result(), 'success', False)
+                               for future in list(futures) if future.done()))
     finally:
         ending.set()
         thread.join()
