@@ -14,6 +14,7 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 import rclpy
 from rclpy.executors import ExternalShutdownException
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
@@ -26,6 +27,8 @@ from drive_can_bridge.monitor.reports import read_status, Report
 from drive_can_bridge.ros.monitor.messages import statuses
 from drive_can_bridge.ros.values import TOPIC_TYPES
 from drive_can_bridge.simulation.names import quantity_of
+
+RCLError = rclpy_implementation.RCLError
 
 NODE_NAME = '_demo_commander'
 #: s between two commands to a drive
@@ -108,6 +111,9 @@ def main() -> int:
         rclpy.spin(node)
     except ExternalShutdownException:  # SIGTERM
         pass
+    except RCLError:    # SIGTERM in the middle of a command
+        if rclpy.ok():
+            raise
     return 0
 
 

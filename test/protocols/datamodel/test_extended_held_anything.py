@@ -31,6 +31,10 @@ POSITION = parameter('position_setpoint', 60, type=INT16, scale=0.1, unit='deg',
 MEASURED = parameter('actual_position', 212, type=INT16, scale=0.1, unit='deg', access=RO)
 
 
+#: reads 122 to 125, as the first of all
+ASK_MAP = 0x002007A4
+
+
 class AxisObserver(Observer):
     """
     Keeps books of positions.
@@ -82,14 +86,16 @@ class AxisObserver(Observer):
         words = [int.from_bytes(data[place:place + 2], 'big') for place in (0, 2)]
         if identifier == CYCLIC:
             word, position = words if self.controlled else (0, words[0])
-            self.sees_position(position, now)
+            self.sees_position(position, now, rests=self.controlled and not word)
             self.tells('cycle', runs=bool(word))
+        elif identifier == ASK_MAP and not self.online:
+            self.anew = True    # it is looked for again, and where it is will be read again
         elif identifier & 0x100000 and number == 60:
             assert words[0] in {self.last, self.reported, *self.read}, 'a stop repeats what is'
         elif identifier & 0x100000 and number == 52:
             self.tells('cycle', runs=any(words))
 
-    def sees_position(self, position: int, now: float) -> None:
+    def sees_position(self, position: int, now: float, *, rests: bool) -> None:
         if 0.0 < self.timeout < now - self.commanded_at:
             self.command = None
         if self.command is not None and self.running_said is self.controlled:
@@ -99,11 +105,13 @@ class AxisObserver(Observer):
             allowed.add(self.reported)
         if self.anew:
             allowed |= self.read | self.old
+        elif rests and not self.running_said:   # a map that differed: where it is, is read again
+            allowed |= self.read
         if not self.controlled:
             assert self.reported is not None or self.read, 'where it is, nobody knows'
         assert position in allowed, f'{position} is none of {allowed}: the axis jumps'
-        # a read of users does not make it known; one of ours shows by what is sent
-        if self.reported is not None or position in self.read - {self.last}:
+        # before it has answered a cycle it may be looked for again, and read anew
+        if self.reported is not None:
             self.anew = False
             self.old.clear()
         self.last = position
@@ -168,6 +176,8 @@ class AxisMachine(AnyOrder):
             observer.running_said = observer.controlled and bool(status & 2)
             if not observer.running_said and observer.controlled:
                 observer.command = None
+        elif heard.identifier == 0x10200D31 and not words[0] & 2:
+            observer.running_said = False
         elif heard.identifier == 0x10200D41:
             observer.read.add(words[0])
         exchanges = session.statistics.exchanges
