@@ -115,8 +115,9 @@ def test_what_fails_says_why(bridge: StartBridge) -> None:
 def test_several_bridges_and_none(bridge: StartBridge, tmp_path: Path) -> None:
     with pytest.raises(DriveCanError, match='^no configured bridge is running in namespace /no'):
         open_drives(namespace='no')
-    bridge(parameters(), arguments=('-r', '__ns:=/a'))
-    bridge(parameters(), arguments=('-r', '__ns:=/b', '-r', '__node:=other'), key='/**')
+    for one in (bridge(parameters(), arguments=('-r', '__ns:=/a')), bridge(
+            parameters(), arguments=('-r', '__ns:=/b', '-r', '__node:=other'), key='/**')):
+        one.online()    # before it is configured it has no drives
     with pytest.raises(WhichBridge, match='/a/drive_can_bridge, /b/other; choose one with'):
         open_drives()
     with open_drives(namespace='b') as drives:

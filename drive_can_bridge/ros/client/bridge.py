@@ -20,8 +20,8 @@ from drive_can_bridge.ros.client.graph import Graph, NoAnswer
 
 #: s until a bridge that nobody has found counts as not running
 _SEARCH = 4.0
-#: s for which others are looked for once one is found
-_SETTLE = 0.5
+#: s without anything new in the graph until there are no others, once one is found
+_SETTLE = 1.0
 #: s that one that may be a bridge has to say so
 _ASK_TIMEOUT = 5.0
 #: names in one call
@@ -83,8 +83,13 @@ class BridgeSource:
         """Return the full name of the bridge, and its drives."""
         found: dict[str, tuple[str, ...]] = {}
         looked: set[str] = set()
-        end = time.monotonic() + _SEARCH
+        graph: list[object] = []
+        last = time.monotonic() + _SEARCH
+        end = last
         while time.monotonic() < end:
+            before, graph = graph, self._graph.everything()
+            if found and graph != before:   # they are still being discovered
+                end = min(last, time.monotonic() + _SETTLE)
             new = [node for node in self._graph.nodes_with('change_state', _LIFECYCLE)
                    if node not in looked and self._in_namespace(node)]
             if not new:
@@ -94,7 +99,9 @@ class BridgeSource:
                 drives = self._drives_of(node)
                 if drives:
                     found[node] = drives
-                    end = min(end, time.monotonic() + _SETTLE)
+                    # asking it took its time: whoever else is there gets as much
+                    last = time.monotonic() + _SEARCH
+                    end = time.monotonic() + _SETTLE
         if not found:
             where = '' if self._namespace is None else f' in namespace {self._namespace}'
             domain = os.environ.get('ROS_DOMAIN_ID') or '0'

@@ -98,6 +98,11 @@ class Graph:
                       for name, types in self.node.get_service_names_and_types()
                       if name.endswith(ending) and service_type in types)
 
+    def everything(self) -> list[object]:
+        """Return all nodes and services that have been discovered."""
+        return [*sorted(self.node.get_node_names_and_namespaces()),
+                *sorted(self.node.get_service_names_and_types())]
+
     def call(self, node: str, service: str, request: Any, timeout: float = _CALL_TIMEOUT) -> Any:
         """
         Call a parameter service of a node.
