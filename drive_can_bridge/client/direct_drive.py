@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from drive_can_bridge.client.conversation import BusConversation
 from drive_can_bridge.client.drive import (
-    Drive, DriveFacts, Enabled, readable_names, ReadOutcome, WriteOutcome,
+    Drive, DriveFacts, Enabled, readable_names, ReadOutcome, sort_out, WriteOutcome,
 )
 from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration
 from drive_can_bridge.core.directory import ParameterDirectory
@@ -119,20 +119,7 @@ class DirectDrive(Drive):
     def read(self, *names: str,
              told: Callable[[ReadOutcome], object] | None = None) -> dict[str, ReadOutcome]:
         wanted = names or readable_names(self)
-        found: dict[str, ReadOutcome] = {}
-        asked: list[tuple[str, Parameter]] = []
-        for name in dict.fromkeys(wanted):
-            parameter = self.find(name)
-            if parameter is None:
-                found[name] = ReadOutcome(name, reason=self._directory.unknown(name))
-            elif not parameter.readable:
-                found[name] = ReadOutcome(name, parameter, reason='write-only')
-            else:
-                asked.append((name, parameter))
-        if told is not None:
-            for unasked in found.values():
-                told(unasked)
-        asked.sort(key=lambda each: (each[1].number or 0, each[1].subindex or 0))
+        found, asked = sort_out(self, wanted, told)
         for name, parameter, outcome in self._outcomes(asked):
             made = self._read_outcome(name, parameter, outcome)
             found[name] = made

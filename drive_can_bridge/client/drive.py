@@ -201,6 +201,31 @@ def readable_names(drive: Drive) -> list[str]:
         or drive.facts.through and not parameter.writable and drive.role(name) is Role.CYCLIC)]
 
 
+def sort_out(drive: Drive, names: Sequence[str],
+             told: Callable[[ReadOutcome], object] | None,
+             ) -> tuple[dict[str, ReadOutcome], list[tuple[str, Parameter]]]:
+    """
+    Tell what cannot be read at all from what is to be asked for.
+
+    :param told: is told the outcomes that are known without asking.
+    :return: these outcomes; and name and parameter of the rest, neighbours beside each other,
+        because they share frames.
+    """
+    known: dict[str, ReadOutcome] = {}
+    asked: list[tuple[str, Parameter]] = []
+    for name in dict.fromkeys(names):
+        parameter = drive.find(name)
+        if parameter is None or not parameter.readable:
+            reason = drive.check(name, None) if parameter is None else 'write-only'
+            known[name] = ReadOutcome(name, parameter, reason=reason)
+            if told is not None:
+                told(known[name])
+        else:
+            asked.append((name, parameter))
+    asked.sort(key=lambda each: (each[1].number or 0, each[1].subindex or 0))
+    return known, asked
+
+
 class Drives(Mapping[str, Drive]):
     """
     The drives that were opened, by name, in the order of the configuration.

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters
 
 from drive_can_bridge.client.drive import (
-    Drive, DriveFacts, Enabled, readable_names, ReadOutcome, WriteOutcome,
+    Drive, DriveFacts, Enabled, readable_names, ReadOutcome, sort_out, WriteOutcome,
 )
 from drive_can_bridge.core.directory import ParameterDirectory
 from drive_can_bridge.core.errors import ValueRefused
@@ -98,21 +98,7 @@ class BridgedDrive(Drive):
     def read(self, *names: str,
              told: Callable[[ReadOutcome], object] | None = None) -> dict[str, ReadOutcome]:
         wanted = names or readable_names(self)
-        found: dict[str, ReadOutcome] = {}
-        asked: list[str] = []
-        for name in dict.fromkeys(wanted):
-            parameter = self.find(name)
-            if parameter is None:
-                found[name] = ReadOutcome(name, reason=self._directory.unknown(name))
-            elif not parameter.readable:
-                found[name] = ReadOutcome(name, parameter, reason='write-only')
-            else:
-                asked.append(name)
-        if told is not None:
-            for outcome in found.values():
-                told(outcome)
-        # neighbours share frames
-        asked.sort(key=lambda name: self._place(name))
+        found, asked = sort_out(self, wanted, told)
         for start in range(0, len(asked), BLOCK):
             for outcome in self._get(asked[start:start + BLOCK]):
                 found[outcome.name] = outcome
@@ -120,21 +106,17 @@ class BridgedDrive(Drive):
                     told(outcome)
         return {name: found[name] for name in wanted}
 
-    def _place(self, name: str) -> tuple[int, int]:
-        parameter = self.find(name)
-        return ((parameter.number or 0, parameter.subindex or 0) if parameter is not None
-                else (0, 0))
-
-    def _get(self, names: Sequence[str]) -> list[ReadOutcome]:
+    def _get(self, asked: Sequence[tuple[str, Parameter]]) -> list[ReadOutcome]:
+        names = [name for name, _ in asked]
         answer = self._graph.call(self._node, 'get_parameters',
-                                  GetParameters.Request(names=list(names)))
+                                  GetParameters.Request(names=names))
         values = dict(zip(names, map(plain, answer.values)))
         missing = [name for name in names if values.get(name) is None]
         reasons = dict(zip(missing, self._reasons(missing)))
         made = []
-        for name in names:
-            parameter, value = self.find(name), values.get(name)
-            if parameter is None or value is None:
+        for name, parameter in asked:
+            value = values.get(name)
+            if value is None:
                 made.append(ReadOutcome(name, parameter, reason=reasons.get(name, _NO_VALUE)))
             else:
                 made.append(ReadOutcome(name, parameter, raw_of(parameter, value), value))
