@@ -19,7 +19,6 @@ import os
 import select
 import termios
 import threading
-import time
 from types import TracebackType
 
 #: bytes that wait for a reader at most
@@ -27,7 +26,7 @@ QUEUE_MAX = 1 << 20
 #: bytes that may be written before the emptying thread gets its turn
 PIPE_SIZE = 1 << 18
 #: s that the end of the process waits for what has not been written yet
-FLUSH_TIMEOUT = 0.2
+FLUSH_TIMEOUT = 0.5
 
 
 class StandardError:
@@ -38,7 +37,7 @@ class StandardError:
     """
 
     def __init__(self) -> None:
-        self._real = -1
+        self._real = self._source = -1
         self._chunks: deque[bytes] = deque()
         self._size = 0
         self._dropped = 0
@@ -50,7 +49,7 @@ class StandardError:
             self._real = os.dup(2)
         except OSError:  # it was closed; nobody will ever wait for it
             return self
-        source, sink = os.pipe()
+        self._source, sink = os.pipe()
         try:
             fcntl.fcntl(sink, fcntl.F_SETPIPE_SZ, PIPE_SIZE)
         except (AttributeError, OSError):  # Python 3.9; not allowed: the usual 64 kB
@@ -58,7 +57,7 @@ class StandardError:
         os.set_blocking(sink, False)
         os.dup2(sink, 2)
         os.close(sink)
-        for name, target in (('standard error', lambda: self._empty(source)),
+        for name, target in (('standard error', self._empty),
                              ('standard error, writing', self._write)):
             threading.Thread(target=target, name=name, daemon=True).start()
         return self
@@ -79,30 +78,34 @@ class StandardError:
         """Wait until all is written that was, for ``timeout`` s at most; False: it is not."""
         if self._real < 0:
             return True
-        deadline = time.monotonic() + timeout
-        while _waiting(2):
-            if time.monotonic() > deadline:
-                return False
-            time.sleep(0.001)
         with self._changed:
             return self._changed.wait_for(
-                lambda: not self._size and not self._dropped, deadline - time.monotonic())
+                lambda: not (self._size or self._dropped or self._unread()), timeout)
 
-    def _empty(self, source: int) -> None:
-        while True:
-            chunk = os.read(source, 65536)
+    def _empty(self) -> None:
+        source = select.poll()
+        source.register(self._source, select.POLLIN)
+        while not self._ending:
+            source.poll()
+            # what has left the pipe is in the queue: nobody sees it in neither of them
             with self._changed:
+                chunk = os.read(self._source, 65536)
                 if not chunk:
                     self._ending = True
+                    os.close(self._source)
                 elif self._size + len(chunk) > QUEUE_MAX:
                     self._dropped += chunk.count(b'\n') or 1
                 else:
                     self._size += len(chunk)
                     self._chunks.append(chunk)
                 self._changed.notify_all()
-            if not chunk:
-                os.close(source)
-                return
+
+    def _unread(self) -> int:
+        """Return how many bytes the emptying thread has still to take."""
+        count = array('i', [0])
+        if not self._ending:
+            fcntl.ioctl(self._source, termios.FIONREAD, count)
+        return count[0]
 
     def _write(self) -> None:
         while True:
@@ -136,13 +139,3 @@ class StandardError:
             except OSError:
                 return False
         return True
-
-
-def _waiting(sink: int) -> int:
-    """Return how many bytes of a pipe nobody has read yet."""
-    count = array('i', [0])
-    try:
-        fcntl.ioctl(sink, termios.FIONREAD, count)
-    except OSError:  # not a pipe any more
-        return 0
-    return count[0]

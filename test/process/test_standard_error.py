@@ -2,6 +2,7 @@
 """A standard error that keeps nobody waiting, in a process of its own."""
 
 import os
+from pathlib import Path
 import subprocess
 import sys
 import textwrap
@@ -44,6 +45,20 @@ def test_everything_arrives_whoever_writes_it() -> None:
     assert (done.returncode, lines[:3], lines[-1]) == (
         0, ['python', 'descriptor', 'library'], 'afterwards')
     assert lines[3:-1] == ['x' * 99] * 20_000
+
+
+def test_flushed_is_written(tmp_path: Path) -> None:
+    with (tmp_path / 'written').open('wb') as file:
+        done = run("""
+            sys.setswitchinterval(1e-6)
+            real = os.dup(2)
+            with StandardError() as output:
+                for number in range(1, 5001):
+                    os.write(2, b'x' * 9 + b'\\n')
+                    assert output.flush(30.0)
+                    assert os.fstat(real).st_size == 10 * number, number
+            """, stderr=file)
+    assert done.returncode == 0, (tmp_path / 'written').read_text()[-1000:]
 
 
 def test_nobody_reads() -> None:
