@@ -40,11 +40,12 @@ INTERNAL: dict[str, set[str]] = {
     # what it asks of drives comes from whoever starts it: it knows no ROS
     'panel': {'', 'core', 'monitor'},
     'security': {'', 'core', 'protocols'},
-    'ros.monitor': {'', 'core', 'monitor'},
+    'ros.guest': {'', 'core'},
+    'ros.monitor': {'', 'core', 'monitor', 'ros.guest'},
     'ros.demo': {'', 'core', 'configuration', 'simulation', 'monitor', 'ros', 'ros.monitor'},
     'demo': {'', 'core', 'configuration', 'process'},
     'client.drive': {'', 'core'},
-    'ros.client': {'', 'core', 'process', 'client.drive'},
+    'ros.client': {'', 'core', 'process', 'client.drive', 'ros.guest'},
     'client': {
         '', 'core', 'configuration', 'protocols', 'transport', 'exchange', 'process',
         'client.drive', 'ros.client'},
@@ -71,6 +72,7 @@ EXTERNAL: dict[str, set[str]] = {
     'trace': {'can', 'matplotlib'},
     # yaml: only to tell which nodes a parameter file names when none of them is ours
     'ros': {*ROS_PACKAGES, 'yaml'},
+    'ros.guest': ROS_PACKAGES,
     'ros.monitor': ROS_PACKAGES,
     'ros.client': ROS_PACKAGES,
     'ros.demo': ROS_PACKAGES,

@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
         listener = listen(args.host, args.port)
         access = Access(host=args.host, port=listener.getsockname()[1])
         model = Model(args.namespace)
-        source = MonitorClient(model, command=COMMAND, budget=BUDGET)
+        source = MonitorClient(model, budget=BUDGET)
         place = environment.in_words()
 
         def ready() -> None:

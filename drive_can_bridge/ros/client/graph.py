@@ -13,7 +13,6 @@ knows the earlier ones of this node, too.
 """
 
 from collections.abc import Callable
-import os
 import time
 from typing import Any
 
@@ -21,17 +20,12 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.srv import (
     DescribeParameters, GetParameters, GetParameterTypes, ListParameters, SetParameters,
 )
-import rclpy
-from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
-from rclpy.node import Node
 from rclpy.qos import qos_profile_parameters, QoSProfile
-from rclpy.signals import SignalHandlerOptions
 
 from drive_can_bridge.core.errors import DriveCanError
+from drive_can_bridge.ros.guest import Guest
 
-#: a leading underscore hides a node from ``ros2 node list``
-_NODE_NAME = '_drive_can_client_{}'
 _SLICE = 0.05
 #: s after which a greeting is said again for the first time; then twice as many, and so on
 _GREETING = 0.1
@@ -59,27 +53,18 @@ class Graph:
     """
 
     def __init__(self) -> None:
-        self._context = Context()
-        try:
-            rclpy.init(args=[], context=self._context,
-                       signal_handler_options=SignalHandlerOptions.NO)
-            self.node = Node(_NODE_NAME.format(os.getpid()), context=self._context,
-                             use_global_arguments=False, enable_rosout=False,
-                             start_parameter_services=False)
-        except Exception as error:  # rcl fails in several types
-            reason = str(error).partition(', at ')[0]
-            raise DriveCanError(f'ROS does not start: {reason}') from error
-        self._executor = SingleThreadedExecutor(context=self._context)
+        self._guest = Guest('client')
+        self.node = self._guest.node
+        self._executor = SingleThreadedExecutor(context=self._guest.context)
         self._executor.add_node(self.node)
         self._clients: dict[tuple[str, str], Any] = {}
         self._known: set[str] = set()
 
     def close(self) -> None:
         """Leave the graph. Idempotent."""
-        if self._context.ok():
+        if self._guest.context.ok():
             self._executor.shutdown()
-            self.node.destroy_node()
-            self._context.try_shutdown()
+        self._guest.leave()
 
     def wait(self, condition: Callable[[], bool], timeout: float) -> bool:
         """Wait until a condition is true; False if it does not become so in time."""

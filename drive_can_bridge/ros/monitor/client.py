@@ -8,25 +8,21 @@ happens in :meth:`MonitorClient.poll`, in the thread that calls it.
 
 from collections.abc import Callable, Iterable
 import math
-import os
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import Log, ParameterEvent
 from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters
-import rclpy
-from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
-from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Bool
 
-from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.monitor.model import Model
 from drive_can_bridge.monitor.plan import BUDGET, SamplingPlan
 from drive_can_bridge.monitor.snapshot import Place
 from drive_can_bridge.monitor.text import is_ros_name, printable
 from drive_can_bridge.monitor.values import ParameterInfo
+from drive_can_bridge.ros.guest import Guest
 from drive_can_bridge.ros.monitor.inbox import (
     Call, Inbox, latched_quality, log_quality, newest_quality,
 )
@@ -34,8 +30,6 @@ from drive_can_bridge.ros.monitor.messages import (
     drive_value, log_level, parameter_info, plain_value, stamp_of, statuses, values,
 )
 
-#: a leading underscore hides a node from ``ros2 node list``
-NODE_NAME = '_drive_can_monitor_{}'
 #: s between two looks at the graph, which are not cheap
 _GRAPH_PERIOD = 2.0
 #: descriptors asked for at once
@@ -48,24 +42,14 @@ class MonitorClient:
     """
     Fills a model.
 
-    :param command: who this is, for errors.
     :param budget: messages per second to be sampled.
     :raises DriveCanError: ROS does not start.
     """
 
-    def __init__(self, model: Model, *, command: str = 'drive_can monitor',
-                 budget: float = BUDGET) -> None:
+    def __init__(self, model: Model, *, budget: float = BUDGET) -> None:
         self._model = model
-        self._context = Context()
-        try:
-            rclpy.init(args=[], context=self._context,
-                       signal_handler_options=SignalHandlerOptions.NO)
-            self._node = Node(NODE_NAME.format(os.getpid()), context=self._context,
-                              use_global_arguments=False, enable_rosout=False,
-                              start_parameter_services=False)
-        except Exception as error:  # rcl fails in several types
-            reason = str(error).partition(', at ')[0]
-            raise DriveCanError(f'{command}: ROS does not start: {reason}') from error
+        self._guest = Guest('monitor')
+        self._node = self._guest.node
         self._now = 0.0
         self._plan = SamplingPlan(budget)
         self._inboxes = [
@@ -139,8 +123,7 @@ class MonitorClient:
 
     def close(self) -> None:
         """Leave the graph."""
-        self._node.destroy_node()
-        self._context.try_shutdown()
+        self._guest.leave()
 
     # -- what arrives -----------------------------------------------------------------------------
 
