@@ -10,16 +10,20 @@ from typing import Any
 SLOWNESS = 12.0 if os.environ.get('DRIVE_CAN_EMULATED') else 1.0
 #: s after which a thing that has not happened never will
 DEADLINE = 60.0 * SLOWNESS
+#: s between two looks: soon at first, and at last so that looking takes nothing from others
+SHORTEST, LONGEST = 0.002, 0.02
 
 
 def wait_for(condition: Callable[[], Any], what: str = 'a condition', timeout: float = DEADLINE,
              ) -> Any:
     """Wait until a condition is true, and return what it returned."""
     deadline = time.monotonic() + timeout
+    pause = SHORTEST
     while True:
         value = condition()
         if value:
             return value
         if time.monotonic() > deadline:
             raise AssertionError(f'waited {timeout:g} s for {what}')
-        time.sleep(0.002)
+        time.sleep(pause)
+        pause = min(1.1 * pause, LONGEST)

@@ -62,7 +62,8 @@ def _client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Client]:
 
 
 @pytest.fixture
-def client(_client: Client, processes: Processes) -> Client:
+def client(_client: Client, processes: Processes) -> Iterator[Client]:
     """Return the ROS client, a process that lives as long as the test run."""
     processes.guests.append(_client.process)
-    return _client
+    yield _client
+    _client.ask('forget')

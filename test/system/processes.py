@@ -51,6 +51,7 @@ class Process:
         self.command = list(command)
         self.out = directory / f'{name}.out'
         self.err = directory / f'{name}.err'
+        self._out, self._err = _Lines(self.out), _Lines(self.err)
         with self.out.open('wb') as out, self.err.open('wb') as err:
             self.process = subprocess.Popen(self.command, stdin=subprocess.PIPE, stdout=out,
                                             stderr=(err if standard_error is None
@@ -67,23 +68,27 @@ class Process:
     @property
     def lines(self) -> list[str]:
         """Whole lines of standard output so far."""
-        return _whole_lines(self.out)
+        return self._out.read()
 
     @property
     def errors(self) -> list[str]:
         """Whole lines of standard error so far."""
-        return _whole_lines(self.err)
+        return self._err.read()
 
     def line(self, pattern: str, *, errors: bool = False, since: int = 0,
              timeout: float = DEADLINE) -> str:
         """Wait for a line that contains the pattern, from line number ``since`` on."""
         expression = re.compile(pattern)
+        looked = since
 
         def find() -> str | None:
+            nonlocal looked
             ended = not self.running  # first: what it wrote last is in the file then
-            for line in (self.errors if errors else self.lines)[since:]:
+            lines = self.errors if errors else self.lines
+            for line in lines[looked:]:
                 if expression.search(line):
                     return line
+            looked = max(looked, len(lines))
             if ended:
                 raise AssertionError(f'{self.name} ended ({self.process.returncode}) without a '
                                      f'line {pattern!r}')
@@ -168,6 +173,7 @@ class Processes:
         process.__class__ = Simulator
         assert isinstance(process, Simulator)
         process.links = self.directory / 'links'
+        process._frames, process._looked = [], 0
         process.line('^drive ')
         return process
 
@@ -200,6 +206,8 @@ class Simulator(Process):
     """``drive_can simulate --log-frames``: also a witness of what was on the bus."""
 
     links: Path
+    _frames: list[str]
+    _looked: int
 
     def kill(self) -> None:
         """
@@ -214,16 +222,24 @@ class Simulator(Process):
     def frames(self, pattern: str = '', since: int = 0) -> list[str]:
         """Return the logged frames, as ``003FFFF0#0000000000000000 R``; R: from the bridge."""
         expression = re.compile(pattern)
-        frames = [line.split(' ', 2)[2] for line in self.lines if line.startswith('(')]
-        return [frame for frame in frames[since:] if expression.search(frame)]
+        lines = self.lines
+        self._frames += [line.split(' ', 2)[2] for line in lines[self._looked:]
+                         if line.startswith('(')]
+        self._looked = len(lines)
+        return [frame for frame in self._frames[since:] if expression.search(frame)]
 
     def frame(self, pattern: str, since: int = 0, count: int = 1) -> list[str]:
         """Wait for ``count`` frames that match."""
-        def find() -> list[str] | None:
+        found: list[str] = []
+        looked = since
+
+        def find() -> bool:
+            nonlocal looked
             assert self.running, f'{self.name} has ended'
-            found = self.frames(pattern, since)
-            return found if len(found) >= count else None
-        found: list[str] = wait_for(find, f'{count} frames {pattern!r}')
+            found.extend(self.frames(pattern, looked))
+            looked = max(looked, len(self._frames))
+            return len(found) >= count
+        wait_for(find, f'{count} frames {pattern!r}')
         return found
 
 
@@ -302,6 +318,21 @@ class Client:
         return facts
 
 
-def _whole_lines(path: Path) -> list[str]:
-    text = path.read_text(encoding='utf-8', errors='replace')
-    return text[:text.rfind('\n') + 1].splitlines()
+class _Lines:
+    """The whole lines of a file that grows, each of them read once."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._rest = b''
+        self._place = 0
+        self._lines: list[str] = []
+
+    def read(self) -> list[str]:
+        """Return all of them so far."""
+        with self._path.open('rb') as file:
+            file.seek(self._place)
+            new = file.read()
+        self._place += len(new)
+        whole, end, self._rest = (self._rest + new).rpartition(b'\n')
+        self._lines += (whole + end).decode(errors='replace').splitlines()
+        return list(self._lines)

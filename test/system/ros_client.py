@@ -7,6 +7,7 @@ It knows nothing of the bridge but what its contract says, and answers each line
 """
 
 from collections import deque
+import itertools
 import json
 import queue
 import re
@@ -20,7 +21,7 @@ from lifecycle_msgs.srv import ChangeState
 from rcl_interfaces.msg import Log, Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import GetParameters, SetParameters, SetParametersAtomically
 import rclpy
-from rclpy.executors import ExternalShutdownException
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, qos_profile_parameters, QoSProfile
 from std_msgs.msg import Bool, Float64, Int64
 from std_srvs.srv import SetBool, Trigger
@@ -36,16 +37,20 @@ class Client:
 
     def __init__(self, node):
         self.node = node
+        # one that stays: what rclpy.spin_once does costs a tenth of a core
+        self.executor = SingleThreadedExecutor()
+        self.executor.add_node(node)
         self.publishers = {}
         self.received = {}
         self.services = {}
+        self.logs = []
         self.statuses = []
         self.diagnostics_topic = node.create_subscription(
             DiagnosticArray, '/diagnostics', lambda message: self.statuses.extend(message.status),
             QoSProfile(depth=50))
 
     def spin(self, seconds):
-        rclpy.spin_once(self.node, timeout_sec=seconds)
+        self.executor.spin_once(timeout_sec=seconds)
 
     def until(self, condition, timeout, what):
         deadline = time.monotonic() + timeout
@@ -53,6 +58,20 @@ class Client:
             if time.monotonic() > deadline:
                 raise Failed(f'waited {timeout:g} s for {what}')
             self.spin(0.02)
+
+    def forget(self, timeout):
+        """Begin anew: whatever a test made would be served, and announced, for all that follow."""
+        for publisher, timer in self.publishers.values():
+            self.node.destroy_timer(timer)
+            self.node.destroy_publisher(publisher)
+        for _, subscription in self.received.values():
+            self.node.destroy_subscription(subscription)
+        for subscription in self.logs:
+            self.node.destroy_subscription(subscription)
+        for service in self.services.values():
+            self.node.destroy_client(service)
+        for kept in (self.publishers, self.received, self.services, self.logs, self.statuses):
+            kept.clear()
 
     # -- topics -----------------------------------------------------------------------------------
 
@@ -124,8 +143,8 @@ class Client:
 
     def listen_to_log(self, timeout):
         self.log = []
-        self.node.create_subscription(Log, '/rosout', lambda message: self.log.append(message.msg),
-                                      QoSProfile(depth=1000))
+        self.logs.append(self.node.create_subscription(
+            Log, '/rosout', lambda message: self.log.append(message.msg), QoSProfile(depth=1000)))
 
     def logged(self, text, timeout):
         self.until(lambda: any(text in line for line in self.log), timeout, f'{text} in the log')
@@ -206,20 +225,21 @@ def from_message(value):
             ParameterType.PARAMETER_STRING: value.string_value}.get(value.type)
 
 
-def read_lines(lines):
-    for line in sys.stdin:
+def read_lines(lines, told):
+    for line in itertools.chain(sys.stdin, [None]):
         lines.put(line)
-    lines.put(None)
+        told.trigger()
 
 
 def serve(client):
     lines = queue.SimpleQueue()
-    threading.Thread(target=read_lines, args=(lines,), daemon=True).start()
+    told = client.node.create_guard_condition(lambda: None)
+    threading.Thread(target=read_lines, args=(lines, told), daemon=True).start()
     while True:
         try:
             line = lines.get_nowait()
         except queue.Empty:
-            client.spin(0.01)
+            client.spin(1.0)
             continue
         if line is None:
             return
