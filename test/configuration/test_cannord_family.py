@@ -141,10 +141,14 @@ def test_stations_at_the_ends(tmp_path: Path) -> None:
     ('part: {subindex: 1}', 'parameters.part.subindex: a sub-index without a number, allowed is '
                             'number with subindex, or neither'),
     ('kept: {storage: eeprom}', 'parameters.kept.storage: process data are not stored, allowed '
-                                'without a number is to leave it out'),
+                                'without a number is ram, or to leave it out'),
 ])
 def test_problems_of_a_profile(tmp_path: Path, entry: str, found: str) -> None:
     assert problems(tmp_path, FILE, f'{PROFILE}  {entry}\n') == [f'table.yaml:13: {found}']
+
+
+def test_process_data_are_volatile(tmp_path: Path) -> None:
+    assert problems(tmp_path, FILE, f'{PROFILE}  passing: {{storage: ram}}\n') == []
 
 
 def test_control_is_built_in(tmp_path: Path) -> None:

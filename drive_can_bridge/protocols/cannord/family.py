@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import re
 
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.parameters import Parameter, ParameterType
+from drive_can_bridge.core.parameters import Parameter, ParameterType, Storage
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.cannord.broadcast import broadcast_identifier, groups
 from drive_can_bridge.protocols.cannord.identifiers import (
@@ -215,9 +215,9 @@ class Cannord(Family):
         if parameter.subindex is not None:
             yield Complaint(f'{place}.subindex', 'a sub-index without a number, allowed is '
                                                  'number with subindex, or neither')
-        if parameter.storage is not None:
+        if parameter.storage is Storage.EEPROM:
             yield Complaint(f'{place}.storage', 'process data are not stored, allowed without a '
-                                                'number is to leave it out')
+                                                'number is ram, or to leave it out')
         if parameter.type.bits == 32:
             yield Complaint(f'{place}.type', f'{parameter.type.value} does not fit a process '
                                              'word, allowed without a number are bool, int16, '
