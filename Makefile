@@ -18,7 +18,7 @@ help:
 	@echo 'make bench   measurements; ARGS="..." goes to bench/run.py'
 	@echo 'make pictures  those of README and docs, from a demo that runs'
 	@echo 'make lint    style'
-	@echo 'make setup   only the virtual environment that all of them use, in $(VENV)'
+	@echo 'make setup   only the virtual environment that all of them use, in $(VENV); the demo makes half'
 	@echo 'make clean   removes it and everything else that was built'
 	@echo
 	@echo 'With ROS 2 Jazzy sourced, that one is used; otherwise it comes as wheels (Linux on x86-64).'
@@ -28,7 +28,8 @@ setup:
 	@.ci/setup '$(PYTHON)' '$(VENV)'
 
 # Ctrl-C ends the demo, which ends well, and so does make.
-demo: setup
+demo:
+	@.ci/setup '$(PYTHON)' '$(VENV)' demo
 	@exec $(BIN)/python .ci/foreground $(BIN)/drive_can demo $(ARGS)
 
 test: setup

@@ -70,7 +70,10 @@ setup(
         # ROS 2 Jazzy as wheels, for machines without a ROS installation.
         'ros': [
             'ros-rclpy[fastrtps]==7.1.6',
-            'ros-common-interfaces==5.3.6',
+            'ros-diagnostic-msgs==5.3.6',
+            'ros-sensor-msgs==5.3.6',
+            'ros-std-msgs==5.3.6',
+            'ros-std-srvs==5.3.6',
         ],
         # EDS and DCF files as profiles. No rosdep key: without it, CSV tables can be imported.
         'eds': ['canopen>=2.3'],
