@@ -92,6 +92,7 @@ class ExtendedSession(DataModelSession):
         self._frame: Frame | None = None
         self._frame_raws: list[int] | None = None  # in it, until it has left
         self._frame_runs = False  # it holds anything but neutral and disable
+        self._ran = False  # such a one left, and no look has shown that neutral ones arrive since
         self._sent_word: int | None = None
         self._awaiting = False
         self._forgiven = False
@@ -154,7 +155,7 @@ class ExtendedSession(DataModelSession):
 
     def _go_idle(self, advice: str) -> None:
         self._phase = Phase.IDLE
-        self._stopping = self._differs = False
+        self._stopping = self._differs = self._ran = False
         self._cycles_left = -1
         self.setpoints.allow(False)
         self._clear_channel()
@@ -176,8 +177,13 @@ class ExtendedSession(DataModelSession):
             self._differs = False
             if self._phase is not Phase.CYCLIC:
                 self._begin_cycles(now)
+            elif self.online and not self.told.owed:
+                self._ran = False
         elif verdict is Verdict.DIFFER:
             self._differs = True
+            if self._ran:   # neutral cycles since may have reached other parameters, or nobody
+                self._ran = False
+                self.told.note(CYCLE, runs=True)
             owed = self.told.owed
             self._lose(f'mapping differs: {text}', now)
             self._stop_awaiting()
@@ -265,6 +271,7 @@ class ExtendedSession(DataModelSession):
         if not sent:
             return
         self.told.note(CYCLE, runs=self._frame_runs)
+        self._ran = self._ran or self._frame_runs
         if self._frame_raws is not None:    # the first time that it left
             self.sent.take(self._frame_raws)
             self._frame_raws = None

@@ -250,6 +250,9 @@ class StandardSession(DataModelSession):
             self._write_setpoint(now)
         elif self._by_hand is not None:
             self._by_hand.update(now)
+            if self.control.stopping:   # setpoints stop with it, and not a period later
+                self._look(now)
+                self._write_setpoint(now)
 
     # -- rounds -----------------------------------------------------------------------------------
 

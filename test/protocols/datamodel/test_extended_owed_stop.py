@@ -156,12 +156,12 @@ OTHER_RESPONSE = '102007E4#00D200D100D30000'
 OTHER_REQUEST = '102007A4#0033003200000000'
 
 
-def look(talk: Conversation) -> None:
+def look(talk: Conversation, speed: float = 100.0, request: str = RUNNING) -> None:
     """Cycle until the maps are looked at, at 11.002 s."""
     for cycle in range(2, 50):
-        talk.commands(0, 100.0, 10.0 + 0.02 * cycle)
-        assert exchange(talk, 10.0 + 0.02 * cycle) == RUNNING
-    talk.commands(0, 100.0, 11.0)
+        talk.commands(0, speed, 10.0 + 0.02 * cycle)
+        assert exchange(talk, 10.0 + 0.02 * cycle) == request
+    talk.commands(0, speed, 11.0)
     talk.until(11.0 + TICK)
     assert talk.hears(ANSWER, 11.002) == [ASK_REQUEST_MAP]
     talk.events()
@@ -245,6 +245,42 @@ def test_map_that_differs_under_a_drive_at_rest_needs_no_stop() -> None:
     assert talk.hears(ANSWER, 11.002) == [ASK_REQUEST_MAP]
     assert talk.hears(OTHER_REQUEST, 11.003) == []
     assert talk.until(11.9) == []
+
+
+def test_neutral_cycles_that_another_map_has_taken_were_no_stop() -> None:
+    talk = running()
+    look(talk, 0.0, NEUTRAL)     # with the map of somebody else, for who knows how long
+    assert not talk.session.told.owed
+    assert talk.hears(OTHER_REQUEST, 11.003) == [SPEED_ZERO]
+    assert [text for _, text in talk.until(11.006)] == [LIMIT_ZERO, ASK_SPEED]
+    assert confirmed(talk, 11.007) == []
+
+
+def test_neutral_cycles_that_a_look_has_backed_were_a_stop() -> None:
+    talk = running()
+    look(talk, 0.0, NEUTRAL)
+    checked(talk, 11.002)
+    for cycle in range(1, 50):
+        assert exchange(talk, 11.0 + 0.02 * cycle) == NEUTRAL
+    talk.until(12.0 + TICK)
+    assert talk.hears(ANSWER, 12.002) == []
+    talk.until(12.005)
+    assert talk.hears(OTHER_REQUEST, 12.006) == []
+    assert talk.session.state is DriveState.MAPPING_DIFFERS
+
+
+def test_drive_that_was_deaf_comes_back_with_another_map() -> None:
+    """It has heard none of the last neutral cycles, and goes on at the speed that it was told."""
+    talk = running()
+    last = [text for _, text in talk.until(12.0)]
+    assert last.count(NEUTRAL) == 3
+    assert last[-1] == ASK_REQUEST_MAP
+    assert not talk.session.told.owed
+    assert talk.hears(OTHER_REQUEST, 12.001) == [ASK_RESPONSE_MAP]
+    assert talk.hears(RESPONSE_MAP, 12.002) == [SPEED_ZERO]
+    assert [text for _, text in talk.until(12.005)] == [LIMIT_ZERO, ASK_SPEED]
+    assert confirmed(talk, 12.006) == []
+    assert talk.session.state is DriveState.MAPPING_DIFFERS
 
 
 def test_end_while_maps_differ_and_the_stop_is_not_confirmed() -> None:

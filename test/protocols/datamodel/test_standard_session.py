@@ -745,6 +745,25 @@ def test_commands_are_taken_while_it_is_enabled_only() -> None:
     assert SPEED_ZERO in round_of(talk, 10.08, ENABLED)
 
 
+@pytest.mark.parametrize('action', [ControlAction.DISABLE, ControlAction.QUICK_STOP])
+@pytest.mark.parametrize('request_', [(SPEED, WORD), (SPEED,)])
+def test_setpoints_stop_with_the_word(request_: tuple[Parameter, ...],
+                                      action: ControlAction) -> None:
+    talk = polling(request=request_, control=CONTROL, period=1.0, control_timeout=5.0,
+                   command_timeout=0.0, refresh_interval=60.0, rearm_immediate=True)
+    talk.hears(READY, 10.002)
+    talk.until(10.9)
+    talk.asks(ControlAction.ENABLE, 10.95)
+    round_of(talk, 11.0, READY)
+    talk.until(11.9)
+    round_of(talk, 12.0, ENABLED)
+    talk.commands(0, 150.0, 12.1)
+    assert '3F1#063200DC05000000' in round_of(talk, 13.0, ENABLED)
+    stop, = talk.asks(action, 13.1)
+    assert stop.startswith('3F1#063400')
+    assert SPEED_ZERO in [text for _, text in talk.until(13.15)]
+
+
 def test_enable_is_not_repeated_before_the_status_was_read() -> None:
     """A restart that nobody saw: one read goes unanswered, the device has forgotten its word."""
     talk = controlled(refresh_interval=0.1)
