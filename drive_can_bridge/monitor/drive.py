@@ -75,16 +75,19 @@ class DriveRecord:
         self._online_at = math.nan
         self._sampled_since: float | None = None
         self._readings: dict[str, tuple[str, float]] = {}
+        self._told_again = 0
 
     @property
     def rate(self) -> float:
         """Exchanges per second."""
         return self._rate.value
 
-    def reported(self, report: Report, stamp: float, now: float) -> None:
-        """Take what the bridge says."""
+    def reported(self, report: Report, stamp: float, now: float) -> bool:
+        """Take what the bridge says; return whether it has begun anew."""
         self._report, self._reported_at = report, now
+        anew = self._rate.went_back(report.count('exchanges'))
         self._rate.update(report.count('exchanges'), stamp)
+        return anew
 
     def went_online(self, online: bool, now: float) -> None:
         """Take ``~/online``."""
@@ -97,6 +100,20 @@ class DriveRecord:
             self._sampled_since = None
         elif self._sampled_since is None:
             self._sampled_since = now
+
+    def described(self, parameters: Iterable[ParameterInfo]) -> None:
+        """Take what the drive says of its parameters."""
+        known, self.parameters = self.parameters, {info.name: info for info in parameters}
+        # told anew: by a bridge that was started again, perhaps with another configuration, behind
+        # which there may be another drive
+        again = {name for name, info in self.parameters.items()
+                 if known.get(name, info) is not info}
+        self._readings = {name: reading for name, reading in self._readings.items()
+                          if known.get(name) is self.parameters.get(name)}
+        self._told_again += bool(again)
+        if any(known[name] != self.parameters[name] for name in again):
+            # what was in another unit does not belong to the same line
+            self.responses, self.requests = _Values(), _Values()
 
     def read(self, readings: Iterable[tuple[str, Value | None]], now: float) -> None:
         """Take values that a service has read; None: it could not be read."""
@@ -127,7 +144,8 @@ class DriveRecord:
             sample_age=now - responses.at, place=self.place,
             parameters=tuple(self.parameters.values()),
             readings={name: Reading(text, now - at)
-                      for name, (text, at) in self._readings.items()})
+                      for name, (text, at) in self._readings.items()},
+            told_again=self._told_again)
 
     def _judge(self, report: Report, now: float, silent: float) -> tuple[str, Level, str, bool]:
         """Return state, level, advice, and whether it is online."""

@@ -57,6 +57,10 @@ class Rate:
         self._last: tuple[float, float] | None = None
         self.value = 0.0
 
+    def went_back(self, count: float) -> bool:
+        """Tell whether a count is less than the last: whoever counts has begun anew."""
+        return self._last is not None and count < self._last[1]
+
     def update(self, count: float, at: float) -> None:
         """
         Take a count.

@@ -35,10 +35,13 @@ class _BusRecord:
         self._sent, self._received = Rate(), Rate()
         self._report: Report | None = None
 
-    def reported(self, report: Report, stamp: float) -> None:
+    def reported(self, report: Report, stamp: float) -> bool:
+        """Take a report; return whether its bridge has begun anew."""
         self._report = report
+        anew = self._sent.went_back(report.count('frames_sent'))
         self._sent.update(report.count('frames_sent'), stamp)
         self._received.update(report.count('frames_received'), stamp)
+        return anew
 
     def look(self, name: str, *, label: str, silent: float) -> BusSnapshot:
         report = self._report or Report('', False, name, Level.STALE, '')
@@ -82,6 +85,7 @@ class Model:
         self._bridges: dict[str, _BridgeRecord] = {}
         self._drives: dict[str, DriveRecord] = {}
         self._log: deque[LogLine] = deque(maxlen=LOG_MAX)
+        self._anew: set[str] = set()
 
     # -- what arrives -----------------------------------------------------------------------------
 
@@ -125,8 +129,7 @@ class Model:
     def described(self, drive: str, parameters: Sequence[ParameterInfo]) -> None:
         """Take what a drive says about its parameters."""
         if drive in self._drives:
-            self._drives[drive].parameters = {
-                info.name: info for info in parameters[:PARAMETERS_MAX]}
+            self._drives[drive].described(parameters[:PARAMETERS_MAX])
 
     def read(self, drive: str, readings: Iterable[tuple[str, Value | None]], now: float) -> None:
         """Take values of parameters that were asked for; None: it could not be read."""
@@ -172,6 +175,15 @@ class Model:
         return tuple(name for bridge, record in self._bridges.items() if record.silent(now)
                      for name in (bridge, *record.drives))
 
+    def take_anew(self) -> set[str]:
+        """
+        Return the full names of bridges that were started again, and of their drives, once.
+
+        What they have told of themselves may hold no longer, however short a time they were away.
+        """
+        anew, self._anew = self._anew, set()
+        return anew
+
     def rates(self) -> dict[str, float]:
         """Return the exchanges per second of all drives."""
         return {name: drive.rate for name, drive in self._drives.items()}
@@ -209,12 +221,15 @@ class Model:
             del bridge.buses[gone]
         for gone in bridge.drives.keys() - drives.keys():
             del bridge.drives[gone], self._drives[gone]
+        anew = False
         for name, report in list(buses.items())[:BUSES_MAX]:
-            bridge.buses.setdefault(name, _BusRecord()).reported(report, stamp)
+            anew |= bridge.buses.setdefault(name, _BusRecord()).reported(report, stamp)
         for name, report in drives.items():
             record = bridge.drives.get(name)
             if record is None:
                 if name in self._drives or len(self._drives) >= DRIVES_MAX:
                     continue  # of another bridge; two of one name are no drives of anybody
                 record = bridge.drives[name] = self._drives[name] = DriveRecord(name)
-            record.reported(report, stamp, now)
+            anew |= record.reported(report, stamp, now)
+        if anew:
+            self._anew |= {reports[0].bridge, *bridge.drives}

@@ -4,12 +4,15 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
+from itertools import islice
 import math
 import re
 
 from drive_can_bridge.monitor.text import is_ros_name, printable
 
 _SUBJECT = re.compile(r'(?P<bridge>\S+): (?P<kind>bus|drive) (?P<name>\S+)')
+#: keys that one status may have
+_FACTS_MAX = 100
 #: by which a status of a bridge is told from others of a similar name
 _MARKS = {'bus': 'load_percent', 'drive': 'missed_exchanges'}
 
@@ -84,5 +87,6 @@ def read_status(status: Status) -> Report | None:
         bridge=bridge, is_drive=match['kind'] == 'drive', name=printable(match['name']),
         level=Level(status.level) if 0 <= status.level <= 3 else Level.ERROR,
         message=printable(status.message),
-        facts={printable(key): printable(value) for key, value in status.facts.items()})
+        facts={printable(key): printable(value)
+               for key, value in islice(status.facts.items(), _FACTS_MAX)})
     return report if is_ros_name(bridge) and is_ros_name(report.full_name) else None

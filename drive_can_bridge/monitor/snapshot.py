@@ -82,6 +82,7 @@ class DriveSnapshot:
     :param sample_age: s since a sample was received; infinite before the first one.
     :param parameters: what the drive has; empty until it has told.
     :param readings: of the parameters that were asked for.
+    :param told_again: how often it has told of them once more: readings are asked for anew.
     """
 
     name: str
@@ -106,6 +107,7 @@ class DriveSnapshot:
     place: Place = Place()
     parameters: tuple[ParameterInfo, ...] = ()
     readings: Mapping[str, Reading] = field(default_factory=dict)
+    told_again: int = 0
 
 
 @dataclass(frozen=True, slots=True)

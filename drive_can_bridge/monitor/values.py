@@ -115,6 +115,9 @@ class ParameterInfo:
         """
         word = text.strip()
         try:
+            # Python takes 1_5 for 15, and digits of all scripts
+            if '_' in word or not word.isascii():
+                raise ValueError(word)
             if self.kind is ValueKind.BOOL:
                 return _BOOLS[word.lower()]
             if self.kind is ValueKind.INTEGER:

@@ -10,7 +10,6 @@ browser send here with the user's cookie. The *token* says who may look, and who
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import Enum
-from http.cookies import CookieError, SimpleCookie
 import ipaddress
 import secrets
 import socket
@@ -162,11 +161,11 @@ def _is_address(name: str) -> bool:
 
 
 def _cookie(headers: Iterable[str], name: str) -> str:
+    # by hand: cookies do not tell ports apart, and for http.cookies one of another program that is
+    # not as it should be hides all that follow
     for header in headers:
-        try:
-            found = SimpleCookie(header).get(name)
-        except CookieError:
-            continue
-        if found is not None:
-            return found.value
+        for cookie in header.split(';'):
+            found, _, value = cookie.strip().partition('=')
+            if found == name:
+                return value
     return ''

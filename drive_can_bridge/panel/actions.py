@@ -68,10 +68,12 @@ class Actions:
             outcomes = await asyncio.gather(*(self._feed.stop(name, stop) for name in names))
             if wanted != ALL:
                 return _said(outcomes[0])
-            return _said(Outcome(
-                all(outcome.success for outcome in outcomes),
-                '\n'.join(f'{name[1:]}: {outcome.text or "done"}'
-                          for name, outcome in zip(names, outcomes))))
+            told = [f'{name[1:]}: {outcome.text or "done"}'
+                    for name, outcome in zip(names, outcomes)]
+            # whoever stops all must not think that those stand still
+            told += [f'{drive.name[1:]}: not told, it has no control word'
+                     for drive in self._feed.snapshot.drives if not has_control(drive)]
+            return _said(Outcome(all(outcome.success for outcome in outcomes), '\n'.join(told)))
         return _answering(action)
 
     async def _write(self, request: Request) -> Response:
@@ -105,12 +107,14 @@ class Actions:
             'cache-control': 'no-store'})
 
     async def _compare(self, request: Request) -> Response:
+        _of_type(request, 'application/yaml')
         drive = self._drive(request.query_params.get('drive'))
         compared = await self._backups.compare(drive, await request.body())
         return JSONResponse({'success': compared.ok, 'text': compared.text})
 
     async def _restore(self, request: Request) -> Response:
         self._writer(request, 'restoring a backup')
+        _of_type(request, 'application/yaml')
         drive = self._drive(request.query_params.get('drive'))
         restored = await self._backups.restore(drive, await request.body())
         return JSONResponse({'success': restored.ok, 'text': restored.text})
@@ -133,10 +137,14 @@ def _operator(request: Request, what: str) -> None:
                             f"viewer's")
 
 
-async def _fields(request: Request) -> dict[str, Any]:
+def _of_type(request: Request, kind: str) -> None:
     # a form of another page could not say this without being asked about
-    if request.headers.get('content-type', '').partition(';')[0] != 'application/json':
-        raise _Refused(415, 'say it in application/json')
+    if request.headers.get('content-type', '').partition(';')[0] != kind:
+        raise _Refused(415, f'say it in {kind}')
+
+
+async def _fields(request: Request) -> dict[str, Any]:
+    _of_type(request, 'application/json')
     try:
         fields = json.loads(await request.body())
     except (ValueError, RecursionError):

@@ -12,7 +12,7 @@ from drive_can_bridge.monitor.snapshot import BusSnapshot, DriveSnapshot, Snapsh
 from drive_can_bridge.panel.access import Role
 from drive_can_bridge.panel.feed import has_control
 from drive_can_bridge.panel.parts import (
-    box, Changing, level_class, Look, place_in_words, stop_buttons, Values, words,
+    box, Changing, level_class, Look, marked, place_in_words, stop_buttons, Values, words,
 )
 
 
@@ -72,7 +72,7 @@ class _Card:
     """One drive among the others."""
 
     def __init__(self, drive: DriveSnapshot, role: Role) -> None:
-        element = box('card').props(f'data-drive={drive.name}')
+        element = marked(box('card'), drive=drive.name)
         self._look = Look(element, 'card')
         with element:
             with box('top'):

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fastapi import FastAPI
-from nicegui import ui
+from nicegui import app as framework, ui
 from nicegui.client import Client
 from nicegui.element import Element
 from starlette.requests import Request
@@ -33,8 +33,9 @@ _HEAD = ''.join((
     f'<script src="/panel/panel.js?{__version__}"></script>'))
 _TITLE = 'drive_can panel'
 _PAGES = {'/': 'Drives', '/log': 'Log'}
-#: pages at once: each takes memory until its browser has gone for a while
-PAGES_MAX = 40
+#: pages at once for each role, so that viewers do not keep operators out: each takes memory until
+#: its browser has gone for a while
+PAGES_MAX = 20
 
 
 @dataclass(frozen=True)
@@ -62,6 +63,7 @@ def application(feed: Feed, access: Access, setting: Setting) -> ASGIApp:
     web.router.routes.extend(
         Actions(feed, Backups(), allow_writes=setting.allow_writes).routes())
     web.mount('/panel', StaticFiles(directory=_STATIC))
+    framework.add_exception_handler(404, _nothing)
     _add_pages(feed, setting)
     ui.run_with(web, title=_TITLE, dark=None, tailwind=False, show_welcome_message=False,
                 favicon=_STATIC / 'icon.svg', reconnect_timeout=10.0,
@@ -72,9 +74,9 @@ def application(feed: Feed, access: Access, setting: Setting) -> ASGIApp:
 def _add_pages(feed: Feed, setting: Setting) -> None:
     @ui.page('/')
     def overview(request: Request) -> Response | None:
-        if _full():
-            return _too_many()
         role = request.scope[ROLE]
+        if _full(role):
+            return _too_many()
         with _frame('/', role):
             page = Overview(role, setting.place)
         _live(feed, View(page.show))
@@ -82,9 +84,9 @@ def _add_pages(feed: Feed, setting: Setting) -> None:
 
     @ui.page('/drive/{name:path}')
     def drive(request: Request, name: str) -> Response | None:
-        if _full():
-            return _too_many()
         role = request.scope[ROLE]
+        if _full(role):
+            return _too_many()
         ui.page_title(f'{name} · {_TITLE}')
         with _frame('', role):
             page = DrivePage(feed, f'/{name}', role, allow_writes=setting.allow_writes)
@@ -93,21 +95,28 @@ def _add_pages(feed: Feed, setting: Setting) -> None:
 
     @ui.page('/log')
     def log(request: Request) -> Response | None:
-        if _full():
+        role = request.scope[ROLE]
+        if _full(role):
             return _too_many()
-        with _frame('/log', request.scope[ROLE]):
+        with _frame('/log', role):
             page = LogPage()
         _live(feed, View(page.show))
         return None
 
 
-def _full() -> bool:
-    return len(Client.instances) > PAGES_MAX
+def _full(role: Role) -> bool:
+    pages = sum(client.request.scope[ROLE] is role for client in Client.instances.values())
+    return pages > PAGES_MAX  # the one that is being made is among them
+
+
+async def _nothing(request: Request, _: Exception) -> Response:
+    """Say that there is no such page; the web framework would make one, for anybody."""
+    return PlainTextResponse('there is nothing at this address\n', 404)
 
 
 def _too_many() -> Response:
-    return PlainTextResponse(f'{PAGES_MAX} pages are open already: close some, or wait a minute\n',
-                             503)
+    return PlainTextResponse(f'{PAGES_MAX} pages are open already with this token: close some, or '
+                             'wait a minute\n', 503)
 
 
 def _frame(here: str, role: Role) -> Element:

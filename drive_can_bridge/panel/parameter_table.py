@@ -6,11 +6,12 @@ from typing import Any
 
 from nicegui import background_tasks, ui
 
+from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import ValueKind
 from drive_can_bridge.monitor.snapshot import DriveSnapshot
 from drive_can_bridge.monitor.values import ParameterInfo
 from drive_can_bridge.panel.feed import Feed
-from drive_can_bridge.panel.parts import box, button, Changing, in_script, words
+from drive_can_bridge.panel.parts import box, button, Changing, in_script, marked, words
 
 _PAGE = 15
 
@@ -28,10 +29,10 @@ class ParameterTable:
         self._drive = drive
         self._writes = writes
         self._parameters: Sequence[ParameterInfo] = ()
+        self._seen: Sequence[ParameterInfo] = ()
         self._page = 0
-        self._reading = False
         self._looked_at = False
-        self._to_read: frozenset[str] = frozenset()
+        self._asked: set[str] = set()
         with box('section'):
             with box('row-of'):
                 self._search = ui.input(
@@ -60,24 +61,32 @@ class ParameterTable:
         found = self._found()
         pages = max(1, -(-len(found) // _PAGE))
         self._page = min(self._page, pages - 1)
-        seen = found[self._page * _PAGE:(self._page + 1) * _PAGE]
+        seen = self._seen = found[self._page * _PAGE:(self._page + 1) * _PAGE]
         self._nothing.set_visibility(not drive.parameters)
         self._count.set_text(f'{len(found)} of {len(drive.parameters)} parameters, '
                              f'page {self._page + 1} of {pages}')
-        rows = self._rows.of(tuple(info.name for info in seen))
+        rows = self._rows.of(tuple(seen))
         for row in rows:
             row.show(drive)
-        wanted = frozenset(info.name for info in seen if info.readable)
-        if self._looked_at and drive.online and not wanted <= self._to_read:
-            self._to_read |= wanted
-            background_tasks.create(self._read(sorted(wanted)))
+        wanted = [info.name for info in seen if info.readable
+                  and info.name not in drive.readings and info.name not in self._asked]
+        if self._looked_at and drive.online and wanted:
+            self._read(wanted)
 
-    async def _read(self, names: Sequence[str]) -> None:
-        await self._feed.read(self._drive, names)
+    def _read(self, names: Sequence[str]) -> None:
+        async def read() -> None:
+            try:
+                await self._feed.read(self._drive, names)
+            finally:
+                self._asked.difference_update(names)
+        self._asked.update(names)
+        background_tasks.create(read())
 
     def _read_again(self) -> None:
-        self._to_read = frozenset()
         self._again()
+        drive = self._feed.drive(self._drive)
+        if drive is not None and drive.online:
+            self._read([info.name for info in self._seen if info.readable])
 
     def _turn(self, pages: int) -> None:
         self._page = max(0, self._page + pages)
@@ -98,9 +107,8 @@ class ParameterTable:
         return [info for info in self._parameters
                 if all(word in _searchable(info) for word in wanted)]
 
-    def _make_rows(self, names: tuple[str, ...]) -> list['_Row']:
-        known = {info.name: info for info in self._parameters}
-        return [_Row(self._drive, known[name], writes=self._writes) for name in names]
+    def _make_rows(self, seen: tuple[ParameterInfo, ...]) -> list['_Row']:
+        return [_Row(self._drive, info, writes=self._writes) for info in seen]
 
 
 class _Row:
@@ -108,7 +116,7 @@ class _Row:
         self._info = info
         self._text: str | None = None
         self._field: Any = None
-        with box('parameter').props(f'data-parameter={info.name}'):
+        with marked(box('parameter'), parameter=info.name):
             with box():
                 words(info.name, 'name')
                 words(' · '.join(filter(None, (
@@ -122,6 +130,7 @@ class _Row:
                         'keydown.enter', js_handler=f'(event) => {script}')
                     words(info.unit, 'dim')
                     button('Write', 'plain', script)
+                    self._now = words('', 'dim')
                 else:
                     self._label = words('…' if info.readable else 'cannot be read', 'number')
             words(_limits(info), 'small number')
@@ -130,16 +139,27 @@ class _Row:
             box('answer')
 
     def show(self, drive: DriveSnapshot) -> None:
-        """Show what was read; what somebody types is left alone until something else is read."""
+        """Show what was read; what somebody types is left alone, and that stands beside it."""
         reading = drive.readings.get(self._info.name)
         if reading is None or reading.text == self._text:
             return
-        self._text = reading.text
-        if self._field is not None:
+        before, self._text = self._text or '', reading.text
+        unit = f' {self._info.unit}' if self._info.unit and reading.text else ''
+        text = f'{reading.text}{unit}' if reading.text else 'could not be read'
+        if self._field is None:
+            self._label.set_text(text)
+        elif self._field.value in (before, reading.text) or self._same(reading.text):
             self._field.set_value(reading.text)
+            self._now.set_text('' if reading.text else text)
         else:
-            unit = f' {self._info.unit}' if self._info.unit and reading.text else ''
-            self._label.set_text(f'{reading.text}{unit}' if reading.text else 'could not be read')
+            self._now.set_text(f'now {text}')
+
+    def _same(self, text: str) -> bool:
+        """Tell whether what is typed is what was read."""
+        try:
+            return self._info.parse(self._field.value) == self._info.parse(text)
+        except (ValueRefused, AttributeError):  # empty, or nothing that a browser would send
+            return False
 
 
 def _limits(info: ParameterInfo) -> str:

@@ -5,7 +5,7 @@ Small pieces of pages. What has not changed is not sent: nothing flickers, littl
 Text goes in as text, never as HTML: descriptions and log lines come from anybody.
 """
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Sequence
 import json
 import math
 from typing import Any
@@ -24,6 +24,12 @@ _STOPS = {Stop.QUICK_STOP: ('Quick stop', 'stop'), Stop.DISABLE: ('Disable', 'da
 def box(classes: str = '', tag: str = 'div') -> Element:
     """Make a container."""
     return ui.element(tag).classes(classes)
+
+
+def marked(element: Element, **marks: str) -> Element:
+    """Give an element ``data-`` attributes; not by ``props``, which would read what is in them."""
+    element.props.update({f'data-{name}': text for name, text in marks.items()})
+    return element
 
 
 def words(text: str = '', classes: str = '') -> ui.label:
@@ -56,10 +62,10 @@ class Changing:
     def __init__(self, container: Element, make: Callable[[Any], Any]) -> None:
         self._container = container
         self._make = make
-        self._key: Hashable = None
+        self._key: object = None
         self._content: Any = None
 
-    def of(self, key: Hashable) -> Any:
+    def of(self, key: object) -> Any:
         """Return the content for a key."""
         if key != self._key:
             self._key = key
@@ -129,7 +135,8 @@ def place_in_words(drive: DriveSnapshot) -> str:
     place = drive.place
     parts = [f'bus {place.bus}' if place.bus else '',
              f'station {place.station}' if place.station else '', place.protocol,
-             '' if math.isnan(place.period) else f'every {1e3 * place.period:g} ms']
+             '' if math.isnan(place.period)
+             else f'every {1e3 * place.period:g}\N{NO-BREAK SPACE}ms']
     return ' · '.join(part for part in parts if part)
 
 

@@ -5,6 +5,7 @@ import asyncio
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 import logging
+import math
 import resource
 import socket
 from typing import Any
@@ -14,6 +15,7 @@ import uvicorn
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from drive_can_bridge.core.errors import DriveCanError
+from drive_can_bridge.monitor.text import printable
 
 #: connections at once; a browser takes a handful
 CONNECTIONS_MAX = 200
@@ -26,6 +28,8 @@ _HEAD_MAX = 16_384
 _MESSAGE_MAX = 262_144
 #: s between two looks for the end, and for what is under way then
 _LOOK_PERIOD = 0.1
+#: lines on standard error in so many s
+_LINES_MAX, _WHILE = 10, 60.0
 _GRACE = 1
 
 
@@ -67,14 +71,35 @@ class _Server(uvicorn.Server):
 
 
 class _OneLine(logging.Formatter):
-    """No traceback reaches a user."""
+    """No traceback reaches a user, nor anything that a terminal would obey: browsers say it."""
 
     def format(self, record: logging.LogRecord) -> str:
         text = record.getMessage()
         if record.exc_info and record.exc_info[1] is not None:
             error = record.exc_info[1]
-            text = f'{text} ({type(error).__name__}: {error})'
-        return f'drive_can panel: {" ".join(text.split())[:500]}'
+            said = f'{type(error).__name__}: {error}'
+            # asyncio tells of its tasks besides
+            text = said if record.name == 'asyncio' else f'{text} ({said})'
+        return f'drive_can panel: {printable(" ".join(text.split()))}'
+
+
+class _NotMany(logging.Filter):
+    """Nobody fills standard error: so many lines in a while, and how many there were besides."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._since, self._told, self._kept_back = -math.inf, 0, 0
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        if record.created - self._since > _WHILE:
+            if self._kept_back:
+                record.msg = f'({self._kept_back} lines left out) {record.msg}'
+            self._since, self._told, self._kept_back = record.created, 0, 0
+        if self._told == _LINES_MAX:
+            self._kept_back += 1
+            return False
+        self._told += 1
+        return True
 
 
 def listen(host: str, port: int) -> socket.socket:
@@ -107,9 +132,11 @@ def serve(app: ASGIApp, listener: socket.socket, *, ended: Callable[[], bool],
     _make_room()
     handler = logging.StreamHandler()
     handler.setFormatter(_OneLine())
+    handler.addFilter(_NotMany())
     for name, level in (('uvicorn', logging.CRITICAL), ('nicegui', logging.ERROR),
-                        ('drive_can_panel', logging.ERROR),
-                        ('asyncio', logging.ERROR)):
+                        ('drive_can_panel', logging.ERROR), ('asyncio', logging.ERROR),
+                        ('engineio.server', logging.CRITICAL),
+                        ('socketio.server', logging.CRITICAL)):
         logger = logging.getLogger(name)
         logger.handlers, logger.propagate = [handler], False
         logger.setLevel(level)

@@ -116,11 +116,13 @@ class Wish:
     Parameters that the page shows, and that have to be read for it.
 
     :param wish: counts how often the user asked for it anew.
+    :param told_again: counts how often the drive told of its parameters anew.
     """
 
     drive: str
     names: tuple[str, ...]
     wish: int
+    told_again: int
 
 
 def to_read(snapshot: Snapshot, choice: Choice, *, width: int, height: int) -> Wish | None:
@@ -131,7 +133,7 @@ def to_read(snapshot: Snapshot, choice: Choice, *, width: int, height: int) -> W
     rows = height - 2 - _Frame(width, height).overhead - 1
     names = tuple(info.name for info in detail.on_screen(drive, choice.screen, rows)
                   if info.readable)
-    return Wish(drive.name, names, choice.wish) if names else None
+    return Wish(drive.name, names, choice.wish, drive.told_again) if names else None
 
 
 def closely(choice: Choice) -> str | None:

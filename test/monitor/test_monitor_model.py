@@ -1,11 +1,13 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """What the model makes of what arrives, with literal times."""
 
+from dataclasses import replace
 import math
 
 from hypothesis import given, strategies as st
 from monitor_builders import (
-    AT, BRIDGE, bus_status, drive_status, feed, model_of, NOW, PARAMETERS, seen, three_drives,
+    AT, BRIDGE, bus_status, drive_status, feed, info, model_of, NOW, PARAMETERS, seen,
+    three_drives,
 )
 import pytest
 
@@ -218,3 +220,43 @@ def test_where_a_drive_is_stays_with_it() -> None:
     drive, = seen(model).drives
     assert drive.place == place
     assert drive.parameters == PARAMETERS
+
+
+def test_what_was_read_before_a_bridge_started_again_is_forgotten() -> None:
+    model = model_of([drive_status()])
+    model.described('/conveyor', PARAMETERS[:3])
+    model.described('/conveyor', PARAMETERS)  # the next of many: nothing is told again
+    feed(model, '/conveyor')
+    model.read('/conveyor', [('ramp_time', 2.5)], NOW)
+    drive, = seen(model).drives
+    assert (drive.readings['ramp_time'].text, drive.told_again) == ('2.50', 0)
+    # the same configuration, but who knows what it has to do with
+    model.described('/conveyor', [replace(parameter) for parameter in PARAMETERS])
+    drive, = seen(model).drives
+    assert (drive.readings, drive.told_again) == ({}, 1)
+    assert drive.values
+    # another one: what was in another unit goes, too
+    model.described('/conveyor', [info('ramp_time', 'ms', 'uint16', access='rw'),
+                                  *map(replace, PARAMETERS[:5])])
+    drive, = seen(model).drives
+    assert (drive.values, drive.setpoints, drive.told_again) == ((), (), 2)
+
+
+@pytest.mark.parametrize('counts', [
+    ({'exchanges': '2'}, {}), ({}, {'frames_sent': '7'}), ({'exchanges': '0'}, {})])
+def test_a_bridge_that_counts_from_the_start_was_started_again(
+        counts: tuple[dict[str, str], dict[str, str]]) -> None:
+    drives = [drive_status(), drive_status('lift')]
+    model = model_of([bus_status(), *drives])
+    assert model.take_anew() == set()
+    of_drive, of_bus = counts
+    model.diagnosed([bus_status(**of_bus), drive_status(**of_drive), drives[1]], AT + 1.0,
+                    NOW + 1.0)
+    assert model.take_anew() == {BRIDGE, '/conveyor', '/lift'}
+    assert model.take_anew() == set()
+
+
+def test_there_is_an_upper_limit_to_what_diagnostics_say() -> None:
+    model = model_of([drive_status(**{f'key{number}': '' for number in range(10_000)})])
+    drive, = seen(model).drives
+    assert len(drive.facts) == 100

@@ -129,12 +129,17 @@ class Browser:
             'return field && field.value')
         return found
 
-    def write(self, name: str, text: str) -> None:
-        """Type a value and press Enter."""
+    def type(self, name: str, text: str) -> None:
+        """Type a value."""
         from selenium.webdriver.common.keys import Keys
         field = self.find_all(f'[data-parameter="{name}"] input')[0]
         field.send_keys(Keys.CONTROL, 'a')
-        field.send_keys(text, Keys.ENTER)
+        field.send_keys(text)
+
+    def write(self, name: str, text: str) -> None:
+        """Type a value and press Enter."""
+        from selenium.webdriver.common.keys import Keys
+        self.type(name, f'{text}{Keys.ENTER}')
 
     # -- charts -----------------------------------------------------------------------------------
 

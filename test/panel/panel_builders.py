@@ -88,7 +88,7 @@ class Site:
         self._directory = directory
         self._file = directory / 'drives.yaml'
         self._file.write_text(FILE.format(directory=directory), encoding='utf-8')
-        (directory / 'hostile.yaml').write_text(PROFILE.format(script=SCRIPT), encoding='utf-8')
+        self.write_profile()
         self._links = directory / 'links'
         #: as candump writes it
         self.frame_log = directory / 'frames.log'
@@ -108,6 +108,14 @@ class Site:
         self.host = f'127.0.0.1:{self.port}'
         wait_for(lambda: self.do('disable', 'operator', {'drive': '/lift'}).said['success'],
                  'that the panel reaches the drives')
+
+    def write_profile(self, *changes: tuple[str, str]) -> None:
+        """Write the profile of a drive, with changes."""
+        text = PROFILE.format(script=SCRIPT)
+        for before, after in changes:
+            assert before in text
+            text = text.replace(before, after)
+        (self._directory / 'hostile.yaml').write_text(text, encoding='utf-8')
 
     def start_bridge(self) -> Running:
         """Start the bridge, once more after it has ended."""

@@ -35,6 +35,16 @@ def test_the_token_of_each_role_opens_and_becomes_a_cookie() -> None:
             Entry(role))
 
 
+@pytest.mark.parametrize('other', ['a[b]=1', 'a={"b":"c d"}', 'a="', '=', 'a', 'ä=ö', 'a=b=c',
+                                   'drive_can_panel_9000=x'])
+def test_cookies_of_other_programs_are_in_nobody_s_way(other: str) -> None:
+    # they have one jar for all ports of a host
+    access = Access(port=PORT)
+    own = f'drive_can_panel_8080={access.tokens[Role.OPERATOR]}'
+    for cookie in (f'{other}; {own}', f'{own}; {other}', f'{other};{own};{other}'):
+        assert judge(access, cookie=cookie) == Entry(Role.OPERATOR)
+
+
 @pytest.mark.parametrize('cookie', [
     '', 'drive_can_panel_8080=', 'drive_can_panel_8080=x', 'drive_can_panel_8081={token}',
     'drive_can_panel_8080={token}x', 'token={token}', '\xff\x00;=;;', 'drive_can_panel_8080=\xfc'])

@@ -197,6 +197,42 @@ def test_the_bridge_dies_and_comes_back(site: Site, browser: Browser) -> None:
     assert browser.run('return window.mark') == 1
 
 
+def test_two_operators_at_the_same_parameter(site: Site, browser: Browser, phone: Browser) -> None:
+    for each in (browser, phone):
+        each.open(site.addresses['operator'])
+        each.open(f'http://{site.host}/drive/conveyor')
+        each.click('.q-tab', 'Parameters')
+    wait_for(lambda: browser.field('ramp_time') and phone.field('ramp_time'), 'its value, as read')
+    phone.type('ramp_time', '7')
+    browser.write('ramp_time', '3')
+    browser.shows('written')
+    # what one writes does not get among what the other types, and is told
+    phone.shows('now 3.00')
+    assert phone.field('ramp_time') == '7'
+
+
+def test_a_bridge_that_comes_back_with_another_configuration(
+        site: Site, browser: Browser) -> None:
+    said = site.do('write', 'operator', {'drive': '/conveyor', 'name': 'ramp_time', 'value': '2'})
+    assert said.said['success'], said.text
+    browser.open(site.addresses['operator'])
+    browser.open(f'http://{site.host}/drive/conveyor')
+    browser.click('.q-tab', 'Parameters')
+    wait_for(lambda: browser.field('ramp_time') == '2.00', 'its value')
+    browser.shows(r'0 … 100 s')
+    browser.run('window.mark = 1')
+    assert site.bridge.end(signal.SIGINT) == 0
+    site.write_profile(('scale: 0.01, unit: s', 'scale: 10, unit: ms'),
+                       ('maximum: 100,', 'maximum: 100000,'))
+    try:
+        site.bridge = site.start_bridge()
+        browser.shows(r'0 … 100000 ms')
+        wait_for(lambda: browser.field('ramp_time') == '2000', 'its value in the other unit')
+        assert browser.run('return window.mark') == 1
+    finally:
+        site.write_profile()
+
+
 def last_line(site: Site, identifier: str) -> str:
     """Return the newest frame with an identifier."""
     lines = site.frame_log.read_text(encoding='ascii').splitlines()

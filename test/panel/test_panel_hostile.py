@@ -88,8 +88,9 @@ def test_another_origin_is_refused(site: Site, origin: str) -> None:
 
 def test_what_another_page_can_send_without_asking_is_refused(site: Site) -> None:
     form = {'Content-Type': 'text/plain', 'Origin': f'http://{site.host}'}
-    answer = site.ask('POST', '/do/quick_stop', 'operator', form, b'{"drive": "/lift"}')
-    assert answer.status == 415
+    for path in ('quick_stop', 'restore?drive=/lift', 'compare?drive=/lift'):
+        answer = site.ask('POST', f'/do/{path}', 'operator', form, b'{"drive": "/lift"}')
+        assert answer.status == 415
     answer = site.do('quick_stop', 'operator', STOP, Sec_Fetch_Site='cross-site')
     assert answer.status == 403
 
@@ -151,6 +152,25 @@ def test_what_is_no_request_is_refused(site: Site, body: bytes) -> None:
     assert answer.said['text'] == 'that is no JSON object'
 
 
+def test_all_are_stopped_and_those_that_cannot_be_are_named(site: Site) -> None:
+    said = site.do('quick_stop', 'operator', {'drive': '*'}).said
+    assert said['success'] is True
+    assert said['text'].splitlines()[1:] == ['conveyor: not told, it has no control word']
+    assert said['text'].startswith('lift: ')
+
+
+@pytest.mark.parametrize('value', ['1_5', '１５', '\x1b[2J', 'nan', '1' * 900_000, ''])
+def test_what_is_no_number_is_refused(site: Site, value: str) -> None:
+    fields = {'drive': '/conveyor', 'name': 'mode', 'value': value}
+    wait_for(lambda: 'not told' not in site.do('write', 'operator', fields).said['text'],
+             'its parameters')
+    said = site.do('write', 'operator', fields).said
+    assert said['success'] is False
+    assert 'is no value: write an integer' in said['text']
+    assert len(said['text']) < 1000
+    assert said['text'].isprintable()
+
+
 @pytest.mark.parametrize('action', ['enable', 'reset_fault', 'command', 'joint_command'])
 def test_nothing_that_moves_can_be_asked_for(site: Site, action: str) -> None:
     assert site.do(action, 'operator', STOP).status == 404
@@ -185,6 +205,7 @@ def test_a_body_without_end_is_not_taken(site: Site) -> None:
         connection.sendall((
             f'POST /do/compare?drive=/lift HTTP/1.1\r\nHost: {site.host}\r\n'
             f'Cookie: {site.cookie("viewer")["Cookie"]}\r\n'
+            'Content-Type: application/yaml\r\n'
             'Transfer-Encoding: chunked\r\n\r\n').encode())
         sent = 0
         # as much as is taken, until there is an answer
@@ -244,8 +265,16 @@ def room(site: Site) -> bool:
 
 
 def test_pages_without_end_are_not_made(site: Site) -> None:
+    # what there is not makes no pages
+    for number in range(60):
+        answer = site.get(f'/nothing{number}', 'viewer')
+        assert (answer.status, answer.text) == (404, 'there is nothing at this address\n')
     answers = [site.get('/', 'viewer') for _ in range(60)]
     assert {answer.status for answer in answers} == {200, 503}
     assert 'pages are open already' in answers[-1].text
+    # viewers cannot keep an operator out
+    assert site.get('/', 'operator').status == 200
+    answers = [site.get('/', 'operator') for _ in range(60)]
+    assert answers[-1].status == 503
     # a stop is no page
     assert site.do('quick_stop', 'operator', STOP).said['success'] is True

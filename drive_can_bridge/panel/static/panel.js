@@ -14,7 +14,7 @@ const panel = (() => {
 
   // -- requests -----------------------------------------------------------------------------------
 
-  function tell(success, text) {
+  function tell(success, text, stays) {
     const told = document.createElement('div');
     told.className = `told ${success ? 'ok' : 'error'}`;
     told.setAttribute('role', success ? 'status' : 'alert');
@@ -30,7 +30,7 @@ const panel = (() => {
     list.append(told);
     while (list.children.length > 4) list.firstChild.remove();
     // what went wrong stays until it is read
-    if (success) setTimeout(() => told.remove(), 6000);
+    if (success && !stays) setTimeout(() => told.remove(), 6000);
   }
 
   async function ask(path, options) {
@@ -50,8 +50,9 @@ const panel = (() => {
   async function stop(action, drive, name) {
     const answer = await send(action, {drive});
     const text = answer.text || `${action.replace('_', ' ')} done`;
-    // of all drives, each is named in the answer
-    tell(answer.success, drive === '*' ? text : `${name}: ${text}`);
+    // of all drives, each is named in the answer, also those that were told nothing
+    const all = drive === '*';
+    tell(answer.success, all ? text : `${name}: ${text}`, all);
   }
 
   async function write(drive, name, row) {
@@ -156,18 +157,21 @@ const panel = (() => {
   function plot(id, now, series) {
     const one = chart(id);
     one.newest = now;
-    const before = [...one.series.keys()].join();
+    const shown = () => [...one.series].map(([name, each]) => `${name} ${each.unit}`).join();
+    const before = shown();
     for (const name of [...one.series.keys()]) {
       if (!series.some((each) => each.name === name)) one.series.delete(name);
     }
     for (const each of series) {
-      const kept = one.series.get(each.name) || {unit: each.unit, points: []};
+      let kept = one.series.get(each.name);
+      // another unit: of a bridge that runs with another configuration now
+      if (!kept || kept.unit !== each.unit) kept = {unit: each.unit, points: []};
       const last = kept.points.length ? kept.points[kept.points.length - 1][0] : 0;
       for (const point of each.points) if (point[0] > last) kept.points.push(point);
       while (kept.points.length && kept.points[0][0] < now - KEPT) kept.points.shift();
       one.series.set(each.name, kept);
     }
-    const changed = before !== [...one.series.keys()].join();
+    const changed = before !== shown();
     if (changed || !one.paused) draw(id, changed);
   }
 

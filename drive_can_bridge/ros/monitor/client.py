@@ -143,7 +143,7 @@ class MonitorClient:
                   else frozenset())
         model.sampled(wanted, now)
         _keep(self._samples, wanted, self._subscribe_samples, _close_all)
-        self._asked &= {*model.drives, *model.bridges} - set(model.silent(now))
+        self._asked &= {*model.drives, *model.bridges} - set(model.silent(now)) - model.take_anew()
         for bridge in model.bridges:
             if bridge not in self._asked:
                 self._ask_places(bridge)

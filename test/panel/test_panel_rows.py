@@ -1,0 +1,70 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Rows of parameters: what they show, and what becomes of names that mean no good."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import pytest
+
+from drive_can_bridge.core.parameters import ValueKind
+from drive_can_bridge.monitor.reports import Level
+from drive_can_bridge.monitor.snapshot import DriveSnapshot, Reading
+from drive_can_bridge.monitor.values import ParameterInfo
+
+pytest.importorskip('nicegui', reason="needs the extra 'panel'")
+
+RAMP = ParameterInfo('ramp_time', ValueKind.DOUBLE, facts={'unit': 's', 'scale': '0.01'})
+
+
+@pytest.fixture
+def page() -> Iterator[object]:
+    """Return a page, with nobody who looks at it."""
+    from nicegui.client import Client
+    from nicegui.page import page as kind
+    client = Client(kind(''))
+    with client:
+        yield client
+    client.delete()
+
+
+def drive(text: str, name: str = RAMP.name) -> DriveSnapshot:
+    """Return a drive of which one parameter was read."""
+    return DriveSnapshot('/lift', 'lift', '/drive_can_bridge', 'online', Level.OK, True, '',
+                         readings={name: Reading(text, 0.0)})
+
+
+@pytest.mark.parametrize('name', [
+    'x onclick="alert(1)"', "x :title='alert(1)'", 'x\n@click=alert(1)', '"', 'x innerHTML=<b>'])
+def test_a_name_stays_one_attribute(page: object, name: str) -> None:
+    from drive_can_bridge.panel.parameter_table import _Row
+    _Row('/lift', replace(RAMP, name=name), writes=True)
+    marks = [element.props for element in page.elements.values()  # type: ignore[attr-defined]
+             if 'data-parameter' in element.props]
+    assert [dict(props) for props in marks] == [{'data-parameter': name}]
+
+
+def test_what_is_typed_is_left_alone_and_what_was_read_stands_beside_it(page: object) -> None:
+    from drive_can_bridge.panel.parameter_table import _Row
+    row = _Row('/lift', RAMP, writes=True)
+    row.show(drive('2.50'))
+    assert (row._field.value, row._now.text) == ('2.50', '')
+    row.show(drive('3.00'))
+    assert (row._field.value, row._now.text) == ('3.00', '')
+    # somebody types; somebody else writes
+    row._field.value = '1'
+    row.show(drive('4.00'))
+    assert (row._field.value, row._now.text) == ('1', 'now 4.00 s')
+    row.show(drive('5.00'))
+    assert (row._field.value, row._now.text) == ('1', 'now 5.00 s')
+    # what was typed has been written, and is read as the drive has it
+    row._field.value = '1.5'
+    row.show(drive('1.50'))
+    assert (row._field.value, row._now.text) == ('1.50', '')
+
+
+def test_what_cannot_be_read_is_said(page: object) -> None:
+    from drive_can_bridge.panel.parameter_table import _Row
+    for writes in (False, True):
+        row = _Row('/lift', RAMP, writes=writes)
+        row.show(drive(''))
+        assert (row._now if writes else row._label).text == 'could not be read'
