@@ -212,15 +212,21 @@ def flight_figures(found: dict[str, Any]) -> list[Figure]:
 
 
 def joints_figures(found: dict[str, Any]) -> list[Figure]:
-    """Compare a bridge with and without the message of all joints."""
-    shares = [found[name]['cpu'] / found[name]['elapsed'] for name in ('with', 'without')]
-    return [
-        Figure('CPU with all joints in one message, 100 Hz',
-               f'{100 * shares[0]:.1f} % ({found["received"] / found["with"]["elapsed"]:.0f} '
-               f'messages/s, {found["with"]["missed"]} missed)',
-               f'without {100 * shares[1]:.1f} % ({found["without"]["missed"]} missed)',
-               shares[0] / shares[1], 1.05),
-    ]
+    """Compare a bridge with and without the messages of all joints, in turn: by pairs."""
+    shares = {name: [result['process_cpu'] / result['elapsed'] for result in found[name]]
+              for name in ('without', 'states', 'states and commands')}
+    missed = {name: sum(result['missed'] for result in found[name]) for name in shares}
+    own = [result['cpu']['joints'] / result['elapsed'] for result in found['states']]
+    figures = []
+    for name, goal in (('states', 1.05), ('states and commands', 1.1)):
+        ratios = [with_it / without for with_it, without in zip(shares[name], shares['without'])]
+        figures.append(Figure(
+            f'CPU with all joints in one message, 100 Hz, {name}',
+            f'{100 * median(shares[name]):.1f} % ({missed[name]} missed; thread of its own '
+            f'{100 * median(own):.2f} %)',
+            f'without {100 * median(shares["without"]):.1f} % ({missed["without"]} missed)',
+            median(ratios), goal))
+    return figures
 
 
 def start_figures(found: dict[str, Any]) -> list[Figure]:
