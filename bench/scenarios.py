@@ -5,7 +5,7 @@ What is measured. Each scenario runs the bridge and its floor one after the othe
 All return plain numbers: times in s, CPU time in s, memory in MB; lists are samples.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, ExitStack
 from dataclasses import dataclass, replace
 import os
@@ -346,8 +346,15 @@ def do_it_yourself(load: Load, duration: float) -> dict[str, Any]:
                 found[name] = {
                     'cpu': (process.cpu() - cpu) / elapsed,
                     'requests_per_s': len(distances) / elapsed,
+                    'wanted': load.drives / load.period,
                     'period_errors': [abs(each - load.period) for each in distances]}
     return found
+
+
+def sweep(numbers: Sequence[int], period: float, duration: float) -> dict[int, dict[str, Any]]:
+    """Measure the same for so many drives, all of them on one bus."""
+    return {number: do_it_yourself(Load(number, period, commands=100.0), duration)
+            for number in numbers}
 
 
 def start(drives: int, duration: float) -> dict[str, Any]:
