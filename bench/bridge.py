@@ -26,6 +26,8 @@ from drive_can_bridge.ros.bridge_node import BridgeNode
 from drive_can_bridge.ros.executor_thread import ExecutorThread
 
 ONLINE_TIMEOUT = 30.0
+#: s until something that is not to happen
+NEVER = 1e5
 
 
 class Measured:
@@ -42,6 +44,9 @@ class Measured:
         self._threads = {'timer': [exchange._thread for exchange in exchanges],
                          'reader': [exchange.link._thread for exchange in exchanges],
                          'services': [self._spinner._thread]}
+        self._joints = self.bridge._joints and self.bridge._joints._thread
+        if self._joints:
+            self._threads['joints'] = [self._joints._thread]
         self._before: dict[str, Any] = {}
 
     def clear(self) -> bool:
@@ -67,6 +72,12 @@ class Measured:
             'latencies': [error for each in statistics for error in each.latency.samples()],
             'online': sum(session.online for session in self.sessions),
         }
+
+    def joints(self, rate: float) -> bool:
+        """Have the message of all joints published at so many Hz; 0: not at all."""
+        assert self._joints is not None
+        self._joints.set_period(1.0 / rate if rate else NEVER)
+        return True
 
     def trace(self) -> dict[str, float]:
         """Have a trace written; return when it is there."""
@@ -137,7 +148,8 @@ def main() -> None:
         if time.monotonic() > waited_until:
             raise SystemExit('the drives did not come online')
         time.sleep(0.005)
-    serve({'clear': measured.clear, 'result': measured.result, 'trace': measured.trace},
+    serve({'clear': measured.clear, 'result': measured.result, 'trace': measured.trace,
+           'joints': measured.joints},
           ready=time.monotonic() - begun, close=measured.close)
 
 

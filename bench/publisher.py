@@ -4,16 +4,20 @@ Other processes that publish.
 
 ``publisher.py bare PERIOD`` publishes ``/bare/response`` and nothing else: the bare pair's half.
 ``publisher.py commands DRIVES RATE`` publishes setpoints for each of so many drives at a rate.
+``publisher.py joints DRIVES`` publishes commands for all joints, at the rate that it is told.
 """
 
+from collections.abc import Callable
 import sys
 import threading
 import time
+from typing import Any
 
 from child import serve, sleep_until
 import rclpy  # isort: skip
 from rclpy.node import Node
 from rclpy.serialization import serialize_message
+from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 from topics import DriveTopics
 
@@ -46,17 +50,50 @@ def publish_commands(node: Node, drives: int, rate: float) -> None:
         deadline = max(deadline, time.monotonic() - period)
 
 
+class JointCommands:
+    """Commands for all joints, as ros2_control sends them."""
+
+    def __init__(self, node: Node, drives: int) -> None:
+        names = [f'joint{number}' for number in range(drives)]
+        self._publisher = node.create_publisher(
+            JointState, '/drive_can_bridge/joint_commands', 1)
+        self._messages = [serialize_message(JointState(name=names, velocity=[speed] * drives))
+                          for speed in (0.0, 0.1)]
+        self._rate = 0.0
+
+    def set_rate(self, rate: float) -> bool:
+        """Publish so often from now on; 0: not at all."""
+        self._rate = rate
+        return True
+
+    def run(self) -> None:
+        """Publish for ever."""
+        deadline, count = time.monotonic(), 0
+        while True:
+            deadline = max(deadline + 1.0 / (self._rate or 100.0), time.monotonic() - 0.1)
+            sleep_until(deadline)
+            if self._rate:
+                count += 1
+                self._publisher.publish(self._messages[count % 2])
+
+
 def main() -> None:
     """Publish in a thread until the standard input ends."""
     rclpy.init(args=[])
     node = Node(f'bench_publisher_{sys.argv[1]}', enable_rosout=False,
                 start_parameter_services=False)
-    if sys.argv[1] == 'bare':
+    commands: dict[str, Any] = {}
+    arguments: tuple[Any, ...] = ()
+    target: Callable[..., object]
+    if sys.argv[1] == 'joints':
+        joints = JointCommands(node, int(sys.argv[2]))
+        target, commands = joints.run, {'rate': joints.set_rate}
+    elif sys.argv[1] == 'bare':
         target, arguments = publish_bare, (node, float(sys.argv[2]))
     else:
         target, arguments = publish_commands, (node, int(sys.argv[2]), float(sys.argv[3]))
     threading.Thread(target=target, args=arguments, daemon=True).start()
-    serve({})
+    serve(commands)
 
 
 if __name__ == '__main__':

@@ -1,10 +1,9 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""Figures from what the scenarios found, as a table, and as a plot where matplotlib is there."""
+"""Figures from what the scenarios found, as a table."""
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 import math
-from pathlib import Path
 from typing import Any
 
 from scenarios import median, p99
@@ -80,6 +79,14 @@ def diy_figures(found: dict[str, Any]) -> list[Figure]:
                f'({diy["requests_per_s"]:.0f} requests/s)',
                p99(bridge['period_errors']) / p99(diy['period_errors']), 1.0),
     ]
+
+
+def sweep_figures(found: dict[int, Any]) -> list[Figure]:
+    """Against the node of an ordinary user, by the number of drives."""
+    return [Figure(f'{name.split(",")[0]}, {number} drives', *rest)
+            for number, each in found.items()
+            for name, *rest in ((line.name, line.value, line.floor, line.judged,
+                                 1.0, line.at_least) for line in diy_figures(each))]
 
 
 def latency_figures(found: dict[str, list[float]]) -> list[Figure]:
@@ -212,15 +219,21 @@ def flight_figures(found: dict[str, Any]) -> list[Figure]:
 
 
 def joints_figures(found: dict[str, Any]) -> list[Figure]:
-    """Compare a bridge with and without the message of all joints."""
-    shares = [found[name]['cpu'] / found[name]['elapsed'] for name in ('with', 'without')]
-    return [
-        Figure('CPU with all joints in one message, 100 Hz',
-               f'{100 * shares[0]:.1f} % ({found["received"] / found["with"]["elapsed"]:.0f} '
-               f'messages/s, {found["with"]["missed"]} missed)',
-               f'without {100 * shares[1]:.1f} % ({found["without"]["missed"]} missed)',
-               shares[0] / shares[1], 1.05),
-    ]
+    """Compare a bridge with and without the messages of all joints, in turn: by pairs."""
+    shares = {name: [result['process_cpu'] / result['elapsed'] for result in found[name]]
+              for name in ('without', 'states', 'states and commands')}
+    missed = {name: sum(result['missed'] for result in found[name]) for name in shares}
+    own = [result['cpu']['joints'] / result['elapsed'] for result in found['states']]
+    figures = []
+    for name, goal in (('states', 1.05), ('states and commands', 1.1)):
+        ratios = [with_it / without for with_it, without in zip(shares[name], shares['without'])]
+        figures.append(Figure(
+            f'CPU with all joints in one message, 100 Hz, {name}',
+            f'{100 * median(shares[name]):.1f} % ({missed[name]} missed; thread of its own '
+            f'{100 * median(own):.2f} %)',
+            f'without {100 * median(shares["without"]):.1f} % ({missed["without"]} missed)',
+            median(ratios), goal))
+    return figures
 
 
 def start_figures(found: dict[str, Any]) -> list[Figure]:
@@ -241,7 +254,7 @@ FIGURES: dict[str, Callable[[Any], list[Figure]]] = {
     'subscribed': lambda found: exchange_figures(found, 'subscribed', 1.5),
     'unsubscribed': lambda found: exchange_figures(found, 'nobody subscribed', 1.0),
     'ordinary': lambda found: exchange_figures(found, 'all of it at ordinary priority', 1.5),
-    'diy': diy_figures, 'buses': buses_figures,
+    'diy': diy_figures, 'sweep': sweep_figures, 'buses': buses_figures,
     'latency': latency_figures, 'service': service_figures,
     'flood': flood_figures, 'stop': stop_figures, 'monitor': monitor_figures,
     'backup': backup_figures, 'drives': drives_figures, 'decode': decode_figures,
@@ -272,42 +285,3 @@ def table(lines: list[Figure]) -> str:
 def as_json(lines: list[Figure]) -> list[dict[str, Any]]:
     """Return the figures as plain data."""
     return [{**asdict(line), 'met': line.met} for line in lines]
-
-
-def plot(results: dict[str, list[Any]], path: Path) -> str:
-    """
-    Draw the distributions of period errors and latencies.
-
-    :return: why not, or ''.
-    """
-    try:
-        import matplotlib
-        matplotlib.use('Agg')
-        from matplotlib import pyplot
-    except ImportError:
-        return 'matplotlib is not installed'
-    chart, (left, right) = pyplot.subplots(1, 2, figsize=(11, 4.5), layout='constrained')
-    curves: list[tuple[Any, str, list[float]]] = []
-    for name in ('full', 'subscribed', 'unsubscribed'):
-        for run in results.get(name, [])[:1]:
-            curves.append((left, f'bridge, {name}', run['bridge']['period_errors']))
-            curves.append((left, f'sleeping thread, {name}', run['sleeper']))
-    for run in results.get('diy', [])[:1]:
-        curves.append((left, 'do-it-yourself node, 8 drives', run['diy']['period_errors']))
-    for run in results.get('latency', [])[:1]:
-        curves += [(right, 'bridge', run['drive0']), (right, 'bare pair', run['bare'])]
-    for run in results.get('service', [])[:1]:
-        curves += [(right, 'get_parameters, bridge', run['drive']),
-                   (right, 'get_parameters, bare service', run['bare'])]
-    for axes, label, samples in curves:
-        ordered = sorted(1e3 * max(each, 1e-6) for each in samples)
-        shares = [1.0 - place / len(ordered) for place in range(len(ordered))]
-        axes.plot(ordered, shares, label=label, drawstyle='steps-post')
-    for axes, title in ((left, 'period error'), (right, 'latency')):
-        axes.set(xscale='log', yscale='log', xlabel='ms', title=title,
-                 ylabel='share of samples that are worse')
-        axes.grid(which='both', alpha=0.3)
-        if axes.lines:
-            axes.legend(fontsize='small')
-    chart.savefig(path, dpi=110)
-    return ''

@@ -14,9 +14,15 @@ import platform
 import sys
 from typing import Any
 
+import plots
 import report
 import scenarios
 from scenarios import Load
+
+#: numbers of drives for which bridge and do-it-yourself node are compared
+SWEEP = (1, 2, 4, 8, 15, 22, 30)
+#: takes long, and is run when it is named only
+NAMED_ONLY = ('sweep',)
 
 
 def plan(options: argparse.Namespace) -> dict[str, Callable[[], Any]]:
@@ -48,6 +54,7 @@ def plan(options: argparse.Namespace) -> dict[str, Callable[[], Any]]:
             Load(drives, period, subscribed=False), duration, 100.0),
         'decode': lambda: scenarios.decode(options.frames),
         'start': lambda: scenarios.start(drives, options.memory_duration),
+        'sweep': lambda: scenarios.sweep(SWEEP, 0.01, duration),
     }
 
 
@@ -69,7 +76,8 @@ def machine() -> str:
 def main(arguments: list[str] | None = None) -> int:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('scenarios', nargs='*', help='which ones (default: all)')
+    parser.add_argument('scenarios', nargs='*',
+                        help=f'which ones (default: all but {", ".join(NAMED_ONLY)})')
     parser.add_argument('--drives', type=int, default=15)
     parser.add_argument('--period', type=float, default=0.005, help='s')
     parser.add_argument('--duration', type=float, default=5.0, help='s of each measurement')
@@ -78,6 +86,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument('--repeat', type=int, default=1, help='runs; the median one is shown')
     parser.add_argument('--json', type=Path, help='write figures and samples to this file')
     parser.add_argument('--plot', type=Path, help='write the distributions to this PNG file')
+    parser.add_argument('--sweep-plot', type=Path,
+                        help='write CPU and period error over the number of drives to this PNG')
     options = parser.parse_args(arguments)
     planned = plan(options)
     unknown = [name for name in options.scenarios if name not in planned]
@@ -86,7 +96,7 @@ def main(arguments: list[str] | None = None) -> int:
     begun = machine()
     results: dict[str, list[Any]] = {}
     for _ in range(options.repeat):
-        for name in options.scenarios or planned:
+        for name in options.scenarios or [each for each in planned if each not in NAMED_ONLY]:
             print(f'{name} …', file=sys.stderr, flush=True)
             results.setdefault(name, []).append(planned[name]())
     lines = report.figures(results)
@@ -94,8 +104,8 @@ def main(arguments: list[str] | None = None) -> int:
     if options.json:
         options.json.write_text(json.dumps(
             {'machine': begun, 'figures': report.as_json(lines), 'results': results}))
-    if options.plot:
-        reason = report.plot(results, options.plot)
+    for draw, path in ((plots.distributions, options.plot), (plots.sweep, options.sweep_plot)):
+        reason = draw(results, path) if path else ''
         if reason:
             print(f'no plot: {reason}', file=sys.stderr)
     return 0

@@ -5,7 +5,7 @@ What is measured. Each scenario runs the bridge and its floor one after the othe
 All return plain numbers: times in s, CPU time in s, memory in MB; lists are samples.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, ExitStack
 from dataclasses import dataclass, replace
 import os
@@ -108,7 +108,8 @@ class Bus:
                       f'        cyclic_response: [{responses}]']
             if load.joints is not None:
                 lines += [f'        joint: {{name: joint{number}, position: actual_position, '
-                          'velocity: actual_speed, effort: motor_current}']
+                          'velocity: actual_speed, effort: motor_current, '
+                          'velocity_command: speed_setpoint}']
         self.file.write_text('\n'.join(lines) + '\n', encoding='utf-8')
         self.drives, *_ = [stack.enter_context(child('drives.py', channel, *pace))
                            for channel in self.channels]
@@ -345,8 +346,15 @@ def do_it_yourself(load: Load, duration: float) -> dict[str, Any]:
                 found[name] = {
                     'cpu': (process.cpu() - cpu) / elapsed,
                     'requests_per_s': len(distances) / elapsed,
+                    'wanted': load.drives / load.period,
                     'period_errors': [abs(each - load.period) for each in distances]}
     return found
+
+
+def sweep(numbers: Sequence[int], period: float, duration: float) -> dict[int, dict[str, Any]]:
+    """Measure the same for so many drives, all of them on one bus."""
+    return {number: do_it_yourself(Load(number, period, commands=100.0), duration)
+            for number in numbers}
 
 
 def start(drives: int, duration: float) -> dict[str, Any]:
@@ -385,26 +393,31 @@ def flight(load: Load, duration: float) -> dict[str, Any]:
     return found
 
 
-def joints(load: Load, duration: float, rate: float, rounds: int = 3) -> dict[str, Any]:
-    """Measure the CPU time of a bridge with and without the message of all joints, in turn."""
-    found: dict[str, Any] = {name: {'cpu': 0.0, 'elapsed': 0.0, 'exchanges': 0, 'missed': 0}
-                             for name in ('without', 'with')}
+def joints(load: Load, duration: float, rate: float, rounds: int = 10) -> dict[str, Any]:
+    """
+    Measure the CPU time of one bridge with and without the message of all joints, in turn.
+
+    Then the same with commands for all joints as often.
+    """
+    names = ('without', 'states', 'states and commands')
+    found: dict[str, Any] = {name: [] for name in names}
     found['received'] = 0
-    for _ in range(rounds):
-        for name, each in (('without', 0.0), ('with', rate)):
-            with ExitStack() as stack:
-                bus = Bus(stack, replace(load, joints=each))
-                listener = stack.enter_context(child('subscriber.py', 'joints'))
-                bridge = stack.enter_context(bridge_under(load, bus))
-                time.sleep(SETTLE)
+    load = replace(load, joints=rate)
+    with ExitStack() as stack:
+        bus = Bus(stack, load)
+        listener = stack.enter_context(child('subscriber.py', 'joints'))
+        commander = stack.enter_context(child('publisher.py', 'joints', load.drives))
+        bridge = stack.enter_context(bridge_under(load, bus))
+        for _ in range(rounds):
+            for name in names:
+                bridge.ask(f'joints {0.0 if name == "without" else rate}')
+                commander.ask(f'rate {rate if "commands" in name else 0.0}')
+                time.sleep(0.1)
                 bridge.ask('clear')
                 listener.ask('clear')
-                time.sleep(duration)
-                result = bridge.ask('result')
+                time.sleep(duration / 2)
+                found[name].append(bridge.ask('result'))
                 found['received'] += listener.ask('count')
-                found[name]['cpu'] += result['process_cpu']
-                for key in ('elapsed', 'exchanges', 'missed'):
-                    found[name][key] += result[key]
     return found
 
 

@@ -2,28 +2,36 @@
 """
 What docs/ros2_control.md shows: the arm of the example, with everything that may come between.
 
-Simulated drives and the bridge are processes of their own, as in real life; the controllers are
-those of ``test/ros2_control_twin.py``. Every frame of the bus is recorded.
+usage: ros2_control_run.py TRACE
+
+Bridge and simulated drives share a bus that is in this process, and ``drive_can record`` listens
+to it; the controllers are those of ``test/ros2_control_twin.py``.
 """
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 import math
+import os
 from pathlib import Path
 import signal
-import subprocess
 import sys
+import tempfile
 import threading
 import time
-from typing import Any, IO
+from typing import Any
 
 HERE = Path(__file__).resolve().parent
-sys.path.append(str(HERE.parent / 'test'))
+sys.path += [str(HERE.parent / 'test'), str(HERE.parent / 'test' / 'ros')]
 
+from bridges import Bridge  # noqa: E402
 import rclpy  # noqa: E402
 from rclpy.executors import SingleThreadedExecutor  # noqa: E402
+from rclpy.signals import SignalHandlerOptions  # noqa: E402
 from ros2_control_twin import HardwareTwin, run, System, TrajectoryTwin  # noqa: E402
 from std_srvs.srv import SetBool, Trigger  # noqa: E402
+import yaml  # noqa: E402
+
+from drive_can_bridge.cli.main import main as drive_can  # noqa: E402
+from drive_can_bridge.simulation.plant import Mechanics  # noqa: E402
 
 FOLDER = HERE.parent / 'config' / 'ros2_control'
 AXES = ('shoulder', 'elbow', 'wrist')
@@ -89,7 +97,7 @@ class Arm:
         self.pass_time(0.3)
 
 
-def play(arm: Arm, drives: 'IO[str]') -> None:
+def play(arm: Arm, one: Bridge) -> None:
     """Let happen what may happen."""
     arm.wait(lambda: all(math.isfinite(arm.hardware.state[joint, 'position']) for joint in HOME))
     arm.pass_time(0.5)
@@ -107,16 +115,14 @@ def play(arm: Arm, drives: 'IO[str]') -> None:
     arm.reactivate()
     arm.go(OUT, 2.0)                    # a fault on the way
     arm.pass_time(0.7)
-    drives.write('shoulder trip\n')
-    drives.flush()
+    one.played['shoulder'].fault('trip')
     arm.pass_time(1.0)
     arm.call('/shoulder/reset_fault', Trigger)
     arm.enable('shoulder')
     arm.reactivate()
     arm.go(HOME, 2.0)                   # a lost drive on the way
     arm.pass_time(0.7)
-    drives.write('shoulder power_cut=1\n')
-    drives.flush()
+    one.played['shoulder'].fault('power_cut=1')
     arm.wait(lambda: not arm.online('shoulder_joint'))
     arm.wait(lambda: arm.online('shoulder_joint'))
     arm.pass_time(0.3)
@@ -126,42 +132,54 @@ def play(arm: Arm, drives: 'IO[str]') -> None:
     arm.pass_time(2.5)
 
 
-@contextmanager
-def process(*command: str, **options: Any) -> 'Iterator[subprocess.Popen[str]]':
-    """Run one of our executables."""
-    with subprocess.Popen([sys.executable, '-m', *command], text=True, **options) as child:
-        try:
-            yield child
-        finally:
-            child.send_signal(signal.SIGINT)
-            child.wait(timeout=20.0)
+def control(one: Bridge, failures: list[BaseException]) -> None:
+    """Play it all, and end the recording."""
+    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    node = rclpy.create_node('controllers')
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    try:
+        play(Arm(node, executor), one)
+    except BaseException as error:  # noqa: BLE001  outermost loop of a thread
+        failures.append(error)
+    finally:
+        node.destroy_node()
+        rclpy.shutdown()
+        os.kill(os.getpid(), signal.SIGINT)
+
+
+def parameters() -> dict[str, Any]:
+    """Return those of the example, with a bus in this process, which has the more to do."""
+    text = (FOLDER / 'arm.yaml').read_text(encoding='utf-8')
+    content: dict[str, Any] = yaml.safe_load(text)['/**/drive_can_bridge']['ros__parameters']
+    content['buses']['main'].update(interface='virtual', channel='arm')
+    for drive in content['drives'].values():
+        drive.update(missed_limit=20, command_timeout=1.0)
+    return content
 
 
 def record(trace: Path) -> None:
     """Play it all, and record the bus."""
-    parameters = str(FOLDER / 'arm.yaml')
-    axes = [text for name in AXES for text in ('--axis', f'{name}:load=0.3,noise=1,brake=1')]
-    with process('drive_can_bridge.cli.main', 'simulate', '--params-file', parameters, '--pty',
-                 '--log-frames', str(trace), *axes, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-                 stderr=subprocess.DEVNULL) as drives:
-        assert drives.stdin is not None and drives.stdout is not None
-        channel = drives.stdout.readline().split()[-1]
-        threading.Thread(target=drives.stdout.read, daemon=True).start()
-        with process('drive_can_bridge.ros.main', '--ros-args', '--params-file', parameters,
-                     '-p', 'buses.main.interface:=slcan', '-p', f'buses.main.channel:={channel}',
-                     '-r', '~/joint_states:=/robot_joint_states',
-                     '-r', '~/joint_commands:=/robot_joint_commands',
-                     stderr=subprocess.DEVNULL):
-            rclpy.init(args=[])
-            node = rclpy.create_node('controllers')
-            executor = SingleThreadedExecutor()
-            executor.add_node(node)
-            try:
-                play(Arm(node, executor), drives.stdin)
-            finally:
-                node.destroy_node()
-                rclpy.shutdown()
-        drives.stdin.close()
+    with tempfile.TemporaryDirectory() as folder:
+        one = Bridge(Path(folder), parameters(),
+                     arguments=('-r', '~/joint_states:=/robot_joint_states',
+                                '-r', '~/joint_commands:=/robot_joint_commands',
+                                '--log-level', 'error'),
+                     mechanics=dict.fromkeys(AXES, Mechanics(load=0.3, noise=1, brake=1)))
+        failures: list[BaseException] = []
+        try:
+            one.begin()
+            controllers = threading.Thread(target=control, args=(one, failures))
+            controllers.start()
+            code = drive_can(['record', '-o', str(trace), '--params-file', str(one.file)])
+            controllers.join()
+            lost = {name: drive.times_lost for name, drive in one.node.drives.items()}
+        finally:
+            one.close()
+    if failures or code:
+        raise SystemExit(failures[0] if failures else code)
+    if lost != {**dict.fromkeys(AXES, 0), 'shoulder': 1}:
+        raise SystemExit(f'ros2_control: this machine is too busy, drives were lost: {lost}')
 
 
 if __name__ == '__main__':

@@ -16,10 +16,14 @@ class LastSent:
     :ivar times: how often frames with new contents have carried each, for whoever waits for one.
     """
 
-    __slots__ = ('parameters', 'raws', 'times')
+    __slots__ = ('_widths', 'parameters', 'raws', 'times')
 
     def __init__(self, parameters: Sequence[Parameter]) -> None:
         self.parameters = tuple(parameters)
+        #: of each: its bits, and the one of them that is the sign, as masks
+        self._widths = [((1 << parameter.type.bits) - 1,
+                         1 << parameter.type.bits - 1 if parameter.type.signed else 0)
+                        for parameter in self.parameters]
         self.raws: tuple[int | None, ...] = ()
         self.times = [0] * len(self.parameters)
         self.clear()
@@ -36,9 +40,9 @@ class LastSent:
         :param first: place of the first of them in ``parameters``.
         """
         end = first + len(words)
-        raws = (*self.raws[:first], *(
-            parameter.raw_from_word(parameter.word_from_raw(word))
-            for parameter, word in zip(self.parameters[first:end], words)), *self.raws[end:])
+        raws = (*self.raws[:first], *[
+            ((word & mask) ^ sign) - sign
+            for (mask, sign), word in zip(self._widths[first:end], words)], *self.raws[end:])
         for place in range(first, min(end, len(self.times))):
             self.times[place] += 1
         if raws != self.raws:

@@ -198,6 +198,13 @@ class Parameter:
         :raises ValueRefused: not finite, wrong type, outside ``minimum..maximum``, or outside
             what the type can represent. Nothing is ever clamped.
         """
+        if self.scaled and type(value) is float:    # nearly all commands; the rest has reasons
+            low, high = self._carried_limits
+            if low <= value <= high:
+                raw = math.floor((value - self.offset) / self.scale + 0.5)
+                least, most = self.raw_limits
+                if least <= raw <= most:
+                    return raw
         if self.type is ParameterType.BOOL:
             if value is True or value is False:
                 return int(value)
@@ -251,6 +258,19 @@ class Parameter:
                 min(high, math.floor(ends[1] + STEP_TOLERANCE)))
 
     @cached_property
+    def _limits(self) -> tuple[float, float]:
+        """The profile's limits, with the slack that rounding needs."""
+        slack = abs(self.scale) * STEP_TOLERANCE
+        return (-math.inf if self.minimum is None else self.minimum - slack,
+                math.inf if self.maximum is None else self.maximum + slack)
+
+    @cached_property
+    def _carried_limits(self) -> tuple[float, float]:
+        """What of that the type can carry."""
+        (low, high), (least, most) = self._limits, self.value_range
+        return max(low, least), min(high, most)
+
+    @cached_property
     def value_range(self) -> tuple[float, float]:
         """Smallest and largest physical value that the type can carry, whatever the limits."""
         first, last = (raw * self.scale + self.offset for raw in self.type.raw_range)
@@ -267,10 +287,8 @@ class Parameter:
 
         :raises ValueRefused: with the range in words.
         """
-        slack = abs(self.scale) * STEP_TOLERANCE
-        below = self.minimum is not None and value < self.minimum - slack
-        above = self.maximum is not None and value > self.maximum + slack
-        if below or above:
+        low, high = self._limits
+        if value < low or value > high:
             raise ValueRefused(f'{value_text(value)} is out of range: {self.range_text}')
 
     @property

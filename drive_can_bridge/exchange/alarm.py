@@ -22,9 +22,9 @@ class Alarm:
         """The next sleep ends at once."""
         return not self._silence.locked()
 
-    def sleep(self, timeout: float) -> None:
-        """Sleep for ``timeout`` s, or until somebody rings."""
-        self._silence.acquire(timeout=max(0.0, timeout))
+    def sleep(self, timeout: float) -> bool:
+        """Sleep for ``timeout`` s, or until somebody rings; tell whether somebody did."""
+        return self._silence.acquire(timeout=timeout if timeout > 0.0 else 0.0)
 
     def ring(self) -> None:
         """Wake the sleeper, or the next one at once. From any thread."""

@@ -258,8 +258,7 @@ class BusExchange:
             now = self._clock()
             session.submit(request, now)
             self._pump(member)
-        if any(each.due < self._wake_at for each in (member, *member.partners)):
-            self._alarm.ring()
+        self._ring_if_sooner(member)
 
     def reconfigure(self, session: Session, **changes: Any) -> None:
         """Change what may change while running (see :meth:`.Session.reconfigure`)."""
@@ -270,6 +269,12 @@ class BusExchange:
 
     def _member(self, session: Session) -> Member:
         return next(member for member in self._members if member.session is session)
+
+    def _ring_if_sooner(self, member: Member) -> None:
+        """Wake the timer thread if a drive, or a partner of it, wants to be served before that."""
+        if member.due < self._wake_at or member.partners and any(
+                partner.due < self._wake_at for partner in member.partners):
+            self._alarm.ring()
 
     # -- the timer thread -------------------------------------------------------------------------
 
@@ -342,8 +347,7 @@ class BusExchange:
                 return
             member.session.receive_frame(frame, now, now - arrived)
             self._pump(member)
-        if any(each.due < self._wake_at for each in (member, *member.partners)):
-            self._alarm.ring()
+        self._ring_if_sooner(member)
 
     def bus_opened(self) -> None:
         """Begin (again) with every drive."""

@@ -9,9 +9,8 @@ the take of as many as can wait (:mod:`.polled_topics`). The subscriptions stand
 group that no executor ever runs.
 """
 
-from collections.abc import Callable
-import math
-from typing import Any
+from collections.abc import Callable, Sequence
+from functools import partial
 
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
@@ -24,6 +23,17 @@ from drive_can_bridge.core.setpoints import CommandOutcome
 from drive_can_bridge.core.words import value_text
 from drive_can_bridge.ros.polled_topics import PolledTopics, Warn
 from drive_can_bridge.ros.values import TOPIC_TYPES
+
+#: what a JointState carries beside names
+QUANTITIES = ('position', 'velocity', 'effort')
+#: one of them, and its values for all joints of a message
+Column = tuple[str, Sequence[float]]
+
+
+def joint_columns(message: JointState) -> list[Column]:
+    """Return what a message carries: an empty array leaves that quantity alone."""
+    return [(quantity, values) for quantity in QUANTITIES
+            if len(values := getattr(message, quantity))]
 
 
 class CommandIntake:
@@ -40,15 +50,20 @@ class CommandIntake:
         self._warn = warn
         self._inform = inform
         self._told: set[str] = set()
-        self._drive = drive
+        self._joint = joint = drive.joint
         self._topics = PolledTopics(node, warn, self.refuse)
-        self._index = {setpoint.parameter.name: index
-                       for index, setpoint in enumerate(session.setpoints.items)}
+        #: by quantity of the joint: which setpoint, SI units per unit of it, whether an integer
+        self._joint_targets: dict[str, tuple[int, float, bool]] = {}
         try:
-            for name, index in self._index.items():
-                kind = session.setpoints.items[index].parameter.kind
-                self._topics.subscribe(TOPIC_TYPES[kind], f'~/command/{name}', self._taker(index))
-            if drive.joint is not None:
+            for index, setpoint in enumerate(session.setpoints.items):
+                name, kind = setpoint.parameter.name, setpoint.parameter.kind
+                self._topics.subscribe(TOPIC_TYPES[kind], f'~/command/{name}',
+                                       partial(self._command, index))
+                for quantity in QUANTITIES if joint is not None else ():
+                    if joint is not None and getattr(joint, f'{quantity}_command') == name:
+                        self._joint_targets[quantity] = (
+                            index, joint.factors[name], kind is ValueKind.INTEGER)
+            if joint is not None:
                 self._topics.subscribe(JointState, '~/joint_command', self._take_joint)
         except BaseException:
             self.destroy()
@@ -78,9 +93,6 @@ class CommandIntake:
 
     # -- inside -----------------------------------------------------------------------------------
 
-    def _taker(self, index: int) -> Callable[[Any, float], None]:
-        return lambda value, now: self._command(index, value, now)
-
     def _command(self, index: int, value: Value, now: float) -> None:
         session = self._session
         try:
@@ -102,7 +114,7 @@ class CommandIntake:
                        f'once first')
 
     def _take_joint(self, message: JointState, now: float) -> None:
-        joint = self._drive.joint
+        joint = self._joint
         if joint is None:
             return
         try:
@@ -112,40 +124,33 @@ class CommandIntake:
             self._warn('joint name', f'joint_command without an entry named {joint.name}',
                        once=True)
             return
-        self.take_entry(message, entry, now)
+        self.take_entry(joint_columns(message), entry, now)
 
-    def take_entry(self, message: JointState, entry: int, now: float) -> None:
+    def take_entry(self, columns: Sequence[Column], entry: int, now: float) -> None:
         """Take one joint's part of a message."""
-        joint = self._drive.joint
-        if joint is None:
-            return
-        for quantity, values, target in (
-                ('position', message.position, joint.position_command),
-                ('velocity', message.velocity, joint.velocity_command),
-                ('effort', message.effort, joint.effort_command)):
-            if not len(values) or entry < len(values) and math.isnan(values[entry]):
-                continue
+        for quantity, values in columns:
+            if entry < len(values):
+                value = values[entry]
+                if value != value:      # NaN: left alone
+                    continue
+            target = self._joint_targets.get(quantity)
             if target is None:
-                if quantity not in self._told:
-                    self._told.add(quantity)
-                    self._inform(f'joint_command has a {quantity}, which is ignored: '
-                                 f'joint.{quantity}_command is not configured')
+                self._tell_ignored(quantity)
             elif entry >= len(values):
                 self.refuse(f'joint {quantity}',
                             f'joint_command has fewer {quantity} values than names')
             else:
-                self._command_joint(target, values[entry], now)
+                index, factor, integer = target
+                physical: Value = value / factor
+                if integer:
+                    physical = round(physical) if abs(physical) < 1e15 else physical
+                self._command(index, physical, now)
 
-    def _command_joint(self, name: str, value: float, now: float) -> None:
-        joint = self._drive.joint
-        index = self._index[name]
-        parameter = self._session.setpoints.items[index].parameter
-        if joint is None:
-            return
-        physical: Value = value / joint.factors[name]
-        if parameter.kind is ValueKind.INTEGER:
-            physical = round(physical) if abs(physical) < 1e15 else physical
-        self._command(index, physical, now)
+    def _tell_ignored(self, quantity: str) -> None:
+        if quantity not in self._told:
+            self._told.add(quantity)
+            self._inform(f'joint_command has a {quantity}, which is ignored: '
+                         f'joint.{quantity}_command is not configured')
 
     def refuse(self, topic: str, text: str) -> None:
         """Count and tell a command that is thrown away."""

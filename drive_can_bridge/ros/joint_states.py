@@ -11,6 +11,7 @@ A joint whose drive is not online is left out: nobody is told a position that no
 
 from collections.abc import Sequence
 from functools import partial
+from itertools import chain
 import math
 from typing import Any, NamedTuple
 
@@ -20,20 +21,23 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
 from drive_can_bridge.core.configuration import JointConfiguration
+from drive_can_bridge.ros.commands import QUANTITIES
 from drive_can_bridge.ros.drive_node import DriveNode
+from drive_can_bridge.ros.event_topic import COUNT_PERIOD
 from drive_can_bridge.ros.prepared import PreparedMessage
 from drive_can_bridge.ros.quality import overriding, state_quality
 from drive_can_bridge.ros.stamps import Stamps
+from drive_can_bridge.transport.clock import steady_now
 
 RCLError = rclpy_implementation.RCLError
 
 TOPIC = '~/joint_states'
-QUANTITIES = ('position', 'velocity', 'effort')
 
 
-class _Value(NamedTuple):
-    """One quantity of one joint: its slot in a sample, and the way to its SI value."""
+class _Cell(NamedTuple):
+    """One number of the message: whose sample it is in, where in it, and the way to SI units."""
 
+    row: int
     slot: int
     scale: float
     offset: float
@@ -44,35 +48,28 @@ class _Joint:
     """
     A joint that is measured.
 
-    :ivar values: for each quantity of the bridge what it is; None: this joint lacks it.
+    :ivar width: how many values of a sample it looks at.
     """
 
-    def __init__(self, drive: DriveNode, joint: JointConfiguration,
-                 quantities: Sequence[str]) -> None:
-        self.drive = drive
+    def __init__(self, drive: DriveNode, joint: JointConfiguration) -> None:
+        self.session = drive.session
+        self.samples = drive.samples
         self.name = joint.name
         parameters = {parameter.name: (slot, parameter) for slot, parameter
                       in enumerate(drive.session.sample_parameters)}
-        self.values: list[_Value | None] = []
-        for quantity in quantities:
+        self._places: dict[str, tuple[int, float, float, float]] = {}
+        for quantity in QUANTITIES:
             name = getattr(joint, quantity)
-            if name is None:
-                self.values.append(None)
-                continue
-            slot, parameter = parameters[name]
-            linear = (parameter.scale, parameter.offset) if parameter.scaled else (1.0, 0.0)
-            self.values.append(_Value(slot, *linear, joint.factors[name]))
+            if name is not None:
+                slot, parameter = parameters[name]
+                linear = (parameter.scale, parameter.offset) if parameter.scaled else (1.0, 0.0)
+                self._places[quantity] = (slot, *linear, joint.factors[name])
+        self.width = 1 + max(slot for slot, *_ in self._places.values())
 
-    def measured(self, raws: tuple[int, ...]) -> list[float]:
-        """Return what a sample says, NaN where it says nothing."""
-        found = []
-        for value in self.values:
-            if value is None or value[0] >= len(raws):
-                found.append(math.nan)
-            else:
-                slot, scale, offset, factor = value
-                found.append((raws[slot] * scale + offset) * factor)
-        return found
+    def cell(self, quantity: str, row: int) -> _Cell:
+        """Return where a quantity is when the sample is in this row; NaN: this joint lacks it."""
+        slot, scale, offset, factor = self._places.get(quantity, (0, math.nan, 0.0, 1.0))
+        return _Cell(row, slot, scale, offset, factor)
 
 
 class JointStates:
@@ -87,20 +84,27 @@ class JointStates:
         self._quantities = [quantity for quantity in QUANTITIES if any(
             joint is not None and getattr(joint, quantity) for _, joint in joints)]
         self._joints = [
-            _Joint(drive, joint, self._quantities) for drive, joint in joints
+            _Joint(drive, joint) for drive, joint in joints
             if joint is not None and any(getattr(joint, each) for each in QUANTITIES)]
         self._node = node
         self._stamps = Stamps(node.get_clock())
         self.publisher = node.create_publisher(
             JointState, TOPIC, state_quality(), qos_overriding_options=overriding(node, TOPIC))
-        self._names: list[str] = []
+        self._present: list[_Joint] = []
+        self._columns: list[list[_Cell]] = []
         self._message = JointState()
         self._prepared: PreparedMessage | None = None
+        self._count_at = 0.0
+        self._wanted = False
 
     def publish(self) -> None:
         """Publish what is known now, if anything is and somebody listens."""
         try:
-            if self.publisher.get_subscription_count():
+            now = steady_now()
+            if now >= self._count_at:
+                self._count_at = now + COUNT_PERIOD
+                self._wanted = bool(self.publisher.get_subscription_count())
+            if self._wanted:
                 self._publish()
         except (InvalidHandle, RCLError):
             if self._node.context.ok():
@@ -111,39 +115,46 @@ class JointStates:
         self._node.destroy_publisher(self.publisher)
 
     def _publish(self) -> None:
-        names: list[str] = []
-        rows: list[list[float]] = []
+        present: list[_Joint] = []
+        rows: list[tuple[float, ...]] = []
         oldest = math.inf
         for joint in self._joints:
-            last = joint.drive.samples.last
-            if last is None or not joint.drive.session.online:
+            last = joint.samples.last
+            if last is None or not joint.session.online:
                 continue
-            raws, received_at = last
-            names.append(joint.name)
-            rows.append(joint.measured(raws))
-            oldest = min(oldest, received_at)
-        if not names:
+            received_at = last[1]
+            raws: tuple[float, ...] = last[0]
+            if len(raws) < joint.width:     # a short response: what has not arrived is not known
+                raws += (math.nan,) * (joint.width - len(raws))
+            present.append(joint)
+            rows.append(raws)
+            if received_at < oldest:
+                oldest = received_at
+        if not present:
             return
-        if names != self._names:
-            self._prepare(names)
-        columns = list(zip(*rows))
-        numbers: list[Any] = [*self._stamps.at(oldest), *columns]
+        if present != self._present:
+            self._prepare(present)
+        columns = [[(rows[row][slot] * scale + offset) * factor
+                    for row, slot, scale, offset, factor in column] for column in self._columns]
+        stamp = self._stamps.at(oldest)
         if self._prepared is not None:
-            self._prepared.publish(numbers)
+            self._prepared.publish([*stamp, *chain.from_iterable(columns)])
             return
         message = self._message
-        message.header.stamp.sec, message.header.stamp.nanosec = numbers[:2]
-        for quantity, column in zip(self._quantities, columns):
-            setattr(message, quantity, column)
+        message.header.stamp.sec, message.header.stamp.nanosec = stamp
+        for quantity, values in zip(self._quantities, columns):
+            setattr(message, quantity, values)
         self.publisher.publish(message)
 
-    def _prepare(self, names: list[str]) -> None:
+    def _prepare(self, present: list[_Joint]) -> None:
         """Prepare the message for these joints: others than before are online."""
-        self._names = names
-        message = self._message = JointState(name=names)
+        self._present = present
+        self._columns = [[joint.cell(quantity, row) for row, joint in enumerate(present)]
+                         for quantity in self._quantities]
+        message = self._message = JointState(name=[joint.name for joint in present])
         stamp = message.header.stamp
         numbers: list[Any] = [('i', partial(setattr, stamp, 'sec')),
                               ('I', partial(setattr, stamp, 'nanosec'))]
-        numbers += [(f'{len(names)}d', partial(setattr, message, quantity))
+        numbers += [(f'{len(present)}d', partial(setattr, message, quantity))
                     for quantity in self._quantities]
         self._prepared = PreparedMessage.find(self.publisher, message, numbers)

@@ -7,16 +7,16 @@ because each bus has a thread that takes commands just before its cycles; what c
 of other buses is left to theirs.
 """
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.text import printable
-from drive_can_bridge.ros.commands import CommandIntake
+from drive_can_bridge.ros.commands import Column, CommandIntake, joint_columns
 from drive_can_bridge.ros.drive_node import DriveNode
-from drive_can_bridge.ros.joint_states import JointStates, QUANTITIES
+from drive_can_bridge.ros.joint_states import JointStates
 from drive_can_bridge.ros.log import Log
 from drive_can_bridge.ros.periodic_thread import PeriodicThread
 from drive_can_bridge.ros.polled_topics import PolledTopics
@@ -108,32 +108,37 @@ class _Taker:
         self._warn = warn
         self._inform = inform
         self._strangers: set[str] = set()
+        #: names of the last message that was in order, and who takes which entry of such a one
+        self._names: list[str] | None = None
+        self._parts: list[tuple[int, CommandIntake]] = []
 
     def __call__(self, message: JointState, now: float) -> None:
         """Hand each joint its part."""
         names = list(message.name)
-        wrong = self._problem(names, message)
+        columns = joint_columns(message)
+        wrong = self._problem(names, columns)
         if wrong:
             for name in self._joints.keys() & set(names):
                 self._joints[name].count_refused()
             if self._warn is not None:
                 self._warn('joint commands', f'joint_commands refused: {wrong}')
             return
-        for entry, name in enumerate(names):
-            intake = self._joints.get(name)
-            if intake is not None:
-                intake.take_entry(message, entry, now)
-            elif name not in self._known and self._warn is not None:
-                self._tell_stranger(name)
+        if names != self._names:
+            self._names = names
+            self._parts = [(entry, self._joints[name]) for entry, name in enumerate(names)
+                           if name in self._joints]
+            for name in names:
+                if name not in self._known and self._warn is not None:
+                    self._tell_stranger(name)
+        for entry, intake in self._parts:
+            intake.take_entry(columns, entry, now)
 
-    @staticmethod
-    def _problem(names: list[str], message: JointState) -> str:
-        for quantity in QUANTITIES:
-            count = len(getattr(message, quantity))
-            if count not in (0, len(names)):
-                return (f'{count} {quantity} values for {len(names)} names; allowed are as many '
-                        f'as names, with NaN for joints that are to be left alone, or none')
-        if len(set(names)) != len(names):
+    def _problem(self, names: list[str], columns: Sequence[Column]) -> str:
+        for quantity, values in columns:
+            if len(values) != len(names):
+                return (f'{len(values)} {quantity} values for {len(names)} names; allowed are as '
+                        f'many as names, with NaN for joints that are to be left alone, or none')
+        if names != self._names and len(set(names)) != len(names):
             twice = next(name for name in names if names.count(name) > 1)
             return f'{printable(twice)} stands twice, allowed is once'
         return ''

@@ -4,7 +4,8 @@
 from collections.abc import Callable
 import threading
 
-from drive_can_bridge.transport.link import steady_now
+from drive_can_bridge.exchange.alarm import Alarm
+from drive_can_bridge.transport.clock import steady_now
 
 
 class PeriodicThread:
@@ -23,7 +24,7 @@ class PeriodicThread:
         self._period = period
         self._action = action
         self._failed = failed
-        self._changed = threading.Event()
+        self._changed = Alarm()     # an Event costs more than many an action
         self._ending = False
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
 
@@ -34,20 +35,19 @@ class PeriodicThread:
     def set_period(self, period: float) -> None:
         """Begin anew with another period, in s."""
         self._period = period
-        self._changed.set()
+        self._changed.ring()
 
     def stop(self) -> None:
         """End, and wait for a call that is under way."""
         self._ending = True
-        self._changed.set()
+        self._changed.ring()
         if self._thread.is_alive() and self._thread is not threading.current_thread():
             self._thread.join(timeout=5.0)
 
     def _run(self) -> None:
         due = steady_now() + self._period
         while not self._ending:
-            if self._changed.wait(max(0.0, due - steady_now())):
-                self._changed.clear()
+            if self._changed.sleep(due - steady_now()):
                 due = steady_now() + self._period
                 continue
             try:

@@ -33,26 +33,29 @@ ROW = 1000
 #: how a number of each kind stands in a message; a bool is no number
 NUMBER_CODES = {ValueKind.DOUBLE: 'd', ValueKind.INTEGER: 'q'}
 #: struct code of a number, and what puts it into the message; ``15d`` is that many in a row, which
-#: are put and published as a list
+#: are put as a list and published as so many numbers
 Number = tuple[str, Callable[[Any], object]]
 
 
 class PreparedMessage:
     """
-    The bytes of one message and the places of its numbers. Not to be used by two threads at once.
+    The bytes of one message, in which numbers change. Not to be used by two threads at once.
 
-    :param places: for each number, what packs it into a buffer, and its offset.
+    One ``struct`` makes all of them: what is constant goes into it as byte strings, in turn with
+    the numbers.
+
+    :param layout: of the whole message.
+    :param parts: what it packs, in turn a byte string and a number, a byte string at the end.
     """
 
-    __slots__ = ('_buffer', '_places', '_publish')
+    __slots__ = ('_pack', '_parts', '_publish')
 
-    def __init__(self, publisher: Publisher, buffer: bytearray,
-                 places: list[tuple[Callable[..., None], int]]) -> None:
+    def __init__(self, publisher: Publisher, layout: struct.Struct, parts: list[Any]) -> None:
         # the way to the handle through ``Publisher.publish`` costs more than the handing over; a
         # destroyed publisher raises RCLError
         self._publish: Callable[[bytes], None] = publisher.handle.publish_raw
-        self._buffer = buffer
-        self._places = places
+        self._pack = layout.pack
+        self._parts = parts
 
     @classmethod
     def find(cls, publisher: Publisher, message: Any,
@@ -60,19 +63,17 @@ class PreparedMessage:
         """
         Prepare ``message``, whose ``numbers`` change; None when they are not found in its bytes.
 
-        The message is left with arbitrary numbers in it.
+        They have to be given in the order in which the message has them. The message is left with
+        arbitrary numbers in it.
         """
         markers = [_marker(code, index) for index, (code, _) in enumerate(numbers)]
         for (_, put), marker in zip(numbers, markers):
             put(marker)
         data = serialize_message(message)
         for order in '<>':
-            wanted = [_packer(order + code)(marker)
-                      for (code, _), marker in zip(numbers, markers)]
-            if all(data.count(part) == 1 for part in wanted):
-                return cls(publisher, bytearray(data), [
-                    (_filler(order + code), data.index(part))
-                    for (code, _), part in zip(numbers, wanted)])
+            found = _found(data, order, [code for code, _ in numbers], markers)
+            if found is not None:
+                return cls(publisher, *found)
         return None
 
     def publish(self, numbers: Sequence[Any]) -> None:
@@ -81,10 +82,9 @@ class PreparedMessage:
 
         :raises RCLError: the publisher, or the context, is gone.
         """
-        buffer = self._buffer
-        for (pack_into, offset), number in zip(self._places, numbers):
-            pack_into(buffer, offset, number)
-        self._publish(bytes(buffer))
+        parts = self._parts
+        parts[1::2] = numbers
+        self._publish(self._pack(*parts))
 
 
 def _marker(code: str, index: int) -> Any:
@@ -93,15 +93,18 @@ def _marker(code: str, index: int) -> Any:
     return _MARKERS[code] + type(_MARKERS[code])(index)
 
 
-def _packer(code: str) -> Callable[[Any], bytes]:
-    """Return what packs a number, or a row of them."""
-    pack = struct.Struct(code).pack
-    return (lambda row: pack(*row)) if len(code) > 2 else pack
-
-
-def _filler(code: str) -> Callable[..., None]:
-    """Return what packs a number, or a row of them, into a buffer at an offset."""
-    pack_into = struct.Struct(code).pack_into
-    if len(code) == 2:
-        return pack_into
-    return lambda buffer, offset, row: pack_into(buffer, offset, *row)
+def _found(data: bytes, order: str, codes: Sequence[str],
+           markers: Sequence[Any]) -> tuple[struct.Struct, list[Any]] | None:
+    """Return layout and parts of a message with these markers in it; None: they are not there."""
+    layout, parts, end = order, [], 0
+    for code, marker in zip(codes, markers):
+        row = marker if isinstance(marker, list) else [marker]
+        wanted = struct.pack(order + code, *row)
+        place = data.find(wanted)
+        if data.count(wanted) != 1 or place < end:
+            return None
+        for number in row:
+            layout += f'{place - end}s{code[-1]}'
+            parts += [data[end:place], number]
+            end = place = place + struct.calcsize(order + code[-1])
+    return struct.Struct(f'{layout}{len(data) - end}s'), [*parts, data[end:]]

@@ -19,14 +19,11 @@ from std_msgs.msg import Bool
 
 from drive_can_bridge.core.configuration import DriveConfiguration, JointConfiguration
 from drive_can_bridge.core.parameters import Parameter, Value
-from drive_can_bridge.ros.event_topic import EventTopic
+from drive_can_bridge.ros.event_topic import COUNT_PERIOD, EventTopic
 from drive_can_bridge.ros.prepared import NUMBER_CODES, PreparedMessage
 from drive_can_bridge.ros.quality import latched_quality, overriding, state_quality
 from drive_can_bridge.ros.stamps import Stamp
 from drive_can_bridge.ros.values import converters, TOPIC_TYPES
-
-#: s between two looks at who subscribes
-COUNT_PERIOD = 0.1
 
 
 class ValueTopic:

@@ -1,6 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """From the steady clock of the exchange to the stamps of ROS messages."""
 
+import math
 import time
 
 from rclpy.clock import Clock, ROSClock
@@ -10,6 +11,8 @@ from drive_can_bridge.transport.clock import steady_now
 #: s that two looks at clocks may be apart, and how often it is tried
 APART_MAX = 0.0001
 ATTEMPTS = 3
+#: s between two looks at which time it is: simulated or not
+LOOK_PERIOD = 0.1
 #: seconds and nanoseconds, as ``builtin_interfaces/Time`` has them
 Stamp = tuple[int, int]
 
@@ -19,13 +22,17 @@ class Stamps:
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
+        self._simulated = False
+        self._look_at = -math.inf
 
     def at(self, received_at: float) -> Stamp:
         """Return the stamp of a moment of the steady clock. Simulated time only knows "now"."""
-        if isinstance(self._clock, ROSClock) and self._clock.ros_time_is_active:
-            nanoseconds = self._clock.now().nanoseconds
-        else:
-            nanoseconds = self._at(received_at)
+        if received_at >= self._look_at:
+            self._look_at = received_at + LOOK_PERIOD
+            self._simulated = (isinstance(self._clock, ROSClock)
+                               and self._clock.ros_time_is_active)
+        nanoseconds = (self._clock.now().nanoseconds if self._simulated
+                       else self._at(received_at))
         return divmod(nanoseconds, 1_000_000_000)
 
     @staticmethod

@@ -181,6 +181,27 @@ def test_what_is_sent_is_within_the_limits(
     assert abs(sent - value) < abs(scale) + tolerance
 
 
+class Slow(float):
+    """A number that is not taken the short way."""
+
+
+@given(st.one_of(st.floats(), st.floats(-1e5, 1e5)),
+       st.one_of(st.none(), st.floats(-1e5, 0.0)), st.one_of(st.none(), st.floats(0.0, 1e5)),
+       st.sampled_from([0.1, 0.3, -0.3, 7.0, -1e4, 1e-300]), st.sampled_from([0.0, -40.0, 1e9]),
+       st.sampled_from([INT16, UINT16, INT32, ParameterType.BOOL]))
+def test_the_short_way_says_the_same(
+        value: float, low: float | None, high: float | None, scale: float, offset: float,
+        kind: ParameterType) -> None:
+    entry = parameter('any', 1, type=kind, scale=scale, offset=offset, minimum=low, maximum=high)
+
+    def said(number: float) -> object:
+        try:
+            return entry.raw_from_value(number)
+        except ValueRefused as error:
+            return str(error)
+    assert said(value) == said(Slow(value))
+
+
 def test_limits_without_a_value_between_them() -> None:
     entry = parameter('gap', 1, scale=10.0, minimum=1.0, maximum=9.0, unit='V')
     assert entry.raw_limits == (1, 0)

@@ -10,7 +10,7 @@ def test_ring_before_the_sleep_is_kept() -> None:
     alarm = Alarm()
     alarm.ring()
     assert alarm.ringing
-    alarm.sleep(3600.0)
+    assert alarm.sleep(3600.0), 'somebody rang'
     assert not alarm.ringing
 
 
@@ -25,8 +25,8 @@ def test_several_rings_count_once() -> None:
 
 def test_sleep_ends_by_itself_even_when_its_time_is_over() -> None:
     alarm = Alarm()
-    alarm.sleep(-1.0)
-    alarm.sleep(0.001)
+    assert not alarm.sleep(-1.0)
+    assert not alarm.sleep(0.001)
     assert not alarm.ringing
 
 

@@ -60,12 +60,12 @@ def test_no_burst_after_standing_still(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 class _Jumps:
-    """An event for which nobody waits in vain: each wait lets the clock jump."""
+    """An alarm that nobody rings: each sleep lets the clock jump."""
 
     def __init__(self, clock: list[float], jumps: list[float], thread: PeriodicThread) -> None:
         self._clock, self._jumps, self._thread = clock, jumps, thread
 
-    def wait(self, timeout: float) -> bool:
+    def sleep(self, timeout: float) -> bool:
         self._clock[0] += self._jumps.pop(0)
         self._thread._ending = not self._jumps
         return False

@@ -87,6 +87,29 @@ def test_joint_states(client: Client) -> None:
     assert (one.header.stamp.sec, one.header.stamp.nanosec) == (1, 2)
 
 
+def test_rows_of_numbers(client: Client) -> None:
+    names = ['a', 'bc', 'def']
+    message = JointState(name=names)
+    numbers = [('i', partial(setattr, message.header.stamp, 'sec')),
+               ('I', partial(setattr, message.header.stamp, 'nanosec')),
+               ('3d', partial(setattr, message, 'position')),
+               ('3d', partial(setattr, message, 'effort'))]
+    values = [(1, 2, *range(6)), (3, 4, *(-0.5 * number for number in range(6)))]
+    for one, wanted in zip(received(client, message, numbers, values), values, strict=True):
+        assert (list(one.name), len(one.velocity)) == (names, 0)
+        assert (one.header.stamp.sec, one.header.stamp.nanosec,
+                *one.position, *one.effort) == wanted
+
+
+def test_numbers_in_another_order_are_not_prepared(client: Client) -> None:
+    message = JointState()
+    publisher = client.node.create_publisher(JointState, '/nothing_joint', 1)
+    assert PreparedMessage.find(publisher, message, [
+        ('I', partial(setattr, message.header.stamp, 'nanosec')),
+        ('i', partial(setattr, message.header.stamp, 'sec'))]) is None
+    client.node.destroy_publisher(publisher)
+
+
 def test_what_is_not_found_is_not_prepared(client: Client) -> None:
     publisher = client.node.create_publisher(Bool, '/nothing_bool', 1)
     assert PreparedMessage.find(publisher, Bool(), [('d', lambda _: None)]) is None
