@@ -4,6 +4,7 @@
 from collections.abc import Callable, Iterator
 from pathlib import Path
 import shutil
+import signal
 import socket
 import subprocess
 import time
@@ -141,6 +142,71 @@ def test_it_fits_what_a_bridge_has(run: Run, tmp_path: Path) -> None:
     finally:
         node.destroy_node()
         context.try_shutdown()
+
+
+def test_it_fits_what_clients_do(run: Run, tmp_path: Path) -> None:
+    rclpy = pytest.importorskip('rclpy')
+    pytest.importorskip('nicegui', reason="needs the extra 'panel'")
+    from rclpy.context import Context
+    policy = written(tmp_path)
+    links, file = tmp_path / 'links', str(tmp_path / 'drives.yaml')
+    run('drive_can', 'simulate', '--params-file', file, '--pty-link', str(links))
+    wait_for((links / 'main').is_symlink, 'the drives')
+    run('drive_can_bridge', '--ros-args', '--params-file', file, '-p',
+        f'buses.main.channel:={links / "main"}')
+    context = Context()
+    rclpy.init(context=context)
+    node = rclpy.create_node('looks', context=context)
+    # which enclave each may run in, and what its nodes have done in turn
+    done: dict[str, dict[tuple[str, str], set[str]]] = {}
+    looks = {('topics', 'publish'): node.get_publisher_names_and_types_by_node,
+             ('topics', 'subscribe'): node.get_subscriber_names_and_types_by_node,
+             ('services', 'reply'): node.get_service_names_and_types_by_node,
+             ('services', 'request'): node.get_client_names_and_types_by_node}
+
+    def note(enclave: str) -> set[str]:
+        """Look what the clients that are there have; return what they have had so far."""
+        found = done.setdefault(enclave, {way: set() for way in looks})
+        for name, place in node.get_node_names_and_namespaces():
+            if name.startswith('_drive_can_'):
+                for way, look in looks.items():
+                    try:
+                        # of its own services each node may have some, by a pattern
+                        found[way] |= {each.replace(f'/{name}/', '/_drive_can_*/')
+                                       for each, _ in look(name, place)}
+                    except rclpy.node.NodeNameNonExistentError:  # it has just ended
+                        pass
+        return set().union(*found.values())
+
+    def gone() -> bool:
+        return not any(name.startswith('_drive_can_') for name in node.get_node_names())
+    try:
+        monitor = run('drive_can', 'monitor')
+        monitor.line('^conveyor online')
+        wait_for(lambda: {'/conveyor/response', '/lift/online', '/rosout'} <= note('/viewer'),
+                 'what the monitor subscribes to')
+        assert monitor.end(signal.SIGINT) == 0
+        wait_for(gone, 'the end of the monitor')
+        for enclave, words in (('/viewer', ('read', 'conveyor')),
+                               ('/operator', ('write', 'conveyor', 'ramp_time=2'))):
+            command = run('drive_can', *words)
+            wait_for(lambda: note(enclave) and command.process.poll() is not None,  # noqa: B023
+                     'the end of the command')
+            assert command.process.returncode == 0, command.errors
+            wait_for(gone, 'the end of its node')
+        panel = run('drive_can', 'panel', '--port', '0')
+        panel.line('^viewer: ')
+        wait_for(lambda: {'/lift/enable', '/lift/quick_stop', '/diagnostics'} <= note('/operator'),
+                 'what the panel asks')
+        assert panel.end(signal.SIGINT) == 0
+    finally:
+        node.destroy_node()
+        context.try_shutdown()
+    for enclave, found in done.items():
+        for (kind, verb), names in found.items():
+            assert names - allowed(policy, enclave, kind, verb) == set(), (enclave, kind, verb)
+    assert '/conveyor/get_parameters' in done['/viewer']['services', 'request']
+    assert '/conveyor/set_parameters' in done['/operator']['services', 'request']
 
 
 @pytest.mark.parametrize(('arguments', 'code', 'words'), [

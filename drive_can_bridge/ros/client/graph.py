@@ -36,8 +36,9 @@ _CALL_TIMEOUT = 120.0
 #: s without the server until it has gone
 _GONE = 2.0
 
+WRITING = 'set_parameters'
 SERVICES: dict[str, Any] = {
-    'get_parameters': GetParameters, 'set_parameters': SetParameters,
+    'get_parameters': GetParameters, WRITING: SetParameters,
     'list_parameters': ListParameters, 'describe_parameters': DescribeParameters}
 
 
@@ -133,9 +134,10 @@ class Graph:
         key = node, service
         if key not in self._clients:
             self._known.discard(node)
-            for name, service_type in SERVICES.items():     # all that may ever be wanted
-                self._clients.setdefault((node, name), self.node.create_client(
-                    service_type, f'{node}/{name}', qos_profile=qos_profile_parameters))
+            # all that may be wanted by whoever reads; what writes is not for everybody (SROS2)
+            for name in ({service} if service == WRITING else SERVICES.keys() - {WRITING}):
+                self._clients[node, name] = self.node.create_client(
+                    SERVICES[name], f'{node}/{name}', qos_profile=qos_profile_parameters)
         return self._clients[key]
 
     def _acquaint(self, node: str) -> None:
