@@ -24,6 +24,7 @@ from drive_can_bridge.process.standard_error import StandardError
 from drive_can_bridge.ros import bridge_node
 from drive_can_bridge.ros.bridge_node import BridgeNode
 from drive_can_bridge.ros.executor_thread import ExecutorThread
+from drive_can_bridge.ros.middleware import begin_with_small_histories
 
 ONLINE_TIMEOUT = 30.0
 #: s until something that is not to happen
@@ -133,6 +134,7 @@ def main() -> None:
     """Obey."""
     register()
     be_punctual()
+    begin_with_small_histories()
     if 'ordinary' in sys.argv[2:]:
         bridge_node.raise_priority = lambda: 'no real-time priority: so asked for'
     level = 'error'

@@ -52,6 +52,8 @@ def _main(watcher: SignalWatcher, arguments: list[str]) -> int:
     from rclpy.signals import SignalHandlerOptions
     from rclpy.utilities import remove_ros_args
 
+    from drive_can_bridge.ros.middleware import begin_with_small_histories
+
     try:
         with _quiet_rcl():
             rest = remove_ros_args(arguments)[1:]
@@ -65,6 +67,7 @@ def _main(watcher: SignalWatcher, arguments: list[str]) -> int:
         print(f'drive_can_bridge: {rest[0]}: only ROS arguments are taken '
               f'(drive_can_bridge --ros-args --params-file FILE)', file=sys.stderr)
         return 2
+    begin_with_small_histories()
     try:
         with _quiet_rcl():
             rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)

@@ -1,0 +1,66 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Memory of the middleware."""
+
+import os
+from pathlib import Path
+import subprocess
+import sys
+
+import pytest
+from rclpy.utilities import get_rmw_implementation_identifier
+
+from drive_can_bridge.resources import config_file
+from drive_can_bridge.ros.middleware import begin_with_small_histories, FILES, VARIABLES
+
+#: prints by how many kB services let a process grow
+GROWTH = """
+from pathlib import Path
+import os, rclpy
+from rcl_interfaces.srv import GetParameters
+from rclpy.node import Node
+def resident():
+    return int(Path('/proc/self/status').read_text().split('VmRSS:')[1].split()[0])
+rclpy.init(args=[])
+node = Node('growth', enable_rosout=False, start_parameter_services=False)
+services = []
+for number in range(41):
+    services.append(node.create_service(GetParameters, f'~/s{number}', lambda _, answer: answer))
+    before = before if number else resident()
+print(resident() - before, flush=True)
+os._exit(0)
+"""
+
+
+def growth(**environment: str) -> float:
+    """Return how many kB 40 services take; Fast DDS must have nothing to complain about."""
+    clean = {name: value for name, value in os.environ.items() if name not in VARIABLES}
+    run = subprocess.run([sys.executable, '-c', GROWTH], capture_output=True, text=True,
+                         timeout=120, check=True, env={**clean, **environment})
+    assert not run.stderr
+    return float(run.stdout)
+
+
+def test_small_histories_save_half_of_the_memory() -> None:
+    if 'fastrtps' not in get_rmw_implementation_identifier():
+        pytest.skip('another middleware')
+    environment: dict[str, str] = {}
+    begin_with_small_histories(environment)
+    assert environment == {VARIABLES[0]: str(config_file('fastdds/histories.xml'))}
+    assert growth(**environment) < 0.7 * growth()
+
+
+@pytest.mark.parametrize('name', VARIABLES)
+def test_profiles_of_somebody_else_are_left_alone(name: str) -> None:
+    environment = {name: '/my/profiles.xml'}
+    begin_with_small_histories(environment)
+    assert environment == {name: '/my/profiles.xml'}
+
+
+@pytest.mark.parametrize('name', FILES)
+def test_a_file_in_the_working_directory_counts_too(
+        name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / name).touch()
+    monkeypatch.chdir(tmp_path)
+    environment: dict[str, str] = {}
+    begin_with_small_histories(environment)
+    assert not environment
