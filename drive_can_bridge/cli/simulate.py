@@ -54,8 +54,8 @@ def add_parser(subparsers: Any) -> None:
                                             "file's")
     parser.add_argument('--channel', help="channel for all buses, instead of the file's")
     parser.add_argument('--bitrate', type=_bitrate, metavar='B',
-                        help="bit/s of all buses, instead of the file's; on a pseudo-terminal, who "
-                             'sets another one then is as good as not connected')
+                        help="bit/s of all buses, instead of the file's; whoever sets another one "
+                             'on a pseudo-terminal then hears nothing')
     parser.add_argument('--pty', action='store_true',
                         help='a pseudo-terminal per bus, which behaves like an SLCAN adapter')
     parser.add_argument('--pty-link', metavar='DIR', type=Path,

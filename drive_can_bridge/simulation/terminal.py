@@ -38,7 +38,7 @@ class SlcanTerminal(EndPoint):
     """
     A bus end point on a pseudo-terminal. One thread may receive while others send.
 
-    :param bitrate: of the bus, bit/s: for a client that sets another one nothing passes; None: any.
+    :param bitrate: of the bus, bit/s: a client that sets another hears nothing; None: any.
     :ivar path: the device that a client opens.
     :ivar dropped: frames lost because nobody read them.
     :raises BusUnavailable: the system has no pseudo-terminal left.
