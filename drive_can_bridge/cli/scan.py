@@ -169,7 +169,7 @@ def _tell_trouble(survey: Survey, port: EndPoint, *, asked: bool) -> None:
         complain(f'the controller of this adapter is {port.controller}')
     if survey.trouble:
         complain(f'{survey.trouble}: check power, cable, termination and bit rate')
-    elif not survey.frames:
+    elif not survey.frames and not port.error_frames:
         complain('nothing was heard: ' + (
             'no drive answers at this bit rate; check power, cable and termination, try '
             '--bitrates, and --protocols for drives with 11-bit identifiers' if asked else

@@ -20,7 +20,7 @@ import time
 from typing import Any, TextIO, TypeVar
 
 from drive_can_bridge.core.configuration import BridgeConfiguration, BusConfiguration
-from drive_can_bridge.core.errors import ConfigurationError, TransportError, ValueRefused
+from drive_can_bridge.core.errors import TransportError, ValueRefused
 from drive_can_bridge.simulation.console import Console, describe, help_lines, LineReader
 from drive_can_bridge.simulation.faults import Fault, parse_fault
 from drive_can_bridge.simulation.plant import Mechanics
@@ -53,6 +53,9 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument('--interface', help='python-can interface for all buses, instead of the '
                                             "file's")
     parser.add_argument('--channel', help="channel for all buses, instead of the file's")
+    parser.add_argument('--bitrate', type=_bitrate, metavar='B',
+                        help="bit/s of all buses, instead of the file's; whoever sets another one "
+                             'on a pseudo-terminal then hears nothing')
     parser.add_argument('--pty', action='store_true',
                         help='a pseudo-terminal per bus, which behaves like an SLCAN adapter')
     parser.add_argument('--pty-link', metavar='DIR', type=Path,
@@ -74,31 +77,33 @@ def run(args: argparse.Namespace) -> int:
     Simulate until a signal.
 
     :return: 0 after SIGINT or SIGTERM, 1 failure, 2 wrong usage; one line on standard error each.
+    :raises ConfigurationError: the file has problems.
+    :raises OSError: a file cannot be read, or written.
     """
     try:
         pty = args.pty or args.pty_link is not None
         if pty and (args.interface or args.channel):
             raise _WrongUsage('--pty and --interface/--channel exclude each other')
-        configuration = _on_buses(_load(args.params_file), args.interface, args.channel)
+        configuration = _on_buses(_load(args.params_file), args.interface, args.channel,
+                                  args.bitrate)
         faults = [_of_drive('--fault', text, configuration, parse_fault) for text in args.fault]
         mechanics = dict(_of_drive('--axis', text, configuration, Mechanics.parse)
                          for text in args.axis)
         with ExitStack() as stack:
             return _simulate(stack, configuration, faults, mechanics, pty=pty,
-                             link=args.pty_link, log_frames=args.log_frames)
+                             link=args.pty_link, log_frames=args.log_frames,
+                             strict=args.bitrate is not None)
     except _WrongUsage as error:
         _complain(str(error))
         return WRONG_USAGE
-    except ConfigurationError as error:
-        print(error, file=sys.stderr)
-    except (TransportError, OSError) as error:
+    except TransportError as error:
         _complain(str(error))
-    return FAILED
+        return FAILED
 
 
 def _simulate(stack: ExitStack, configuration: BridgeConfiguration,
               faults: list[tuple[str, Fault]], mechanics: dict[str, Mechanics], *, pty: bool,
-              link: Path | None, log_frames: Path | None) -> int:
+              link: Path | None, log_frames: Path | None, strict: bool) -> int:
     # before anything is announced: whoever reads the first line may send the signal at once
     wake = stack.enter_context(_signals_as_descriptor())
     output = _Output(sys.stdout)
@@ -117,7 +122,7 @@ def _simulate(stack: ExitStack, configuration: BridgeConfiguration,
             raise _WrongUsage(f'--fault {name}:{fault}: {error}') from None
     for bus in configuration.buses.values():
         if pty:
-            terminals[bus.name] = terminal = SlcanTerminal()
+            terminals[bus.name] = terminal = SlcanTerminal(bus.bitrate if strict else None)
             stack.callback(terminal.close)
             if link is not None:
                 terminal.link(link / bus.name)
@@ -174,13 +179,20 @@ def _load(path: Path) -> BridgeConfiguration:
     return configuration_from_file(path)
 
 
-def _on_buses(configuration: BridgeConfiguration, interface: str | None,
-              channel: str | None) -> BridgeConfiguration:
+def _bitrate(text: str) -> int:
+    if not text.isdecimal() or int(text) < 1000:
+        raise argparse.ArgumentTypeError(f'{text}: allowed are bit/s, 1000 or more')
+    return int(text)
+
+
+def _on_buses(configuration: BridgeConfiguration, interface: str | None, channel: str | None,
+              bitrate: int | None) -> BridgeConfiguration:
     """Replace the end points of all buses."""
     buses = {}
     for bus in configuration.buses.values():
         changed = replace(bus, interface=interface or bus.interface,
-                          channel=bus.channel if channel is None else channel)
+                          channel=bus.channel if channel is None else channel,
+                          bitrate=bitrate or bus.bitrate)
         if changed.interface != bus.interface:
             # options of one adapter mean nothing to another
             changed = replace(changed, options={})

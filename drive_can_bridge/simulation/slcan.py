@@ -40,12 +40,15 @@ class SlcanAdapter:
     """
     The state of an adapter.
 
-    :ivar is_open: frames pass.
+    :param bitrate: of its bus, bit/s: with another one set by ``S…`` no frame passes; None: any.
+    :ivar is_open: the channel is open.
     :ivar opened: how often a client opened the channel.
     :ivar refused: commands refused.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, bitrate: int | None = None) -> None:
+        self._bitrate = bitrate
+        self._set = bitrate
         self.is_open = False
         self.opened = 0
         self.refused = 0
@@ -54,6 +57,11 @@ class SlcanAdapter:
         self._command = bytearray()
         self._skipping = False
         self._replies = bytearray()
+
+    @property
+    def connected(self) -> bool:
+        """Frames pass: the channel is open, with the bit rate of the bus as far as we know."""
+        return self.is_open and self._set == self._bitrate
 
     def receive_bytes(self, data: bytes) -> list[Frame]:
         """Take what the client wrote; return the frames it sends. Any bytes will do."""
@@ -112,6 +120,8 @@ class SlcanAdapter:
             self._reply(DONE)
         elif kind in 'Ss':
             wanted = command in _BIT_RATES or kind == 's' and _hexadecimal(command[1:], 4)
+            if wanted and not self.is_open and self._bitrate is not None:
+                self._set = _BIT_RATES.get(command, self._bitrate)  # s…: by somebody who knows
             self._reply(DONE if wanted and not self.is_open else REFUSED)
         elif command == 'V':
             self._reply(VERSION)
@@ -135,14 +145,15 @@ class SlcanAdapter:
         if frame is None or not self.is_open or self._listen_only:
             self._reply(REFUSED)
             return None
-        return frame if command[0] in 'tT' else None
+        return frame if command[0] in 'tT' and self.connected else None
 
     def _reply(self, reply: bytes) -> None:
         self.refused += reply == REFUSED
         self._replies += reply
 
 
-_BIT_RATES = frozenset(f'S{digit}' for digit in range(10))
+_BIT_RATES = {'S0': 10_000, 'S1': 20_000, 'S2': 50_000, 'S3': 100_000, 'S4': 125_000,
+              'S5': 250_000, 'S6': 500_000, 'S7': 750_000, 'S8': 1_000_000, 'S9': 83_300}
 
 
 def _frame(command: str) -> Frame | None:

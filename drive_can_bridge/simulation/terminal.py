@@ -38,12 +38,13 @@ class SlcanTerminal(EndPoint):
     """
     A bus end point on a pseudo-terminal. One thread may receive while others send.
 
+    :param bitrate: of the bus, bit/s: a client that sets another hears nothing; None: any.
     :ivar path: the device that a client opens.
     :ivar dropped: frames lost because nobody read them.
     :raises BusUnavailable: the system has no pseudo-terminal left.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, bitrate: int | None = None) -> None:
         super().__init__()
         try:
             self._master, self._slave = os.openpty()
@@ -55,7 +56,7 @@ class SlcanTerminal(EndPoint):
         self.path = os.ttyname(self._slave)
         self.dropped = 0
         self._lock = threading.Lock()
-        self._adapter = SlcanAdapter()
+        self._adapter = SlcanAdapter(bitrate)
         self._received: deque[Frame] = deque()
         self._outgoing: deque[tuple[float, bytes]] = deque()
         self._started = b''         # rest of what the kernel took a part of
@@ -92,13 +93,13 @@ class SlcanTerminal(EndPoint):
 
     def send(self, frame: Frame, timeout: float = 0.0) -> None:
         """
-        Hand a frame to the client. It is dropped while the channel is closed.
+        Hand a frame to the client. It is dropped while that is not connected.
 
         :raises BusUnavailable: closed.
         """
         self._check_open()
         with self._lock:
-            if not self._adapter.is_open:
+            if not self._adapter.connected:
                 return
             if len(self._outgoing) >= BACKLOG:
                 self._outgoing.popleft()

@@ -177,7 +177,8 @@ def test_python_can_interface(start: Any) -> None:
     (('--axis', 'lift:load=2'), 2, "'load=2' is not possible; allowed: load=0…1"),
     (('--interface', 'nonsense'), 1, 'nonsense'),
     (('--pty-link', '/dev/null/x'), 1, '/dev/null'),
-    (('--params-file', '/nowhere.yaml'), 1, '/nowhere.yaml'),
+    (('--params-file', '/nowhere.yaml'), 1, 'drive_can: /nowhere.yaml: No such file'),
+    (('--params-file', '/dev/null'), 1, 'drive_can: /dev/null: not a regular file'),
 ])
 def test_what_cannot_be(start: Any, arguments: tuple[str, ...], status: int, message: str,
                         ) -> None:
@@ -185,6 +186,12 @@ def test_what_cannot_be(start: Any, arguments: tuple[str, ...], status: int, mes
     assert command.process.wait(30.0) == status
     assert len(command.errors) == 1
     assert message in command.errors[0]
+
+
+def test_a_bit_rate_that_cannot_be(start: Any) -> None:
+    command = start('--bitrate', '99')
+    assert command.process.wait(30.0) == 2
+    assert command.errors[-1].endswith('--bitrate: 99: allowed are bit/s, 1000 or more')
 
 
 def test_reader_of_the_output_who_left(start: Any) -> None:

@@ -75,6 +75,18 @@ class TestCommands:
         assert adapter.take_replies() == b'\r\a'
         assert adapter.is_open
 
+    @pytest.mark.parametrize(('setting', 'passes'), [
+        (b'S6', True), (b'S4', False), (b's031C', True), (b'', True)])
+    def test_only_the_bit_rate_of_the_bus_will_do(self, setting: bytes, passes: bool) -> None:
+        adapter = SlcanAdapter(500_000)
+        assert not adapter.connected
+        assert adapter.receive_bytes(setting + b'\rO\rt1230\r') == [frame('123#')] * passes
+        assert adapter.take_replies() == b'\r' * (2 if setting else 1)
+        assert (adapter.is_open, adapter.connected) == (True, passes)
+        # closed, and opened with the right one
+        assert adapter.receive_bytes(b'C\rS6\rO\rt1230\r') == [frame('123#')]
+        assert adapter.connected
+
     def test_commands_in_pieces(self) -> None:
         adapter = opened()
         pieces = [b'T003F', b'FFF0', b'200', b'FF\rt12', b'30\r']
@@ -123,6 +135,18 @@ def terminal() -> Any:
 
 
 class TestTerminal:
+
+    def test_a_client_at_another_bit_rate_hears_nothing(self) -> None:
+        terminal = SlcanTerminal(500_000)
+        try:
+            with client(terminal) as bus:
+                bus.send(can.Message(arbitration_id=0x3FFFF0, data=[1, 2, 3]))
+                wait_for(lambda: terminal.receive(0.01) is not None or terminal.is_open)
+                terminal.send(frame('7F1#CC'))
+                assert bus.recv(0.2) is None
+                assert receive(terminal, 0.1) is None
+        finally:
+            terminal.close()
 
     def test_frames_pass_both_ways(self, terminal: SlcanTerminal) -> None:
         with client(terminal) as bus:

@@ -9,6 +9,7 @@ is on emulated controllers with a bit rate runs where DRIVE_CAN_CONTROLLERS name
 from collections.abc import Iterator
 import os
 from pathlib import Path
+import re
 
 from kernel_adapter import ip, KernelAdapter
 from parameter_files import bridge_file, CONVEYOR
@@ -18,6 +19,8 @@ from repeating import again_and_again
 from slcan_peer import ZEROS
 from test_system_reconnection import rearm_and_move, start_moving, status_of
 from waiting import SLOWNESS, wait_for
+
+from drive_can_bridge.cli.main import main as drive_can
 
 CYCLIC_REQUEST = 'T003FFFF08'
 MOVING = f'{CYCLIC_REQUEST}05DC{ZEROS[4:]}'
@@ -123,6 +126,26 @@ def test_controller_in_trouble(processes: Processes, client: Client, namespace: 
     assert bridge.end() == 0
     frames = [line for line in adapter.lines if line.startswith('T')]
     assert frames[-3:] == [NEUTRAL] * 3
+
+
+def test_a_scan_says_what_is_wrong_with_the_bus(adapter: KernelAdapter,
+                                                capsys: pytest.CaptureFixture[str]) -> None:
+    scan = ['scan', '--interface', 'socketcan', '--channel', adapter.name, '--bitrate', '125000']
+    # somebody talks, and we understand nothing: a wrong bit rate, or no termination
+    with again_and_again(lambda: adapter.send(b'e1s\r')):
+        assert drive_can([*scan, '--passive', '--listen', str(SLOWNESS)]) == 1
+    out, err = capsys.readouterr()
+    assert out == 'no drive found, 0 frames heard\n'
+    assert re.fullmatch(r'[1-9][0-9]* error frames: stuff error; check cable, shield, termination '
+                        r'and bit rate\n', err)
+
+    # nobody acknowledges: the queue fills
+    adapter.stop_reading()
+    assert drive_can([*scan, '--listen', '0.1']) == 1
+    assert capsys.readouterr().err == (
+        'send: transmit queue full: no other node acknowledges: check power, cable, termination '
+        'and bit rate\n')
+    adapter.read_again()
 
 
 @pytest.mark.skipif(len(CONTROLLERS) != 2, reason='DRIVE_CAN_CONTROLLERS names no two controllers')
