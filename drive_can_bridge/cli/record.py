@@ -134,7 +134,8 @@ class _Counter:
         return json.dumps({
             'bus': self._name, 'file': str(output.last), 'files': output.count,
             'frames': self._frames, 'sent': self._sent, 'error_frames': self._error_frames,
-            'seconds': round(seconds, 3), 'load_percent': round(self._load(self._bits, seconds), 1)})
+            'seconds': round(seconds, 3),
+            'load_percent': round(self._load(self._bits, seconds), 1)})
 
     def _load(self, bits: int, seconds: float) -> float:
         return 100.0 * STUFFING * bits / (max(seconds, 1e-3) * self._bitrate)
