@@ -76,8 +76,9 @@ class Running:
         for number in Path(f'/proc/{self.process.pid}/task').iterdir():
             for child in (number / 'children').read_text().split():
                 words = Path(f'/proc/{child}/cmdline').read_bytes().decode().split('\0')
-                if 'drive_can_bridge.demo.child' in words:
-                    place = words.index('drive_can_bridge.demo.child')
+                place = next((place for place, word in enumerate(words)
+                              if 'drive_can_bridge.demo.child' in word), None)
+                if place is not None:
                     program = words[place + 1]
                     found[words[place + 2] if program == 'drive_can' else program] = int(child)
         return found

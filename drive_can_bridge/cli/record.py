@@ -39,8 +39,8 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument('--rotate', metavar='MB', type=positive,
                         help='begin a new file when one has that size: FILE_000, FILE_001, …')
     parser.add_argument('--json', action='store_true',
-                        help='at the end, a JSON document for each bus: bus, file, frames, sent, '
-                             'error_frames, load_percent, seconds')
+                        help='at the end, a JSON document for each bus: bus, file (the last), '
+                             'files (how many), frames, sent, error_frames, load_percent, seconds')
     parser.set_defaults(run=run)
 
 
@@ -132,8 +132,9 @@ class _Counter:
         import json
         seconds = time.monotonic() - self._began
         return json.dumps({
-            'bus': self._name, 'file': output.names, 'frames': self._frames, 'sent': self._sent,
-            'error_frames': self._error_frames, 'seconds': round(seconds, 3),
+            'bus': self._name, 'file': str(output.last), 'files': output.count,
+            'frames': self._frames, 'sent': self._sent, 'error_frames': self._error_frames,
+            'seconds': round(seconds, 3),
             'load_percent': round(self._load(self._bits, seconds), 1)})
 
     def _load(self, bits: int, seconds: float) -> float:
@@ -141,27 +142,36 @@ class _Counter:
 
 
 class _Rotating:
-    """One trace file, or several of limited size."""
+    """
+    One trace file, or several of limited size.
+
+    :ivar count: how many there are.
+    """
 
     def __init__(self, path: Path, channels: list[str], megabytes: float | None) -> None:
         self._path = path
         self._channels = channels
         self._limit = None if megabytes is None else megabytes * _MEGABYTE
-        self._number = 0
+        self.count = 1
         self._writer = self._open()
 
     def _open(self) -> TraceWriter:
         path = self._path
         if self._limit is not None:
-            path = path.with_name(f'{path.stem}_{self._number:03d}{path.suffix}')
+            path = path.with_name(f'{path.stem}_{self.count - 1:03d}{path.suffix}')
         return TraceWriter(path, self._channels)
+
+    @property
+    def last(self) -> Path:
+        """The file that is written, or was last."""
+        return self._writer.path
 
     @property
     def names(self) -> str:
         """The file, or how many there are."""
         if self._limit is None:
-            return str(self._path)
-        return f'{self._writer.path} is the last of {self._number + 1} files'
+            return str(self.last)
+        return f'{self.last} is the last of {self.count} files'
 
     def write(self, record: Record) -> None:
         """Write an entry."""
@@ -171,7 +181,7 @@ class _Rotating:
         """Begin a new file when this one is large enough; else make it readable so far."""
         if self._limit is not None and self._writer.size >= self._limit:
             self._writer.close()
-            self._number += 1
+            self.count += 1
             self._writer = self._open()
         else:
             self._writer.flush()

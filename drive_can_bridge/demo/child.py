@@ -21,6 +21,10 @@ PROGRAMS = {
     'drive_can': 'drive_can_bridge.cli.main',
     'commander': 'drive_can_bridge.ros.demo.commander',
 }
+#: how a child begins: not as with -m, which imports from the working directory first; there a
+#: directory with the name of this package is no rarity
+_BEGIN = ('import sys; sys.path[:] = filter(None, sys.path); '
+          f'from {__name__} import main; sys.exit(main())')
 _PR_SET_PDEATHSIG = 1
 _MOMENT = 0.01
 
@@ -40,7 +44,7 @@ class Child:
         self.what = what
         self.log = log
         self.told = False
-        command = [sys.executable, '-m', __name__, program, *arguments]
+        command = [sys.executable, '-c', _BEGIN, program, *arguments]
         keyboard = None if shared else subprocess.DEVNULL
         if log is None:
             self.process = subprocess.Popen(command, stdin=keyboard, stdout=output,
@@ -101,7 +105,3 @@ def main() -> int:
     sys.argv = [program, *arguments]
     code: int = importlib.import_module(PROGRAMS[program]).main()
     return code
-
-
-if __name__ == '__main__':
-    sys.exit(main())

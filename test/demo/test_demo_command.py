@@ -12,6 +12,8 @@ import pytest
 from running import Running
 from waiting import wait_for
 
+from drive_can_bridge.demo.child import Child
+
 pytest.importorskip('rclpy')
 
 LINE = re.compile(r'(conveyor|lift|turntable) (?:offline|online( \w+=-?[\d.]+( [^\s=]+)?)+)')
@@ -35,6 +37,17 @@ OWN_FILE = """
 """
 
 Start = Callable[..., Running]
+
+
+def test_a_directory_with_the_name_of_the_package_does_not_matter(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / 'drive_can_bridge').mkdir()
+    (tmp_path / 'drive_can_bridge' / '__init__.py').write_text('raise ImportError\n')
+    monkeypatch.chdir(tmp_path)
+    with (tmp_path / 'out').open('wb') as output:
+        child = Child('the child', 'drive_can', '--version', output=output)
+    assert child.wait(20.0) and child.code == 0
+    assert (tmp_path / 'out').read_text().startswith('drive_can ')
 
 
 def requests(log: Path) -> dict[str, list[str]]:

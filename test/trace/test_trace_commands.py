@@ -200,13 +200,17 @@ def test_record_then_decode(file: Path, tmp_path: Path,
         assert understood(live) == understood(lines)
 
 
-def test_record_in_files_of_limited_size(file: Path, tmp_path: Path) -> None:
+def test_record_in_files_of_limited_size(file: Path, tmp_path: Path,
+                                         capsys: pytest.CaptureFixture[str]) -> None:
     output = tmp_path / 'out.log'
     with Talker(f'trace_{tmp_path.name}'):
         assert drive_can('record', '-o', output, '--params-file', file, '--seconds', '2.5',
-                         '--rotate', '0.001') == 0
+                         '--rotate', '0.001', '--json') == 0
     assert not output.exists()
-    assert len(list(tmp_path.glob('out_00?.log'))) >= 2
+    written = sorted(tmp_path.glob('out_00?.log'))
+    assert len(written) >= 2
+    document = json.loads(capsys.readouterr().out)
+    assert (document['file'], document['files']) == (str(written[-1]), len(written))
 
 
 def test_record_says_what_a_format_loses(file: Path, tmp_path: Path,
