@@ -14,7 +14,7 @@ How long one example takes says how busy the machine is, and is no failure.
 
 *In parallel*, with pytest-xdist (``-n auto --dist loadscope``, as ``make test`` does): the tests
 of a module stay together, because they may share what is expensive to start; those that consist of
-waiting for processes of their own are spread. Long ones come first. What measures time has the
+waiting for something of their own are spread. Long ones come first. What measures time has the
 mark ``alone``: nothing else of the test run happens meanwhile.
 
 *Signals.* Who runs us under ``nohup``, or in the background of a script, has us ignore some
@@ -76,12 +76,12 @@ def _domain(in_process: bool) -> str:
 
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
-#: directories and modules whose tests wait for processes of their own: each test by itself
+#: directories and modules whose tests wait for something of their own: each test by itself
 SPREAD = ('test/system/', 'test/demo/', 'test/monitor/test_monitor_attach',
-          'test/simulation/test_simulate_command', 'test/process/')
+          'test/simulation/test_simulate_command', 'test/process/', 'test/backup/test_restore')
 #: what comes first, because it takes longest
-FIRST = ('test/system/test_soak', 'test/system/', 'test/monitor/test_monitor_attach',
-         'test/demo/', 'test/ros/', 'test/')
+FIRST = ('test/system/test_soak', 'test/ros/test_ros_contract', 'test/panel/', 'test/system/',
+         'test/monitor/test_monitor_attach', 'test/demo/', 'test/backup/', 'test/ros/', 'test/')
 #: processes for each core that has nothing else to do: most of the time they wait
 WORKERS_PER_CORE = 3
 

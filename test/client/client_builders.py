@@ -111,6 +111,23 @@ class World:
 
 
 @contextmanager
+def stranger(world: World, frame: Frame, after: float) -> Iterator[None]:
+    """Send a frame again and again, for the first time after some seconds."""
+    ending = threading.Event()
+
+    def send() -> None:
+        while not ending.wait(after):
+            world.send(frame)
+    thread = threading.Thread(target=send, name='stranger')
+    thread.start()
+    try:
+        yield
+    finally:
+        ending.set()
+        thread.join()
+
+
+@contextmanager
 def a_world(directory: Path, **drives: dict[str, Any]) -> Iterator[World]:
     """Play drives; all four families without any."""
     with World(parameter_file(directory, drives or ALL)) as world:

@@ -4,12 +4,11 @@
 from collections.abc import Iterator
 import copy
 from pathlib import Path
-import threading
 import time
 from typing import Any
 
 from builders import frame
-from client_builders import a_world, ALL, CONVEYOR, LIFT, MIXER, PUMP, World
+from client_builders import a_world, ALL, CONVEYOR, LIFT, MIXER, PUMP, stranger, World
 import pytest
 from waiting import wait_for
 
@@ -213,18 +212,13 @@ REQUESTS = {'conveyor': '002003C4#0000000000000000', 'lift': '3F2#1E00',
             'mixer': '264#0012000000000000', 'pump': '505#0000000000000000'}
 
 
+@pytest.mark.usefixtures('listens')
 @pytest.mark.parametrize('name', REQUESTS)
 def test_another_master_before_the_first_request(tmp_path: Path, name: str) -> None:
     with a_world(tmp_path, **ALL) as world:
-        def disturb() -> None:
-            world.send(frame(REQUESTS[name]))
-        timer = threading.Timer(0.5 * LISTEN, disturb)
-        timer.start()
-        try:
+        with stranger(world, frame(REQUESTS[name]), after=0.4 * LISTEN):
             with pytest.raises(AnotherMaster) as caught:
                 open_drives(world.file, only=['conveyor'])
-        finally:
-            timer.join()
         assert str(caught.value).startswith(f'bus main: another master talks to drive {name} (')
 
 

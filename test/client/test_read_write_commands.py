@@ -7,11 +7,10 @@ import os
 from pathlib import Path
 import subprocess
 import sys
-import threading
 from typing import Any
 
 from builders import frame
-from client_builders import a_world, CONVEYOR, LIFT, parameter_file, World
+from client_builders import a_world, CONVEYOR, LIFT, parameter_file, stranger, World
 import pytest
 
 from drive_can_bridge.cli.main import main
@@ -151,6 +150,7 @@ def test_write_json(run: Run) -> None:
 
 
 def test_a_write_that_does_not_arrive(run: Run, world: World) -> None:
+    world.drives['conveyor'].set_value('ramp_time', 3.25)
     world.drives['conveyor'].fault('stuck=ramp_time')
     try:
         code, lines, _ = run('write', 'conveyor', 'ramp_time=9')
@@ -177,12 +177,11 @@ def test_in_use(run: Run, world: World) -> None:
     assert errors.startswith(f'bus main: drive lift is used by process {os.getpid()} ')
 
 
+@pytest.mark.usefixtures('listens')
 def test_another_master_ends_it(run: Run, tmp_path: Path) -> None:
     with a_world(tmp_path, conveyor=CONVEYOR, lift=LIFT) as own:
-        timer = threading.Timer(0.4, own.send, [frame('3F2#1E00')])
-        timer.start()
-        code, lines, errors = run('read', 'conveyor', file=own.file)
-        timer.join()
+        with stranger(own, frame('3F2#1E00'), after=0.4):
+            code, lines, errors = run('read', 'conveyor', file=own.file)
     assert (code, lines) == (1, [])
     assert errors == ('bus main: another master talks to drive lift (3F2#1E00); end it first\n')
 

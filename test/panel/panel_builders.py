@@ -4,14 +4,18 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from http.client import HTTPConnection, HTTPResponse
+from importlib.util import find_spec
 import json
 from pathlib import Path
 import re
 from typing import Any
 
+import pytest
 from running import Running
 from waiting import wait_for
 
+#: looked for, not imported: that takes a second, and only the processes need it
+NEEDS_PANEL = pytest.mark.skipif(find_spec('nicegui') is None, reason="needs the extra 'panel'")
 #: what a drive's description, or a log line, may try
 SCRIPT = '<script>window.intruded=1</script><img src=x onerror=window.intruded=1>'
 FILE = """

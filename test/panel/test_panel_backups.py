@@ -1,12 +1,13 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Backups through the panel: the commands that a person would use, run by it."""
 
-from panel_builders import Site
+from panel_builders import NEEDS_PANEL, Site
 import pytest
 from waiting import wait_for
 
 pytest.importorskip('rclpy')
-pytest.importorskip('nicegui', reason="needs the extra 'panel'")
+
+pytestmark = NEEDS_PANEL
 
 
 def test_a_backup_is_made_compared_and_restored(site: Site) -> None:

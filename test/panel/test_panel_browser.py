@@ -8,15 +8,14 @@ import time
 from urllib.parse import urlsplit
 
 from panel_browser import Browser, browser_missing
-from panel_builders import SCRIPT, Site
+from panel_builders import NEEDS_PANEL, SCRIPT, Site
 from panel_somebody import Somebody
 import pytest
 from waiting import wait_for
 
-pytest.importorskip('nicegui', reason="needs the extra 'panel'")
 pytest.importorskip('selenium', reason='.ci/browser brings it')
 
-pytestmark = [pytest.mark.browser, pytest.mark.skipif(browser_missing() != '',
+pytestmark = [NEEDS_PANEL, pytest.mark.browser, pytest.mark.skipif(browser_missing() != '',
                                                       reason=browser_missing())]
 
 

@@ -6,7 +6,7 @@ import signal
 import socket
 import time
 
-from panel_builders import Run, Site
+from panel_builders import NEEDS_PANEL, Run, Site
 import pytest
 
 pytest.importorskip('rclpy')
@@ -34,8 +34,8 @@ def test_what_is_missing_is_said(run: Run, tmp_path: Path, missing: str, words: 
 
 
 @pytest.mark.parametrize('signum', [signal.SIGINT, signal.SIGTERM])
+@NEEDS_PANEL
 def test_it_ends_at_once_whoever_looks(site: Site, run: Run, signum: int) -> None:
-    pytest.importorskip('nicegui', reason="needs the extra 'panel'")
     panel = run('drive_can', 'panel', '--port', '0', '--namespace', '/nowhere')
     address = panel.line('^viewer: http').partition(' ')[2]
     port, token = int(address.split(':')[2].partition('/')[0]), address.rpartition('=')[2]
@@ -56,8 +56,8 @@ def test_it_ends_at_once_whoever_looks(site: Site, run: Run, signum: int) -> Non
     assert 'ROS domain' in panel.errors
 
 
+@NEEDS_PANEL
 def test_a_port_that_is_taken(site: Site, run: Run) -> None:
-    pytest.importorskip('nicegui', reason="needs the extra 'panel'")
     panel = run('drive_can', 'panel', '--port', str(site.port))
     assert panel.process.wait(60.0) == 1
     [line] = panel.errors.splitlines()
@@ -65,8 +65,8 @@ def test_a_port_that_is_taken(site: Site, run: Run) -> None:
     assert '--port' in line
 
 
+@NEEDS_PANEL
 def test_listening_on_the_network_is_explained(run: Run) -> None:
-    pytest.importorskip('nicegui', reason="needs the extra 'panel'")
     panel = run('drive_can', 'panel', '--host', '0.0.0.0', '--port', '0')
     assert f'http://{socket.gethostname()}:' in panel.line('^operator: http')
     assert 'whoever reaches this machine and has a token gets in' in panel.errors

@@ -7,12 +7,13 @@ import select
 import selectors
 import socket
 
-from panel_builders import FILE_OF_PANEL, SCRIPT, Site
+from panel_builders import FILE_OF_PANEL, NEEDS_PANEL, SCRIPT, Site
 import pytest
 from waiting import wait_for
 
 pytest.importorskip('rclpy')
-pytest.importorskip('nicegui', reason="needs the extra 'panel'")
+
+pytestmark = NEEDS_PANEL
 
 STOP = {'drive': '/lift'}
 #: everything that there is to be had

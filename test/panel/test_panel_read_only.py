@@ -4,12 +4,13 @@
 from pathlib import Path
 import signal
 
-from panel_builders import Run, Site
+from panel_builders import NEEDS_PANEL, Run, Site
 import pytest
 from waiting import wait_for
 
 pytest.importorskip('rclpy')
-pytest.importorskip('nicegui', reason="needs the extra 'panel'")
+
+pytestmark = NEEDS_PANEL
 
 
 def test_nothing_is_written_and_stops_are_always_there(run: Run, tmp_path: Path) -> None:

@@ -11,6 +11,8 @@ from pathlib import Path
 import re
 from typing import Any
 
+#: s
+PERIOD = 0.05
 SAME_EVERYWHERE = """
   ramp_time:
     {number: 102, type: uint16, scale: 0.01, unit: s, access: rw, storage: eeprom, minimum: 0.01,
@@ -95,11 +97,11 @@ class Facts:
     scattered: dict[str, Any] = field(default_factory=dict)
     scattered_reason: str = ''
     diagnostics: frozenset[str] = frozenset()
-    missed_limit: int = 10
+    missed_limit: int = 20
 
     @property
     def hasty(self) -> dict[str, Any]:
-        """Keys of a drive that tells soon when something is missing."""
+        """Keys of a drive that tells soon when something is missing, but not a busy machine."""
         return {'missed_limit': self.missed_limit, 'parameter_timeout': 0.2}
 
     @property
@@ -130,7 +132,7 @@ class Facts:
         """Return the drive's section of a parameter file."""
         return {
             'bus': 'main', 'protocol': self.protocol, 'station': 1,
-            'profile': str(self.write_profile(directory)), 'period': 0.05,
+            'profile': str(self.write_profile(directory)), 'period': PERIOD,
             'cyclic_request': ['speed_setpoint', 'mode', 'brake'],
             'cyclic_response': self.response,
             # generous: nothing may depend on how busy the machine is
@@ -169,7 +171,7 @@ FAMILIES = [
         stuck='read back 7 instead of 9', order_note=UNACKNOWLEDGED,
         atomic={'gain': 3}, scattered={'gain': 4, 'damping': 4},
         scattered_reason='one parameter fits', diagnostics=frozenset(['short_frames']),
-        missed_limit=5),
+        missed_limit=10),
     Facts(
         'cannord', UNNUMBERED + CANNORD_MORE, status_mapped=False, bits=CANNORD_BITS,
         keys={'cyclic_response': ['actual_speed', 'counts', 'braked']},
@@ -186,5 +188,5 @@ FAMILIES = [
         absent=('p115', 'refused by the drive: 06020000h (no such register or object)'),
         atomic={'gain': 3, 'damping': -3}, scattered={'gain': 4, 'far_away': 4},
         scattered_reason='adjacent', diagnostics=frozenset(['nmt_state', 'emergency']),
-        missed_limit=3),
+        missed_limit=6),
 ]

@@ -44,8 +44,9 @@ def test_a_drive_that_works(bridge: StartBridge, client: Client) -> None:
     assert status['level'] == 'WARN' and status['command_age_s'] == 'nan'
     assert 'publish 0 to /conveyor/command/speed_setpoint' in status['message']
     client.publish('/conveyor/command/speed_setpoint', Float64(data=0.0))
-    status = client.diagnostics(DRIVE, lambda drive: drive['state'] == 'online')
-    assert status['level'] == 'OK'
+    # a warning that an answer came too late goes by; busy machines have some
+    status = client.diagnostics(DRIVE, lambda drive: drive['state'] == 'online'
+                                and drive['level'] == 'OK')
     assert float(status['command_age_s']) >= 0.0
     status = client.diagnostics(DRIVE, lambda drive: int(drive['exchanges']) > 10)
     for name in ('latency', 'period_error'):

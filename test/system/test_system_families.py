@@ -95,10 +95,13 @@ def test_run_write_and_stop(processes: Processes, client: Client, namespace: str
 
     # some take settings only while they stand still
     name, value, request, response = facts.parameter
+    found, = client.get(drive, name)
     assert client.set(drive, **{name: value}) == [(True, '')]
     simulator.frame(request)
     simulator.frame(response)
     assert client.get(drive, name) == [pytest.approx(value)]
+    # nobody wants to wait for a ramp of that length
+    assert client.set(drive, **{name: found}) == [(True, '')]
     wrong, value, words = facts.refused
     before = client.get(drive, wrong)
     (success, reason), = client.set(drive, **{wrong: value})
