@@ -48,6 +48,8 @@ def plan(options: argparse.Namespace) -> dict[str, Callable[[], Any]]:
         'drives': lambda: {number: scenarios.exchange(
             Load(number, period, subscribed=False), duration, floor=False)
             for number in sorted({1, 4, 8, drives})},
+        'alone': lambda: scenarios.exchange(
+            Load(1, 0.01, subscribed=False), duration, floor=False),
         'flight': lambda: scenarios.flight(
             Load(drives, period, subscribed=False, trace=2 * duration), duration),
         'joints': lambda: scenarios.joints(

@@ -360,7 +360,7 @@ def sweep(numbers: Sequence[int], period: float, duration: float) -> dict[int, d
 def start(drives: int, duration: float) -> dict[str, Any]:
     """Measure the time to the first exchange of all drives, and memory, beside bare nodes."""
     load = Load(drives, 0.02)
-    found: dict[str, Any] = {}
+    found: dict[str, Any] = {'drives': drives}
     with child('bare_nodes.py', drives) as bare:
         found['bare_nodes_s'] = bare.ready
         found['bare_nodes_mb'] = bare.resident_mb()
@@ -373,6 +373,13 @@ def start(drives: int, duration: float) -> dict[str, Any]:
             for _ in range(4):
                 time.sleep(duration / 4)
                 found['resident_mb'].append(bridge.resident_mb())
+    for number in (1, 2 * drives):
+        with ExitStack() as stack:
+            load = Load(number, 0.02)
+            bus = Bus(stack, load)
+            subscribers(stack, load)
+            with bridge_under(load, bus) as bridge:
+                found[f'resident_mb_{"one" if number == 1 else "twice"}'] = bridge.resident_mb()
     return found
 
 
