@@ -93,19 +93,21 @@ class CyclicExchange(Generic[TelegramT]):
         return self._encode(raws)
 
     def _left(self, sent: bool, now: float) -> None:
-        """Take note of a frame; one that may start somebody counts even alone."""
+        """
+        Take note of a frame.
+
+        One that may start somebody counts even alone; otherwise a cycle counts only when the bus
+        has taken every frame of it.
+        """
+        session = self._session
         self._frames_out -= 1
         if not sent:
             self.whole = False
         elif self._runs:
             self.ran = True
-            self._session.told.note(CYCLE, runs=True)
-        if self.whole and not self._frames_out:
-            self._cycle_left(now)
-
-    def _cycle_left(self, now: float) -> None:
-        """Take note of a cycle of which the bus has taken every frame: only then it counts."""
-        session = self._session
+            session.told.note(CYCLE, runs=True)
+        if self._frames_out or not self.whole:
+            return
         if not self._runs:
             session.told.note(CYCLE, runs=False)
         if self._raws is not None:      # the first time that it left

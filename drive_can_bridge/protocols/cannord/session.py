@@ -324,7 +324,7 @@ class CannordSession(Session):
     def _publish(self, sample: ProcessDataReceived) -> None:
         self.measured(sample.raws)
         self._last_sample = (*sample.raws, *self._last_sample[len(sample.raws):])
-        self.note(sample)
+        self._events.append(sample)
 
     # -- parameters -------------------------------------------------------------------------------
 

@@ -337,7 +337,7 @@ class ExtendedSession(Session):
             self.control.status_received(raws[slot] if slot < len(raws) else None, now)
             self.control_changed(now)
         self.measured(raws)
-        self.note(ProcessDataReceived(raws, received_at))
+        self._events.append(ProcessDataReceived(raws, received_at))
         self._channel.release(now)
 
     # -- timer ------------------------------------------------------------------------------------
