@@ -426,7 +426,7 @@ class AnyOrder(RuleBasedStateMachine):
     def counts_are_right(self) -> None:
         if self.session is None:
             return
-        assert self.session._waiting_requests() <= 64
+        assert self.session.waiting_requests <= 64
         assert self.session.online == self.observer.online or not self.observer.active
         if not self.observer.bus:
             assert not self.session.online

@@ -219,3 +219,83 @@ def test_ros_packages_are_declared() -> None:
     manifest = ElementTree.parse(CHECKOUT / 'package.xml').getroot()
     declared = {node.text for node in manifest.iter('exec_depend')}
     assert ROS_PACKAGES <= declared
+
+
+# -- size and inheritance -------------------------------------------------------------------------
+
+#: lines that a module has at most
+LINES_MAX = 400
+#: those that have more, and how many: they may shrink, and leave this table
+LARGER = {'core/session.py': 594, 'protocols/canopen_pkw/session.py': 463}
+#: steps from a class to the base of all its ancestors
+STEPS_MAX = 2
+
+
+class Class(NamedTuple):
+    """One class of the package: the names of its bases, and of its methods."""
+
+    name: str
+    source: Path
+    bases: tuple[str, ...]
+    methods: frozenset[str]
+
+
+def classes() -> dict[str, Class]:
+    """Return all classes of the package by name."""
+    found: dict[str, Class] = {}
+    for path in SOURCES:
+        for node in ast.walk(ast.parse(path.read_text(encoding='utf-8'), str(path))):
+            if isinstance(node, ast.ClassDef):
+                bases = [base.value if isinstance(base, ast.Subscript) else base
+                         for base in node.bases]
+                names = tuple(base.id for base in bases if isinstance(base, ast.Name))
+                methods = frozenset(each.name for each in node.body
+                                    if isinstance(each, ast.FunctionDef))
+                # of two with the same name: the one that says more about its ancestors
+                if node.name not in found or names:
+                    found[node.name] = Class(node.name, path, names, methods)
+    return found
+
+
+CLASSES = classes()
+
+
+def ancestors(name: str) -> Iterator[tuple[int, Class]]:
+    """Go through the ancestors of a class in this package, each with its distance."""
+    for base in CLASSES[name].bases:
+        if base in CLASSES and base != name:
+            yield 1, CLASSES[base]
+            yield from ((steps + 1, other) for steps, other in ancestors(base))
+
+
+def test_modules_are_short(source: Path) -> None:
+    lines = len(source.read_text(encoding='utf-8').splitlines())
+    assert lines <= LARGER.get(source.relative_to(PACKAGE).as_posix(), LINES_MAX)
+
+
+def test_what_is_larger_is_still_there() -> None:
+    for name in LARGER:
+        lines = len((PACKAGE / name).read_text(encoding='utf-8').splitlines())
+        assert lines > LINES_MAX, f'{name} is short enough: it needs no exception'
+
+
+def test_no_class_has_many_generations_above_it() -> None:
+    deep = [f'{name}: {other.name}' for name in CLASSES
+            for steps, other in ancestors(name) if steps > STEPS_MAX]
+    assert not deep
+
+
+def test_no_session_inherits_from_another() -> None:
+    assert not [f'{name}: {other.name}' for name in CLASSES
+                for steps, other in ancestors(name) if steps > 1
+                and any(each.name == 'Session' for _, each in ancestors(name))]
+
+
+def test_private_methods_are_overridden_inside_their_package_only() -> None:
+    wrong = [
+        f'{each.source}: {name}.{method} overrides {other.name}'
+        for name, each in CLASSES.items() for _, other in ancestors(name)
+        for method in each.methods & other.methods
+        if method.startswith('_') and not method.startswith('__')
+        and each.source.parent != other.source.parent]
+    assert not wrong, '\n'.join(wrong)

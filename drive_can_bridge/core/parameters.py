@@ -30,7 +30,13 @@ _STEPS_MAX = 1e18
 
 
 class ParameterType(Enum):
-    """Width and sign of a parameter on the wire."""
+    """
+    Width and sign of a parameter on the wire.
+
+    :ivar bits: width.
+    :ivar signed: two's complement, or not.
+    :ivar raw_range: smallest and largest raw integer.
+    """
 
     BOOL = 'bool'
     INT16 = 'int16'
@@ -38,24 +44,16 @@ class ParameterType(Enum):
     INT32 = 'int32'
     UINT32 = 'uint32'
 
-    @property
-    def bits(self) -> int:
-        """Width on the wire, in bits."""
-        return 32 if self in (ParameterType.INT32, ParameterType.UINT32) else 16
-
-    @property
-    def signed(self) -> bool:
-        """Two's complement, or not."""
-        return self in (ParameterType.INT16, ParameterType.INT32)
-
-    @property
-    def raw_range(self) -> tuple[int, int]:
-        """Smallest and largest raw integer."""
-        if self is ParameterType.BOOL:
-            return 0, 1
-        if self.signed:
-            return -(1 << self.bits - 1), (1 << self.bits - 1) - 1
-        return 0, (1 << self.bits) - 1
+    def __init__(self, name: str) -> None:
+        # no properties: every word of every telegram asks for them
+        self.bits = 32 if name.endswith('32') else 16
+        self.signed = name.startswith('int')
+        if name == 'bool':
+            self.raw_range = 0, 1
+        elif self.signed:
+            self.raw_range = -(1 << self.bits - 1), (1 << self.bits - 1) - 1
+        else:
+            self.raw_range = 0, (1 << self.bits) - 1
 
 
 class ValueKind(Enum):

@@ -39,6 +39,8 @@ class Written:
 
 
 Outcome = Union[Failure, ReadValue, Written]
+#: of a request: one for each name
+Outcomes = tuple[Outcome, ...]
 
 #: what begins every reason of a failure for which no frame of the drive came
 NO_ANSWER = 'no answer'

@@ -15,6 +15,12 @@ and collects frames to send and events:
 
 A session never blocks, never raises on anything a drive sends, and sends nothing before
 ``activate``, after ``deactivate`` has run its course, or while the bus is down.
+
+What is the same for all families stands here: when a drive is found and lost, what is taken back
+then, which requests are refused, how a stop begins and what is said when it was not acknowledged.
+A family fills in what the exchange of its drives is: :meth:`Session.begin`,
+:meth:`Session.begin_stop`, :meth:`Session.go_idle`, frames, timers, and a few occasions to act
+(below "what a family may add").
 """
 
 from abc import ABC, abstractmethod
@@ -23,19 +29,18 @@ from dataclasses import replace
 from enum import Enum
 
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.control import (
-    ControlAction, ControlCompleted, ControlMachine, ControlRequest,
-)
+from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
+from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.events import (
     Event, FrameRejected, Noted, RequestCompleted, SetpointsExpired, StationFound, StationLost,
 )
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.core.holding import HeldSetpoint
 from drive_can_bridge.core.last_sent import LastSent
 from drive_can_bridge.core.outbox import Outbox
 from drive_can_bridge.core.parameters import Parameter, Value
+from drive_can_bridge.core.request_desk import RequestDesk, RequestServer
 from drive_can_bridge.core.requests import (
-    BRIDGE_INACTIVE, BUS_DOWN, BUSY, Failure, is_answer, Outcome, Request,
+    BRIDGE_INACTIVE, BUS_DOWN, BUSY, is_answer, Outcomes, Request,
 )
 from drive_can_bridge.core.retry import RetryPolicy
 from drive_can_bridge.core.roles import Cells, Role, Roles
@@ -63,14 +68,6 @@ class DriveState(Enum):
     NOT_ARMED = 'not armed'
     ONLINE = 'online'
     FAULT = 'fault'
-
-
-def untold_text(untold: Sequence[HeldSetpoint]) -> str:
-    """Say why an axis cannot be driven yet: the drive does not have its position."""
-    texts = [f'{setpoint.parameter.name} does not have the value of {setpoint.measured.name} yet'
-             + ('' if setpoint.known else ', which is not known or which it cannot carry')
-             for setpoint in untold]
-    return f'it would jump: {"; ".join(texts)}'
 
 
 class Session(ABC):
@@ -123,10 +120,13 @@ class Session(ABC):
         self.phase: float | None = None
         self.told = Told()
         self.partners: Sequence[Session] = ()
-        self._outbox = Outbox()
+        self.outbox = Outbox()
         self._events: list[Event] = []
-        self._open_requests: list[Request] = []
         self._advice = 'not activated'
+
+    def serve_by(self, server: RequestServer) -> None:
+        """Have requests of users served by this."""
+        self._requests = RequestDesk(server, self.statistics, self._request_completed)
 
     @property
     def builtin_parameters(self) -> tuple[Parameter, ...]:
@@ -160,7 +160,7 @@ class Session(ABC):
         self.told.stopped()  # what an activation before this one told is not ours to undo
         if self.bus_available:
             self._advice = LOOKING
-            self._begin(now)
+            self.start_over(now)
 
     def serve(self) -> None:
         """
@@ -171,9 +171,17 @@ class Session(ABC):
         """
         self.active = self.serving = True
 
-    @abstractmethod
     def deactivate(self, now: float) -> None:
         """Begin the safe stop: neutral setpoints, ``disable``; then silence."""
+        self.active = False
+        owes = self.prepare_stop(now)
+        self._requests.fail_all(BRIDGE_INACTIVE)
+        self.withdraw(BRIDGE_INACTIVE, now)
+        if owes and self.begin_stop(now):
+            return
+        if owes or not self.bus_available:
+            self._leave_owing()
+        self.go_idle('deactivated')
 
     @property
     @abstractmethod
@@ -183,53 +191,108 @@ class Session(ABC):
     @property
     def longest_stop(self) -> float:
         """Return how many s a stop takes at most."""
-        return STOP_CYCLES * self._stop_spacing
+        return STOP_CYCLES * self.stop_spacing
 
     def bus_up(self, now: float) -> None:
         """Begin to use the bus: it was opened."""
         self.bus_available = True
         if self.active and not self.serving:
             self._advice = LOOKING
-            self._begin(now)
+            self.start_over(now)
 
     def bus_down(self, now: float, reason: str) -> None:
         """Handle the loss of the bus: requests fail, the drive is offline."""
         self.bus_available = False
-        self._fail_requests(BUS_DOWN)
-        self._lose(f'bus down: {reason}', now)
-        self._go_idle(f'bus down: {reason}')
-        self._outbox.clear()
+        self._requests.fail_all(BUS_DOWN)
+        self.lose(f'bus down: {reason}', now)
+        self.go_idle(f'bus down: {reason}')
+        self.outbox.clear()
         if self.told.owed:
-            self._warn(f'the bus was lost before it could be told to stop: {MAY_RUN}')
+            self.warn(f'the bus was lost before it could be told to stop: {MAY_RUN}')
 
     def give_up(self, now: float) -> None:
         """Handle a stop that did not come to its end in time: the bus takes nothing."""
         self._leave_owing()
-        self._go_idle('deactivated')
-        self._outbox.clear()
+        self.go_idle('deactivated')
+        self.outbox.clear()
 
     @abstractmethod
     def time_lost(self, now: float) -> None:
         """Handle a process that stood still: nothing stale goes out, setpoints want re-arming."""
 
-    @abstractmethod
-    def _begin(self, now: float) -> None:
-        """Start over: nothing is known of the drive."""
+    def start_over(self, now: float) -> None:
+        """Begin anew: nothing is known of the drive."""
+        reason = 'the drive is being reconnected'
+        if self.online:
+            self.lose(reason, now)
+        else:
+            self.withdraw(reason, now)
+        self.setpoints.forget()
+        self.begin(now)
+
+    def lose(self, reason: str, now: float) -> None:
+        """Make the drive offline, if it is not."""
+        was_online = self.online
+        self.withdraw(reason, now)
+        self.setpoints.forget()
+        if was_online and self.mute and self.told.owed:
+            self.warn(f'where its axis is, nobody knows, so that it is told nothing: {MAY_RUN}')
+        self.be_offline(reason)
+        self.lost(now, was_online=was_online)
+
+    def stood_still(self, now: float) -> None:
+        """Begin anew after a stall."""
+        self.lose('the bridge stood still', now)
+        self.start_over(now)
+
+    def withdraw(self, reason: str, now: float) -> None:
+        """Go neutral, and back to ``disable``."""
+        self.setpoints.allow(False)
+        if self.control is not None:
+            self.control.withdraw(reason, now)
+            self.tell_notes()
+            self.let_commands_through()
+            self.withdrawn(now)
+
+    # -- what a family fills in -------------------------------------------------------------------
 
     @abstractmethod
-    def _go_idle(self, advice: str) -> None:
+    def begin(self, now: float) -> None:
+        """Begin the exchange; nothing is known of the drive."""
+
+    @abstractmethod
+    def prepare_stop(self, now: float) -> bool:
+        """Forget what the stop will not need; tell whether there is anything to be stopped."""
+
+    @abstractmethod
+    def begin_stop(self, now: float) -> bool:
+        """Begin to tell the drive to stand still; False: there is no way to tell it."""
+
+    @abstractmethod
+    def go_idle(self, advice: str) -> None:
         """Send nothing more, and be offline."""
 
-    def _lose(self, reason: str, now: float) -> None:
-        """Make the drive offline, if it is not."""
-        self._withdraw(reason, now)
-        self._forget_positions()
-        self._advice = reason
-        self._be_offline(reason)
+    # -- what a family may add --------------------------------------------------------------------
 
-    @abstractmethod
-    def _withdraw(self, reason: str, now: float) -> None:
-        """Go neutral, and back to ``disable``."""
+    def lost(self, now: float, *, was_online: bool) -> None:  # noqa: B027  optional
+        """Take note that the drive is lost."""
+
+    def went_offline(self) -> None:  # noqa: B027  optional
+        """Forget what belongs to a drive that is online."""
+
+    def withdrawn(self, now: float) -> None:
+        """Take note that the control word is ``disable`` again."""
+        self.see_to_control_word(now)
+
+    def see_to_control_word(self, now: float) -> None:  # noqa: B027  optional
+        """Have a control word sent that has changed."""
+
+    def request_answered(self, request: Request, outcomes: Outcomes) -> None:  # noqa: B027
+        """Take note of what a request has brought about."""
+
+    def request_refusal(self, now: float) -> str:
+        """Say what of the drive itself forbids requests now; '' if nothing."""
+        return ''
 
     # -- traffic ----------------------------------------------------------------------------------
 
@@ -258,7 +321,7 @@ class Session(ABC):
 
     def take_frames(self) -> list[Frame]:
         """Return the frames to be sent now, in order."""
-        return self._outbox.take()
+        return self.outbox.take()
 
     def frames_left(self, now: float, refused: Collection[int] = ()) -> None:
         """
@@ -266,7 +329,7 @@ class Session(ABC):
 
         :param refused: places in the list of those that the bus did not take: they do not count.
         """
-        self._outbox.left(now, refused)
+        self.outbox.left(now, refused)
 
     def take_events(self) -> list[Event]:
         """Return what happened since the last call."""
@@ -303,14 +366,13 @@ class Session(ABC):
         if isinstance(request, ControlRequest):
             self._submit_control(request, now)
             return
-        refusal = self._refusal(now)
+        refusal = self.request_refusal(now) or self._refusal()
         if refusal:
-            self._complete(request, (Failure(refusal),) * len(request))
+            self._requests.refuse(request, refusal)
         elif not len(request):
-            self._complete(request, ())
+            self._requests.complete(request, ())
         else:
-            self._open_requests.append(request)
-            self._enqueue(request, now)
+            self._requests.serve(request, self.request_answered, now)
 
     def _submit_control(self, request: ControlRequest, now: float) -> None:
         refusal = self.control_refusal(request.action)
@@ -318,14 +380,14 @@ class Session(ABC):
             self._events.append(ControlCompleted(request, False, refusal))
             return
         self.control.request(request, now)
-        self._control_changed(now)
+        self.control_changed(now)
 
-    def _refusal(self, now: float) -> str:
+    def _refusal(self) -> str:
         if not self.active:
             return BRIDGE_INACTIVE
         if not self.bus_available:
             return BUS_DOWN
-        if self._waiting_requests() >= WAITING_REQUESTS_MAX:
+        if self.waiting_requests >= WAITING_REQUESTS_MAX:
             return BUSY
         return ''
 
@@ -338,7 +400,7 @@ class Session(ABC):
         if role is Role.CONTROL:
             return 'use ~/enable'
         if role is Role.CYCLIC:
-            return self._cyclic_refusal(own)
+            return self.cyclic_refusal(own)
         if not self.active or self.serving:
             return ''
         return 'mapping parameter: not written while the bridge is active'
@@ -363,41 +425,23 @@ class Session(ABC):
         """What tells the drive how cyclic telegrams are to be read."""
         return frozenset()
 
-    def _cyclic_refusal(self, parameter: Parameter) -> str:
+    def cyclic_refusal(self, parameter: Parameter) -> str:
+        """Say why a setpoint is not written by request."""
         return f'sent cyclically: publish ~/command/{parameter.name}'
 
-    @abstractmethod
-    def _enqueue(self, request: Request, now: float) -> None:
-        """Queue a request that may be served; it ends with :meth:`_answer`."""
+    def fail_requests(self, reason: str) -> None:
+        """Forget the requests that are under way, and answer them."""
+        self._requests.fail_all(reason)
 
-    @abstractmethod
-    def _fail_requests(self, reason: str) -> None:
-        """Forget what is under way, and answer it by :meth:`_fail_open_requests`."""
+    @property
+    def waiting_requests(self) -> int:
+        """How many requests wait behind the one being served."""
+        return self._requests.waiting
 
-    @abstractmethod
-    def _waiting_requests(self) -> int:
-        """Return how many user requests wait behind the one being served."""
-
-    def _answer(self, request: Request, outcomes: tuple[Outcome, ...]) -> None:
-        """Answer a request that was queued."""
-        self._open_requests.remove(request)
-        self._complete(request, outcomes)
-
-    def _fail_open_requests(self, reason: str) -> None:
-        """Answer whatever was queued. The family has forgotten it already."""
-        requests, self._open_requests = self._open_requests, []
-        for request in requests:
-            self._complete(request, (Failure(reason),) * len(request))
-
-    def _complete(self, request: Request, outcomes: tuple[Outcome, ...]) -> None:
-        for outcome in outcomes:
-            if isinstance(outcome, Failure):
-                self.statistics.requests_failed += 1
-            else:
-                self.statistics.requests_ok += 1
-        if self.serving and outcomes:
-            self.online = any(map(is_answer, outcomes))
-        self._events.append(RequestCompleted(request, outcomes))
+    def _request_completed(self, event: RequestCompleted) -> None:
+        if self.serving and event.outcomes:
+            self.online = any(map(is_answer, event.outcomes))
+        self._events.append(event)
 
     def reconfigure(self, *, command_timeout: float | None = None,
                     rearm_immediate: bool | None = None,
@@ -425,25 +469,15 @@ class Session(ABC):
             return BUS_DOWN
         if not self.online:
             return DRIVE_OFFLINE
-        untold = self.setpoints.untold if action is ControlAction.ENABLE else []
-        return untold_text(untold) if untold else ''
+        return self.setpoints.untold_text if action is ControlAction.ENABLE else ''
 
-    def _control_changed(self, now: float) -> None:
+    def control_changed(self, now: float) -> None:
         """React to a control word, or a state, that may have changed."""
-        self._tell_notes()
-        self._let_commands_through()
-        self._see_to_control_word(now)
+        self.tell_notes()
+        self.let_commands_through()
+        self.see_to_control_word(now)
 
-    def _see_to_control_word(self, now: float) -> None:  # noqa: B027  optional hook
-        """Have a control word sent that has changed."""
-
-    def _forget_positions(self) -> None:
-        """Take note that axes may be anywhere, because the drive was lost."""
-        self.setpoints.forget()
-        if self._mute and self.told.owed and self.online:
-            self._warn(f'where its axis is, nobody knows, so that it is told nothing: {MAY_RUN}')
-
-    def _measured(self, raws: Sequence[int | None]) -> None:
+    def measured(self, raws: Sequence[int | None]) -> None:
         """Take a sample, for setpoints that stay where the axis is; after its status word."""
         if not self.setpoints.held:
             return
@@ -452,19 +486,19 @@ class Session(ABC):
         free = control is not None and control.off and (
             control.at_rest or self._status_in_sample)
         if self.setpoints.measure(raws, driven=not free):
-            self._let_commands_through()
+            self.let_commands_through()
 
     @property
-    def _mute(self) -> bool:
+    def mute(self) -> bool:
         """Tell whether nothing may be sent: where the axis is, nobody knows, and it would go."""
         return self.control is None and not self.setpoints.known
 
-    def _let_commands_through(self) -> None:
+    def let_commands_through(self) -> None:
         """Take commands while they may move the drive, and only then: otherwise it is neutral."""
-        self.setpoints.allow(self.active and self.online and self._operating)
+        self.setpoints.allow(self.active and self.online and self.operating)
 
     @property
-    def _operating(self) -> bool:
+    def operating(self) -> bool:
         """Tell whether setpoints may move the drive, as far as its control word is concerned."""
         return self.control is None or self.control.operating
 
@@ -482,7 +516,7 @@ class Session(ABC):
             return DriveState.OFFLINE
         if self.control is not None and self.control.fault:
             return DriveState.FAULT
-        if not self._operating:
+        if not self.operating:
             return DriveState.DISABLED
         if self.setpoints.waiting:
             return DriveState.NOT_ARMED
@@ -505,23 +539,25 @@ class Session(ABC):
     # -- for the families -------------------------------------------------------------------------
 
     @property
-    def _stop_spacing(self) -> float:
+    def stop_spacing(self) -> float:
         """Return how many s lie between two cycles of a stop, or of a pulse."""
         return min(self.drive.period, STOP_SPACING_MAX)
 
-    def _be_online(self) -> None:
+    def be_online(self) -> None:
         """Tell that the drive exchanges process data."""
         self.online = self.ever_online = True
         self._advice = ''
         self._events.append(StationFound())
 
-    def _be_offline(self, reason: str) -> None:
+    def be_offline(self, reason: str) -> None:
         """Tell that the drive is offline, if it was not."""
+        self._advice = reason
         if self.online:
             self.online = False
             self._events.append(StationLost(reason))
+        self.went_offline()
 
-    def _expire(self, now: float) -> bool:
+    def expire(self, now: float) -> bool:
         """Let setpoints go neutral that no fresh command keeps; tell whether there were any."""
         expired = self.setpoints.expire(now)
         if expired:
@@ -529,20 +565,29 @@ class Session(ABC):
                 tuple(setpoint.parameter.name for setpoint in expired)))
         return bool(expired)
 
-    def _reject(self, text: str) -> None:
+    def advise(self, text: str) -> None:
+        """Say what is missing while the drive is offline, and what to look at."""
+        self._advice = text
+
+    def reject(self, text: str) -> None:
         """Count and tell a frame of the drive that is malformed or unasked."""
         self.statistics.rejected += 1
         self._events.append(FrameRejected(text))
 
-    def _warn(self, text: str) -> None:
+    def note(self, event: Event) -> None:
+        """Tell something else that happened."""
+        self._events.append(event)
+
+    def warn(self, text: str) -> None:
+        """Tell people what is not as it should be."""
         self._events.append(Noted(text, warning=True))
 
     def _leave_owing(self) -> None:
         """Say at the end of an activation that the drive could not be told to stop."""
         if self.told.owed:
-            self._warn(f'could not be told to stop: {MAY_RUN}')
+            self.warn(f'could not be told to stop: {MAY_RUN}')
 
-    def _tell_notes(self) -> None:
+    def tell_notes(self) -> None:
         """Tell what the control machine noted; during a stop, it is what everybody expects."""
         if self.control is not None:
             for note in self.control.take_notes():

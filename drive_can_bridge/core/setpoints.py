@@ -147,6 +147,15 @@ class Setpoints:
         """Those of which the drive does not have the present position."""
         return [setpoint for setpoint in self.held if not setpoint.told]
 
+    @property
+    def untold_text(self) -> str:
+        """Why an axis cannot be driven yet: the drive does not have its position; '' if it has."""
+        texts = [
+            f'{setpoint.parameter.name} does not have the value of {setpoint.measured.name} yet'
+            + ('' if setpoint.known else ', which is not known or which it cannot carry')
+            for setpoint in self.untold]
+        return f'it would jump: {"; ".join(texts)}' if texts else ''
+
     def reset(self) -> None:
         """Take note that nothing was ever measured."""
         for setpoint in self.held:

@@ -71,3 +71,8 @@ def suggestion(word: str, known: Iterable[str]) -> str:
         return 'nothing is allowed here'
     more = ' …' if len(words) > _WORDS_MAX else ''
     return f'allowed: {", ".join(words[:_WORDS_MAX])}{more}'
+
+
+def counted(number: int, one: str, many: str) -> str:
+    """Return a number of things."""
+    return f'{number} {one if number == 1 else many}'

@@ -17,15 +17,16 @@ from collections.abc import Callable, Sequence
 import math
 import threading
 import time
-from typing import Any, Protocol
+from typing import Any
 
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.control import ControlRequest
-from drive_can_bridge.core.events import Event, ProcessDataReceived
+from drive_can_bridge.core.events import ProcessDataReceived
 from drive_can_bridge.core.frame import bits_on_bus, Frame, Route
 from drive_can_bridge.core.requests import Request
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.exchange.alarm import Alarm
+from drive_can_bridge.exchange.listeners import BusListener, DriveListener
 from drive_can_bridge.exchange.phases import spread
 from drive_can_bridge.exchange.router import Router
 from drive_can_bridge.transport.link import Link, steady_now
@@ -40,47 +41,6 @@ LATENESS_MAX = 0.25
 REQUEST_PERIOD = 1.0
 #: s that a stop may take beyond its neutral cycles
 STOP_MARGIN = 0.5
-
-
-class DriveListener(Protocol):
-    """
-    What an exchange tells the owner of a drive.
-
-    Every call comes with the bus lock held, from the reader or timer thread or from the thread
-    that called the exchange: it has to be short and must not call back into the exchange.
-    """
-
-    def take_commands(self, now: float) -> None:
-        """Hand the newest setpoint commands to the session: a cycle may be due."""
-
-    def discard_commands(self, why: str) -> None:
-        """
-        Throw away commands that are waiting: they are stale.
-
-        :param why: in words; '' where nobody has to be told.
-        """
-
-    def process_data(self, event: ProcessDataReceived) -> None:
-        """Publish a sample. The fast path."""
-
-    def request_sent(self, now: float) -> None:
-        """Publish what the drive was told last: it changed, or a second has passed."""
-
-    def handle_event(self, event: Event) -> None:
-        """Publish or log anything else."""
-
-
-class BusListener(Protocol):
-    """What an exchange tells about its bus; from the reader or timer thread, lock not held."""
-
-    def bus_opened(self, bus: str) -> None:
-        """Take note that the bus is there (again)."""
-
-    def bus_lost(self, bus: str, reason: str) -> None:
-        """Take note that the bus is gone, or could not be opened."""
-
-    def fatal(self, bus: str, reason: str, *, misconfigured: bool) -> None:
-        """End the bridge: the exchange cannot go on."""
 
 
 class Member:

@@ -9,20 +9,20 @@ the family's. All functions here are generators for :class:`.channel.Channel`.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Generator, Hashable, Sequence
+from collections.abc import Callable, Generator, Hashable, Sequence
 from typing import Generic, TypeVar, Union
 
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.requests import (
-    Failure, NO_ANSWER_OFFLINE, NOT_SENT, Outcome, ReadRequest, ReadValue, Request,
+    Failure, NO_ANSWER_OFFLINE, NOT_SENT, Outcome, Outcomes, ReadRequest, ReadValue, Request,
 )
 from drive_can_bridge.core.retry import RetryPolicy
+from drive_can_bridge.protocols.channel import Channel, Lane
 from drive_can_bridge.protocols.courier import ReplyT, StepT
 
 #: what one read asks for, and what one parameter takes
 SpanT = TypeVar('SpanT', bound=Hashable)
 
-Outcomes = tuple[Outcome, ...]
 Item = tuple[Parameter, int]
 #: the words that a read brought, one for each address of its span
 Found = Union[tuple[int, ...], Failure]
@@ -127,3 +127,25 @@ class Access(ABC, Generic[SpanT, StepT, ReplyT]):
                     gone = outcome
             outcomes.append(outcome)
         return tuple(outcomes)
+
+
+class ChannelServer(Generic[SpanT, StepT, ReplyT]):
+    """Serves the requests of users in their lane of a drive's acyclic channel."""
+
+    def __init__(self, channel: Channel[StepT, ReplyT],
+                 access: Access[SpanT, StepT, ReplyT]) -> None:
+        self._channel = channel
+        self._access = access
+
+    @property
+    def waiting(self) -> int:
+        """How many requests wait behind the one being served."""
+        return self._channel.waiting_users
+
+    def serve(self, request: Request, done: Callable[[Outcomes], None], now: float) -> None:
+        """Queue a request; ``done`` gets an outcome for each name."""
+        self._channel.run(self._access.serve(request), done, now, Lane.USERS)
+
+    def cancel(self) -> None:
+        """Forget all of them; nobody is told."""
+        self._channel.cancel(Lane.USERS)

@@ -81,10 +81,10 @@ class Scout(ABC):
     def asked(self, frame: Frame, now: float) -> None:
         """Take note of a question of our own: its answer is no sign of a master."""
         self._ours = True
-        self._hear_request(frame, now)
+        self.hear_request(frame, now)
         self._ours = False
 
-    def _hear_request(self, frame: Frame, now: float) -> None:
+    def hear_request(self, frame: Frame, now: float) -> None:
         """Note a request, where answers are only known by what was asked."""
         return
 

@@ -31,8 +31,10 @@ from drive_can_bridge.configuration.parameter_file import duplicate_keys
 from drive_can_bridge.configuration.problems import report
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.errors import ConfigurationError
+from drive_can_bridge.core.words import counted
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.exchange.one_master import BRIDGE, InUse, Ownership
+from drive_can_bridge.exchange.stop import stop_all
 from drive_can_bridge.process.scheduling import raise_priority
 from drive_can_bridge.protocols.families import FAMILIES, make_sessions
 from drive_can_bridge.ros.diagnostics import Diagnostics
@@ -278,29 +280,12 @@ class BridgeNode(LifecycleNode):
     def _activate(self) -> None:
         for exchange in self.exchanges.values():
             exchange.activate()
-        self.log.info(
-            f'active: {_count(len(self.drives), "drive", "drives")} on '
-            f'{_count(len(self.exchanges), "bus", "buses")}')
+        self.log.info(f'active: {counted(len(self.drives), "drive", "drives")} on '
+                      f'{counted(len(self.exchanges), "bus", "buses")}')
 
     def _stop_drives(self) -> None:
-        # every bus at the same time: the slowest one decides, not the sum
-        threads = [threading.Thread(target=self._stop_bus, args=(exchange,),
-                                    name=f'stop {exchange.bus.name}')
-                   for exchange in self.exchanges.values() if exchange.active]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
-
-    def _stop_bus(self, exchange: BusExchange) -> None:
-        reason = exchange.bus_reason or 'the bus blocks'
-        try:
-            if exchange.deactivate():
-                return
-        except Exception as error:  # noqa: BLE001  outermost call of a thread: nothing is silent
-            reason = f'{type(error).__name__}: {error}'
-        self.log.error(f'bus {exchange.bus.name}: the stop frames could not all be '
-                                f'sent: {reason}')
+        for bus, reason in stop_all(self.exchanges.values()).items():
+            self.log.error(f'bus {bus}: the stop frames could not all be sent: {reason}')
 
     def _clean_up(self) -> None:
         if self._diagnostics_thread is not None:
@@ -380,8 +365,6 @@ class BridgeNode(LifecycleNode):
         """In lifecycle state active."""
         return bool(self._state_machine.current_state[0] == State.PRIMARY_STATE_ACTIVE)
 
-    # -- diagnostics ------------------------------------------------------------------------------
-
     @property
     def diagnostics(self) -> Diagnostics | None:
         """What reports on buses and drives, from configure to cleanup."""
@@ -401,8 +384,8 @@ class BridgeNode(LifecycleNode):
         """Log it."""
         exchange = self.exchanges.get(bus)
         if exchange is not None:  # else it was given up while it was still being opened
-            self.log.error(f'bus {bus}: {reason}; tried again every '
-                                    f'{exchange.bus.reconnect_period:g} s')
+            again = exchange.bus.reconnect_period
+            self.log.error(f'bus {bus}: {reason}; tried again every {again:g} s')
         if self._flight is not None:
             self._flight.bus_lost(bus)
 
@@ -414,7 +397,3 @@ class BridgeNode(LifecycleNode):
         else:
             self.log.fatal(text)
             self._fatal(text)
-
-
-def _count(number: int, one: str, many: str) -> str:
-    return f'{number} {one if number == 1 else many}'

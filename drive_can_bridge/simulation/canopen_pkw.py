@@ -14,9 +14,10 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.frame import Frame, Route, STANDARD_IDENTIFIER_MAX
 from drive_can_bridge.core.parameters import Value
-from drive_can_bridge.protocols.canopen_pkw import abort_codes, network, pkw
+from drive_can_bridge.protocols.canopen import abort_codes, network
+from drive_can_bridge.protocols.canopen.network import Emergency, NmtCommand, NmtState
+from drive_can_bridge.protocols.canopen_pkw import pkw, refusals
 from drive_can_bridge.protocols.canopen_pkw.identifiers import Identifiers
-from drive_can_bridge.protocols.canopen_pkw.network import Emergency, NmtCommand, NmtState
 from drive_can_bridge.simulation.canopen.node import CanopenNode
 from drive_can_bridge.simulation.canopen.sdo import checked_length, Refused
 from drive_can_bridge.simulation.canopen_pkw_registers import RegisterTable
@@ -168,7 +169,7 @@ class SimulatedPkwDrive(SimulatedDrive):
             first, second = (*self.table.read(request.address, meaning.count), 0)[:2]
             return pkw.response(request, (first, second))
         except Refused as error:
-            return pkw.error_response(request, abort_codes.words_from_code(
+            return pkw.error_response(request, refusals.words_from_code(
                 error.code, self._abort_code_order))
 
     # -- by hand ----------------------------------------------------------------------------------

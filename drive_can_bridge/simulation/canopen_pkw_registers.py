@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter, Storage
-from drive_can_bridge.protocols.canopen_pkw import abort_codes
+from drive_can_bridge.protocols.canopen import abort_codes
 from drive_can_bridge.protocols.canopen_pkw.object_map import BLOCKS, object_of, register_of
 from drive_can_bridge.protocols.canopen_pkw.pkw import (
     Address, value_from_words, words_from_value,

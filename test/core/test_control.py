@@ -9,8 +9,8 @@ from hypothesis import settings, strategies as st
 from hypothesis.stateful import initialize, invariant, rule, RuleBasedStateMachine
 import pytest
 
-from drive_can_bridge.core.control import (
-    ControlAction, ControlMachine, ControlRequest)
+from drive_can_bridge.core.control import ControlAction, ControlRequest
+from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.profile import ControlTable, StatusPattern
 
 ENABLE = ControlAction.ENABLE

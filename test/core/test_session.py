@@ -7,9 +7,8 @@ from typing import Any
 from builders import CONTROL, drive, GAIN, parameter, read, SPEED, STATUS, WORD
 import pytest
 
-from drive_can_bridge.core.control import (
-    ControlAction, ControlCompleted, ControlMachine, ControlRequest,
-)
+from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
+from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.events import RequestCompleted, StationLost
 from drive_can_bridge.core.frame import Frame
@@ -28,40 +27,51 @@ class Idle(Session):
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
         self.done: list[str] = []
+        self.serve_by(self.Server(self))
 
-    def deactivate(self, now: float) -> None:
-        self.active = False
+    class Server:
+        """Lets everybody wait."""
 
-    def _begin(self, now: float) -> None:
+        def __init__(self, session: 'Idle') -> None:
+            self._session = session
+
+        @property
+        def waiting(self) -> int:
+            return self._session.waiting
+
+        def serve(self, request: Request, done: Any, now: float) -> None:
+            self._session.waiting += 1
+
+        def cancel(self) -> None:
+            self._session.done.append('cancel')
+
+    def prepare_stop(self, now: float) -> bool:
+        return False
+
+    def begin_stop(self, now: float) -> bool:
+        raise NotImplementedError
+
+    def begin(self, now: float) -> None:
         self.done.append(f'begin at {now:g}, {self._advice}')
         self.online = True
 
-    def _go_idle(self, advice: str) -> None:
+    def go_idle(self, advice: str) -> None:
         self.done.append(f'idle: {advice}')
 
-    def _withdraw(self, reason: str, now: float) -> None:
-        self.done.append(f'withdraw: {reason}')
-
-    def _fail_requests(self, reason: str) -> None:
-        self.done.append(f'fail: {reason}')
+    def lost(self, now: float, *, was_online: bool) -> None:
+        self.done.append(f'lost: {self._advice}')
 
     def time_lost(self, now: float) -> None:
         raise NotImplementedError
 
     def receive_frame(self, frame: Frame, now: float, age: float = 0.0) -> None:
-        self._outbox.put(frame)
+        self.outbox.put(frame)
 
     def handle_timer(self, now: float) -> None:
         raise NotImplementedError
 
     def next_timer(self) -> float:
         return math.inf
-
-    def _enqueue(self, request: Request, now: float) -> None:
-        self.waiting += 1
-
-    def _waiting_requests(self) -> int:
-        return self.waiting
 
 
 def session(**options: object) -> Idle:
@@ -89,8 +99,7 @@ def test_loss_of_the_bus() -> None:
     made.receive_frame(Frame(1, b'', False), 3.0)
     made.done.clear()
     made.bus_down(4.0, 'unplugged')
-    assert made.done == ['fail: bus down', 'withdraw: bus down: unplugged',
-                         'idle: bus down: unplugged']
+    assert made.done == ['cancel', 'lost: bus down: unplugged', 'idle: bus down: unplugged']
     assert made.take_events() == [StationLost('bus down: unplugged')]
     assert made.take_frames() == []
     made.submit(read(GAIN), 5.0)
@@ -144,7 +153,7 @@ def test_states() -> None:
         assert made.command(0, 1.0, 1.0) is CommandOutcome.DISABLED
         made.control.word_sent(1.0)
         made.control.status_received(raw, 1.0)
-        made._control_changed(1.0)
+        made.control_changed(1.0)
     assert made.state is DriveState.NOT_ARMED
     assert made.command(0, 1.0, 1.0) is CommandOutcome.ARMED
     assert made.state is DriveState.ONLINE

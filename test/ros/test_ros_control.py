@@ -10,7 +10,7 @@ import pytest
 from std_msgs.msg import Float64
 from std_srvs.srv import SetBool, Trigger
 
-from drive_can_bridge.core.control import ControlMachine
+from drive_can_bridge.core.control_machine import ControlMachine
 
 DRIVE = 'drive_can_bridge: drive lift'
 #: the control word has a slot, or is written on change

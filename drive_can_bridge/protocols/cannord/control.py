@@ -18,7 +18,7 @@ all of them, and a fault of one is a fault of the group.
 
 from collections.abc import Sequence
 
-from drive_can_bridge.core.control import ControlMachine
+from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.profile import ControlTable, StatusPattern
 from drive_can_bridge.core.status_reports import Wording
 from drive_can_bridge.protocols.cannord.states import (

@@ -12,12 +12,24 @@ The scale of P513 comes from the profile, as that of every parameter; a profile 
 it gets no warning.
 """
 
+from collections.abc import Callable
+import math
+
+from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.events import Noted
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.profile import Profile
+from drive_can_bridge.core.requests import (
+    Failure, Outcomes, ReadRequest, ReadValue, Request, WriteRequest, Written,
+)
+from drive_can_bridge.protocols.cannord.channel import TaskChannel
+from drive_can_bridge.protocols.cannord.procedures import TaskAccess
 
 TIMEOUT_NUMBER = 513
 #: periods that the time-out should last at least: one frame lost, the next one late
 PERIODS_MIN = 3
+#: s until a time-out that nobody answered is asked for again
+UNKNOWN_PAUSE = 10.0
 
 
 def timeout_parameter(profile: Profile) -> Parameter | None:
@@ -41,3 +53,59 @@ def timeout_warning(parameter: Parameter, timeout: float, period: float) -> str:
     return (f'telegram time-out {timeout:g} s ({parameter.name}, {parameter.address}) is too '
             f'tight for a period of {period:g} s: set it to {least:g} s or more, or shorten the '
             'period')
+
+
+class TimeoutWatch:
+    """
+    Reads the telegram time-out of one inverter, where its profile lists it.
+
+    :param access: how parameters are read.
+    :param emit: takes what people should know.
+    :ivar warning: why it does not fit; '' if it does, or nobody knows.
+    """
+
+    def __init__(self, drive: DriveConfiguration, channel: TaskChannel, access: TaskAccess,
+                 emit: Callable[[Noted], None]) -> None:
+        self.warning = ''
+        self._parameter = timeout_parameter(drive.profile)
+        self._period = drive.period
+        self._channel = channel
+        self._access = access
+        self._emit = emit
+        self._asking = False
+        self._ask_at = -math.inf
+
+    def forget(self) -> None:
+        """Take note that the channel was cleared."""
+        self._asking = False
+
+    def look(self, now: float) -> None:
+        """Read it, unless nobody answered lately."""
+        if self._parameter is None or self._asking or now < self._ask_at:
+            return
+        self._asking = True
+        self._channel.run(
+            self._access.serve(ReadRequest((self._parameter,))), self._take, now)
+
+    def request_answered(self, request: Request, outcomes: Outcomes) -> None:
+        """Look again when somebody has written it."""
+        if isinstance(request, WriteRequest) and any(
+                parameter.number == TIMEOUT_NUMBER and isinstance(outcome, Written)
+                for (parameter, _), outcome in zip(request.items, outcomes)):
+            self._ask_at = -math.inf    # now it is known to answer
+            self.look(self._channel.now)
+
+    def _take(self, outcomes: Outcomes) -> None:
+        outcome, = outcomes
+        self._asking = False
+        if self._parameter is None:
+            return
+        if isinstance(outcome, ReadValue):
+            self.warning = timeout_warning(
+                self._parameter, float(self._parameter.value_from_raw(outcome.raw)), self._period)
+            if self.warning:
+                self._emit(Noted(self.warning, warning=True))
+        elif isinstance(outcome, Failure):
+            self._ask_at = self._channel.now + UNKNOWN_PAUSE
+            self._emit(Noted(f'telegram time-out ({self._parameter.address}) unknown: '
+                             f'{outcome.reason}'))

@@ -10,7 +10,7 @@ import math
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import RemoteProtocolError
-from drive_can_bridge.core.parameters import Access, Parameter, ParameterType
+from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.protocols.cannord.broadcast import broadcast_identifier
 from drive_can_bridge.protocols.cannord.identifiers import identifier, MessageObject
 from drive_can_bridge.protocols.cannord.parameter_frame import (
@@ -20,7 +20,7 @@ from drive_can_bridge.protocols.cannord.process_data import (
     decode_extra, decode_main, EXTRA_LENGTH, MAIN_VALUES, ProcessData,
 )
 from drive_can_bridge.protocols.cannord.states import (
-    is_faulted, state_of, STATUS_BITS, STATUS_WORD,
+    CONTROL_PARAMETER, is_faulted, state_of, STATUS_PARAMETER,
 )
 from drive_can_bridge.protocols.observer import (
     Direction, DriveObserver, Emit, Handler, Kind, Questions, Verdict,
@@ -31,9 +31,6 @@ _CYCLIC, _PARAMETER = Kind.CYCLIC, Kind.PARAMETER
 #: periods after which process data count as unanswered although no other followed
 _PATIENCE = 2.0
 
-CONTROL_PARAMETER = Parameter(name='control_word', description='Control word of the inverter')
-STATUS_PARAMETER = Parameter(name=STATUS_WORD, access=Access.READ_ONLY,
-                             bits=tuple(STATUS_BITS.items()))
 _DOUBLE_RESPONSES = (Response.DOUBLE, Response.ARRAY_DOUBLE)
 _ARRAY_TASKS = {task for (array, _, _), task in WRITE_TASKS.items() if array} | {Task.READ_ARRAY}
 _DOUBLE_TASKS = {task for (_, double, _), task in WRITE_TASKS.items() if double}
@@ -80,7 +77,7 @@ class CannordObserver(DriveObserver):
         self._tasks: dict[TaskKey, ParameterFrame] = {}
         self._asked = math.nan
         self._last = -math.inf
-        self._forgiven = False
+        self._stale = False
         self._heard_request = False
 
     def handler(self, identifier: int, extended: bool) -> Handler | None:
@@ -147,8 +144,8 @@ class CannordObserver(DriveObserver):
                 verdict = Verdict.MALFORMED
                 remark = (f'{len(raws) - 1} values, {len(self._response_main) - 1} needed; '
                           f'{remark}')
-        elif self._forgiven:
-            self._forgiven = False
+        elif self._stale:
+            self._stale = False
             verdict = Verdict.LATE
         elif is_faulted(content.word):
             remark = f'{remark}, told without being asked'
@@ -161,7 +158,7 @@ class CannordObserver(DriveObserver):
         self._tell(now, _RESPONSE, _CYCLIC, 'cyclic response', verdict=Verdict.LOST,
                    remark=f'no answer in {1e3 * (now - self._asked):.0f} ms')
         self._asked = math.nan
-        self._forgiven = True
+        self._stale = True
         self.observed.missed += 1
 
     # -- parameters -------------------------------------------------------------------------------

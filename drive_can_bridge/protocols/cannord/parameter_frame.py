@@ -21,7 +21,7 @@ the halves of a value the other way round, ``value_order: low_first`` makes byte
 32-bit little-endian number.
 
 The sub-index counts only in the array tasks (6, 7, 8, 11, 12). For a parameter that each parameter
-set has of its own it is ``4 · element + set - 1`` (:func:`sub_index`), otherwise the element.
+set has of its own it is ``4 · element + set - 1``, otherwise the element.
 """
 
 from dataclasses import dataclass
@@ -187,19 +187,6 @@ class ParameterLayout:
         index = ind >> 8 if self.index_byte == 'high' else ind & INDEX_MAX
         return ParameterFrame(pke >> _IDENTIFIER_SHIFT, pke & NUMBER_MAX, index,
                               first << 16 | second)
-
-
-def sub_index(element: int, parameter_set: int) -> int:
-    """
-    Return the sub-index of an element of a parameter that each parameter set has of its own.
-
-    :param element: 0 to 63, counted from 0.
-    :param parameter_set: 1 to 4.
-    """
-    if not 0 <= element <= 63 or not 1 <= parameter_set <= 4:
-        raise LocalProtocolError(f'element {element} of set {parameter_set}: '
-                                 'allowed are elements 0 to 63 and sets 1 to 4')
-    return element << 2 | parameter_set - 1
 
 
 def error_text(number: int) -> str:

@@ -8,10 +8,12 @@ Every generator here is for :class:`.channel.TaskChannel`.
 from collections.abc import Callable, Generator, Sequence
 
 from drive_can_bridge.core.parameters import Parameter, Storage
-from drive_can_bridge.core.requests import Failure, NOT_SENT, Outcome, ReadValue, Written
+from drive_can_bridge.core.requests import (
+    Failure, NOT_SENT, Outcome, Outcomes, ReadValue, Written,
+)
 from drive_can_bridge.core.retry import RetryPolicy
 from drive_can_bridge.core.words import value_text
-from drive_can_bridge.protocols.access import Access, Found, Item, Outcomes
+from drive_can_bridge.protocols.access import Access, Found, Item
 from drive_can_bridge.protocols.cannord.channel import Ask, Reply
 from drive_can_bridge.protocols.cannord.parameter_frame import (
     error_text, ParameterFrame, Response, Task, WRITE_TASKS,

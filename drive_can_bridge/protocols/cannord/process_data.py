@@ -25,6 +25,7 @@ from collections.abc import Sequence
 import struct
 from typing import NamedTuple
 
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import LocalProtocolError, RemoteProtocolError
 
 #: values in the longest main frame
@@ -128,3 +129,8 @@ def _packed(layout: struct.Struct, words: Sequence[int]) -> bytes:
         return layout.pack(*words)
     except struct.error:
         raise LocalProtocolError(f'{list(words)}: every word must be 0 to 65535') from None
+
+
+def values_needed(drive: DriveConfiguration) -> int:
+    """Return how many values travel: the longer of both lists decides."""
+    return max(len(drive.cyclic_request), len(drive.cyclic_response))

@@ -37,7 +37,7 @@ class CannordScout(Scout):
             self._questions.append(
                 Frame(identifier(MessageObject.PARAMETER_TASK, address), data, False))
 
-    def _hear_request(self, frame: Frame, now: float) -> None:
+    def hear_request(self, frame: Frame, now: float) -> None:
         self.hear(frame, now)
 
     def hear(self, frame: Frame, now: float) -> None:

@@ -17,108 +17,91 @@ data beside them: lower identifiers win on the bus.
 """
 
 import math
+from typing import TYPE_CHECKING
 
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.control import ControlMachine
+from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.errors import RemoteProtocolError
-from drive_can_bridge.core.events import (
-    ForeignMasterSeen, Noted, ProcessDataReceived,
-)
+from drive_can_bridge.core.events import ForeignMasterSeen, ProcessDataReceived
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.core.outbox import Left
-from drive_can_bridge.core.parameters import Access, Parameter
-from drive_can_bridge.core.requests import (
-    BRIDGE_INACTIVE, Failure, Outcome, ReadRequest, ReadValue, Request, WriteRequest, Written,
-)
+from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.requests import Outcomes, Request
 from drive_can_bridge.core.roles import Cells
-from drive_can_bridge.core.session import (
-    Session, STOP_CYCLES,
-)
+from drive_can_bridge.core.session import Session
+from drive_can_bridge.core.setpoints import Setpoints
+from drive_can_bridge.protocols.access import ChannelServer
 from drive_can_bridge.protocols.cannord import procedures
 from drive_can_bridge.protocols.cannord.channel import TaskChannel
 from drive_can_bridge.protocols.cannord.control import make_control
 from drive_can_bridge.protocols.cannord.identifiers import identifier, MessageObject
-from drive_can_bridge.protocols.cannord.monitoring import (
-    TIMEOUT_NUMBER, timeout_parameter, timeout_warning,
-)
+from drive_can_bridge.protocols.cannord.monitoring import TimeoutWatch
 from drive_can_bridge.protocols.cannord.parameter_frame import ParameterLayout
 from drive_can_bridge.protocols.cannord.process_data import (
     decode_extra, decode_main, encode_extra, encode_main, EXTRA_LENGTH, main_length, MAIN_VALUES,
+    values_needed,
 )
-from drive_can_bridge.protocols.cannord.states import is_faulted, STATUS_BITS, STATUS_WORD
-from drive_can_bridge.protocols.channel import Lane
-from drive_can_bridge.protocols.cycle_timer import CycleTimer
+from drive_can_bridge.protocols.cannord.states import (
+    CONTROL_PARAMETER, is_faulted, STATUS_PARAMETER,
+)
+from drive_can_bridge.protocols.cyclic_exchange import CyclicExchange
+from drive_can_bridge.protocols.exchange_book import ExchangeBook
+
+if TYPE_CHECKING:
+    from drive_can_bridge.protocols.cannord.group import Group
 
 NO_ANSWER = 'no answer to process data'
-#: what the inverter is told, for the books of what it was told
-CYCLE = 'cycle'
-#: s until a telegram time-out that nobody answered is asked for again
-UNKNOWN_TIMEOUT_PAUSE = 10.0
-
-STATUS_PARAMETER = Parameter(
-    name=STATUS_WORD, access=Access.READ_ONLY, bits=tuple(STATUS_BITS.items()),
-    description='Status word of the inverter')
-CONTROL_PARAMETER = Parameter(
-    name='control_word', access=Access.WRITE_ONLY, description='Control word of the inverter')
-
-
-def values_needed(drive: DriveConfiguration) -> int:
-    """Return how many values travel: the longer of both lists decides."""
-    return max(len(drive.cyclic_request), len(drive.cyclic_response))
 
 
 class CannordSession(Session):
     """
     Process data, parameter tasks, and the state of one inverter that is addressed by itself.
 
-    :param control: the machine to be used; None: one for this inverter alone.
-    :param places: how many values the frames to and from the inverter hold at least.
+    :param group: the broadcast group of the inverter, if it is in one. The inverter that leads it
+        is sent the frames of all; the others are only listened to, beside their parameters.
     """
 
-    def __init__(self, drive: DriveConfiguration, control: ControlMachine | None = None, *,
-                 places: int = 0) -> None:
-        options = drive.options
-        self._machine = control or make_control(
+    def __init__(self, drive: DriveConfiguration, group: 'Group | None' = None) -> None:
+        options, self._group = drive.options, group
+        self._led = group is not None and not group.is_leader(drive)
+        self._member = drive.name if group is not None and not self._led else ''
+        self._machine = group.control if group is not None and not self._led else make_control(
             parameter_set=options.parameter_set, timeout=drive.control_timeout)
         super().__init__(drive, self._machine)
+        if self._led:
+            self.setpoints = Setpoints((), timeout=0.0, rearm_immediate=False)
         self._extended: bool = options.extended_identifiers
         self.request_identifier, self._response_identifier, self._task_identifier, \
             self._task_response_identifier = (
                 identifier(kind, drive.station, extended=self._extended)
                 for kind in MessageObject)
-        places = max(places, values_needed(drive))
+        places = values_needed(drive) if group is None else group.places
         self._swap: bool = options.swap_setpoints_2_3
         self._length = main_length(min(places, MAIN_VALUES))
         self._extra = places > MAIN_VALUES
         self._main_response = drive.cyclic_response[:MAIN_VALUES]
         self._extra_response = drive.cyclic_response[MAIN_VALUES:]
         self._channel = TaskChannel(
-            ParameterLayout(options.value_order, options.index_byte), self._send_task,
-            self.retry)
+            ParameterLayout(options.value_order, options.index_byte),
+            lambda payload, left: self.outbox.put(
+                Frame(self._task_identifier, payload, self._extended), left), self.retry)
         self._access = procedures.TaskAccess(
             self.retry, last_value=self._last_value, persist=options.persist_writes)
-        self._cycling = False
-        self._stopping = False
-        self._cycles_left = 0               # before a stop is complete
-        self._payloads: list[bytes] = []    # of the frames of a cycle, main frame first
-        self._payloads_words: tuple[int, ...] | None = None     # in them, until they have left
-        self._payloads_run = False          # they hold anything but neutral and disable
-        self._frames_out = 0                # of this cycle, of which nobody has said what became
-        self._whole = True                  # the bus has taken all frames of this cycle so far
-        self._sent_word: int | None = None
-        self._awaiting = False
-        self._awaiting_extra = False
-        self._forgiven = 0                  # answers to frames that were given up
+        # what only a master sends
+        self._masters = {self.request_identifier, self._task_identifier,
+                         group and group.broadcast}
+        self.serve_by(ChannelServer(self._channel, self._access))
+        self._timeout = TimeoutWatch(drive, self._channel, self._access, self.note)
+        self._book = ExchangeBook(drive, self.statistics)
+        self._timer = self._book.timer
+        self._exchange = CyclicExchange(
+            self, self._book, self._encode, slot=0,
+            left=None if group is None else group.cycle_left,
+            ended=lambda _: self.go_idle('deactivated'))
+        self._cycling = self._stopping = self._awaiting_extra = False
         self._held: ProcessDataReceived | None = None   # until values 4 and 5 arrive
         self._extra_missing = False
         self._last_sample: tuple[int, ...] = ()
-        self._sent_at = -math.inf
         self._answer_due = math.inf
-        self._timer = CycleTimer(drive.period)
-        self._missed_in_row = 0
-        self._timeout_warning = ''
-        self._asking_timeout = False
-        self._ask_timeout_at = -math.inf
 
     @property
     def builtin_parameters(self) -> tuple[Parameter, ...]:
@@ -130,19 +113,14 @@ class CannordSession(Session):
 
     # -- life cycle -------------------------------------------------------------------------------
 
-    def deactivate(self, now: float) -> None:
-        self.active = False
-        self._fail_requests(BRIDGE_INACTIVE)
-        self._withdraw(BRIDGE_INACTIVE, now)
-        if not self._cycling:
-            if not self.bus_available:
-                self._leave_owing()
-            self._go_idle('deactivated')
-            return
+    def prepare_stop(self, now: float) -> bool:
+        self._clear_acyclic()
+        return self._cycling and not self._led  # the last frames are the leader's business
+
+    def begin_stop(self, now: float) -> bool:
         self._stopping = True
-        self._cycles_left = STOP_CYCLES
-        self._timer.no_later(max(now, self._timer.began_at + self._stop_spacing))
-        self._timer.hurry(now)
+        self._exchange.stop_soon(now)
+        return True
 
     @property
     def stopped(self) -> bool:
@@ -150,115 +128,71 @@ class CannordSession(Session):
 
     def time_lost(self, now: float) -> None:
         self._channel.time_lost(now)
-        if not self._cycling or self._stopping:
-            return
-        self._lose('the bridge stood still', now)
-        self._begin(now)
+        if self._cycling and not self._stopping:
+            self.stood_still(now)
 
-    def _begin(self, now: float) -> None:
-        """Start over: nothing is known of the inverter."""
-        (self._lose if self.online else self._withdraw)('the drive is being reconnected', now)
-        self.setpoints.forget()
+    def begin(self, now: float) -> None:
         self._stopping = False
-        self._stop_awaiting()
-        self._missed_in_row = 0
+        self._expect_nothing()
+        self._book.missed_in_row = 0
+        self._exchange.cycles_left = -1
         self._cycling = True
-        self._timer.start(self._first_cycle(now))
+        if self._led:
+            self._timer.stop()
+            return
+        self._timer.start(max(now, self._timer.began_at + self.drive.period))
         if self.told.owed:
             self._timer.hurry(now)
 
-    def _first_cycle(self, now: float) -> float:
-        return max(now, self._timer.began_at + self.drive.period)
-
-    def _go_idle(self, advice: str) -> None:
+    def go_idle(self, advice: str) -> None:
         self._cycling = self._stopping = False
         self.setpoints.allow(False)
+        self._clear_acyclic()
+        self._expect_nothing()
         self._timer.stop()
-        self._stop_awaiting()
-        self._advice = advice
-        self._be_offline(advice)
+        self.be_offline(advice)
 
-    def _be_offline(self, reason: str) -> None:
+    def _clear_acyclic(self) -> None:
+        self._channel.clear()
+        self._timeout.forget()
+
+    def went_offline(self) -> None:
         self._held = None
         self._last_sample = ()
         self._extra_missing = False
-        self._timeout_warning = ''
-        super()._be_offline(reason)
-
-    def _withdraw(self, reason: str, now: float) -> None:
-        """Go neutral, and back to ``disable``."""
-        self.setpoints.allow(False)
-        self._machine.withdraw(reason, now)
-        self._control_changed(now)
+        self._timeout.warning = ''
+        if self._group is not None:
+            self._group.member_lost(self)
 
     # -- process data, sending --------------------------------------------------------------------
 
     def _cycle(self, now: float) -> None:
         """Send what is due once a period. The fast path of the timer."""
         self._settle(now)
-        self._expire(now)
-        if self.setpoints.changed or self._machine.word != self._sent_word:
-            self._payloads = self._encode()
-        error = self._timer.begun(now, self._stop_spacing if self._stopping else None)
-        if error == error:  # not NaN
-            self.statistics.period_error.add(error)
-        self._frames_out, self._whole = 0, True
-        self._transmit(now)
+        again = self._stopping and not self._exchange.whole
+        payloads = self._exchange.begin(now)
+        if self._group is None:
+            self.send(self.request_identifier, payloads)
+            self.expect_answer(now)
+        else:
+            self._group.send(payloads, now, stopping=self._stopping, again=again)
 
-    def _transmit(self, now: float) -> None:
-        """Hand out the frames of this cycle."""
-        self._put(self.request_identifier)
-        self.expect_answer(now)
+    def send(self, addressed: int, payloads: list[bytes]) -> None:
+        """Hand out main frame and additional frame of a cycle to one identifier."""
+        for payload in payloads:
+            self._exchange.put(Frame(addressed, payload, self._extended))
 
-    def _put(self, addressed: int) -> None:
-        """Hand out main frame and additional frame to one identifier."""
-        for payload in self._payloads:
-            self._frames_out += 1
-            self._outbox.put(Frame(addressed, payload, self._extended), self._frame_left)
-
-    def _frame_left(self, sent: bool, now: float) -> None:
-        """Take note of a frame; one that may start somebody counts even alone."""
-        self._frames_out -= 1
-        if not sent:
-            self._whole = False
-        elif self._payloads_run:
-            self.told.note(CYCLE, runs=True)
-        if not self._frames_out and self._whole:
-            self._cycle_left(now)
-
-    def _cycle_left(self, now: float) -> None:
-        """Take note of a cycle of which the bus has taken every frame: only then it counts."""
-        self.told.note(CYCLE, runs=self._payloads_run)
-        if self._payloads_words is not None:    # the first time that they left
-            self.sent.take(self._payloads_words)
-            self._payloads_words = None
-        if self._machine.word == self._sent_word:   # nobody was lost meanwhile
-            fresh = self._machine.word_due
-            self._machine.word_sent(now)
-            if fresh or self._machine.word != self._sent_word:
-                self._control_changed(now)
-            if self._machine.pulsing:
-                self._timer.no_later(now + self._stop_spacing)
-        if self._stopping:
-            self._cycles_left -= 1
-            if self._cycles_left == 0:
-                self._go_idle('deactivated')
-
-    def _see_to_control_word(self, now: float) -> None:
+    def see_to_control_word(self, now: float) -> None:
         if self._machine.stopping and not self._stopping and (
-                self._machine.word != self._sent_word
+                self._machine.word != self._exchange.word
                 or self.setpoints.changed and self.told.owed):
             self._timer.hurry(now)
 
-    def _encode(self) -> list[bytes]:
-        self._sent_word = self._machine.word
-        self._payloads_run = not (self._machine.at_rest and self.setpoints.at_rest)
-        words = [setpoint.parameter.word_from_raw(setpoint.raw)
-                 for setpoint in self.setpoints.items]
-        self.setpoints.changed = False
-        self._payloads_words = (self._sent_word, *words)
-        payloads = [encode_main(self._sent_word, words[:MAIN_VALUES], length=self._length,
-                                swap=self._swap)]
+    def _encode(self, raws: list[int]) -> list[bytes]:
+        word, *values = raws
+        words = [setpoint.parameter.word_from_raw(raw)
+                 for setpoint, raw in zip(self.setpoints.items, values)]
+        payloads = [encode_main(word, words[:MAIN_VALUES], length=self._length, swap=self._swap)]
         if self._extra:
             payloads.append(encode_extra(words[MAIN_VALUES:]))
         return payloads
@@ -272,12 +206,12 @@ class CannordSession(Session):
         :param until: when the answer counts as missed; infinity: with the next cycle.
         """
         if not self._cycling:
-            self._forgiven = 1 + self._extra
+            self._book.stale = 1 + self._extra
             return
         self._settle(now)
-        self._awaiting = True
+        self._book.awaiting = True
+        self._book.began_at = now
         self._awaiting_extra = self._extra
-        self._sent_at = now
         self._answer_due = until
 
     def _settle(self, now: float) -> None:
@@ -287,30 +221,26 @@ class CannordSession(Session):
         if self._held is not None:
             self._extra_missing = True
             self._publish_held()
-        if not self._awaiting:
-            return
-        self._awaiting = False
-        self._forgiven = 1      # one answer too many is on its way, if this one is only late
-        self.statistics.missed += 1
-        self._missed_in_row += 1
-        if self._missed_in_row >= self.drive.missed_limit and not self._stopping:
-            self._missed_in_row = 0
+        if (self._book.awaiting and self._book.missed()
+                and not self._stopping):
+            self._book.missed_in_row = 0
             if self.online:
-                self._lose(f'{NO_ANSWER} for {self.drive.missed_limit} cycles', now)
-            self._advice = (f'{NO_ANSWER}: drive silent, wrong station, bit rate or identifier '
-                            'format, or P509 not set to CAN')
+                self.lose(f'{NO_ANSWER} for {self.drive.missed_limit} cycles', now)
+            self.advise(f'{NO_ANSWER}: drive silent, wrong station, bit rate or identifier '
+                        'format, or P509 not set to CAN')
 
-    def _stop_awaiting(self) -> None:
+    def _expect_nothing(self) -> None:
         """Expect no answer any more; one that is on its way is no surprise, though."""
-        self._forgiven = self._awaiting + self._awaiting_extra
-        self._awaiting = self._awaiting_extra = False
+        self._book.expect_nothing()
+        self._book.stale += self._awaiting_extra
+        self._awaiting_extra = False
         self._answer_due = math.inf
         self._held = None
 
     def receive_frame(self, frame: Frame, now: float, age: float = 0.0) -> None:
         received, data, extended = frame
         if extended != self._extended:
-            self._reject(f'{frame}: not of this drive')
+            self.reject(f'{frame}: not of this drive')
         elif received == self._response_identifier:
             if len(data) == EXTRA_LENGTH:
                 self._receive_extra(data)
@@ -320,44 +250,47 @@ class CannordSession(Session):
             try:
                 self._channel.receive(data, now)
             except RemoteProtocolError as error:
-                self._reject(str(error))
-        elif received in (self.request_identifier, self._task_identifier):
-            self._see_foreign_master(frame)
+                self.reject(str(error))
+        elif received in self._masters:
+            self.note(ForeignMasterSeen(
+                f'another master sends to station {self.drive.station}: {frame}'))
         else:
-            self._reject(f'{frame}: not of this drive')
+            self.reject(f'{frame}: not of this drive')
 
     def _receive_main(self, data: bytes, now: float, received_at: float) -> None:
         """Take status word and actual values. The fast path of the reader."""
         try:
             word, values = decode_main(data, swap=self._swap)
         except RemoteProtocolError as error:
-            self._reject(str(error))
+            self.reject(str(error))
             return
-        asked = self._awaiting
+        book = self._book
+        asked = book.awaiting
         if asked:
-            self._awaiting = False
-            self._missed_in_row = 0
-            self.statistics.exchanges += 1
-            latency = received_at - self._sent_at
-            self.statistics.latency.add(latency if latency > 0.0 else 0.0)
+            book.answered(received_at)
         elif not (is_faulted(word) and self.online):
-            if self._forgiven:
-                self._forgiven -= 1
-            elif not is_faulted(word):  # while offline: the first exchange tells it again
-                self._reject('process data that nobody asked for')
+            # a fault while offline is told again by the first exchange
+            if not book.take_stale() and not is_faulted(word):
+                self.reject('process data that nobody asked for')
             return
         if not self.online and not self._stopping:
-            self._found(now)
+            self.be_online()
+            self._timeout.look(now)
+            if self._group is not None:
+                self._group.member_found(self)
         if asked and is_faulted(word) and not self._machine.fault:
-            self._forgiven = 1      # it may have been told unasked: then the answer follows
-        self._take_status(word, now)
+            book.stale = 1      # it may have been told unasked: then the answer follows
+        self._machine.status_received(word, now, self._member)
+        self.control_changed(now)
+        if self._led and self._group is not None:
+            self._group.member_status(self, word, now)
         if not self.online:         # found again by a stop
             return
         wanted = self._main_response
         raws = (word, *(parameter.raw_from_word(value)
                         for parameter, value in zip(wanted, values)))
         if len(values) < len(wanted):
-            self._reject(f'process data with {len(values)} values, {len(wanted)} needed')
+            self.reject(f'process data with {len(values)} values, {len(wanted)} needed')
         elif asked and len(data) < self._length:
             self.statistics.short += 1
         if self._held is not None:      # its values 4 and 5 would come after these
@@ -372,10 +305,8 @@ class CannordSession(Session):
     def _receive_extra(self, data: bytes) -> None:
         """Take actual values 4 and 5."""
         if not self._awaiting_extra:
-            if self._forgiven:
-                self._forgiven -= 1
-            else:
-                self._reject('additional process data that nobody asked for')
+            if not self._book.take_stale():
+                self.reject('additional process data that nobody asked for')
             return
         self._awaiting_extra = False
         held, self._held = self._held, None
@@ -391,26 +322,11 @@ class CannordSession(Session):
             self._publish(held)
 
     def _publish(self, sample: ProcessDataReceived) -> None:
-        self._measured(sample.raws)
+        self.measured(sample.raws)
         self._last_sample = (*sample.raws, *self._last_sample[len(sample.raws):])
         self._events.append(sample)
 
-    def _found(self, now: float) -> None:
-        self._be_online()
-        self._look_at_timeout(now)
-
-    def _take_status(self, word: int, now: float) -> None:
-        self._machine.status_received(word, now)
-        self._control_changed(now)
-
-    def _see_foreign_master(self, frame: Frame) -> None:
-        self._events.append(ForeignMasterSeen(
-            f'another master sends to station {self.drive.station}: {frame}'))
-
     # -- parameters -------------------------------------------------------------------------------
-
-    def _send_task(self, payload: bytes, left: Left) -> None:
-        self._outbox.put(Frame(self._task_identifier, payload, self._extended), left)
 
     def _last_value(self, name: str) -> int | None:
         """Return the raw integer of a parameter that was received last."""
@@ -419,25 +335,8 @@ class CannordSession(Session):
                 return raw
         return None
 
-    def _enqueue(self, request: Request, now: float) -> None:
-        def done(outcomes: tuple[Outcome, ...]) -> None:
-            self._answer(request, outcomes)
-            if isinstance(request, WriteRequest) and any(
-                    parameter.number == TIMEOUT_NUMBER and isinstance(outcome, Written)
-                    for (parameter, _), outcome in zip(request.items, outcomes)):
-                self._ask_timeout_at = -math.inf    # now it is known to answer
-                self._look_at_timeout(self._channel.now)
-
-        self._channel.run(
-            self._access.serve(request), done, now, Lane.USERS)
-
-    def _waiting_requests(self) -> int:
-        return self._channel.waiting_users
-
-    def _fail_requests(self, reason: str) -> None:
-        self._channel.clear()
-        self._asking_timeout = False
-        self._fail_open_requests(reason)
+    def request_answered(self, request: Request, outcomes: Outcomes) -> None:
+        self._timeout.request_answered(request, outcomes)
 
     def cells(self, parameter: Parameter) -> Cells:
         # a task without sub-index acts on the first element
@@ -450,30 +349,6 @@ class CannordSession(Session):
             return procedures.PROCESS_DATA_ONLY
         return refusal
 
-    # -- the inverter's own time-out --------------------------------------------------------------
-
-    def _look_at_timeout(self, now: float) -> None:
-        """Read the telegram time-out, where the profile lists it."""
-        parameter = timeout_parameter(self.drive.profile)
-        if parameter is None or self._asking_timeout or now < self._ask_timeout_at:
-            return
-        self._asking_timeout = True
-
-        def done(outcomes: tuple[Outcome, ...]) -> None:
-            outcome, = outcomes
-            self._asking_timeout = False
-            if isinstance(outcome, ReadValue):
-                self._timeout_warning = timeout_warning(
-                    parameter, float(parameter.value_from_raw(outcome.raw)), self.drive.period)
-                if self._timeout_warning:
-                    self._events.append(Noted(self._timeout_warning, warning=True))
-            elif isinstance(outcome, Failure):
-                self._ask_timeout_at = self._channel.now + UNKNOWN_TIMEOUT_PAUSE
-                self._events.append(Noted(f'telegram time-out ({parameter.address}) unknown: '
-                                          f'{outcome.reason}'))
-
-        self._channel.run(self._access.serve(ReadRequest((parameter,))), done, now)
-
     # -- timer ------------------------------------------------------------------------------------
 
     def handle_timer(self, now: float) -> None:
@@ -483,7 +358,7 @@ class CannordSession(Session):
             self._cycle(now)
         if now >= self._machine.next_timer():
             self._machine.handle_timer(now)
-            self._control_changed(now)
+            self.control_changed(now)
         if now >= self._channel.next_timer():
             self._channel.advance(now)
 
@@ -495,9 +370,30 @@ class CannordSession(Session):
 
     @property
     def warning(self) -> str:
-        if self._timeout_warning:
-            return self._timeout_warning
-        if self._extra_missing:
-            return ('values 4 and 5 do not arrive: the drive does not answer the additional '
-                    'frame; extra_setpoints is for SK 540E and SK 545E')
-        return ''
+        if self._timeout.warning or not self._extra_missing:
+            return self._timeout.warning
+        return ('values 4 and 5 do not arrive: the drive does not answer the additional '
+                'frame; extra_setpoints is for SK 540E and SK 545E')
+
+    # -- as one of a broadcast group --------------------------------------------------------------
+
+    @property
+    def operating(self) -> bool:
+        return (self._machine if self._group is None else self._group.control).operating
+
+    def control_refusal(self, action: ControlAction) -> str:
+        refusal = super().control_refusal(action)
+        return refusal if self._group is None else self._group.control_refusal(
+            self, action, refusal)
+
+    def cyclic_refusal(self, parameter: Parameter) -> str:
+        return (self._group.cyclic_refusal(parameter) if self._group is not None and self._led
+                else super().cyclic_refusal(parameter))
+
+    @property
+    def how_to_enable(self) -> str:
+        return (self._group.how_to_enable if self._group is not None and self._led
+                else super().how_to_enable)
+
+    def facts(self) -> dict[str, str]:
+        return {} if self._group is None else {'broadcast': self._group.fact(self)}

@@ -8,6 +8,7 @@ from typing import Union
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.protocols.canopen_pkw import object_map, pkw
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address
 from drive_can_bridge.protocols.polling import Place, plan_reads
@@ -169,3 +170,13 @@ def keys(parameter: Parameter) -> frozenset[Key]:
             if other is not None and len(addresses) == 1:
                 found.add(other)
     return frozenset(found)
+
+
+def half_refusal(parameter: Parameter, profile: Profile) -> str:
+    """Say why an unlisted parameter is not written that is one half of a listed one; else ''."""
+    mine = keys(parameter)
+    for other in profile.parameters.values():
+        if other.type.bits != parameter.type.bits and mine & keys(other):
+            return (f'one half of {other.name}: set that' if other.writable
+                    else f'read-only: one half of {other.name}')
+    return ''

@@ -15,7 +15,7 @@ as it is back under remote control.
 from collections.abc import Callable, Generator
 import math
 
-from drive_can_bridge.core.control import ControlMachine
+from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.told import Told
 from drive_can_bridge.protocols.canopen_pkw import addresses

@@ -8,7 +8,8 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Route, STANDARD_IDENTIFIER_MAX
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.session import Session
-from drive_can_bridge.protocols.canopen_pkw import addresses, network, pkw
+from drive_can_bridge.protocols.canopen import network
+from drive_can_bridge.protocols.canopen_pkw import addresses, pkw
 from drive_can_bridge.protocols.canopen_pkw.addresses import Span
 from drive_can_bridge.protocols.canopen_pkw.identifiers import Identifiers
 from drive_can_bridge.protocols.canopen_pkw.options import PkwOptions

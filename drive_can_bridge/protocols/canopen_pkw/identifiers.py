@@ -4,7 +4,7 @@
 from typing import NamedTuple
 
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.protocols.canopen_pkw import network
+from drive_can_bridge.protocols.canopen import network
 
 
 class Identifiers(NamedTuple):

@@ -28,7 +28,7 @@ from typing import Any, NamedTuple, Union
 
 from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.retry import RetryPolicy
-from drive_can_bridge.protocols.canopen_pkw import abort_codes, pkw
+from drive_can_bridge.protocols.canopen_pkw import pkw, refusals
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Function, Message
 from drive_can_bridge.protocols.channel import Channel
 from drive_can_bridge.protocols.courier import Courier
@@ -85,7 +85,7 @@ class Refused(NamedTuple):
     @property
     def text(self) -> str:
         """The refusal in words."""
-        return f'refused by the drive: {abort_codes.describe(self.code)}'
+        return f'refused by the drive: {refusals.describe(self.code)}'
 
 
 class Silence(NamedTuple):
@@ -104,7 +104,7 @@ Reply = Union[Answered, Refused, Silence]
 Procedure = Generator[Step, Reply, Any]
 
 
-class Mailbox(Courier[Step, Reply]):
+class MailboxCourier(Courier[Step, Reply]):
     """
     One exchange at a time. Late answers have the wrong toggle.
 
@@ -186,7 +186,7 @@ class Mailbox(Courier[Step, Reply]):
         self._synchronised = True
         self._end()
         if message.code == Function.ERROR:
-            return Refused(abort_codes.code_from_words(message.words, self._order))
+            return Refused(refusals.code_from_words(message.words, self._order))
         return Answered(message.words)
 
     def handle_timer(self, now: float) -> Reply | bool:
@@ -267,7 +267,7 @@ class Mailbox(Courier[Step, Reply]):
 class MailboxChannel(Channel[Step, Reply]):
     """Runs procedures through a mailbox."""
 
-    def __init__(self, mailbox: Mailbox) -> None:
+    def __init__(self, mailbox: MailboxCourier) -> None:
         super().__init__(mailbox)
         self.mailbox = mailbox
 

@@ -12,7 +12,8 @@ import math
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.parameters import Parameter, ParameterType
-from drive_can_bridge.protocols.canopen_pkw import abort_codes, addresses, network, pkw
+from drive_can_bridge.protocols.canopen import network
+from drive_can_bridge.protocols.canopen_pkw import addresses, pkw, refusals
 from drive_can_bridge.protocols.canopen_pkw.addresses import Span
 from drive_can_bridge.protocols.canopen_pkw.identifiers import Identifiers
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Function, Layout, Message
@@ -142,7 +143,7 @@ class PkwObserver(DriveObserver):
         return None
 
     def _refusal(self, message: Message) -> str:
-        return abort_codes.describe(abort_codes.code_from_words(message.words,
+        return refusals.describe(refusals.code_from_words(message.words,
                                                                 self._abort_order))
 
     def _parts(self, span: Span) -> Sequence[Span]:

@@ -223,7 +223,7 @@ def error_response(request: Message, words: Words) -> Message:
     """
     Make the response with which the device refuses a request.
 
-    :param words: the abort code, see :func:`.abort_codes.words_from_code`.
+    :param words: the abort code, see :func:`.refusals.words_from_code`.
     """
     return request._replace(code=int(Function.ERROR), words=words)
 

@@ -19,10 +19,12 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.frame import Frame, Route, STANDARD_IDENTIFIER_MAX
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.protocols.canopen_pkw import network, pkw, sdo
-from drive_can_bridge.protocols.canopen_pkw.abort_codes import describe, TEXTS
+from drive_can_bridge.protocols.canopen import network, sdo
+from drive_can_bridge.protocols.canopen.abort_codes import TEXTS
+from drive_can_bridge.protocols.canopen_pkw import pkw
 from drive_can_bridge.protocols.canopen_pkw.identifiers import Identifiers
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Layout, Message
+from drive_can_bridge.protocols.canopen_pkw.refusals import describe
 from drive_can_bridge.protocols.prober import Conversation, Finding, Prober, Question, spaced
 
 STATUS = Address(455)

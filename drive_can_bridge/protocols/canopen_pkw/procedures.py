@@ -9,9 +9,9 @@ from collections.abc import Callable, Generator, Sequence
 from typing import NamedTuple, Union
 
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.core.requests import Failure, NOT_SENT, Outcome, Written
+from drive_can_bridge.core.requests import Failure, NOT_SENT, Outcome, Outcomes, Written
 from drive_can_bridge.core.retry import RetryPolicy
-from drive_can_bridge.protocols.access import Access, Found, Item, Outcomes
+from drive_can_bridge.protocols.access import Access, Found, Item
 from drive_can_bridge.protocols.canopen_pkw import addresses
 from drive_can_bridge.protocols.canopen_pkw.addresses import Span
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
@@ -101,7 +101,7 @@ class RegisterAccess(Access[Span, Step, Reply]):
 #: what a round of reads brought: the words of all registers; None: something was not answered
 RoundResult = Union[dict[Address, int], None]
 #: what became of the last writes: why which one may not have been executed
-Farewell = Generator[Step, Reply, list[str]]
+StopProcedure = Generator[Step, Reply, list[str]]
 
 
 class LastWrite(NamedTuple):
@@ -143,7 +143,7 @@ def read_round(spans: Sequence[Span], answered: Callable[[Span, tuple[int, ...]]
 
 
 def write_until_answered(writes: Sequence[LastWrite], attempts: int, timeout: float,
-                         last: float) -> Farewell:
+                         last: float) -> StopProcedure:
     """
     Tell a drive to stand still, each thing until it is answered or was tried ``attempts`` times.
 

@@ -5,7 +5,8 @@ from typing import Any
 
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.protocols.canopen_pkw import network, pkw, sdo
+from drive_can_bridge.protocols.canopen import network, sdo
+from drive_can_bridge.protocols.canopen_pkw import pkw
 from drive_can_bridge.protocols.scout import Certainty, Scout
 
 #: the object of the mailbox, in the upper half of a mapping entry
@@ -40,7 +41,7 @@ class CanopenScout(Scout):
         for node in range(1, network.NODE_MAX + 1):
             self._questions.append(sdo.encode_upload(node, sdo.DEVICE_TYPE, 0))
 
-    def _hear_request(self, frame: Frame, now: float) -> None:
+    def hear_request(self, frame: Frame, now: float) -> None:
         if frame.identifier & 0x780 == network.REQUEST_BASE:
             self._request(frame.identifier & 0x7F, frame.data, now)
 

@@ -20,12 +20,13 @@ Setpoints and the control word are written while the drive is online: when they 
 setpoints again after ``refresh_interval``.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection
 from enum import Enum
 import math
 
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.control import ControlAction, ControlMachine
+from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.events import (
     ForeignMasterSeen, ProcessDataReceived,
@@ -33,21 +34,26 @@ from drive_can_bridge.core.events import (
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.core.requests import BRIDGE_INACTIVE, Request
 from drive_can_bridge.core.roles import Cells
 from drive_can_bridge.core.session import LOOKING, Session
-from drive_can_bridge.core.told import MAY_RUN
-from drive_can_bridge.protocols.canopen_pkw import addresses, network, pkw, procedures
+from drive_can_bridge.protocols.access import ChannelServer
+from drive_can_bridge.protocols.canopen import network
+from drive_can_bridge.protocols.canopen.node import Change, Node
+from drive_can_bridge.protocols.canopen.notes import PacedNotes
+from drive_can_bridge.protocols.canopen_pkw import addresses, pkw, procedures
 from drive_can_bridge.protocols.canopen_pkw.addresses import Span
 from drive_can_bridge.protocols.canopen_pkw.control_writer import ControlWriter
 from drive_can_bridge.protocols.canopen_pkw.identifiers import Identifiers
-from drive_can_bridge.protocols.canopen_pkw.mailbox import Mailbox, MailboxChannel, Refused
-from drive_can_bridge.protocols.canopen_pkw.node import Change, Node
-from drive_can_bridge.protocols.canopen_pkw.notes import PacedNotes
+from drive_can_bridge.protocols.canopen_pkw.mailbox import (
+    MailboxChannel, MailboxCourier, Reply, Step,
+)
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Layout, Message
+from drive_can_bridge.protocols.canopen_pkw.round import Round
+from drive_can_bridge.protocols.canopen_pkw.sent_writes import SentWrites
 from drive_can_bridge.protocols.canopen_pkw.setpoint_writer import SetpointWriter
 from drive_can_bridge.protocols.channel import Lane
-from drive_can_bridge.protocols.cycle_timer import CycleTimer
+from drive_can_bridge.protocols.exchange_book import ExchangeBook
+from drive_can_bridge.protocols.safe_stop import SafeStop
 
 #: how often a drive is told to stand still
 STOP_ATTEMPTS = 3
@@ -80,59 +86,49 @@ class PkwSession(Session):
         self._layout = Layout(options.layout)
         self._addressing: str = options.addressing
         self._word_order: str = options.word_order
-        self._notes = PacedNotes(lambda note: self._events.append(note))
+        self._notes = PacedNotes(self.note)
         self._node = Node(drive.station, nmt_start=options.nmt_start,
                           heartbeat_timeout=options.heartbeat_timeout)
-        self._channel = MailboxChannel(Mailbox(
+        self._channel = MailboxChannel(MailboxCourier(
             self._send, order=options.abort_code_order, retry=self.retry))
-        self._access = procedures.RegisterAccess(
-            self.retry, addressing=self._addressing, word_order=self._word_order)
+        self.serve_by(ChannelServer(self._channel, procedures.RegisterAccess(
+            self.retry, addressing=self._addressing, word_order=self._word_order)))
+        self._stop: SafeStop[Step, Reply] = SafeStop(self, self._channel, self._stop_ended)
         self._setpoint_writer = SetpointWriter(
-            self._channel, self.setpoints, self._warn, self.told, addressing=self._addressing,
+            self._channel, self.setpoints, self.warn, self.told, addressing=self._addressing,
             word_order=self._word_order, refresh=options.refresh_interval)
         self._control_writer: ControlWriter | None = None
         self._status: Parameter | None = None
         if control is not None and table is not None:
             word = drive.profile.parameters[table.parameter]
             self._control_writer = ControlWriter(
-                self._channel, control, word, self._control_changed, self._warn, self.told,
+                self._channel, control, word, self.control_changed, self.warn, self.told,
                 disable=table.disable, addressing=self._addressing,
                 word_order=self._word_order,
                 refresh=options.refresh_interval if word in drive.cyclic_request else 0.0)
             self._status = drive.profile.parameters.get(table.status_parameter or '')
-        self._response_spans = [addresses.span_of(parameter, self._addressing)
-                                for parameter in drive.cyclic_response]
-        self._request_places = {
-            addresses.span_of(parameter, self._addressing): place
-            for place, parameter in enumerate(self.sent.parameters)}
-        self._plan = addresses.round_plan(drive)
-        self._refusals: dict[Span, str] = {}
-        self._timer = CycleTimer(drive.period)
+        self._writes = SentWrites(
+            self.sent, addressing=self._addressing, word_order=self._word_order)
+        self._round = Round(drive, self._status, self.warn)
+        self._book = ExchangeBook(drive, self.statistics)
+        self._timer = self._book.timer
         self._phase = Phase.IDLE
-        self._missed_in_row = 0
         self._status_known = False  # it was read just now
-        self._owed = False  # there was something to be stopped when the stop began
-        self._round_began = -math.inf
         self._received_at = -math.inf
 
     # -- life cycle -------------------------------------------------------------------------------
 
-    def deactivate(self, now: float) -> None:
-        was_running = self._phase is not Phase.IDLE and (
+    def prepare_stop(self, now: float) -> bool:
+        return self._phase is not Phase.IDLE and (
             self.told.owed or self.ever_online and now >= self._node.free_at)
-        self.active = False
-        self._fail_requests(BRIDGE_INACTIVE)
-        self._withdraw(BRIDGE_INACTIVE, now)
+
+    def begin_stop(self, now: float) -> bool:
         self._node.stop()
         self._timer.stop()
         self._channel.drop(now)
-        if not was_running:
-            if not self.bus_available:
-                self._leave_owing()
-            self._go_idle('deactivated')
-            return
         self._phase = Phase.STOPPING
         self._stop_now(self._stop_time, now)
+        return True
 
     def _stop_now(self, time: float, now: float, *, in_the_end: float = 0.0) -> None:
         """
@@ -143,24 +139,21 @@ class PkwSession(Session):
         """
         writes = [] if self._control_writer is None else [self._control_writer.disable_write()]
         writes += self._setpoint_writer.neutral_writes()
-        self._owed = self.told.owed
         self._channel.cancel(Lane.STOP)
         self._channel.make_room(now)
         timeout = min(self.drive.parameter_timeout, time / (STOP_ATTEMPTS * max(1, len(writes))))
-        self._channel.run(
+        self._stop.begin(
             procedures.write_until_answered(
                 writes, STOP_ATTEMPTS, timeout, max(timeout, in_the_end)),
-            self._stop_ended, now, Lane.STOP)
+            self._stop_confirmed, now, insist=self._phase is Phase.STOPPING)
 
-    def _stop_ended(self, failed: list[str]) -> None:
-        if not failed:
-            if not self._mute:
-                self.told.stopped()
-        elif self._owed or self._phase is Phase.STOPPING:
-            tail = f': {MAY_RUN}' if self._owed else ''
-            self._warn(f'told to stop, but {"; ".join(failed)}{tail}')
+    def _stop_confirmed(self) -> None:
+        if not self.mute:
+            self.told.stopped()
+
+    def _stop_ended(self) -> None:
         if self._phase is Phase.STOPPING:
-            self._go_idle('deactivated')
+            self.go_idle('deactivated')
 
     @property
     def stopped(self) -> bool:
@@ -180,61 +173,49 @@ class PkwSession(Session):
 
     def time_lost(self, now: float) -> None:
         self._channel.time_lost(now)
-        if self._phase is not Phase.RUNNING:
-            return
-        self._lose('the bridge stood still', now)
-        self._begin(now)
+        if self._phase is Phase.RUNNING:
+            self.stood_still(now)
 
-    def _begin(self, now: float) -> None:
-        """Start over: nothing is known of the drive."""
-        self._lose('the drive is being reconnected', now)
-        self._advice = LOOKING
+    def begin(self, now: float) -> None:
+        self.advise(LOOKING)
         self._phase = Phase.RUNNING
-        self._missed_in_row = 0
-        self._refusals.clear()
-        self._plan = addresses.round_plan(self.drive)
+        self._forget_exchange()
+        self._round.start_over()
         self._node.begin(now)
         self._follow_node(now)
         self._stop_if_owed(now)
 
-    def _go_idle(self, advice: str) -> None:
+    def go_idle(self, advice: str) -> None:
         self._phase = Phase.IDLE
         self._node.stop()
         self._timer.stop()
         self._channel.clear()
         self._notes.flush(self._channel.now)
-        self._refusals.clear()
-        self._advice = advice
-        self._be_offline(advice)
+        self._round.refusals.clear()
+        self.be_offline(advice)
 
     # -- online and offline -----------------------------------------------------------------------
 
     def _found(self, now: float) -> None:
         self._node.online()
-        self._be_online()
+        self.be_online()
         self._setpoint_writer.forget()
         if self._control_writer is not None:
             self._control_writer.forget()
-        self._control_changed(now)
+        self.control_changed(now)
         self._setpoint_writer.look(now)
 
-    def _lose(self, reason: str, now: float) -> None:
-        """Make the drive offline, if it is not."""
-        self._withdraw(reason, now)
-        self._forget_positions()
-        self._advice = reason
-        self._channel.cancel(Lane.OWN)
-        self._channel.cancel(Lane.SETPOINTS)
-        self._channel.cancel(Lane.CONTROL)
-        self._missed_in_row = 0
-        self._be_offline(reason)
+    def lost(self, now: float, *, was_online: bool) -> None:
+        self._forget_exchange()
 
-    def _withdraw(self, reason: str, now: float) -> None:
-        """Go neutral, and back to ``disable``."""
-        self.setpoints.allow(False)
-        if self.control is not None:
-            self.control.withdraw(reason, now)
-            self._tell_notes()
+    def _forget_exchange(self) -> None:
+        """Forget the round and the writes that are under way."""
+        for lane in (Lane.OWN, Lane.SETPOINTS, Lane.CONTROL):
+            self._channel.cancel(lane)
+        self._book.missed_in_row = 0
+
+    def withdrawn(self, now: float) -> None:
+        """Leave it to the stop to write ``disable``."""
 
     def _stop_if_owed(self, now: float) -> None:
         if self.told.owed:
@@ -243,7 +224,7 @@ class PkwSession(Session):
     def _leave_alone(self, reason: str, now: float) -> None:
         """Handle a drive that is silent, but may be listening: it has to stand still."""
         was_online = self.online
-        self._lose(reason, now)
+        self.lose(reason, now)
         self._node.offline(now)
         self._send_nmt()
         if was_online:
@@ -256,111 +237,75 @@ class PkwSession(Session):
         A stop under way takes its course: however often a node starts anew, stops do not pile up.
         """
         self._send_nmt()    # a stop that comes before it is lost
-        self._lose(reason, now)
-        self._fail_requests(answer)
+        self.lose(reason, now)
+        self.fail_requests(answer)
         if self._channel.is_idle(Lane.STOP):
             self._channel.clear()
             self._stop_if_owed(now)
 
     def _send_nmt(self) -> None:
         for frame in self._node.take_frames():
-            self._outbox.put(frame)
+            self.outbox.put(frame)
 
     # -- the round --------------------------------------------------------------------------------
 
     def _start_round(self, now: float) -> None:
         self._write_expired(now)
-        error = self._timer.begun(now)
-        if not math.isnan(error):
-            self.statistics.period_error.add(error)
-        self._round_began = now
+        self._book.begin(now)
         if self.online:
             self._setpoint_writer.look(now)
-            self._see_to_control_word(now)
+            self.see_to_control_word(now)
         self._channel.run(
-            procedures.read_round(self._plan, self._read_answered, self._read_refused),
+            procedures.read_round(self._round.plan, self._read_answered, self._round.refused),
             self._round_ended, now)
 
     def _read_answered(self, span: Span, words: tuple[int, ...]) -> None:
         """Take an answer of the round; the status counts from the moment it was read."""
-        self._refusals.pop(span, None)
+        self._round.refusals.pop(span, None)
         if self.online:
             self._take_status(dict(zip(span.addresses, words)))
-            self._control_changed(self._channel.now)
+            self.control_changed(self._channel.now)
             self._status_known = False
 
     def _take_status(self, words: dict[Address, int]) -> None:
-        status = self._status
-        if status is None or self.control is None:
-            return
-        wanted = addresses.span_of(status, self._addressing)
-        if all(address in words for address in wanted.addresses):
-            now = self._channel.now
+        raw = self._round.status(words)
+        if raw is not None and self.control is not None:
             self._status_known = True
-            self.control.status_received(addresses.raw_from_words(
-                status, [words[address] for address in wanted.addresses], self._word_order), now)
-
-    def _read_refused(self, span: Span, refused: Refused) -> Sequence[Span]:
-        """Take a refusal; two parameters that share a read are read alone from now on."""
-        wanted = addresses.round_spans(self.drive)
-        if span not in wanted:
-            parts = sorted({part for part in wanted
-                            if set(part.addresses) <= set(span.addresses)})
-            place = self._plan.index(span)
-            self._plan[place:place + 1] = parts
-            return parts
-        names = ', '.join(parameter.name for parameter in self.drive.cyclic_response
-                          if addresses.span_of(parameter, self._addressing) == span)
-        if span not in self._refusals:
-            self._warn(f'read {names or span.address}: {refused.text}')
-        self._refusals[span] = f'{names or span.address} {refused.text}'
-        return ()
+            self.control.status_received(raw, self._channel.now)
 
     def _round_ended(self, words: procedures.RoundResult) -> None:
         now = self._channel.now
         if words is None:
             self._miss(now)
             return
-        self._missed_in_row = 0
-        raws = self._raws(words)
+        self._book.missed_in_row = 0
+        raws = self._round.raws(words)
         if not self.online:
             if self._node.heartbeat_lost:
                 return
-            self._measured(raws)   # before anything is written
+            self.measured(raws)   # before anything is written
             self._found(now)
             self._take_status(words)
-            self._control_changed(now)
+            self.control_changed(now)
             self._status_known = False
-        self._measured(raws)
+        self.measured(raws)
         if None in raws:
             return  # something was refused: there is no complete sample
-        statistics = self.statistics
-        statistics.exchanges += 1
-        statistics.latency.add(max(0.0, self._received_at - self._round_began))
-        self._events.append(ProcessDataReceived(
+        self._book.answered(self._received_at)
+        self.note(ProcessDataReceived(
             tuple(raw for raw in raws if raw is not None), self._received_at))
 
-    def _raws(self, words: Mapping[Address, int]) -> list[int | None]:
-        """Return the values that a round has brought; None for what was refused."""
-        return [
-            addresses.raw_from_words(parameter, [words[address] for address in span.addresses],
-                                     self._word_order)
-            if all(address in words for address in span.addresses) else None
-            for parameter, span in zip(self.drive.cyclic_response, self._response_spans)]
-
     def _miss(self, now: float) -> None:
-        self.statistics.missed += 1
-        self._missed_in_row += 1
-        if self._missed_in_row < self.drive.missed_limit:
+        if not self._book.missed():
             return
         if self.online:
             limit = self.drive.missed_limit
             self._leave_alone(f'no complete round of reads for {limit} periods', now)
         elif not self._node.heartbeat_lost:
-            self._advice = SILENT
+            self.advise(SILENT)
 
     def _write_expired(self, now: float) -> None:
-        if self._expire(now):
+        if self.expire(now):
             self._setpoint_writer.look(now)
 
     # -- frames -----------------------------------------------------------------------------------
@@ -368,21 +313,10 @@ class PkwSession(Session):
     def _send(self, message: Message, left: Left) -> None:
         def told(sent: bool, now: float) -> None:
             if sent:
-                self._note_write(message)
+                self._writes.note(message)
             left(sent, now)
-        self._outbox.put(Frame(self._identifiers.request, pkw.encode(message, self._layout),
+        self.outbox.put(Frame(self._identifiers.request, pkw.encode(message, self._layout),
                                False), told)
-
-    def _note_write(self, message: Message) -> None:
-        """Take note of what the device was told, if that is what it is told by us."""
-        meaning = message.meaning
-        if meaning is None or not meaning.writes:
-            return
-        place = self._request_places.get(Span(message.address, meaning.count))
-        if place is not None:
-            self.sent.take((addresses.raw_from_words(
-                self.sent.parameters[place], message.words[:meaning.count],
-                self._word_order),), place)
 
     def frames_left(self, now: float, refused: Collection[int] = ()) -> None:
         super().frames_left(now, refused)
@@ -399,7 +333,7 @@ class PkwSession(Session):
                 self._received_at = now - age
                 message = pkw.decode(data, self._layout)
                 if not self._channel.receive(message, now):
-                    self._reject(f'PKW response that nobody asked for: {message}')
+                    self.reject(f'PKW response that nobody asked for: {message}')
             elif identifier == identifiers.heartbeat:
                 self._heartbeat(network.decode_heartbeat(data), now)
             elif identifier == identifiers.emergency:
@@ -409,22 +343,22 @@ class PkwSession(Session):
                     self._notes.note('emergency' if ails else 'emergency over', text, now,
                                      warning=ails)
             elif identifier == identifiers.request:
-                self._events.append(ForeignMasterSeen(
+                self.note(ForeignMasterSeen(
                     f'another master sends PKW requests to node {self.drive.station}: {frame}'))
         except RemoteProtocolError as error:
-            self._reject(str(error))
+            self.reject(str(error))
 
     def _heartbeat(self, state: network.NmtState, now: float) -> None:
         running = self._phase is Phase.RUNNING
         change = self._node.receive_heartbeat(state, now, running)
         if self._phase is Phase.STOPPING and now < self._node.free_at and not self.told.owed:
-            self._go_idle('deactivated')
+            self.go_idle('deactivated')
         if not running:
             return
         if change is Change.RESTARTED:
             self._notes.note('boot-up', 'boot-up: the device has started', now)
             self._cut_off('the device restarted', 'no answer: the device restarted', now)
-            self._advice = 'the device restarted: waiting for it to answer'
+            self.advise('the device restarted: waiting for it to answer')
         elif change is Change.NOT_OPERATIONAL:
             text = self._node.refusal(now)
             self._cut_off(text, f'drive offline: {text}', now)
@@ -456,7 +390,7 @@ class PkwSession(Session):
                 self._send_nmt()
             if self.control is not None and now >= self.control.next_timer():
                 self.control.handle_timer(now)
-                self._control_changed(now)
+                self.control_changed(now)
             self._write_expired(now)
         self._channel.advance(now)
         if now >= self._timer.due and self._channel.is_idle(Lane.OWN):
@@ -481,7 +415,7 @@ class PkwSession(Session):
                     return f'it would jump: write of {refusal}'
         return super().control_refusal(action)
 
-    def _see_to_control_word(self, now: float) -> None:
+    def see_to_control_word(self, now: float) -> None:
         if not self.online:
             return
         if self._control_writer is not None:
@@ -492,21 +426,9 @@ class PkwSession(Session):
 
     # -- users ------------------------------------------------------------------------------------
 
-    def _refusal(self, now: float) -> str:
+    def request_refusal(self, now: float) -> str:
         blocked = self._node.refusal(now) if self._phase is Phase.RUNNING else ''
-        return f'drive offline: {blocked}' if blocked else super()._refusal(now)
-
-    def _enqueue(self, request: Request, now: float) -> None:
-        self._channel.run(
-            self._access.serve(request), lambda outcomes: self._answer(request, outcomes), now,
-            Lane.USERS)
-
-    def _fail_requests(self, reason: str) -> None:
-        self._channel.cancel(Lane.USERS)
-        self._fail_open_requests(reason)
-
-    def _waiting_requests(self) -> int:
-        return self._channel.waiting_users
+        return f'drive offline: {blocked}' if blocked else ''
 
     def cells(self, parameter: Parameter) -> Cells:
         return addresses.keys(parameter)
@@ -515,12 +437,7 @@ class PkwSession(Session):
         refusal = super().write_refusal(parameter)
         if refusal or parameter.listed:
             return refusal
-        mine = addresses.keys(parameter)
-        for other in self.drive.profile.parameters.values():
-            if other.type.bits != parameter.type.bits and mine & addresses.keys(other):
-                return (f'one half of {other.name}: set that' if other.writable
-                        else f'read-only: one half of {other.name}')
-        return ''
+        return addresses.half_refusal(parameter, self.drive.profile)
 
     # -- state ------------------------------------------------------------------------------------
 
@@ -530,7 +447,7 @@ class PkwSession(Session):
         if self._node.emergency is not None:
             texts.append(f'emergency {self._node.emergency.text}: remove its cause')
         texts += [f'poll of {text}: correct cyclic_response or the profile'
-                  for text in self._refusals.values()]
+                  for text in self._round.refusals.values()]
         texts += [f'write of {text}: correct cyclic_request, the command or the profile'
                   for text in self._setpoint_writer.refusals.values()]
         if self._control_writer is not None and self._control_writer.refusal:

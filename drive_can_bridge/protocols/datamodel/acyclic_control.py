@@ -15,7 +15,7 @@ from collections.abc import Callable
 import math
 
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.control import ControlMachine
+from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.parameters import Parameter, Storage
 from drive_can_bridge.core.told import Told
 from drive_can_bridge.protocols.datamodel.channel import AcyclicChannel, Procedure, Read, Write
@@ -159,7 +159,7 @@ class AcyclicControl:
             STATUS_PERIOD_PENDING if self._control.pending else STATUS_PERIOD))
 
 
-def control_by_hand(drive: DriveConfiguration, channel: AcyclicChannel,
+def make_acyclic_control(drive: DriveConfiguration, channel: AcyclicChannel,
                     control: ControlMachine | None, changed: Callable[[float], None],
                     told: Told, *, word: str, status: str,
                     spacing: float) -> AcyclicControl | None:

@@ -89,7 +89,7 @@ class ExtendedObserver(_DataModelObserver):
             control_slot=slots[0] if slots else None, strict=self._strict)
         self._asked = math.nan      # when the cyclic request under way was sent
         self._last = -math.inf      # the one before, answered or not
-        self._forgiven = False      # one answer too many may come
+        self._stale = False      # one answer too many may come
 
     def handler(self, identifier: int, extended_format: bool) -> Handler | None:
         if not extended_format or identifier & extended.STATION_MASK != self._station:
@@ -122,7 +122,7 @@ class ExtendedObserver(_DataModelObserver):
         observed = self.observed
         asked = self._asked
         if asked != asked:      # NaN
-            late, self._forgiven = self._forgiven, False
+            late, self._stale = self._stale, False
             verdict = Verdict.LATE if late else Verdict.UNASKED
             if self._last == -math.inf:     # asked before the trace began
                 verdict = Verdict.NORMAL
@@ -148,7 +148,7 @@ class ExtendedObserver(_DataModelObserver):
         self._tell(now, _RESPONSE, _CYCLIC, 'cyclic response', verdict=Verdict.LOST,
                    remark=f'no answer in {1e3 * (now - self._asked):.0f} ms')
         self._asked = math.nan
-        self._forgiven = True
+        self._stale = True
         self.observed.missed += 1
 
     def _take_acyclic(self, identifier: int, data: bytes, now: float) -> None:

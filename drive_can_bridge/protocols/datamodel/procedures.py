@@ -9,10 +9,12 @@ from collections.abc import Generator, Sequence
 from typing import NamedTuple
 
 from drive_can_bridge.core.parameters import Parameter, ParameterType, Storage
-from drive_can_bridge.core.requests import Failure, NOT_SENT, Outcome, SENT_UNACKNOWLEDGED, Written
+from drive_can_bridge.core.requests import (
+    Failure, NOT_SENT, Outcome, Outcomes, SENT_UNACKNOWLEDGED, Written,
+)
 from drive_can_bridge.core.retry import RetryPolicy
 from drive_can_bridge.core.words import value_text
-from drive_can_bridge.protocols.access import Access, Found, Item, Outcomes
+from drive_can_bridge.protocols.access import Access, Found, Item
 from drive_can_bridge.protocols.datamodel.channel import Read, Reply, Step, Words, Write
 from drive_can_bridge.protocols.datamodel.extended import CYCLIC_PARAMETER, SLOTS
 from drive_can_bridge.protocols.datamodel.mapping import effective, padded

@@ -87,7 +87,7 @@ class StandardScout(Scout):
             self._questions.append(standard.encode_read_request(
                 standard.REQUEST_ID_BASE + station, HARMLESS_NUMBER, 1))
 
-    def _hear_request(self, frame: Frame, now: float) -> None:
+    def hear_request(self, frame: Frame, now: float) -> None:
         station = frame.identifier - standard.REQUEST_ID_BASE
         if frame.extended or not 1 <= station <= STANDARD_STATION_MAX:
             return
@@ -99,7 +99,7 @@ class StandardScout(Scout):
             self._request(station, frame.data, now)
 
     def hear(self, frame: Frame, now: float) -> None:
-        self._hear_request(frame, now)
+        self.hear_request(frame, now)
         station = frame.identifier - standard.RESPONSE_ID_BASE
         if frame.extended or not 1 <= station <= STANDARD_STATION_MAX:
             return

@@ -5,7 +5,7 @@ The conversation with one DataModel drive that uses 11-bit identifiers.
 There is no cyclic service: once a period all of ``cyclic_response`` is read in one round, and what
 changed in ``cyclic_request`` is written, one parameter a frame. Rounds go on while the drive is
 silent; that is how it is found. Setpoints are written only to a drive that answers. One that was
-lost, or is to be left alone, is written neutral and read back (:mod:`.safe_stop`).
+lost, or is to be left alone, is written neutral and read back (:mod:`.stop_writes`).
 
 Setpoints do not wait for answers: they go out while a read is under way, or in quarantine.
 """
@@ -14,18 +14,18 @@ from enum import Enum
 import math
 
 from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.errors import RemoteProtocolError
-from drive_can_bridge.core.events import (
-    ForeignMasterSeen, ProcessDataReceived,
-)
+from drive_can_bridge.core.events import ForeignMasterSeen, ProcessDataReceived
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.core.requests import BRIDGE_INACTIVE
-from drive_can_bridge.protocols.cycle_timer import CycleTimer
+from drive_can_bridge.core.roles import Cells
+from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.datamodel import standard
-from drive_can_bridge.protocols.datamodel.base_session import DataModelSession
+from drive_can_bridge.protocols.datamodel.acyclic_side import AcyclicSide, map_cells
 from drive_can_bridge.protocols.datamodel.channel import Polling, Procedure, Read, Write
-from drive_can_bridge.protocols.datamodel.safe_stop import ANSWER_TIME, ATTEMPTS
 from drive_can_bridge.protocols.datamodel.standard_round import places, reads
+from drive_can_bridge.protocols.datamodel.stop_writes import ANSWER_TIME, ATTEMPTS
+from drive_can_bridge.protocols.exchange_book import ExchangeBook
 from drive_can_bridge.protocols.polling import Chunk, Round, WriteSchedule
 
 SILENT = 'no answer to reads: drive silent, wrong station, bit rate or identifier mode'
@@ -39,18 +39,22 @@ class Phase(Enum):
     STOPPING = 'last neutral setpoints'
 
 
-class StandardSession(DataModelSession):
+class StandardSession(Session):
     """Rounds of reads, setpoints on change, and the acyclic frames between them."""
 
     def __init__(self, drive: DriveConfiguration) -> None:
-        options = drive.options
+        table, options = drive.profile.control, drive.options
+        super().__init__(drive, None if table is None else ControlMachine(
+            table, timeout=drive.control_timeout))
         request = standard.identifier(options.request_id_base, drive.station)
-        super().__init__(
-            drive,
+        self._side = AcyclicSide(
+            self,
             encode_read=lambda number, count: standard.encode_read_request(
                 request, number, count),
             encode_write=lambda number, words: standard.encode_write(request, number, *words),
-            together=1, polling=Polling(options.quarantine))
+            together=1, stop_ended=self._stop_ended, polling=Polling(options.quarantine))
+        self._channel = self._side.channel
+        self._control_slot, self._status_slot = self._side.control_slot, self._side.status_slot
         self._request_identifier = request
         self._identifiers = request, standard.identifier(
             options.response_id_base, drive.station)
@@ -62,40 +66,40 @@ class StandardSession(DataModelSession):
             <= self._places[self._status_slot].address < chunk.address + chunk.size)
         self._writes = WriteSchedule(len(drive.cyclic_request), options.refresh_interval)
         self._phase = Phase.IDLE
-        self._timer = CycleTimer(drive.period)
+        self._book = ExchangeBook(drive, self.statistics)
+        self._timer = self._book.timer
         self._in_round = False
         self._void = False  # this round began before the process stood still
-        self._round_began = -math.inf
         self._status_asked_at = -math.inf
         self._word_written_at = -math.inf
         self._pulse_at = math.inf  # when the control word is due again, whatever it was
         self._received_at = -math.inf
         self._expected = False  # the answer of a read that nobody wants any more may come
-        self._missed_in_row = 0
         self._doubt = False  # a read went unanswered since the status was read
         self._gap = ''  # what the last round asked for in vain, though others were answered
 
+    @property
+    def map_cells(self) -> Cells:
+        return map_cells(self.drive.options)
+
     # -- life cycle -------------------------------------------------------------------------------
 
-    def deactivate(self, now: float) -> None:
-        self.active = False
-        stop = self._phase is not Phase.IDLE and (self.online or self.told.owed)
-        self._fail_requests(BRIDGE_INACTIVE)
-        if stop:
+    def prepare_stop(self, now: float) -> bool:
+        self._clear_acyclic()
+        owes = self._phase is not Phase.IDLE and (self.online or self.told.owed)
+        if owes:
             self._phase = Phase.STOPPING
-        self._withdraw(BRIDGE_INACTIVE, now)
-        if stop:
-            self._timer.stop()
-            self._writes.forget()
-            self._stop_by_writes(now)
-        if not self._safe_stop.running:
-            if not self.bus_available:
-                self._leave_owing()
-            self._go_idle('deactivated')
+        return owes
+
+    def begin_stop(self, now: float) -> bool:
+        self._timer.stop()
+        self._writes.forget()
+        self._side.begin_stop(now)
+        return self._side.stop.running
 
     def _stop_ended(self) -> None:
         if self._phase is Phase.STOPPING:
-            self._go_idle('deactivated')
+            self.go_idle('deactivated')
 
     @property
     def stopped(self) -> bool:
@@ -110,37 +114,37 @@ class StandardSession(DataModelSession):
         self._void = self._in_round
         self._channel.time_lost(now)
         if self._phase is Phase.POLLING:
-            self._lose('the bridge stood still', now)
+            self.lose('the bridge stood still', now)
             self._timer.start(now)
 
-    def _begin(self, now: float) -> None:
-        """Start over: nothing is known of the drive."""
-        self._lose('the drive is being reconnected', now)
-        self._advice, self._gap = SILENT, ''
+    def begin(self, now: float) -> None:
+        self.advise(SILENT)
+        self._gap = ''
         self._phase = Phase.POLLING
-        self._missed_in_row = 0
+        self._book.missed_in_row = 0
+        self._tell_to_stop(now)
         self._timer.start(now)
 
-    def _lose(self, reason: str, now: float) -> None:
-        was_online = self.online
-        super()._lose(reason, now)
-        self._writes.forget()
-        # it may only have lost its voice: it is told to stand still before it is left alone
-        if self.bus_available and (was_online or self.told.owed):
-            self._stop_by_writes(now)
+    def lost(self, now: float, *, was_online: bool) -> None:
+        self._tell_to_stop(now, was_online)
 
-    def _go_idle(self, advice: str) -> None:
+    def _tell_to_stop(self, now: float, was_online: bool = False) -> None:
+        """See that a drive stands still that may only have lost its voice, if it may run."""
+        self._writes.forget()
+        if self.bus_available and (was_online or self.told.owed):
+            self._side.begin_stop(now)
+
+    def go_idle(self, advice: str) -> None:
         self._phase = Phase.IDLE
         self._timer.stop()
         self._writes.forget()
         self.setpoints.allow(False)
-        self._clear_channel()
-        self._advice = advice
-        self._be_offline(advice)
+        self._clear_acyclic()
+        self.be_offline(advice)
 
-    def _clear_channel(self) -> None:
+    def _clear_acyclic(self) -> None:
         self._expected = self._expected or self._channel.outstanding is not None
-        super()._clear_channel()
+        self._side.clear()
         self._in_round = False
 
     # -- the beat ---------------------------------------------------------------------------------
@@ -151,32 +155,31 @@ class StandardSession(DataModelSession):
         if now >= self._pulse_at and self._control_slot is not None:
             self._pulse_at = math.inf
             self._writes.failed(self._control_slot)
-            self._see_to_control_word(now)
+            self.see_to_control_word(now)
         self._write_setpoint(now)
-        self._serve_control(now)
+        self._side.handle_timer(now)
         if now >= self._channel.next_timer():
             self._channel.advance(now)
 
     def next_timer(self) -> float:
         soonest = min(self._timer.due, self._pulse_at, self._channel.next_timer(),
-                      self._control_timer())
+                      self._side.next_timer())
         return min(soonest, self._channel.courier.free_at) if self._writes.waiting else soonest
 
     def _tick(self, now: float) -> None:
         """Begin a period: look what is to be written, then read."""
         if self.online:
-            self._expire(now)
+            self.expire(now)
             self._look(now)
-        error = self._timer.begun(now)
         if not self._in_round:
-            if not math.isnan(error):
-                self.statistics.period_error.add(error)
+            self._book.begin(now)
             self._in_round = True
             self._void = False
-            self._round_began = now
             self._write_setpoint(now)  # before the first read
             self._channel.run(self._round(), self._round_done, now)
-        elif now - self._round_began > self._patience:
+            return
+        self._timer.begun(now)
+        if now - self._book.began_at > self._patience:
             self._miss(now)  # somebody keeps disturbing; nothing was read for too long
 
     @property
@@ -218,7 +221,7 @@ class StandardSession(DataModelSession):
         runs = raw != self._neutral_raws()[index]
         # What is sent cyclically is volatile: EEPROM parameters are refused by the configuration.
         self._channel.courier.write(
-            Write((parameter.number or 0) + self._offset, (parameter.word_from_raw(raw),),
+            Write((parameter.number or 0) + self._side.offset, (parameter.word_from_raw(raw),),
                   eeprom=False),
             lambda sent, then: self._written(index, raw, sent, then, runs=runs), now)
         self._writes.written(index, raw, now)  # at once: a look meanwhile must not find it due
@@ -236,10 +239,10 @@ class StandardSession(DataModelSession):
         if raw == control.word:
             control.word_sent(now)
             if control.pulsing:
-                self._pulse_at = now + self._stop_spacing
-            self._control_changed(now)
+                self._pulse_at = now + self.stop_spacing
+            self.control_changed(now)
 
-    def _see_to_control_word(self, now: float) -> None:
+    def see_to_control_word(self, now: float) -> None:
         if self.control is None or not self.online or self._phase is not Phase.POLLING:
             return
         if self._control_slot is not None:
@@ -248,8 +251,8 @@ class StandardSession(DataModelSession):
             if self.control.stopping or not self.setpoints.held:
                 self._writes.hurry(self._control_slot)
             self._write_setpoint(now)
-        elif self._by_hand is not None:
-            self._by_hand.update(now)
+        elif self._side.control_writer is not None:
+            self._side.control_writer.update(now)
             if self.control.stopping:   # setpoints stop with it, and not a period later
                 self._look(now)
                 self._write_setpoint(now)
@@ -287,48 +290,51 @@ class StandardSession(DataModelSession):
         if raws is None:
             self._miss(now)
             return
-        statistics = self.statistics
-        self._missed_in_row = 0
         self._doubt = False
-        statistics.exchanges += 1
-        statistics.latency.add(max(0.0, self._received_at - self._round_began))
+        self._book.answered(self._received_at)
         if not self.online:
-            self._measured(raws)    # before anything is written
+            self.measured(raws)    # before anything is written
             self._found(now)
         # a status that was asked for before the word left says nothing about the word
         if (self.control is not None and self._status_slot is not None
                 and self._status_asked_at > self._word_written_at):
             self.control.status_received(raws[self._status_slot], now)
-            self._control_changed(now)
-        self._measured(raws)
-        self._events.append(ProcessDataReceived(raws, self._received_at))
+            self.control_changed(now)
+        self.measured(raws)
+        self.note(ProcessDataReceived(raws, self._received_at))
 
     def _found(self, now: float) -> None:
-        self._be_online()
+        self.be_online()
         self._writes.forget()
         self._look(now)
-        if self._by_hand is not None:
-            self._by_hand.begin(now)
-        self._control_changed(now)
+        self._side.found(now)
 
     def _miss(self, now: float) -> None:
-        self.statistics.missed += 1
-        self._missed_in_row += 1
+        too_many = self._book.missed()
         self._doubt = True
-        if self.online and self._missed_in_row >= self.drive.missed_limit:
+        if not self.online:
+            self.advise(self._gap or SILENT)
+        elif too_many:
             reason = f'no complete round of reads for {self.drive.missed_limit} periods'
-            self._lose(f'{reason}: {self._gap}' if self._gap else reason, now)
-        elif not self.online:
-            self._advice = self._gap or SILENT
+            self.lose(f'{reason}: {self._gap}' if self._gap else reason, now)
+
+    # -- control ----------------------------------------------------------------------------------
+
+    def withdrawn(self, now: float) -> None:
+        super().withdrawn(now)
+        self._side.withdrawn()
+
+    def facts(self) -> dict[str, str]:
+        return {'short_frames': str(self.statistics.short)}
 
     # -- frames from the drive --------------------------------------------------------------------
 
     def receive_frame(self, frame: Frame, now: float, age: float = 0.0) -> None:
         if frame.extended or frame.identifier not in self._identifiers:
-            self._reject(f'{frame}: of somebody else')
+            self.reject(f'{frame}: of somebody else')
             return
         if frame.identifier == self._request_identifier:
-            self._events.append(ForeignMasterSeen(
+            self.note(ForeignMasterSeen(
                 f'another master sends requests to station {self.drive.station}: {frame}'))
             return
         step = self._channel.outstanding
@@ -338,12 +344,12 @@ class StandardSession(DataModelSession):
             if self._expected:
                 self._expected = False
             else:
-                self._reject(f'{frame}: nobody asked for it')
+                self.reject(f'{frame}: nobody asked for it')
             return
         try:
             words = standard.decode_read_response(frame, step.count, strict=self._strict)
         except RemoteProtocolError as error:
-            self._reject(str(error))
+            self.reject(str(error))
             return
         if len(frame.data) != standard.PAYLOAD:
             self.statistics.short += 1

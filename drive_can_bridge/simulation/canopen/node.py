@@ -8,8 +8,8 @@ A drive composes one of these and keeps its PDOs to itself (CiA 301).
 import math
 
 from drive_can_bridge.core.frame import Frame, Route, STANDARD_IDENTIFIER_MAX
-from drive_can_bridge.protocols.canopen_pkw import abort_codes, network
-from drive_can_bridge.protocols.canopen_pkw.network import Emergency, NmtCommand, NmtState
+from drive_can_bridge.protocols.canopen import abort_codes, network
+from drive_can_bridge.protocols.canopen.network import Emergency, NmtCommand, NmtState
 from drive_can_bridge.simulation.canopen.sdo import checked_length, Objects, Refused, SdoServer
 
 SDO_REQUEST_BASE = 0x600

@@ -43,7 +43,7 @@ class CannordObserver(Observer):
         super().__init__(timeout=timeout, immediate=immediate, control=True)
         self.period = period
         self.extra = extra
-        self.farewell = 0
+        self.last_cycles = 0
         self.cycled_at = -math.inf
         self.extra_due = False
         self.may_run = False
@@ -60,7 +60,7 @@ class CannordObserver(Observer):
         online = self.online
         self.doubt()
         self.online = online
-        self.farewell = 0 if session.stopped else 3
+        self.last_cycles = 0 if session.stopped else 3
         self.asked = None
 
     def sees(self, sent: Frame, now: float) -> None:
@@ -96,8 +96,8 @@ class CannordObserver(Observer):
         if words[0] == 0x047F:
             assert self.may_run, 'nothing but ~/enable starts a drive'
         if not self.active:
-            assert self.farewell > 0, 'nothing after the stop'
-            self.farewell -= 1
+            assert self.last_cycles > 0, 'nothing after the stop'
+            self.last_cycles -= 1
             assert words == [0x047E, 0, 0, 0]
 
     def refused(self, sent: Frame, now: float) -> None:
@@ -107,7 +107,7 @@ class CannordObserver(Observer):
             assert self.extra_due
             self.extra_due = False
             if not self.active and self.main_left:
-                self.farewell += 1      # half a cycle is none
+                self.last_cycles += 1      # half a cycle is none
         else:
             assert not self.extra_due
             self.extra_due = self.extra

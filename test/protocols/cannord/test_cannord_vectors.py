@@ -13,7 +13,7 @@ from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.protocols.cannord import identifiers, process_data, states
 from drive_can_bridge.protocols.cannord.identifiers import MessageObject
 from drive_can_bridge.protocols.cannord.parameter_frame import (
-    error_text, ERRORS, ParameterFrame, ParameterLayout, Response, RESPONSES, sub_index, Task,
+    error_text, ERRORS, ParameterFrame, ParameterLayout, Response, RESPONSES, Task,
 )
 
 FILE = json.loads((Path(__file__).parents[2] / 'vectors' / 'cannord.json').read_text(
@@ -238,15 +238,6 @@ def test_errors_have_words() -> None:
     assert sorted(ERRORS) == FILE['error_numbers']
     assert error_text(2) == 'error 2: limit exceeded'
     assert error_text(8) == 'error 8: unknown'
-
-
-def test_sub_indices_of_the_manual() -> None:
-    assert sub_index(5, 2) == 0x15
-    assert sub_index(21, 4) == 0x57
-    assert sub_index(0, 1) == 0
-    for element, chosen in ((64, 1), (-1, 1), (0, 0), (0, 5)):
-        with pytest.raises(LocalProtocolError):
-            sub_index(element, chosen)
 
 
 # -- states ---------------------------------------------------------------------------------------

@@ -9,7 +9,8 @@ import pytest
 
 from drive_can_bridge.core.errors import LocalProtocolError, RemoteProtocolError
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.protocols.canopen_pkw import abort_codes, network, object_map, pkw
+from drive_can_bridge.protocols.canopen import abort_codes, network
+from drive_can_bridge.protocols.canopen_pkw import object_map, pkw, refusals
 
 FILE = json.loads((Path(__file__).parents[2] / 'vectors' / 'canopen_pkw.json').read_text(
     encoding='utf-8'))
@@ -192,10 +193,10 @@ def test_codes_of_refusals(row: dict[str, Any]) -> None:
     code, order = int(row['abort_code'], 16), row['abort_order']
     words = pkw.decode(data(row), layout(row)).words
     other = {'low_first': 'high_first', 'high_first': 'low_first'}[order]
-    assert abort_codes.code_from_words(words, order) == code
-    assert abort_codes.code_from_words(words, 'auto') == code
-    assert abort_codes.code_from_words(words, other) != code
-    assert abort_codes.words_from_code(code, order) == words
+    assert refusals.code_from_words(words, order) == code
+    assert refusals.code_from_words(words, 'auto') == code
+    assert refusals.code_from_words(words, other) != code
+    assert refusals.words_from_code(code, order) == words
 
 
 def test_table_of_codes() -> None:
@@ -205,8 +206,8 @@ def test_table_of_codes() -> None:
     # 'auto' can tell the order of every one of them
     for code in codes:
         for words in ((code & 0xFFFF, code >> 16), (code >> 16, code & 0xFFFF)):
-            assert abort_codes.code_from_words(words, 'auto') == code
-        assert f'{code:08X}h' in abort_codes.describe(code)
+            assert refusals.code_from_words(words, 'auto') == code
+        assert f'{code:08X}h' in refusals.describe(code)
 
 
 # -- registers as objects -------------------------------------------------------------------------

@@ -47,18 +47,18 @@ class ExtendedObserver(Observer):
         self.period = period
         self.verified = False
         self.request_map_read = False
-        self.farewell = 0          # neutral cycles that may still be sent without a verified map
+        self.last_cycles = 0       # neutral cycles that may still be sent without a verified map
         self.cycled_at = -math.inf
         self.eeprom_at = -math.inf
 
     def doubt(self) -> None:
         super().doubt()
         self.verified = self.request_map_read = False
-        self.farewell = 0
+        self.last_cycles = 0
 
     def deactivated(self, session: Any) -> None:
         self.disarm()
-        self.farewell = 0 if session.stopped else 3
+        self.last_cycles = 0 if session.stopped else 3
         self.asked = None
 
     def time_was_lost(self, session: Any) -> None:
@@ -91,11 +91,11 @@ class ExtendedObserver(Observer):
         assert now >= self.cycled_at + min(0.005, 0.5 * self.period) - SLACK, 'a burst'
         self.cycled_at = now
         if not self.active:
-            assert self.farewell > 0, 'nothing cyclic after the stop'
-            self.farewell -= 1
+            assert self.last_cycles > 0, 'nothing cyclic after the stop'
+            self.last_cycles -= 1
         elif self.mapping != 'assume' and not self.verified:
-            assert self.farewell > 0, 'no cyclic frame before the maps were read'
-            self.farewell -= 1
+            assert self.last_cycles > 0, 'no cyclic frame before the maps were read'
+            self.last_cycles -= 1
         words = [int.from_bytes(data[place:place + 2], 'big') for place in (0, 2)]
         if self.controlled and not any(words):
             self.armed, self.raws = [False, False], [0, 0]  # it may have been disabled meanwhile
@@ -170,9 +170,9 @@ class SessionMachine(AnyOrder):
             self.observer.disarm()
             if 'no cyclic response' in event.reason and self.observer.mapping != 'assume':
                 self.observer.verified = self.observer.request_map_read = False
-                self.observer.farewell = 3
+                self.observer.last_cycles = 3
             elif 'response map' in event.reason and 'request map' not in event.reason:
-                self.observer.farewell = 3  # the request map was just read as right
+                self.observer.last_cycles = 3  # the request map was just read as right
         elif isinstance(event, StationFound):
             self.observer.online = True
 

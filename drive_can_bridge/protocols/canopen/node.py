@@ -25,8 +25,8 @@ from enum import Enum
 import math
 
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.protocols.canopen_pkw import network
-from drive_can_bridge.protocols.canopen_pkw.network import Emergency, NmtCommand, NmtState
+from drive_can_bridge.protocols.canopen import network
+from drive_can_bridge.protocols.canopen.network import Emergency, NmtCommand, NmtState
 
 #: s that a node is given to become operational
 START_PAUSE = 0.05

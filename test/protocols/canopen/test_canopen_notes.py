@@ -4,7 +4,7 @@
 import math
 
 from drive_can_bridge.core.events import Noted
-from drive_can_bridge.protocols.canopen_pkw.notes import PacedNotes
+from drive_can_bridge.protocols.canopen.notes import PacedNotes
 
 
 def test_first_of_each_kind_at_once_and_then_one_a_second() -> None:

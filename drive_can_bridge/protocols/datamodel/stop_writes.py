@@ -6,12 +6,11 @@ The writes go at once, whatever is under way and wherever the drive keeps the va
 acknowledges them, so each is read back, and written again where it is not what it should be.
 """
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Generator, Sequence
 from typing import NamedTuple
 
 from drive_can_bridge.core.parameters import Parameter, Storage
-from drive_can_bridge.protocols.channel import Lane
-from drive_can_bridge.protocols.datamodel.channel import AcyclicChannel, Read, Step, Words, Write
+from drive_can_bridge.protocols.datamodel.channel import Read, Step, Words, Write
 
 #: how often everything is written at most
 ATTEMPTS = 3
@@ -42,40 +41,8 @@ class StopWrite(NamedTuple):
         return f'{self.parameter.name} ({self.parameter.address})'
 
 
-class SafeStop:
-    """
-    The acyclic stop of one drive.
-
-    :param ended: takes what failed, in words; nothing: the drive has confirmed it all.
-    :ivar running: it is under way.
-    """
-
-    def __init__(self, channel: AcyclicChannel, ended: Callable[[list[str]], None]) -> None:
-        self.running = False
-        self._channel = channel
-        self._ended = ended
-
-    def begin(self, writes: Sequence[StopWrite], now: float) -> None:
-        """Write everything now, and read it back. One that is under way goes on as it is."""
-        if self.running:
-            return
-        self.running = True
-        for each in writes:
-            self._channel.write_now(each.write, lambda sent, then: None, now)
-        timeout = min(self._channel.courier.retry.timeout, ANSWER_TIME)
-        self._channel.run(_confirm(writes, timeout), self._done, now, Lane.STOP)
-
-    def forget(self) -> None:
-        """Take note that the channel was cleared."""
-        self.running = False
-
-    def _done(self, failed: list[str]) -> None:
-        self.running = False
-        self._ended(failed)
-
-
-def _confirm(writes: Sequence[StopWrite], timeout: float,
-             ) -> Generator[Step, Words | None, list[str]]:
+def confirm(writes: Sequence[StopWrite], timeout: float,
+            ) -> Generator[Step, Words | None, list[str]]:
     """Read back what was written, and write it again as needed; return what failed, in words."""
     blind = [each for each in writes if not each.parameter.readable]
     wrong = [each for each in writes if each.parameter.readable]

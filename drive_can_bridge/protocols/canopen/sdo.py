@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.protocols.canopen_pkw.network import check_node
+from drive_can_bridge.protocols.canopen.network import check_node
 
 REQUEST_BASE = 0x600
 RESPONSE_BASE = 0x580

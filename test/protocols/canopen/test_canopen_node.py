@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from drive_can_bridge.protocols.canopen_pkw.network import Emergency, NmtState
-from drive_can_bridge.protocols.canopen_pkw.node import Change, Node
+from drive_can_bridge.protocols.canopen.network import Emergency, NmtState
+from drive_can_bridge.protocols.canopen.node import Change, Node
 
 BOOT_UP, STOPPED, OPERATIONAL, PRE_OPERATIONAL = NmtState
 OVERLOAD = Emergency(0x2310, 0x02, bytes(5))

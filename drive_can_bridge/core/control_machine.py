@@ -1,0 +1,399 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The machine behind ``~/enable``, ``~/reset_fault`` and ``~/quick_stop`` of one drive.
+
+It decides which control word is sent now. The session of the drive sends that word, reports that
+it left (:meth:`~ControlMachine.word_sent`) and what status words come back, and hands the outcome
+of each request to whoever asked. What it makes of a request stands in :mod:`.control`.
+"""
+
+from collections.abc import Sequence
+import math
+
+from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
+from drive_can_bridge.core.control_operation import Answers, Operation
+from drive_can_bridge.core.control_texts import (
+    disregard_text, no_word_text, state_text, stuck_text, success_text,
+)
+from drive_can_bridge.core.disregard import Disregard
+from drive_can_bridge.core.profile import ControlTable, StatusPattern
+from drive_can_bridge.core.status_reports import StatusReports, Wording
+
+#: how often the reset word leaves where nobody acknowledges it
+RESET_CYCLES = 3
+
+_STOPS = (ControlAction.DISABLE, ControlAction.QUICK_STOP)
+
+
+class ControlMachine:
+    """
+    Bring one drive to the state that was asked for, by the words and conditions of a table.
+
+    After any call, look at :attr:`word`, :meth:`take_completed`, :meth:`take_notes`,
+    :meth:`next_timer`. Time is that of a steady clock, in s.
+
+    :param timeout: seconds until an unconfirmed request fails.
+    :param pulse: how often the reset word leaves.
+    :param members: names of the drives, where several share the control word.
+    :param wording: what the family knows of status words.
+    :ivar table: the words and conditions.
+    """
+
+    def __init__(self, table: ControlTable, *, timeout: float, pulse: int = RESET_CYCLES,
+                 members: Sequence[str] = (), wording: Wording | None = None) -> None:
+        self.table = self._table = table
+        self._timeout = timeout
+        self._pulse = pulse
+        self._pulses_left = 0
+        words = {
+            ControlAction.DISABLE: table.disable, ControlAction.ENABLE: table.enable,
+            ControlAction.QUICK_STOP: table.quick_stop,
+            ControlAction.RESET_FAULT: table.reset_fault}
+        self._words = {action: word for action, word in words.items() if word is not None}
+        self._reports = StatusReports(table, members)
+        self._wording = wording
+        self._sending = ControlAction.DISABLE   # by name: two words may have the same bits
+        self._sent = False                      # the current word left at least once
+        self._fault: bool | None = None         # None: not known
+        self._reached = False                   # enabled was confirmed for this enable word
+        self._disregard = Disregard(timeout)
+        self._operation: Operation | None = None
+        self._answers = Answers()
+        self._notes: list[str] = []
+
+    # -- what the session and diagnostics look at -------------------------------------------------
+
+    @property
+    def word(self) -> int:
+        """Control word to send now."""
+        return self._words[self._sending]
+
+    @property
+    def at_rest(self) -> bool:
+        """The current word tells the drive to stand still: it has the bits of ``disable``."""
+        return self.word == self._words[ControlAction.DISABLE]
+
+    @property
+    def stopping(self) -> bool:
+        """The current word is there to stop a drive: it waits for nobody."""
+        return self._sending in _STOPS
+
+    @property
+    def pulsing(self) -> bool:
+        """The current word is a pulse: it has to leave again soon."""
+        return self._sending is ControlAction.RESET_FAULT
+
+    @property
+    def operating(self) -> bool:
+        """``enable`` is the word sent, and the drive reports enabled (or cannot report it)."""
+        return self._reached
+
+    @property
+    def off(self) -> bool:
+        """The drive reports that it does not drive anything, or cannot and was told so."""
+        if self._table.enabled is None:
+            return self._sending is ControlAction.DISABLE and self._sent
+        return self._reports.off
+
+    @property
+    def word_due(self) -> bool:
+        """The current word has not left since it changed, or since :meth:`withdraw`."""
+        return not self._sent
+
+    @property
+    def state(self) -> str:
+        """State of the drive in words; see :func:`.control_texts.state_text`."""
+        return state_text(self._reports, self._table, self._wording, self._sending, self._sent)
+
+    @property
+    def fault(self) -> bool:
+        """The drive reports a fault, or did when it was last heard."""
+        return self._fault is True
+
+    @property
+    def pending(self) -> bool:
+        """A request, or a quick stop that is answered already, is under way."""
+        return self._operation is not None
+
+    @property
+    def unconfirmed(self) -> bool:
+        """The drive has reported since the current word left, but not what the word wants."""
+        if not self._sent or not self._reports.answered:
+            return False
+        if self._sending is ControlAction.DISABLE:
+            return self._reports.running_on
+        # what the drive does not report at all, it cannot confirm; and a pulse has its own end
+        return self.pending and not self.pulsing and self._table.enabled is not None
+
+    @property
+    def disregard(self) -> str:
+        """How the drive goes on running although it shall not, and what to do; '' if not."""
+        return self._disregard.text
+
+    def take_completed(self) -> list[ControlCompleted]:
+        """Return the outcomes since the last call."""
+        return self._answers.take()
+
+    def take_notes(self) -> list[str]:
+        """Return what the log should say of the drive since the last call."""
+        notes, self._notes = self._notes, []
+        return notes
+
+    # -- inputs -----------------------------------------------------------------------------------
+
+    def request(self, request: ControlRequest, now: float) -> None:
+        """Take a request; its outcome may be there when this returns."""
+        self.handle_timer(now)
+        action = request.action
+        missing = self._reports.missing if action is ControlAction.ENABLE else ()
+        if missing:
+            self._answers.complete(request, False, f'{", ".join(missing)} offline')
+            return
+        if action not in self._words and self._nothing_to_do(action):
+            under_way = self._operation
+            if action is ControlAction.QUICK_STOP and under_way is not None and (
+                    under_way.action not in _STOPS):
+                self._end(False, 'replaced by quick_stop')  # what stands is to stay so
+            self._answers.complete(request, True, self.state)
+            return
+        refusal = self._refusal(action)
+        if refusal is not None:
+            self._answers.complete(request, False, refusal)
+            return
+        under_way = self._operation
+        if under_way is None or under_way.action is not action:
+            if action is ControlAction.RESET_FAULT and self._nothing_to_do(action) and (
+                    under_way is None or under_way.action in _STOPS):
+                self._answers.complete(request, True, self.state)
+                return
+            may_run = self._may_run
+            if under_way is not None:
+                self._end(False, f'replaced by {action.value}')
+            under_way = self._operation = Operation(action, now + self._timeout)
+            if action is ControlAction.QUICK_STOP and may_run and not self._fault:
+                self._send(ControlAction.QUICK_STOP)
+            elif action is not ControlAction.ENABLE:    # of an enabled drive: nothing to do
+                self._send(ControlAction.DISABLE)
+        under_way.requests.append(request)
+        self._advance()
+
+    def word_sent(self, now: float) -> None:
+        """
+        Take note that the current word left.
+
+        Call it each time the bus has taken the word, before the response can arrive; where a write
+        is acknowledged, at the acknowledgement. A word that meanwhile is not the current one any
+        more does not count.
+        """
+        self._sent = True           # before the timer, which may change the word
+        if self.pulsing:
+            self._pulses_left -= 1
+        self.handle_timer(now)
+        self._advance()
+
+    def status_received(self, raw: int | None, now: float, member: str = '') -> None:
+        """
+        Take a status word.
+
+        :param raw: None when a response arrived that should hold a status word, but did not.
+        :param member: whose it is, where several drives share the control word.
+        """
+        self.handle_timer(now)
+        if self._reports.take(member, raw, counts=self._sent) and raw is not None:
+            self._watch_fault(raw)
+            self._watch_enabled(raw)
+            self._advance()
+            self._watch_disabled(now)
+
+    def member_found(self, name: str) -> None:
+        """Take note that a member is online."""
+        self._reports.find(name)
+
+    def member_lost(self, name: str) -> None:
+        """Take note that a member is offline. The others do not run without it."""
+        if not self._reports.lose(name):
+            return
+        self._fault = None if self._fault is None else self._reports.faulted
+        under_way = self._operation
+        if self._reached or (
+                under_way is not None and under_way.action is ControlAction.ENABLE):
+            text = f'{name} offline'
+            if self._reached:
+                self._notes.append(f'enable withdrawn: {text}; only ~/enable starts the group '
+                                   'again')
+            self._end(False, text)
+        self._advance()
+
+    def word_refused(self, word: int, reason: str, now: float) -> None:
+        """
+        Take note that the drive refused a control word: what is under way fails.
+
+        :param reason: what the drive says, in words.
+        """
+        self.handle_timer(now)
+        if word == self.word and self._operation is not None:
+            self._end(False, f'control word {word:04X}h {reason}')
+
+    def handle_timer(self, now: float) -> None:
+        """End what is overdue. Calling it early or late does no harm."""
+        if now >= self.next_timer():
+            self._end(False, self._overdue_text())
+
+    def next_timer(self) -> float:
+        """Return when :meth:`handle_timer` has something to do; ``math.inf`` if never."""
+        return math.inf if self._operation is None else self._operation.deadline
+
+    def withdraw(self, reason: str, now: float) -> None:
+        """
+        Go back to ``disable``: the drive went offline or restarted, or the bridge stops.
+
+        Open requests fail with the reason; nothing is known, and the word is :attr:`word_due`.
+        """
+        self.handle_timer(now)
+        if self._reached:
+            self._notes.append(f'enable withdrawn: {reason}; only ~/enable starts the drive again')
+        self._end(False, reason)
+        self._sent = False
+        self._reports.forget()
+        self._disregard.forget()
+        if not self._fault:         # a known fault stands until the drive says otherwise
+            self._fault = None
+
+    # -- rules ------------------------------------------------------------------------------------
+
+    def _nothing_to_do(self, action: ControlAction) -> bool:
+        """Tell whether the drive is known to be where an action would bring it."""
+        if action is ControlAction.QUICK_STOP:
+            return not self._may_run
+        return action is ControlAction.RESET_FAULT and self._fault is False
+
+    def _refusal(self, action: ControlAction) -> str | None:
+        """Return why a request cannot be taken, in words."""
+        if action not in self._words:
+            return no_word_text(action)
+        if action is ControlAction.ENABLE and self._fault:
+            return 'fault: reset it first'
+        under_way = self._operation
+        if under_way is None or under_way.action not in _STOPS or action in _STOPS:
+            return None
+        if action is ControlAction.RESET_FAULT and self._fault is False:
+            return None
+        return f'{under_way.action.value} under way: try {action.value} again when it has ended'
+
+    def _advance(self) -> None:
+        """Take the next step of what is under way, if the drive confirms the last one."""
+        under_way = self._operation
+        if under_way is None:
+            return
+        table = self._table
+        if under_way.action is ControlAction.ENABLE:
+            if self._sending is ControlAction.DISABLE:
+                if (self._confirmed(table.fault, False) and self._confirmed_off()
+                        and self._confirmed(table.ready, True)):
+                    self._send(ControlAction.ENABLE)
+            elif self._confirmed(table.enabled, True):
+                self._reached = True
+                self._end(True, self._success_text())
+        elif under_way.action is ControlAction.RESET_FAULT:
+            if self.pulsing:
+                if self._pulses_left <= 0:
+                    under_way.pulsed = True
+                    self._send(ControlAction.DISABLE)
+            elif not under_way.pulsed and self._resettable():
+                self._pulses_left = self._pulse
+                self._send(ControlAction.RESET_FAULT)
+            elif self._confirmed(table.fault, False):
+                self._end(True, self.state if table.fault is not None else
+                          'reset_fault sent; the drive does not report faults')
+        elif self._confirmed_off():
+            message = self._success_text()
+            if table.enabled is None and self._sending is ControlAction.QUICK_STOP:
+                self._answers.answer(under_way, True, message)      # keeps braking
+            else:
+                self._end(True, message)
+
+    def _watch_fault(self, raw: int) -> None:
+        """Note a fault that comes or goes; it ends everything but stops and resets."""
+        if self._table.fault is None:
+            return
+        fault = self._table.fault.matches(raw)
+        if not fault and (self._fault is False or self._reports.faulted):
+            return      # nothing new; or rid of it when the last of them is
+        had_fault, self._fault = self._fault, fault
+        if not self._fault:
+            if had_fault:
+                self._notes.append(f'fault gone ({self._reports.text})')
+            return
+        if not had_fault:
+            again = '; only ~/enable starts the drive again' if self._reached else ''
+            self._notes.append(f'fault ({self._reports.text}){again}')
+        under_way = self._operation
+        if under_way is not None and under_way.action is ControlAction.ENABLE:
+            self._end(False, f'fault while enabling ({self._reports.text}): reset it first')
+        elif self._sending is not ControlAction.RESET_FAULT:
+            self._send(ControlAction.DISABLE)
+
+    def _watch_enabled(self, raw: int) -> None:
+        """Withdraw the enable word from a drive that dropped out by itself."""
+        enabled = self._table.enabled
+        if self._reached and enabled is not None and not enabled.matches(raw):
+            text = f'no longer enabled, by itself ({self._reports.text})'
+            self._notes.append(f'{text}; only ~/enable starts the drive again')
+            self._end(False, text)
+
+    def _watch_disabled(self, now: float) -> None:
+        """Tell of a drive that runs on although its control word is ``disable``."""
+        if (self._sending is not ControlAction.DISABLE or not self._sent or self._fault
+                or not self._reports.running_on):
+            self._disregard.forget()
+        elif self._disregard.lasts(now):
+            self._disregard.text = disregard_text(self._reports, self.state, self.word)
+            self._notes.append(self._disregard.text)
+
+    @property
+    def _may_run(self) -> bool:
+        """Whether a stop has anything to do, as far as is known."""
+        return (self._sending in (ControlAction.ENABLE, ControlAction.QUICK_STOP)
+                or not self._confirmed_off())
+
+    def _confirmed(self, pattern: StatusPattern | None, wanted: bool) -> bool:
+        """Tell whether the drive, knowing the current word, reports a condition (or cannot)."""
+        return self._sent if pattern is None else self._reports.confirmed(pattern, wanted)
+
+    def _confirmed_off(self) -> bool:
+        """Tell whether the drive, knowing the current word, reports that it does not run."""
+        return self._sent if self._table.enabled is None else self._reports.standing
+
+    def _resettable(self) -> bool:
+        """Tell whether the drive, knowing ``disable``, reports a fault that can be reset."""
+        return self._sent if self._table.fault is None else self._reports.resettable
+
+    def _send(self, action: ControlAction) -> None:
+        """Make the word of this name the current one."""
+        if self._words[action] != self.word:
+            self._sent = False
+            self._reports.forget_answers()
+            self._disregard.forget()
+        self._sending = action
+        self._reached = self._reached and action is ControlAction.ENABLE
+
+    def _end(self, success: bool, message: str) -> None:
+        """Answer what is under way, if anything; only a successful ENABLE keeps its word."""
+        under_way, self._operation = self._operation, None
+        if under_way is not None:
+            self._answers.answer(under_way, success, message)
+            if success and under_way.action is ControlAction.ENABLE:
+                return
+        self._send(ControlAction.DISABLE)
+
+    def _success_text(self) -> str:
+        return success_text(self._table, self._sending, self.state)
+
+    def _overdue_text(self) -> str:
+        """Say where the drive is stuck, and what usually keeps one there."""
+        under_way, raw = self._operation, self._reports.telling
+        hint = '' if self._wording is None or raw is None else self._wording.hint(raw)
+        pulsed = under_way is not None and under_way.pulsed
+        text = stuck_text(self._reports, self._table, self.state, self._timeout,
+                          f'control word {self.word:04X}h', sent=self._sent, pulsed=pulsed)
+        return f'{text}{hint}'

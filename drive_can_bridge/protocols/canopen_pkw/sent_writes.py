@@ -1,0 +1,32 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Which of the writes that left are setpoints and control words: what the drive was told last."""
+
+from drive_can_bridge.core.last_sent import LastSent
+from drive_can_bridge.protocols.canopen_pkw import addresses
+from drive_can_bridge.protocols.canopen_pkw.addresses import Span
+from drive_can_bridge.protocols.canopen_pkw.pkw import Message
+
+
+class SentWrites:
+    """
+    Keep what a drive was told last.
+
+    :param sent: where that is kept.
+    """
+
+    def __init__(self, sent: LastSent, *, addressing: str, word_order: str) -> None:
+        self._sent = sent
+        self._word_order = word_order
+        self._places = {addresses.span_of(parameter, addressing): place
+                        for place, parameter in enumerate(sent.parameters)}
+
+    def note(self, message: Message) -> None:
+        """Take note of a request that left, if it writes what the drive is told by us."""
+        meaning = message.meaning
+        if meaning is None or not meaning.writes:
+            return
+        place = self._places.get(Span(message.address, meaning.count))
+        if place is not None:
+            self._sent.take((addresses.raw_from_words(
+                self._sent.parameters[place], message.words[:meaning.count],
+                self._word_order),), place)

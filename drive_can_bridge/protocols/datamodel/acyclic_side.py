@@ -1,0 +1,165 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The acyclic side of a DataModel drive, whatever its identifiers look like.
+
+Requests of users, a control or status word without a slot in cyclic telegrams, stops by number.
+"""
+
+from collections.abc import Callable
+import math
+
+from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.roles import Cells
+from drive_can_bridge.core.session import Session
+from drive_can_bridge.protocols.access import ChannelServer
+from drive_can_bridge.protocols.datamodel import procedures
+from drive_can_bridge.protocols.datamodel.acyclic_control import CONTROL_WORD, make_acyclic_control
+from drive_can_bridge.protocols.datamodel.channel import (
+    AcyclicChannel, Polling, Reply, Step, Words, Write,
+)
+from drive_can_bridge.protocols.datamodel.extended import SLOTS
+from drive_can_bridge.protocols.datamodel.options import DataModelOptions
+from drive_can_bridge.protocols.datamodel.process_words import slot_of
+from drive_can_bridge.protocols.datamodel.stop_writes import (
+    ANSWER_TIME, confirm, StopWrite,
+)
+from drive_can_bridge.protocols.safe_stop import SafeStop
+
+
+class AcyclicSide:
+    """
+    The acyclic side of one session.
+
+    :param encode_read: (number, count) -> frame.
+    :param encode_write: (number, words) -> frame.
+    :param together: parameters that fit one write frame.
+    :param stop_ended: called when a stop by acyclic writes has run its course.
+    :param polling: given where the exchange itself goes through the channel.
+    :ivar control_slot: of the control word in ``cyclic_request``, or None.
+    :ivar status_slot: of the status word in ``cyclic_response``, or None.
+    :ivar control_writer: looks after words that have no slot, or None.
+    """
+
+    def __init__(self, session: Session, *, encode_read: Callable[[int, int], Frame],
+                 encode_write: Callable[[int, Words], Frame], together: int,
+                 stop_ended: Callable[[], None], polling: Polling | None = None) -> None:
+        drive, options = session.drive, session.drive.options
+        self.offset: int = options.parameter_offset
+        self._session = session
+        # where each of ``request_parameters`` is written by number
+        self._sent_by_number = {
+            (parameter.number or 0) + self.offset: place
+            for place, parameter in enumerate(session.sent.parameters)}
+        self.channel = AcyclicChannel(
+            encode_read=encode_read, encode_write=encode_write, send=session.outbox.put,
+            wrote=self._note_write, retry=session.retry,
+            eeprom_gap=options.eeprom_write_gap, polling=polling)
+        session.serve_by(ChannelServer(self.channel, procedures.ParameterAccess(
+            session.retry, verify=drive.verify_writes, offset=self.offset, together=together)))
+        table = drive.profile.control
+        word_name = table.parameter if table is not None else ''
+        status_name = table.status_parameter or '' if table is not None else ''
+        self._word = drive.profile.parameters.get(word_name)
+        self.control_slot = slot_of(drive.cyclic_request, word_name)
+        self.status_slot = slot_of(drive.cyclic_response, status_name)
+        self.control_writer = make_acyclic_control(
+            drive, self.channel, session.control, session.control_changed, session.told,
+            word=word_name if self.control_slot is None else '',
+            status=status_name if self.status_slot is None else '',
+            spacing=session.stop_spacing)
+        self.stop: SafeStop[Step, Reply] = SafeStop(session, self.channel, stop_ended)
+
+    def _note_write(self, write: Write) -> None:
+        """Take note of a write that left."""
+        for number, word in enumerate(write.words, write.number):
+            if number in self._sent_by_number:
+                self._session.sent.take((word,), self._sent_by_number[number])
+
+    def clear(self) -> None:
+        """Forget everything acyclic, and whatever waits for its outcome."""
+        self.channel.clear()
+        self.channel.hold(-math.inf)
+        self.stop.forget()
+        if self.control_writer is not None:
+            self.control_writer.stop()
+
+    # -- control and status word without a slot ---------------------------------------------------
+
+    def found(self, now: float) -> None:
+        """Take note that the drive is online."""
+        if self.control_writer is not None:
+            self.control_writer.begin(now)
+        self._session.control_changed(now)
+
+    def withdrawn(self) -> None:
+        """Take note that the control word is ``disable`` again."""
+        if self.control_writer is not None:
+            self.control_writer.end()
+
+    def handle_timer(self, now: float) -> None:
+        """Do what is due for the control and status word."""
+        control, writer = self._session.control, self.control_writer
+        if control is None:
+            return
+        if writer is not None:
+            if now >= writer.look_at:
+                writer.look(now)
+            if now >= writer.retry_at:
+                writer.retry_at = math.inf
+                self._session.see_to_control_word(now)
+        if now >= control.next_timer():
+            control.handle_timer(now)
+            self._session.control_changed(now)
+
+    def next_timer(self) -> float:
+        """Return when ``handle_timer`` wants to be called."""
+        control, writer = self._session.control, self.control_writer
+        if control is None:
+            return math.inf
+        due = control.next_timer()
+        return due if writer is None else min(due, writer.look_at, writer.retry_at)
+
+    # -- stopping by acyclic writes ---------------------------------------------------------------
+
+    def begin_stop(self, now: float, *, setpoints: bool = True) -> None:
+        """
+        Write ``disable`` and neutral setpoints by their numbers, and see that the drive has them.
+
+        A stop that is under way goes on as it is.
+
+        :param setpoints: False: what is in ``cyclic_request`` is stopped by cyclic frames.
+        """
+        session, writes = self._session, []
+        if session.control is not None and self._word is not None and (
+                setpoints or self.control_slot is None):
+            writes.append(self._stop_write(self._word, session.control.word))
+        if setpoints:   # but no position where the axis may not be any more
+            writes += [self._stop_write(setpoint.parameter, setpoint.neutral)
+                       for setpoint in session.setpoints.items if setpoint.known]
+            setpoints = session.control is not None or session.setpoints.known
+        if not writes or self.stop.running:
+            return
+        # what is kept in RAM does not wait until an EEPROM is done
+        writes.sort(key=lambda each: each.write.eeprom)
+        self.stop.running = True    # before the first of them leaves
+        for each in writes:
+            self.channel.write_now(each.write, lambda sent, then: None, now)
+        timeout = min(session.retry.timeout, ANSWER_TIME)
+        self.stop.begin(
+            confirm(writes, timeout), self._all_stopped if setpoints else self._word_stopped, now)
+
+    def _all_stopped(self) -> None:
+        self._session.told.stopped()
+
+    def _word_stopped(self) -> None:
+        self._session.told.note(CONTROL_WORD, runs=False)
+
+    def _stop_write(self, parameter: Parameter, raw: int) -> StopWrite:
+        return StopWrite(parameter, (parameter.number or 0) + self.offset, raw)
+
+
+def map_cells(options: DataModelOptions) -> Cells:
+    """Return what tells a drive how cyclic telegrams are to be read: numbers of the profile."""
+    return frozenset(base + slot for slot in range(SLOTS)
+                     for base in (options.request_map_base, options.response_map_base))
