@@ -34,7 +34,7 @@ _LOOK_PERIOD = 0.1
 _DRIVES_TIMEOUT = 60.0
 #: s that each process gets for its end. A bridge that has lost its drives tries for a while.
 _BRIDGE_PATIENCE = 10.0
-_PATIENCE = 1.0
+_PATIENCE = 5.0
 #: leaves the view's screen, shows the cursor
 _RESTORE = '\x1b[?1049l\x1b[?25h'
 
