@@ -196,7 +196,8 @@ class Parameter:
         :raises ValueRefused: not finite, wrong type, outside ``minimum..maximum``, or outside
             what the type can represent. Nothing is ever clamped.
         """
-        if self.scaled and type(value) is float:    # nearly all commands; the rest has reasons
+        # nearly all commands; the rest has reasons
+        if type(value) is float and self.scaled and self.type is not ParameterType.BOOL:
             low, high = self._carried_limits
             if low <= value <= high:
                 raw = math.floor((value - self.offset) / self.scale + 0.5)

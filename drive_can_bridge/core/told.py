@@ -38,9 +38,10 @@ class Told:
         """
         if runs:
             self._running.add(what)
-        else:
+            self.owed = True
+        elif self.owed:
             self._running.discard(what)
-        self.owed = bool(self._running)
+            self.owed = bool(self._running)
 
     def stopped(self) -> None:
         """Take note that the drive has confirmed to have nothing but neutral and ``disable``."""

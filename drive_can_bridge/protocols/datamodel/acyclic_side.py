@@ -99,9 +99,10 @@ class AcyclicSide:
 
     def handle_timer(self, now: float) -> None:
         """Do what is due for the control and status word."""
-        control, writer = self._session.control, self.control_writer
+        control = self._session.control
         if control is None:
             return
+        writer = self.control_writer
         if writer is not None:
             if now >= writer.look_at:
                 writer.look(now)
