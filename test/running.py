@@ -65,7 +65,7 @@ class Running:
             return found
         return str(wait_for(find, f'line {pattern}'))
 
-    def end(self, signum: int, timeout: float = 20.0) -> int:
+    def end(self, signum: int, timeout: float = 60.0) -> int:
         """Send a signal and wait for the end."""
         self.process.send_signal(signum)
         return self.process.wait(timeout)

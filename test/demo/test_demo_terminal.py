@@ -44,7 +44,7 @@ def test_the_view_comes_and_goes(demo: Running, terminal: Terminal) -> None:
     children = demo.children()
     assert set(children) == {'monitor', 'simulate', 'drive_can_bridge'}
     terminal.type('\x03')
-    assert demo.process.wait(20.0) == 0
+    assert demo.process.wait(60.0) == 0
     view, _, rest = terminal.read().rpartition(LEFT)
     assert 'conveyor' in view
     assert ' missed, period error ' in rest
@@ -56,7 +56,7 @@ def test_the_view_comes_and_goes(demo: Running, terminal: Terminal) -> None:
 def test_whoever_has_seen_enough_ends_everything(demo: Running, terminal: Terminal) -> None:
     children = demo.children()
     terminal.type('q')
-    assert demo.process.wait(20.0) == 0
+    assert demo.process.wait(60.0) == 0
     assert 'has ended' not in terminal.read()
     assert all_gone(children)
 

@@ -135,7 +135,7 @@ def test_keys_show_a_drive_and_read_its_parameters(run: Run, tmp_path: Path) -> 
     assert not terminal.echoes
 
     terminal.type('q')
-    assert monitor.process.wait(20.0) == 0
+    assert monitor.process.wait(60.0) == 0
     assert terminal.echoes
     assert 'Traceback' not in terminal.read()
     terminal.close()

@@ -119,7 +119,7 @@ class Bridge:
         """Record the frames of a bus; use as a context manager."""
         return Recorder(self.channel(bus))
 
-    def online(self, *names: str, timeout: float = 20.0) -> None:
+    def online(self, *names: str, timeout: float = 60.0) -> None:
         """Wait until drives are online; all of them by default."""
         deadline = time.monotonic() + patience(timeout)
         while not all(self.node.drives[name].session.online

@@ -47,7 +47,7 @@ def patience(seconds: float) -> float:
     return seconds * float(os.environ.get('DRIVE_CAN_TEST_PATIENCE', '1'))
 
 
-def wait_until(condition: Callable[[], Any], timeout: float = 20.0, what: str = '') -> Any:
+def wait_until(condition: Callable[[], Any], timeout: float = 60.0, what: str = '') -> Any:
     """Return what a condition gives as soon as it is true."""
     deadline = time.monotonic() + patience(timeout)
     while True:
@@ -103,7 +103,7 @@ class Topic:
         """The last message, or None."""
         return self.messages[-1] if self.messages else None
 
-    def wait(self, condition: Callable[[Any], Any] = lambda _: True, timeout: float = 20.0) -> Any:
+    def wait(self, condition: Callable[[Any], Any] = lambda _: True, timeout: float = 60.0) -> Any:
         """Return the first message from now on that fulfils a condition."""
         start = len(self.messages)
         return wait_until(
@@ -254,7 +254,7 @@ class Client:
     # -- diagnostics, log, events -----------------------------------------------------------------
 
     def diagnostics(self, name: str, condition: Callable[[dict[str, str]], Any] = lambda _: True,
-                    timeout: float = 20.0) -> dict[str, str]:
+                    timeout: float = 60.0) -> dict[str, str]:
         """
         Return the keys of a status that fulfils a condition, from now on.
 

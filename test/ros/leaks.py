@@ -33,7 +33,7 @@ def drive_nodes() -> int:
 
 def assert_nothing_left(client: Client) -> None:
     """Fail if a thread, an open bus, a node or a drive is left over."""
-    deadline = time.monotonic() + patience(10.0)
+    deadline = time.monotonic() + patience(60.0)
     gc.collect()
     while True:
         left = {'threads': threads(), 'buses': open_channels(),

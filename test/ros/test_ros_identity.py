@@ -62,7 +62,7 @@ def test_is_read_whenever_the_drive_comes_online(bridge: StartBridge, client: Cl
     played = one.played['conveyor']
     before = one.node.drives['conveyor'].session.statistics.exchanges
     played.fault('silent')
-    wait_until(lambda: not one.node.drives['conveyor'].session.online, 20.0)
+    wait_until(lambda: not one.node.drives['conveyor'].session.online)
     give(one, serial_number=4712)
     assert client.get(BRIDGE, NAME) == [first]  # nobody has answered since
     played.fault('ok')
