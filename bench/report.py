@@ -132,6 +132,19 @@ def monitor_figures(found: dict[str, Any]) -> list[Figure]:
     ]
 
 
+def panel_figures(found: dict[str, Any]) -> list[Figure]:
+    """Panel: what it takes, for whoever looks."""
+    lines = []
+    for name, who in (('nobody', 'nobody looks'), ('overview', 'one browser, all drives'),
+                      ('drive', 'one browser, one drive and its chart')):
+        one = found[name]
+        lines.append(Figure(f'CPU of the panel, of one core, {who}', f'{100 * one["cpu"]:.1f} %',
+                            f'{one["messages"]:.1f} messages/s', one['cpu'], 0.05))
+    resident, own = found['drive']['mb']
+    return [*lines, Figure('memory of the panel', f'{resident:.0f} MB', f'its own {own:.0f} MB',
+                           resident, 120.0)]
+
+
 def stop_figures(found: dict[str, Any]) -> list[Figure]:
     """From the call of a stop to its frame."""
     figures = []
@@ -272,8 +285,8 @@ FIGURES: dict[str, Callable[[Any], list[Figure]]] = {
     'diy': diy_figures, 'sweep': sweep_figures, 'buses': buses_figures,
     'latency': latency_figures, 'service': service_figures,
     'flood': flood_figures, 'stop': stop_figures, 'monitor': monitor_figures,
-    'alone': alone_figures, 'backup': backup_figures, 'drives': drives_figures,
-    'decode': decode_figures,
+    'alone': alone_figures, 'panel': panel_figures, 'backup': backup_figures,
+    'drives': drives_figures, 'decode': decode_figures,
     'flight': flight_figures, 'joints': joints_figures, 'start': start_figures,
 }
 

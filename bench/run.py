@@ -42,6 +42,8 @@ def plan(options: argparse.Namespace) -> dict[str, Callable[[], Any]]:
         'service': lambda: scenarios.service(Load(1, 0.02, subscribed=False), 300),
         'flood': lambda: scenarios.flood(Load(8, 0.01, subscribed=False), duration, 10000.0),
         'monitor': lambda: scenarios.monitor(Load(drives, period, subscribed=False), duration),
+        'panel': lambda: scenarios.panel(
+            Load(drives, period, subscribed=False, commands=20.0), duration),
         'stop': lambda: scenarios.stop(
             Load(8, 0.01, subscribed=False, control=True, stuck=True), 200, 10000.0, 64),
         'backup': lambda: scenarios.backup(Load(8, 0.01, subscribed=False, settings=119)),

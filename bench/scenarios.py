@@ -6,7 +6,7 @@ All return plain numbers: times in s, CPU time in s, memory in MB; lists are sam
 """
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, ExitStack
+from contextlib import contextmanager, ExitStack, nullcontext
 from dataclasses import dataclass, replace
 import os
 from pathlib import Path
@@ -267,6 +267,28 @@ def monitor(load: Load, duration: float, rounds: int = 4) -> dict[str, Any]:
                     for key in ('missed', 'elapsed'):
                         found[name][key] += result[key]
                     found[name]['cpu'] += result['process_cpu']
+    return found
+
+
+def panel(load: Load, duration: float) -> dict[str, Any]:
+    """Measure the panel while nobody looks, and with one page in one browser, of either kind."""
+    from onlooker import panel as serve  # needs the extra "panel"
+    found: dict[str, Any] = {}
+    with ExitStack() as stack:
+        bus = Bus(stack, load)
+        stack.enter_context(bridge_under(load, bus))
+        server = stack.enter_context(serve())
+        for name, page in (('nobody', None), ('overview', '/'), ('drive', '/drive/drive0')):
+            with server.open(page) if page else nullcontext() as opened:
+                time.sleep(2 * SETTLE)
+                begun, cpu = time.monotonic(), server.cpu()
+                before = opened.messages if opened else 0
+                time.sleep(2 * duration)
+                elapsed = time.monotonic() - begun
+                if opened and not opened.is_alive():
+                    raise SystemExit(f'the panel has closed {page}')
+                found[name] = {'cpu': (server.cpu() - cpu) / elapsed, 'mb': server.memory_mb(),
+                               'messages': (opened.messages - before) / elapsed if opened else 0.0}
     return found
 
 

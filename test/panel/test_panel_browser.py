@@ -8,7 +8,7 @@ import time
 from urllib.parse import urlsplit
 
 from panel_browser import Browser, browser_missing
-from panel_builders import NEEDS_PANEL, SCRIPT, Site
+from panel_builders import NEEDS_PANEL, Run, SCRIPT, Site
 from panel_somebody import Somebody
 import pytest
 from waiting import wait_for
@@ -194,6 +194,23 @@ def test_the_bridge_dies_and_comes_back(site: Site, browser: Browser) -> None:
     browser.gone('is it still running')
     # all that without loading the page anew
     assert browser.run('return window.mark') == 1
+
+
+def test_a_panel_that_was_started_again_has_its_page_say_so(run: Run, tmp_path: Path) -> None:
+    panel = run('drive_can', 'panel', '--port', '0', '--namespace', '/nowhere')
+    address = panel.line('^operator: http').partition(' ')[2]
+    browser = Browser(tmp_path)
+    try:
+        browser.open(address)
+        browser.shows('No bridge yet')
+        assert browser.find_all('.lost') == []
+        assert panel.end(signal.SIGKILL) == -signal.SIGKILL
+        # what is old looks so
+        wait_for(lambda: browser.find_all('.lost'), 'that it is noticed')
+        run('drive_can', 'panel', '--port', str(urlsplit(address).port), '--namespace', '/nowhere')
+        browser.shows('open the address that drive_can panel has printed')
+    finally:
+        browser.close()
 
 
 def test_two_operators_at_the_same_parameter(site: Site, browser: Browser, phone: Browser) -> None:
