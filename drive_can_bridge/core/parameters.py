@@ -265,7 +265,9 @@ class Parameter:
 
     @cached_property
     def _carried_limits(self) -> tuple[float, float]:
-        """What of that the type can carry."""
+        """What of that the type can carry; nothing where a number is no value at all."""
+        if self.type is ParameterType.BOOL:
+            return math.inf, -math.inf
         (low, high), (least, most) = self._limits, self.value_range
         return max(low, least), min(high, most)
 
