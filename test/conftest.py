@@ -80,7 +80,8 @@ os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 SPREAD = ('test/system/', 'test/demo/', 'test/monitor/test_monitor_attach',
           'test/simulation/test_simulate_command', 'test/process/', 'test/backup/test_restore')
 #: what comes first, because it takes longest
-FIRST = ('test/system/test_soak', 'test/ros/test_ros_contract', 'test/panel/', 'test/system/',
+FIRST = ('test/system/test_system_parameters', 'test/system/test_system_backup',
+         'test/ros/test_ros_contract', 'test/system/test_soak', 'test/panel/', 'test/system/',
          'test/monitor/test_monitor_attach', 'test/demo/', 'test/backup/', 'test/ros/', 'test/')
 #: processes for each core that has nothing else to do: most of the time they wait
 WORKERS_PER_CORE = 3

@@ -61,7 +61,7 @@ class Bench:
         self.client.diagnostics(status_of(self.drive))
         while int(self.facts()['exchanges']) < before + 10:
             pass
-        assert not [line for line in self.bridge.errors if 'offline' in line]
+        assert not self.bridge.losses()
 
 
 @pytest.fixture
