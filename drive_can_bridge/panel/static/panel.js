@@ -13,12 +13,11 @@ const panel = (() => {
   }
 
   // what a page without its panel shows is old, and is not to look as if it were not
-  let met = false, told = false;
+  let told = false;
   setInterval(async () => {
     const there = Boolean(window.socket && window.socket.connected);
-    met = met || there;
-    document.body.classList.toggle('lost', met && !there);
-    if (!met || there || told) return;
+    document.body.classList.toggle('lost', !there);
+    if (there || told) return;
     // a panel that was started again has other tokens: the page would try to reach it for ever
     const answer = await ask('/panel/icon.svg', {cache: 'no-store'});
     if (answer.response && answer.response.status === 401 && !told) {
