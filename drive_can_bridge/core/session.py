@@ -172,7 +172,13 @@ class Session(ABC):
         self.active = self.serving = True
 
     def deactivate(self, now: float) -> None:
-        """Begin the safe stop: neutral setpoints, ``disable``; then silence."""
+        """
+        Begin the safe stop: neutral setpoints, ``disable``; then silence.
+
+        One that is under way goes on as it is.
+        """
+        if not self.active:
+            return
         self.active = False
         owes = self.prepare_stop(now)
         self._requests.fail_all(BRIDGE_INACTIVE)

@@ -17,13 +17,15 @@ class Told:
     What the last word to a drive was, for everything that it is told separately.
 
     :ivar owed: it was told to run by at least one of them, and not to stop since.
+    :ivar ran: it was told to run by something that nobody acknowledges, and nothing has shown
+        since that what told it to stop has arrived.
     """
 
-    __slots__ = ('_running', 'owed')
+    __slots__ = ('_running', 'owed', 'ran')
 
     def __init__(self) -> None:
         self._running: set[Hashable] = set()
-        self.owed = False
+        self.owed = self.ran = False
 
     def runs(self, what: Hashable) -> bool:
         """Tell whether one of them was told to run, and not to stop since."""
@@ -46,4 +48,4 @@ class Told:
     def stopped(self) -> None:
         """Take note that the drive has confirmed to have nothing but neutral and ``disable``."""
         self._running.clear()
-        self.owed = False
+        self.owed = self.ran = False

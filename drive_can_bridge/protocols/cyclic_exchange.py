@@ -32,8 +32,6 @@ class CyclicExchange(Generic[TelegramT]):
     :param ended: called when the last cycle before silence has left.
     :ivar word: the control word of the last cycle.
     :ivar cycles_left: still to be sent before silence; -1: no end is planned.
-    :ivar ran: a frame that holds anything but neutral and ``disable`` has left, and nobody has
-        taken note since that neutral ones arrive.
     :ivar whole: the bus has taken all frames of the last cycle so far.
     """
 
@@ -43,7 +41,6 @@ class CyclicExchange(Generic[TelegramT]):
                  left: Callable[[], None] | None = None) -> None:
         self.word: int | None = None
         self.cycles_left = -1
-        self.ran = False
         self.whole = True
         self._session = session
         self._book = book
@@ -104,7 +101,7 @@ class CyclicExchange(Generic[TelegramT]):
         if not sent:
             self.whole = False
         elif self._runs:
-            self.ran = True
+            session.told.ran = True
             session.told.note(CYCLE, runs=True)
         if self._frames_out or not self.whole:
             return

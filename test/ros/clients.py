@@ -20,6 +20,7 @@ from rcl_interfaces.srv import (
 )
 import rclpy
 from rclpy.context import Context
+from rclpy.exceptions import InvalidHandle
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node, NodeNameNonExistentError
 from rclpy.qos import (
@@ -76,7 +77,10 @@ class ClientContext:
 
     def _run(self) -> None:
         while not self._ending:
-            self.executor.spin_once(timeout_sec=0.1)
+            try:
+                self.executor.spin_once(timeout_sec=0.1)
+            except InvalidHandle:
+                pass    # a test destroyed something that rclpy was just looking at
 
     def close(self) -> None:
         """End."""

@@ -148,7 +148,6 @@ class ExtendedSession(Session):
     def go_idle(self, advice: str) -> None:
         self._phase = Phase.IDLE
         self._stopping = self._differs = False
-        self._exchange.ran = False
         self.setpoints.allow(False)
         self._clear_acyclic()
         self._exchange.stop()
@@ -168,11 +167,11 @@ class ExtendedSession(Session):
             if self._phase is not Phase.CYCLIC:
                 self._begin_cycles(now)
             elif self.online and not self.told.owed:
-                self._exchange.ran = False
+                self.told.ran = False
         elif verdict is Verdict.DIFFER:
             self._differs = True
-            if self._exchange.ran:  # neutral cycles since may have reached others, or nobody
-                self._exchange.ran = False
+            if self.told.ran:   # neutral cycles since may have reached others, or nobody
+                self.told.ran = False
                 self.told.note(CYCLE, runs=True)
             owed = self.told.owed
             self.lose(f'mapping differs: {text}', now)

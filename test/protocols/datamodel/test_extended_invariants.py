@@ -22,7 +22,7 @@ import pytest
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.errors import ValueRefused
-from drive_can_bridge.core.events import StationFound, StationLost
+from drive_can_bridge.core.events import MappingDiffered, StationFound, StationLost
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.setpoints import CommandOutcome
 from drive_can_bridge.protocols.families import FAMILIES
@@ -48,6 +48,7 @@ class ExtendedObserver(Observer):
         self.verified = False
         self.request_map_read = False
         self.last_cycles = 0       # neutral cycles that may still be sent without a verified map
+        self.ran = False           # and nobody knows who took the neutral cycles since
         self.cycled_at = -math.inf
         self.eeprom_at = -math.inf
 
@@ -61,9 +62,19 @@ class ExtendedObserver(Observer):
         self.last_cycles = 0 if session.stopped else 3
         self.asked = None
 
+    def activated(self) -> None:
+        super().activated()
+        self.ran = False
+
     def time_was_lost(self, session: Any) -> None:
         if self.active:
             self.doubt()
+
+    def refused(self, sent: Frame, now: float) -> None:
+        identifier = sent.identifier
+        if identifier != CYCLIC and not identifier & 0x100000:
+            # nobody can tell: the answer to a read before, of the same words, will do as well
+            self.asked = identifier >> 4 & 0xFFFF, identifier & 0xF, now
 
     def sees(self, sent: Frame, now: float) -> None:
         identifier, data, is_extended = sent
@@ -102,6 +113,7 @@ class ExtendedObserver(Observer):
         assert words == self.expected(now)
         assert data[4:] == bytes(4)
         self.neutral.clear()
+        self.ran = self.ran or any(words)
         self.tells('cycle', runs=any(words))
 
     def commanded(self, index: int, raw: int, outcome: CommandOutcome, now: float) -> None:
@@ -117,9 +129,7 @@ class ExtendedObserver(Observer):
         numbers = set(range(number, number + count))
         if numbers & {50, 51}:
             assert count == 1 and data == bytes(8), 'setpoints are written to stop only'
-            self.neutral.add(number)
-            if self.neutral >= {50, 51}:
-                self.tells('cycle', runs=False)
+            self.is_neutral(number)
         if numbers & set(range(122, 130)):
             assert self.mapping == 'configure'
             assert count == 1
@@ -136,6 +146,12 @@ class ExtendedObserver(Observer):
             assert now >= self.eeprom_at + 0.02 - SLACK, 'EEPROM writes are paced'
             self.eeprom_at = now
             assert count == 1
+
+    def is_neutral(self, number: int) -> None:
+        """Take note of a setpoint that was written neutral, or found so, since the last cycle."""
+        self.neutral.add(number)
+        if self.neutral >= {50, 51}:
+            self.tells('cycle', runs=False)
 
 
 class SessionMachine(AnyOrder):
@@ -173,6 +189,10 @@ class SessionMachine(AnyOrder):
                 self.observer.last_cycles = 3
             elif 'response map' in event.reason and 'request map' not in event.reason:
                 self.observer.last_cycles = 3  # the request map was just read as right
+        elif isinstance(event, MappingDiffered):
+            if self.observer.ran and self.observer.request_map_read:
+                self.observer.last_cycles = 3  # it is told once more, now that it can be heard
+            self.observer.ran = False
         elif isinstance(event, StationFound):
             self.observer.online = True
 
@@ -208,6 +228,8 @@ class SessionMachine(AnyOrder):
                 or self.now >= asked[2] + 0.1 + SLACK):
             return
         observer.asked = None
+        if asked[0] in (50, 51) and asked[1] == 1 and not any(data[:2]):
+            observer.is_neutral(asked[0])
         if asked[1] != 4 or asked[0] not in (122, 126):
             return
         words = [int.from_bytes(data[place:place + 2], 'big') for place in (0, 2, 4, 6)]
