@@ -172,13 +172,7 @@ class Session(ABC):
         self.active = self.serving = True
 
     def deactivate(self, now: float) -> None:
-        """
-        Begin the safe stop: neutral setpoints, ``disable``; then silence.
-
-        One that is under way goes on as it is.
-        """
-        if not self.active:
-            return
+        """Begin the safe stop: neutral setpoints, ``disable``; then silence."""
         self.active = False
         owes = self.prepare_stop(now)
         self._requests.fail_all(BRIDGE_INACTIVE)

@@ -8,6 +8,7 @@ its frames have left. The last cycles before silence are counted.
 """
 
 from collections.abc import Callable
+import math
 from typing import Generic, TypeVar
 
 from drive_can_bridge.core.frame import Frame
@@ -129,8 +130,12 @@ class CyclicExchange(Generic[TelegramT]):
 
     def stop_soon(self, now: float) -> None:
         """Let the last cycles before silence follow soon."""
-        self.cycles_left = STOP_CYCLES
-        self._timer.no_later(max(now, self._timer.began_at + self._session.stop_spacing))
+        soon = max(now, self._timer.began_at + self._session.stop_spacing)
+        if self._timer.due < math.inf:
+            self.cycles_left = STOP_CYCLES
+            self._timer.no_later(soon)
+        else:   # those of a stop before this one have left, what goes by writes is under way
+            self.run_out(soon)
         self._timer.hurry(now)
 
     def run_out(self, first: float) -> None:

@@ -229,6 +229,19 @@ def test_disable_is_written_at_once_and_read_back() -> None:
     assert warnings(talk) == []
 
 
+def test_deactivated_again_while_only_the_word_is_not_confirmed() -> None:
+    talk, now = written_word()
+    talk.deactivate(now)
+    cycles, last = 0, now
+    while cycles < 3:
+        last = talk.session.next_timer()
+        cycles += talk.at(last).count(NEUTRAL)
+    assert not talk.session.stopped
+    talk.deactivate(last)
+    talk.until(now + 20.0)
+    silent(talk, now + 20.0)
+
+
 def test_disable_that_the_drive_does_not_have_is_written_again() -> None:
     talk, now = written_word()
     assert talk.deactivate(now) == [DISABLE]
