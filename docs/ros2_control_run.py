@@ -170,6 +170,8 @@ def record(trace: Path) -> None:
         try:
             one.begin()
             controllers = threading.Thread(target=control, args=(one, failures))
+            # the recording ends by it, also where whoever started us had it ignored (nohup)
+            signal.signal(signal.SIGINT, signal.default_int_handler)
             controllers.start()
             code = drive_can(['record', '-o', str(trace), '--params-file', str(one.file)])
             controllers.join()
