@@ -193,7 +193,7 @@ def test_it_fits_what_clients_do(run: Run, tmp_path: Path) -> None:
             # it may come and go without being noticed
             while service not in note(enclave):
                 command = run('drive_can', *words)
-                wait_for(lambda: note(enclave) and command.process.poll() is not None,  # noqa: B023
+                wait_for(lambda: (note(enclave), command.process.poll())[1] is not None,  # noqa: B023
                          'the end of the command')
                 assert command.process.returncode == 0, command.errors
                 wait_for(gone, 'the end of its node')
