@@ -105,13 +105,3 @@ class Page(threading.Thread):
                         channel.send(f'42{json.dumps(answer)}')  # type: ignore[attr-defined]
         except ConnectionClosed:
             pass
-
-
-@contextmanager
-def panel() -> Iterator[Panel]:
-    """Serve for as long as needed."""
-    process = Panel()
-    try:
-        yield process
-    finally:
-        process.close()

@@ -6,7 +6,7 @@ All return plain numbers: times in s, CPU time in s, memory in MB; lists are sam
 """
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, ExitStack, nullcontext
+from contextlib import closing, contextmanager, ExitStack, nullcontext
 from dataclasses import dataclass, replace
 import os
 from pathlib import Path
@@ -19,7 +19,7 @@ from typing import Any
 
 from child import Child, child, HERE
 from unix_bus import INTERFACE, register
-from viewer import viewer
+from viewer import Viewer
 
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.configuration.writing import of_one_bus, write_parameter_file
@@ -255,7 +255,7 @@ def monitor(load: Load, duration: float, rounds: int = 4) -> dict[str, Any]:
             for number in range(2 * rounds):
                 with ExitStack() as stack:
                     name = 'with' if number % 2 else 'without'
-                    watcher = stack.enter_context(viewer()) if number % 2 else None
+                    watcher = stack.enter_context(closing(Viewer())) if number % 2 else None
                     time.sleep(2 * SETTLE)
                     bridge.ask('clear')
                     begun = watcher.cpu() if watcher else 0.0
@@ -272,12 +272,12 @@ def monitor(load: Load, duration: float, rounds: int = 4) -> dict[str, Any]:
 
 def panel(load: Load, duration: float) -> dict[str, Any]:
     """Measure the panel while nobody looks, and with one page in one browser, of either kind."""
-    from onlooker import panel as serve  # needs the extra "panel"
+    from onlooker import Panel  # needs the extra "panel"
     found: dict[str, Any] = {}
     with ExitStack() as stack:
         bus = Bus(stack, load)
         stack.enter_context(bridge_under(load, bus))
-        server = stack.enter_context(serve())
+        server = stack.enter_context(closing(Panel()))
         for name, page in (('nobody', None), ('overview', '/'), ('drive', '/drive/drive0')):
             with server.open(page) if page else nullcontext() as opened:
                 time.sleep(2 * SETTLE)

@@ -1,8 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """``drive_can monitor`` in a terminal that somebody looks at."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 import fcntl
 import os
 import pty
@@ -48,13 +46,3 @@ class Viewer:
             except OSError:  # nobody has the terminal open any more
                 os.close(self._near)
                 return
-
-
-@contextmanager
-def viewer() -> Iterator[Viewer]:
-    """Look for as long as needed."""
-    process = Viewer()
-    try:
-        yield process
-    finally:
-        process.close()

@@ -197,7 +197,7 @@ class Parameter:
             what the type can represent. Nothing is ever clamped.
         """
         # nearly all commands; the rest has reasons
-        if type(value) is float and self.scaled and self.type is not ParameterType.BOOL:
+        if type(value) is float and self.scaled:
             low, high = self._carried_limits
             if low <= value <= high:
                 raw = math.floor((value - self.offset) / self.scale + 0.5)

@@ -11,13 +11,11 @@ from rclpy.publisher import Publisher
 
 from drive_can_bridge.core.last_sent import LastSent
 from drive_can_bridge.core.parameters import Parameter, Value
+from drive_can_bridge.ros.audience import Audience
 from drive_can_bridge.ros.prepared import NUMBER_CODES, PreparedMessage
 from drive_can_bridge.ros.quality import overriding, state_quality
 from drive_can_bridge.ros.stamps import Stamp, Stamps
 from drive_can_bridge.ros.values import converters, parameter_value, VALUE_FIELDS
-
-#: s between two looks at who subscribes
-COUNT_PERIOD = 0.1
 
 
 class EventTopic:
@@ -75,16 +73,12 @@ class RequestTopic:
         self._stamps = stamps
         self._converters = converters(sent.parameters)
         self._topic = EventTopic(node, '~/request', sent.parameters)
-        self._count_at = 0.0
-        self._wanted = False
+        self._audience = Audience(self._topic.publisher)
 
     def publish(self, sent_at: float) -> None:
         """Publish it, if anything was sent since activation."""
-        if sent_at >= self._count_at:
-            self._count_at = sent_at + COUNT_PERIOD
-            self._wanted = bool(self._topic.publisher.get_subscription_count())
         raws = self._sent.raws
-        if not self._wanted or all(raw is None for raw in raws):
+        if not self._audience.listens(sent_at) or all(raw is None for raw in raws):
             return
         self._topic.publish([None if raw is None else convert(raw)
                              for convert, raw in zip(self._converters, raws)],

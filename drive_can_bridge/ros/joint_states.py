@@ -21,9 +21,9 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
 from drive_can_bridge.core.configuration import JointConfiguration
+from drive_can_bridge.ros.audience import Audience
 from drive_can_bridge.ros.commands import QUANTITIES
 from drive_can_bridge.ros.drive_node import DriveNode
-from drive_can_bridge.ros.event_topic import COUNT_PERIOD
 from drive_can_bridge.ros.prepared import PreparedMessage
 from drive_can_bridge.ros.quality import overriding, state_quality
 from drive_can_bridge.ros.stamps import Stamps
@@ -94,17 +94,12 @@ class JointStates:
         self._columns: list[list[_Cell]] = []
         self._message = JointState()
         self._prepared: PreparedMessage | None = None
-        self._count_at = 0.0
-        self._wanted = False
+        self._audience = Audience(self.publisher)
 
     def publish(self) -> None:
         """Publish what is known now, if anything is and somebody listens."""
         try:
-            now = steady_now()
-            if now >= self._count_at:
-                self._count_at = now + COUNT_PERIOD
-                self._wanted = bool(self.publisher.get_subscription_count())
-            if self._wanted:
+            if self._audience.listens(steady_now()):
                 self._publish()
         except (InvalidHandle, RCLError):
             if self._node.context.ok():

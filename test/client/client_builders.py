@@ -2,7 +2,7 @@
 """Simulated drives of all families on one bus in this process, and who watches it."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 import copy
 import itertools
 from pathlib import Path
@@ -11,6 +11,7 @@ from types import TracebackType
 from typing import Any
 
 import can
+from repeating import again_and_again
 from waiting import wait_for
 import yaml
 
@@ -110,21 +111,9 @@ class World:
                                  is_extended_id=frame.extended))
 
 
-@contextmanager
-def stranger(world: World, frame: Frame, after: float) -> Iterator[None]:
+def stranger(world: World, frame: Frame, after: float) -> AbstractContextManager[None]:
     """Send a frame again and again, for the first time after some seconds."""
-    ending = threading.Event()
-
-    def send() -> None:
-        while not ending.wait(after):
-            world.send(frame)
-    thread = threading.Thread(target=send, name='stranger')
-    thread.start()
-    try:
-        yield
-    finally:
-        ending.set()
-        thread.join()
+    return again_and_again(lambda: world.send(frame), after, after=after)
 
 
 @contextmanager

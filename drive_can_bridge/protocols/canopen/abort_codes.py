@@ -43,3 +43,13 @@ TEXTS = {
     0x08000023: 'no object dictionary',
     0x08000024: 'no data available',
 }
+
+
+def describe(code: int) -> str:
+    """
+    Return code and meaning for a user.
+
+    >>> describe(0x06090030)
+    '06090030h (value out of range)'
+    """
+    return f'{code:08X}h ({TEXTS.get(code, "unknown code")})'

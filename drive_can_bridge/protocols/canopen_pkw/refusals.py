@@ -11,6 +11,7 @@ The PROFIBUS variants of the same devices refuse with small numbers instead; sho
 turn up here, its meaning is named as a hint.
 """
 
+from drive_can_bridge.protocols.canopen import abort_codes
 from drive_can_bridge.protocols.canopen.abort_codes import TEXTS
 from drive_can_bridge.protocols.canopen_pkw.pkw import value_from_words, Words, words_from_value
 
@@ -63,14 +64,8 @@ def words_from_code(code: int, order: str = 'low_first') -> Words:
 
 
 def describe(code: int) -> str:
-    """
-    Return code and meaning for a user.
-
-    >>> describe(0x06090030)
-    '06090030h (value out of range)'
-    """
-    text = TEXTS.get(code)
-    if text is None and code <= SMALL_MAX:
-        hint = SMALL_TEXTS.get(code, 'unknown there, too')
-        text = f'no SDO abort code; as a PROFIBUS device would mean it: {hint}'
-    return f'{code:08X}h ({text or "unknown code"})'
+    """Return code and meaning for a user."""
+    if code > SMALL_MAX:
+        return abort_codes.describe(code)
+    hint = SMALL_TEXTS.get(code, 'unknown there, too')
+    return f'{code:08X}h (no SDO abort code; as a PROFIBUS device would mean it: {hint})'

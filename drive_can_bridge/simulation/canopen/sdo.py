@@ -10,7 +10,6 @@ from typing import Protocol
 
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.protocols.canopen import abort_codes
-from drive_can_bridge.protocols.canopen_pkw import refusals
 
 LENGTH = 8
 EXPEDITED_MAX = 4
@@ -32,7 +31,7 @@ class Refused(DriveCanError):
     """
 
     def __init__(self, code: int) -> None:
-        super().__init__(refusals.describe(code))
+        super().__init__(abort_codes.describe(code))
         self.code = code
 
 

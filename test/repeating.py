@@ -7,15 +7,16 @@ import threading
 
 
 @contextmanager
-def again_and_again(action: Callable[[], object], period: float = 0.05) -> Iterator[None]:
-    """Do it now and every ``period`` s, until the block ends."""
+def again_and_again(action: Callable[[], object], period: float = 0.05, *,
+                    after: float = 0.0) -> Iterator[None]:
+    """Do it after some seconds and every ``period`` s, until the block ends."""
     ending = threading.Event()
 
     def run() -> None:
-        while True:
+        pause = after
+        while not ending.wait(pause):
             action()
-            if ending.wait(period):
-                return
+            pause = period
     thread = threading.Thread(target=run, daemon=True)
     thread.start()
     try:
