@@ -16,6 +16,7 @@ from drive_can_bridge.cli.listening import (
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.record import Record
+from drive_can_bridge.core.text import printable
 from drive_can_bridge.protocols.observer import Telegram
 from drive_can_bridge.trace import summary
 from drive_can_bridge.trace.files import read_records, READABLE, UnknownFormat
@@ -202,19 +203,12 @@ class _Complaints:
     def __call__(self, text: str) -> None:
         self._count += 1
         if self._count <= _COMPLAINTS_MAX:
-            complain(f'{self._name}: {_printable(text)}')
+            complain(f'{self._name}: {printable(text)}')
 
     def conclude(self) -> None:
         """Tell how many more there were."""
         if self._count > _COMPLAINTS_MAX:
             complain(f'{self._name}: {self._count - _COMPLAINTS_MAX} more like that')
-
-
-def _printable(text: str) -> str:
-    """Escape what a damaged file may bring into a terminal."""
-    shown = ''.join(each if each.isprintable() else each.encode(
-        'unicode_escape').decode('ascii') for each in text)
-    return shown if len(shown) <= 256 else f'{shown[:253]}...'
 
 
 def _only(text: str) -> set[Only]:

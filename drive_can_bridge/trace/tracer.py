@@ -12,6 +12,7 @@ import math
 from drive_can_bridge.core.configuration import BridgeConfiguration, BusConfiguration
 from drive_can_bridge.core.frame import bits_on_bus, Frame, STUFFING
 from drive_can_bridge.core.record import Record, RecordKind
+from drive_can_bridge.core.text import printable
 from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.protocols.observer import (
     Direction, DriveObserver, Handler, Kind, Observed, Telegram, Verdict,
@@ -193,7 +194,8 @@ class Tracer:
         if found is not None:
             bus = self.buses[found.name]
         else:   # of a bus that the file does not have: shown all the same
-            bus = self.buses.setdefault(f'{channel}', BusTrace(f'{channel}', 0, []))
+            name = printable(f'{channel}')
+            bus = self.buses.setdefault(name, BusTrace(name, 0, []))
         self._by_channel[channel] = bus
         return bus
 

@@ -155,6 +155,16 @@ def test_damaged_lines_are_told_and_counted(file: Path, trace: Path,
     assert err.splitlines()[-1] == f'{trace}: 4 more like that'
 
 
+def test_a_trace_does_not_write_on_the_terminal(file: Path, trace: Path,
+                                                capsys: pytest.CaptureFixture[str]) -> None:
+    """Names of channels come from whoever made the trace."""
+    trace.write_text(f'{TRACE}(1700000000.300000) ma\x1b[31min{"n" * 300} 123#00\n')
+    assert drive_can('decode', trace, '--params-file', file) == 0
+    line = capsys.readouterr().out.splitlines()[-1]
+    assert line.startswith('0.300000 +0.000 ma\\x1b[31minnn')
+    assert line.endswith('n… 123#00') and len(line) < 300
+
+
 class Talker:
     """Somebody on the bus of the parameter file."""
 
