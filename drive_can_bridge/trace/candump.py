@@ -79,8 +79,7 @@ def parse_line(line: str) -> Record | None:
 
 def _logged(words: list[str], identifier: str, data: str) -> Record:
     """Read a line of a log file."""
-    time = float(words[0][1:-1])
-    number = int(identifier, 16)
+    time, number = _time(words[0]), _number(identifier)
     extended = len(identifier) == 8
     sent = _DIRECTIONS.get(words[3]) if len(words) == 4 else None
     kind = DATA
@@ -89,8 +88,7 @@ def _logged(words: list[str], identifier: str, data: str) -> Record:
         data = data[2:] if data[0] == '#' else ''
     elif extended and number & _ERROR_FLAG:
         kind, number = RecordKind.ERROR, number & EXTENDED_IDENTIFIER_MAX
-    content = bytes.fromhex(data)
-    return _checked(Record(time, words[1], number, content, extended, kind, sent),
+    return _checked(Record(time, words[1], number, _content(data), extended, kind, sent),
                     len(identifier))
 
 
@@ -101,10 +99,10 @@ def _shown(words: list[str]) -> Record:
     if place is None or place < 2:
         raise ValueError('neither a line of a candump log nor of its screen')
     before, length, after = words[:place], words[place], words[place + 1:]
-    time = float(before.pop(0)[1:-1]) if before[0][:1] == '(' else 0.0
+    time = _time(before.pop(0)) if before[0][:1] == '(' else 0.0
     identifier = before[-1]
     sent = next((_DIRECTIONS[word] for word in before[1:-1] if word in _DIRECTIONS), None)
-    number, extended = int(identifier, 16), len(identifier) == 8
+    number, extended = _number(identifier), len(identifier) == 8
     # "[8]" is a classical frame, "[08]" one of CAN FD
     kind = RecordKind.FD if len(length) == 4 else DATA
     size = int(length[1:-1])
@@ -112,11 +110,32 @@ def _shown(words: list[str]) -> Record:
         kind, size = RecordKind.REMOTE, 0
     elif extended and number & _ERROR_FLAG:
         kind, number = RecordKind.ERROR, number & EXTENDED_IDENTIFIER_MAX
-    content = bytes.fromhex(''.join(after[:size]))
+    content = _content(''.join(after[:size]))
     if len(content) != size:
         raise ValueError(f'{len(content)} data bytes instead of {size}')
     return _checked(Record(time, before[0], number, content, extended, kind, sent),
                     len(identifier))
+
+
+def _time(word: str) -> float:
+    try:
+        return float(word[1:-1])
+    except ValueError:
+        raise ValueError(f'{word[1:-1]!r} is no time') from None
+
+
+def _number(digits: str) -> int:
+    try:
+        return int(digits, 16)
+    except ValueError:
+        raise ValueError(f'{digits!r} is no identifier') from None
+
+
+def _content(digits: str) -> bytes:
+    try:
+        return bytes.fromhex(digits)
+    except ValueError:
+        raise ValueError(f'{digits!r} is no hexadecimal data') from None
 
 
 def _checked(record: Record, digits: int) -> Record:

@@ -165,6 +165,17 @@ def test_a_trace_does_not_write_on_the_terminal(file: Path, trace: Path,
     assert line.endswith('n… 123#00') and len(line) < 300
 
 
+def test_damage_is_told_in_words(file: Path, trace: Path,
+                                 capsys: pytest.CaptureFixture[str]) -> None:
+    trace.write_text('(1.0) can0 123#ZZ\n(1.0) can0 123#0\n(x) can0 123#00\n'
+                     '(1.0) can0 xyz#00\n(1.0) can0 123 [1] ZZ\n')
+    assert drive_can('decode', trace, '--params-file', file) == 1
+    assert capsys.readouterr().err == ''.join(f'{trace}: line {line}\n' for line in (
+        "1: 'ZZ' is no hexadecimal data", "2: '0' is no hexadecimal data", "3: 'x' is no time",
+        "4: 'xyz' is no identifier", "5: 'ZZ' is no hexadecimal data")) + (
+        f'{trace}: there is no frame in it\n')
+
+
 class Talker:
     """Somebody on the bus of the parameter file."""
 
