@@ -154,6 +154,7 @@ class _Rotating:
         self._limit = None if megabytes is None else megabytes * _MEGABYTE
         self.count = 1
         self._writer = self._open()
+        self._full = False
 
     def _open(self) -> TraceWriter:
         path = self._path
@@ -171,24 +172,32 @@ class _Rotating:
         """The file, or how many there are."""
         if self._limit is None:
             return str(self.last)
+        if self.count == 1:
+            return f'{self.last} is the only file'
         return f'{self.last} is the last of {self.count} files'
 
     def write(self, record: Record) -> None:
-        """Write an entry."""
+        """Write an entry, into a new file when the last one is large enough."""
+        if self._full:
+            self.count += 1
+            self._writer = self._open()
+            self._full = False
         self._writer.write(record)
 
     def look(self) -> None:
-        """Begin a new file when this one is large enough; else make it readable so far."""
+        """End this file when it is large enough; else make it readable so far."""
+        if self._full:
+            return
         if self._limit is not None and self._writer.size >= self._limit:
             self._writer.close()
-            self.count += 1
-            self._writer = self._open()
+            self._full = True
         else:
             self._writer.flush()
 
     def close(self) -> None:
         """Finish the file."""
-        self._writer.close()
+        if not self._full:
+            self._writer.close()
 
 
 class _Status:

@@ -8,6 +8,7 @@ import threading
 import time
 
 import pytest
+from waiting import wait_for
 
 from drive_can_bridge.cli import main as front_end
 from drive_can_bridge.core.configuration import BusConfiguration
@@ -232,6 +233,25 @@ def test_record_in_files_of_limited_size(file: Path, tmp_path: Path,
     assert len(written) >= 2
     document = json.loads(capsys.readouterr().out)
     assert (document['file'], document['files']) == (str(written[-1]), len(written))
+
+
+def test_no_file_is_begun_for_a_bus_that_fell_silent(
+        file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    first = tmp_path / 'out_000.log'
+
+    def talk_until_something_is_written() -> None:
+        with Talker(f'trace_{tmp_path.name}'):
+            wait_for(lambda: first.exists() and first.stat().st_size > 0)
+
+    talking = threading.Thread(target=talk_until_something_is_written)
+    talking.start()
+    assert drive_can('record', '-o', tmp_path / 'out.log', '--params-file', file, '--seconds',
+                     '3.5', '--rotate', '0.00001') == 0
+    talking.join()
+    files = sorted(tmp_path.glob('out_*.log'))
+    assert all(each.stat().st_size for each in files)
+    said = 'the only file' if len(files) == 1 else f'the last of {len(files)} files'
+    assert capsys.readouterr().out.endswith(f': {files[-1]} is {said}\n')
 
 
 def test_record_says_what_a_format_loses(file: Path, tmp_path: Path,
