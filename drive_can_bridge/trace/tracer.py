@@ -22,6 +22,8 @@ from drive_can_bridge.transport.error_frames import decode_error_frame
 
 #: identifiers whose owner is remembered; of those of a healthy bus there are a few hundred
 _KNOWN_MAX = 50_000
+#: s by which stamps may go back without a clock that was set: two senders, two stamps
+_DISORDER = 0.1
 _EXTENDED = 1 << 29
 _DATA = RecordKind.DATA
 _REQUEST = Direction.REQUEST
@@ -38,6 +40,8 @@ class BusTrace:
     :ivar error_frames: those that were not.
     :ivar strays: frames of nobody in the parameter file.
     :ivar peak_load: highest load within one second, 0 to 1 and more.
+    :ivar shift: s to add to stamps, so that time goes on where a clock was set back.
+    :ivar newest: time of the last entry.
     """
 
     def __init__(self, name: str, bitrate: int, observers: list[DriveObserver]) -> None:
@@ -46,6 +50,8 @@ class BusTrace:
         self.observers = observers
         self.handlers: dict[int, tuple[Handler, DriveObserver] | None] = {}
         self.deadline = math.inf
+        self.shift = 0.0
+        self.newest = -math.inf
         self.frames = 0
         self.error_frames = 0
         self.strays = 0
@@ -144,6 +150,13 @@ class Tracer:
         bus = self._by_channel.get(channel)
         if bus is None:
             bus = self._new_channel(channel)
+        if bus.shift:
+            time += bus.shift
+            record = record._replace(time=time)
+        if time < bus.newest - _DISORDER:
+            time = self._go_on(bus, time)
+            record = record._replace(time=time)
+        bus.newest = time
         if self.start != self.start:    # NaN
             self.start = time
         if time >= bus.deadline:
@@ -198,6 +211,19 @@ class Tracer:
             bus = self.buses.setdefault(name, BusTrace(name, 0, []))
         self._by_channel[channel] = bus
         return bus
+
+    def _go_on(self, bus: BusTrace, time: float) -> float:
+        """
+        Let time go on from the last entry, although the clock of the trace was set back.
+
+        No answer comes before its question, and nothing would be missed until the old time.
+        """
+        self._sink(bus.name, Telegram(
+            bus.newest, '', Direction.NEITHER, Kind.OTHER, 'time', verdict=Verdict.SUSPICIOUS,
+            remark=f'goes back by {bus.newest - time:.6f} s: the clock was set, or two traces '
+                   f'are in one'))
+        bus.shift += bus.newest - time
+        return bus.newest
 
     def _expire(self, bus: BusTrace, now: float) -> None:
         self._sent = None

@@ -166,6 +166,37 @@ def test_a_trace_does_not_write_on_the_terminal(file: Path, trace: Path,
     assert line.endswith('n… 123#00') and len(line) < 300
 
 
+def test_a_clock_that_was_set_back(file: Path, trace: Path,
+                                   capsys: pytest.CaptureFixture[str]) -> None:
+    """Time goes on: no answer comes before its question, and what is missing is still missed."""
+    trace.write_text("""(1700000000.000000) can0 003FFFF0#138803E800000000 T
+(1699996400.500000) can0 103FFFF0#FA24000500030000 R
+(1699996400.520000) can0 003FFFF0#138803E800000000 T
+(1699996400.521000) can0 103FFFF0#FA24000500030000 R
+(1699996400.540000) can0 123#00 R
+(1699996400.539999) can0 003FFFF0#138803E800000000 T
+(1699996400.600000) can0 123#00 R
+""")
+    assert drive_can('decode', trace, '--params-file', file) == 0
+    lines = [line.replace(': speed_setpoint 500.0 rpm, torque_limit 100.0 %', '').replace(
+        ': actual_speed -150.0 rpm, motor_current 0.05 A, status_word 0003h (ready, enabled)', '')
+        for line in capsys.readouterr().out.splitlines()]
+    assert lines == [
+        '0.000000 +0.000 main conveyor > cyclic request',
+        '0.000000 +0.000 main time: SUSPICIOUS: goes back by 3599.500000 s: the clock was set, or '
+        'two traces are in one',
+        '0.000000 +0.000 main conveyor < cyclic response [0.0 ms]',
+        '0.020000 +0.020 main conveyor > cyclic request',
+        '0.021000 +0.021 main conveyor < cyclic response [1.0 ms]',
+        '0.040000 +0.000 main 123#00',
+        '0.039999 +0.020 main conveyor > cyclic request',
+        '0.079999 +0.059 main conveyor < cyclic response: LOST: no answer in 40 ms',
+        '0.100000 +0.060 main 123#00']
+    assert drive_can('decode', trace, '--params-file', file, '--summary', '--json') == 0
+    summary = json.loads(capsys.readouterr().out.splitlines()[0])
+    assert (summary['exchanges'], summary['latency_max_ms']) == (2, 1.0)
+
+
 def test_damage_is_told_in_words(file: Path, trace: Path,
                                  capsys: pytest.CaptureFixture[str]) -> None:
     trace.write_text('(1.0) can0 123#ZZ\n(1.0) can0 123#0\n(x) can0 123#00\n'
