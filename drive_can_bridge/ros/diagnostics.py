@@ -152,9 +152,12 @@ class DriveReporter:
         if not session.active:
             return DiagnosticStatus.STALE, self.inactive
         if state is DriveState.MAPPING_DIFFERS:
-            return (DiagnosticStatus.ERROR,
-                    f'{session.offline_advice}; correct the drive or the configuration, or set '
-                    f'mapping: configure')
+            advice = 'correct the drive or the configuration'
+            if session.drive.options.mapping == 'configure':
+                advice = f'the drive does not keep the maps that are written: {advice}'
+            else:
+                advice += ', or set mapping: configure'
+            return DiagnosticStatus.ERROR, f'{session.offline_advice}; {advice}'
         if state is DriveState.OFFLINE:
             what = session.offline_advice
             if drive.exchange.bus_state == 'up':

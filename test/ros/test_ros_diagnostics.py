@@ -178,6 +178,18 @@ def test_forgotten_maps_stop_the_cycle(bridge: StartBridge, client: Client) -> N
     one.online()
 
 
+def test_maps_that_the_drive_does_not_keep(bridge: StartBridge, client: Client) -> None:
+    one = bridge(parameters(conveyor={**CONVEYOR, 'mapping': 'configure'}), autostart=False)
+    drive = one.played['conveyor']
+    drive.set_value('p123', 99)
+    drive.fault('refuse=p123')
+    assert client.transition(1) and client.transition(3)
+    status = client.diagnostics(DRIVE, lambda drive: drive['state'] == 'mapping differs')
+    assert status['message'].endswith(
+        '; the drive does not keep the maps that are written: correct the drive or the '
+        'configuration')
+
+
 def test_mapping_configure_rewrites(bridge: StartBridge, client: Client) -> None:
     one = bridge(parameters(conveyor={**CONVEYOR, 'mapping': 'configure'}))
     one.online()
