@@ -4,7 +4,7 @@
 from dataclasses import asdict, replace
 from pathlib import Path
 
-from configuration_builders import changed, load, problems
+from configuration_builders import changed, load, problems, warnings
 import pytest
 
 from drive_can_bridge.core.configuration import DriveConfiguration
@@ -282,3 +282,28 @@ def test_station_names_the_frames(drive: DriveConfiguration) -> None:
     assert purposes == [
         '505h (PKW requests to node 5)', '485h (PKW responses of node 5)',
         '085h (emergency messages of node 5)', '705h (heartbeats of node 5)', '000h (NMT)']
+
+
+@pytest.mark.parametrize('keys, text', [
+    # receive PDO1: of a TeSys T the command register, as delivered
+    ('request_cob_id: 0x205', 'request_cob_id: 205h is receive PDO1 of node 5'),
+    ('request_cob_id: 0x605', 'request_cob_id: 605h is SDO requests to node 5'),
+    ('request_cob_id: 0x80', 'request_cob_id: 080h is SYNC'),
+    ('response_cob_id: 0x185', 'response_cob_id: 185h is transmit PDO1 of node 5'),
+])
+def test_mailbox_where_a_device_has_something_else_as_delivered(keys: str, text: str,
+                                                                tmp_path: Path) -> None:
+    file = changed(FILE, 'period: 0.1', f'period: 0.1\n        {keys}')
+    assert warnings(tmp_path, file, PROFILE) == [
+        f'f.yaml:16: drives.pump.{text} in the predefined connection set: a device that was '
+        'not set up for it takes or sends something else there; predefined_set: false says that '
+        'this one was']
+    assert not warnings(tmp_path, changed(file, 'period: 0.1',
+                                          'period: 0.1\n        predefined_set: false'), PROFILE)
+
+
+def test_mailbox_in_its_place_is_no_worry(tmp_path: Path) -> None:
+    file = changed(FILE, 'period: 0.1', 'period: 0.1\n        request_cob_id: 0x505\n'
+                                        '        response_cob_id: 0x485')
+    assert warnings(tmp_path, file, PROFILE) == []
+    assert warnings(tmp_path, FILE, PROFILE) == []

@@ -51,6 +51,23 @@ class CanopenPkw(Family):
         if not wrong:
             yield from self._check_request(drive)
 
+    def warnings(self, drive: DriveConfiguration) -> Iterator[Complaint]:
+        """Yield what is allowed but suspicious."""
+        if not drive.options.predefined_set:
+            return
+        node = drive.station
+        taken = {network.SYNC_IDENTIFIER: 'SYNC',
+                 **{base + node: f'{what} node {node}'
+                    for base, what in network.PREDEFINED_SET.items()}}
+        for key, at_home in (('request_cob_id', network.REQUEST_BASE + node),
+                             ('response_cob_id', network.RESPONSE_BASE + node)):
+            identifier = getattr(drive.options, key)
+            if identifier in taken and identifier != at_home:
+                yield Complaint(key, f'{identifier:03X}h is {taken[identifier]} in the predefined '
+                                     'connection set: a device that was not set up for it '
+                                     'takes or sends something else there; predefined_set: false '
+                                     'says that this one was')
+
     def claims(self, drive: DriveConfiguration) -> list[Claim]:
         """Return all identifiers of the drive on its bus, both directions."""
         node = drive.station
