@@ -7,13 +7,13 @@ tests stay as they are.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 import math
 from typing import Any
 
 from builders import (
     ACTUAL, Conversation, CURRENT, DAMPING, drive, frame, GAIN, LIMIT, ORDER, RAMP, read, SPEED,
-    STATUS, text_of, write,
+    STATUS, TABLE, text_of, write,
 )
 from literal_drives import ExtendedDrive, PkwNode, StandardDrive
 import pytest
@@ -26,6 +26,7 @@ from drive_can_bridge.core.events import (
     StationLost,
 )
 from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.session import DriveState
 from drive_can_bridge.core.setpoints import CommandOutcome
 from drive_can_bridge.protocols.families import FAMILIES
@@ -38,14 +39,18 @@ class Partner(ABC):
     """
     The drive at the other end of the bus: registers, and the family's telegrams.
 
+    ``registers`` go by the numbers of ``builders``, however the drives of a family address them.
+
     :cvar sample: the raw integers of every sample.
     :cvar unknown: what is said of a parameter that the drive does not have.
     :cvar idle: state of a drive that has just been found.
+    :cvar words: disable and enable, where the control word is built in.
     """
 
     sample: tuple[int, ...] = (1000, 250, 1)
     unknown = 'no answer'
     idle = DriveState.NOT_ARMED
+    words: Mapping[str, int] = {}
 
     device: ExtendedDrive | StandardDrive | PkwNode
 
@@ -54,14 +59,23 @@ class Partner(ABC):
         self.talk = Conversation(self.configuration)
         self.now = 10.0
         self.mute = False
-        self.registers = {
-            parameter.number: 0 for parameter in self.configuration.profile.parameters.values()}
+        self.registers = {parameter.number or 0: 0 for parameter in TABLE}
         self.registers.update({209: 1000, 210: 250, 211: 1})
         self.frames: list[tuple[float, str]] = []
 
     @abstractmethod
     def configure(self, **options: Any) -> DriveConfiguration:
         """Make a configuration with ``speed_setpoint`` as its only setpoint."""
+
+    @staticmethod
+    def own(parameter: Parameter) -> Parameter:
+        """Return a parameter of ``builders`` as drives of the family address it."""
+        return parameter
+
+    @staticmethod
+    def raw_name(number: int) -> str:
+        """Return the raw name of the parameter to which ``builders`` gives a number."""
+        return f'p{number}'
 
     def answers(self, sent: str) -> list[str]:
         """Do what the drive does with a frame; return what it answers."""
@@ -95,6 +109,15 @@ class Partner(ABC):
             self.now = max(self.now, due)
             self.deliver(self.talk.at(self.now))
         raise AssertionError('the timer spins')
+
+    def reads(self, *parameters: Parameter) -> None:
+        """Have parameters read."""
+        self.deliver(self.talk.submits(read(*map(self.own, parameters)), self.now))
+
+    def writes(self, *items: tuple[Parameter, int]) -> None:
+        """Have raw integers written."""
+        self.deliver(self.talk.submits(
+            write(*((self.own(parameter), raw) for parameter, raw in items)), self.now))
 
     def start(self) -> None:
         self.deliver(self.talk.bus_up(self.now))
@@ -150,6 +173,7 @@ class CannordPartner(Partner):
 
     sample = (0x0B31, 1000, 250)
     idle = DriveState.DISABLED
+    words = {'disable': 0x047E, 'enable': 0x047F}
 
     def enable(self) -> None:
         self.deliver(self.talk.asks(ControlAction.ENABLE, self.now))
@@ -417,7 +441,7 @@ def test_acknowledged_or_not_a_refused_write_is_not_sent(make: type[Partner]) ->
         sent.append(text)
         return True
     partner.talk.refusing = refusing
-    partner.deliver(partner.talk.submits(write((GAIN, 7)), partner.now))
+    partner.writes((GAIN, 7))
     partner.live(0.5)
     assert partner.talk.outcomes() == [['not sent: the bus takes no frames']]
     assert partner.registers[GAIN.number] == 0
@@ -530,9 +554,9 @@ def outcomes(partner: Partner) -> list[list[object]]:
 
 def test_parameters_are_read_and_written(partner: Partner) -> None:
     partner.registers[40] = 7
-    partner.deliver(partner.talk.submits(read(GAIN, ACTUAL, DAMPING), partner.now))
+    partner.reads(GAIN, ACTUAL, DAMPING)
     partner.live(0.1)
-    partner.deliver(partner.talk.submits(write((GAIN, 8), (RAMP, 9)), partner.now))
+    partner.writes((GAIN, 8), (RAMP, 9))
     partner.live(0.3)
     assert outcomes(partner) == [[7, 1000, 0], ['written', 'written']]
     assert (partner.registers[40], partner.registers[30]) == (8, 9)
@@ -540,7 +564,7 @@ def test_parameters_are_read_and_written(partner: Partner) -> None:
 
 def test_missing_parameter_takes_no_other_along(partner: Partner) -> None:
     del partner.registers[41]
-    partner.deliver(partner.talk.submits(read(GAIN, DAMPING, RAMP), partner.now))
+    partner.reads(GAIN, DAMPING, RAMP)
     partner.live(3.0)
     (gain, damping, ramp), = outcomes(partner)
     assert (gain, ramp) == (0, 0)
@@ -550,7 +574,7 @@ def test_missing_parameter_takes_no_other_along(partner: Partner) -> None:
 
 def test_requests_never_hold_up_the_exchange(partner: Partner) -> None:
     for _ in range(30):
-        partner.deliver(partner.talk.submits(read(GAIN, RAMP), partner.now))
+        partner.reads(GAIN, RAMP)
     partner.live(1.0)
     assert partner.talk.session.statistics.missed == 0
     assert partner.talk.session.statistics.exchanges > 40
@@ -562,8 +586,8 @@ def test_requests_without_a_drive_end(make: type[Partner]) -> None:
     partner.mute = True
     partner.start()
     for _ in range(3):
-        partner.deliver(partner.talk.submits(read(GAIN, RAMP, DAMPING), partner.now))
-        partner.deliver(partner.talk.submits(write((GAIN, 1)), partner.now))
+        partner.reads(GAIN, RAMP, DAMPING)
+        partner.writes((GAIN, 1))
     partner.live(10.0)
     done = outcomes(partner)
     assert [len(entry) for entry in done] == [3, 1, 3, 1, 3, 1]
@@ -572,16 +596,16 @@ def test_requests_without_a_drive_end(make: type[Partner]) -> None:
 
 def test_requests_are_refused_while_nothing_can_be_sent(make: type[Partner]) -> None:
     partner = make()
-    partner.talk.submits(read(GAIN, RAMP), 1.0)
+    partner.talk.submits(read(partner.own(GAIN), partner.own(RAMP)), 1.0)
     partner.talk.activate(2.0)
-    partner.talk.submits(write((GAIN, 1)), 2.0)
+    partner.talk.submits(write((partner.own(GAIN), 1)), 2.0)
     assert outcomes(partner) == [['bridge inactive'] * 2, ['bus down']]
 
 
 def test_64_requests_wait(partner: Partner) -> None:
     partner.mute = True
     for _ in range(70):
-        partner.deliver(partner.talk.submits(read(GAIN), partner.now))
+        partner.reads(GAIN)
     refused = outcomes(partner)
     assert refused == [['busy']] * len(refused)
     assert len(refused) in (5, 6)
@@ -593,8 +617,8 @@ def test_64_requests_wait(partner: Partner) -> None:
 def test_requests_end_with_the_bus_or_with_activity(partner: Partner) -> None:
     partner.mute = True
     for reason in ('bus down', 'bridge inactive'):
-        partner.deliver(partner.talk.submits(read(GAIN, RAMP), partner.now))
-        partner.deliver(partner.talk.submits(read(GAIN), partner.now))
+        partner.reads(GAIN, RAMP)
+        partner.reads(GAIN)
         if reason == 'bus down':
             partner.talk.bus_down(partner.now)
             partner.deliver(partner.talk.bus_up(partner.now))
@@ -605,8 +629,9 @@ def test_requests_end_with_the_bus_or_with_activity(partner: Partner) -> None:
 
 def test_what_users_may_not_write(partner: Partner) -> None:
     refusal = partner.talk.session.write_refusal
-    assert refusal(SPEED) == 'sent cyclically: publish ~/command/speed_setpoint'
-    assert [refusal(parameter) for parameter in (GAIN, RAMP, ORDER, LIMIT)] == [''] * 4
+    assert refusal(partner.own(SPEED)) == 'sent cyclically: publish ~/command/speed_setpoint'
+    assert [refusal(partner.own(parameter)) for parameter in (GAIN, RAMP, ORDER, LIMIT)] == [
+        ''] * 4
 
 
 # -- anything -------------------------------------------------------------------------------------

@@ -10,10 +10,6 @@ from drive_can_bridge.core.last_sent import LastSent
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.families import make_sessions
 
-#: what the families start with: cannord builds its control word in
-DISABLE = {'cannord': 0x047E}
-ENABLE = {'cannord': 0x047F}
-
 
 @pytest.fixture(params=sorted(PARTNERS), name='family')
 def _family(request: pytest.FixtureRequest) -> str:
@@ -32,6 +28,11 @@ def told(partner: Partner) -> dict[str, int | None]:
     return dict(zip((parameter.name for parameter in sent.parameters), sent.raws))
 
 
+def word(partner: Partner, name: str) -> dict[str, int]:
+    """Return the control word of a family that has it built in."""
+    return {'control_word': partner.words[name]} if partner.words else {}
+
+
 def test_nothing_was_sent_at_first(family: str) -> None:
     partner = PARTNERS[family]()
     assert set(told(partner).values()) == {None}
@@ -42,25 +43,22 @@ def test_nothing_was_sent_at_first(family: str) -> None:
 
 def test_setpoints_as_the_drive_got_them(family: str) -> None:
     partner = started(family)
-    word = {'control_word': DISABLE[family]} if family in DISABLE else {}
-    assert told(partner) == {**word, 'speed_setpoint': 0}
+    assert told(partner) == {**word(partner, 'disable'), 'speed_setpoint': 0}
     same = partner.talk.session.sent.raws
     partner.live(0.1)
     assert partner.talk.session.sent.raws is same, 'nothing changed'
     partner.enable()
-    word = {'control_word': ENABLE[family]} if family in ENABLE else {}
     session = partner.talk.session
     session.setpoints.items[0].armed = True
     session.command(0, -150.0, partner.now)
     assert told(partner)['speed_setpoint'] == 0, 'commanded, not sent'
     partner.take()
     partner.live(0.1)
-    assert told(partner) == {**word, 'speed_setpoint': -1500}
+    assert told(partner) == {**word(partner, 'enable'), 'speed_setpoint': -1500}
     assert list(partner.commanded())[-1] == -1500 & 0xFFFF
     partner.deliver(partner.talk.deactivate(partner.now))
     partner.live(1.0)
-    word = {'control_word': DISABLE[family]} if family in DISABLE else {}
-    assert told(partner) == {**word, 'speed_setpoint': 0}
+    assert told(partner) == {**word(partner, 'disable'), 'speed_setpoint': 0}
 
 
 def test_what_the_bus_refused_was_not_sent(family: str) -> None:

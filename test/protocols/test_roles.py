@@ -8,6 +8,7 @@ from builders import (
     ACTUAL, CONTROL, drive, EEPROM, GAIN, INT32, parameter, RAM, RO, SPEED, TABLE, WORD,
 )
 import pytest
+from test_contract import PARTNERS
 
 from drive_can_bridge.core.directory import ParameterDirectory
 from drive_can_bridge.core.parameters import Parameter, ParameterType
@@ -46,11 +47,14 @@ def raw(of: Session, name: str) -> Parameter:
 
 @pytest.mark.parametrize('family', sorted(FAMILIES))
 def test_another_name_of_a_setpoint(family: str) -> None:
-    one = session(family, ALIAS, STATUS_ALIAS, control=False)
-    for name in ('speed_setpoint', 'jog', 'p50'):
+    partner = PARTNERS[family]
+    table = [partner.own(each) for each in (*TABLE, ALIAS, STATUS_ALIAS)]
+    one, = make_sessions([drive(family, table=table, request=table[:1],
+                                response=(partner.own(ACTUAL),))])
+    for name in ('speed_setpoint', 'jog', partner.raw_name(50)):
         assert one.write_refusal(raw(one, name)) == CYCLIC, name
         assert one.role(raw(one, name)) is Role.CYCLIC, name
-    for name in ('gain', 'p40'):
+    for name in ('gain', partner.raw_name(40)):
         assert one.write_refusal(raw(one, name)) == '', name
         assert one.role(raw(one, name)) is None, name
     # what is received is nobody's business, unless it cannot be written anyway

@@ -6,6 +6,7 @@ Every row describes the same drive as far as its protocol lets it: a speed, an i
 each way, a status word, a setting in EEPROM. Numbers and words are those of the profile texts.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 import re
@@ -69,9 +70,13 @@ class Facts:
 
     :param profile: parameters beside those that all have.
     :param keys: of the drive, beside those that all have.
+    :param more: the parameters that all have, as the family addresses them.
+    :param address: raw name -> address as messages print it.
     :param status_mapped: the status word takes a place in ``cyclic_response``.
+    :param word: the built-in control word of an enabled drive.
     :param states: of the control services: enabled, disabled.
-    :param raw: raw name -> (a parameter that it reaches, what it reads with ``SETTINGS`` there).
+    :param raw: raw name -> (a parameter that it reaches, what it reads with ``SETTINGS`` there);
+        one at least of ramp_time, gain, damping and flag.
     :param no_names: look like raw names and are none here.
     :param absent: a raw name that the drive does not have, and what reading or writing it says.
     :param stuck: the reason when a write has no effect; '' where an acknowledgement is believed.
@@ -85,7 +90,10 @@ class Facts:
     protocol: str
     profile: str
     keys: dict[str, Any] = field(default_factory=dict)
+    more: str = SAME_EVERYWHERE
+    address: Callable[[str], str] = str.upper
     status_mapped: bool = True
+    word: int | None = None
     bits: tuple[str, ...] = ('ready', 'enabled', 'fault')
     states: tuple[str, str] = ('enabled', 'ready')
     raw: dict[str, tuple[str, int]] = field(default_factory=dict)
@@ -98,6 +106,14 @@ class Facts:
     scattered_reason: str = ''
     diagnostics: frozenset[str] = frozenset()
     missed_limit: int = 20
+
+    def raw_name(self, name: str) -> str:
+        """Return the raw name that reaches a parameter."""
+        return next(raw for raw, (reached, _) in self.raw.items() if reached == name)
+
+    def address_of(self, name: str) -> str:
+        """Return the address of a parameter as messages print it."""
+        return self.address(self.raw_name(name))
 
     @property
     def hasty(self) -> dict[str, Any]:
@@ -118,13 +134,13 @@ class Facts:
     @property
     def table(self) -> str:
         """The ``parameters`` of the profile."""
-        return self.profile.partition('control:')[0] + SAME_EVERYWHERE
+        return self.profile.partition('control:')[0] + self.more
 
     def write_profile(self, directory: Path) -> Path:
         """Write the profile file."""
         head, control, rest = self.profile.partition('control:')
         path = directory / f'{self.protocol}.yaml'
-        path.write_text(f'protocols: [{self.protocol}]\nparameters:{head}{SAME_EVERYWHERE}'
+        path.write_text(f'protocols: [{self.protocol}]\nparameters:{head}{self.more}'
                         f'{control}{rest}', encoding='utf-8')
         return path
 
@@ -175,7 +191,7 @@ FAMILIES = [
     Facts(
         'cannord', UNNUMBERED + CANNORD_MORE, status_mapped=False, bits=CANNORD_BITS,
         keys={'cyclic_response': ['actual_speed', 'counts', 'braked']},
-        states=('operation enabled', 'ready to switch on'),
+        states=('operation enabled', 'ready to switch on'), word=0x047F,
         raw={**RAW, 'p600': ('wide', (1 << 32) - 100_000), 'p613.1': ('position', 12)},
         no_names=('x2007.3', 'p2048', 'p110.256'),
         absent=('p115', 'refused by the drive: error 0: invalid parameter number'),

@@ -96,6 +96,11 @@ def command(client: Client, **values: Any) -> None:
         client.publish(f'{DRIVE}/command/{name}', COMMANDS[name](data=value))
 
 
+def keyword(name: str) -> str:
+    """Return a name as a keyword for ``Client.set``."""
+    return name.replace('.', '__')
+
+
 def test_every_family_has_a_row() -> None:
     assert {row.protocol for row in FAMILIES} == set(TABLE)
 
@@ -310,7 +315,7 @@ def test_what_was_last_sent(start: Start, client: Client, facts: Facts) -> None:
     command(client, speed_setpoint=0.0, mode=0, brake=False)
     command(client, speed_setpoint=-250.0, mode=3, brake=True)
     moving = wait_until(lambda: [message for message in topic.messages if sent(message) == {
-        'control_word': drive.value('control_word') if facts.status_mapped else 0x047F,
+        'control_word': facts.word or drive.value('control_word'),
         'speed_setpoint': pytest.approx(-250.0), 'mode': 3, 'brake': True}])
     stamps = [message.stamp.sec + 1e-9 * message.stamp.nanosec for message in topic.messages]
     assert stamps == sorted(stamps) and abs(stamps[-1] - time.time()) < 60.0
@@ -367,7 +372,8 @@ def test_list_describe_and_types(shared: Bridge, client: Client, facts: Facts) -
     found = client.call(f'{DRIVE}/list_parameters', ListParameters, ListParameters.Request(
         prefixes=['gain', 'ramp', 'nothing'], depth=1)).result
     assert list(found.names) == ['gain']
-    names = ['speed_setpoint', 'counts', 'flag', 'order', 'actual_ramp', 'nothing', 'p110']
+    names = ['speed_setpoint', 'counts', 'flag', 'order', 'actual_ramp', 'nothing',
+             facts.raw_name('gain')]
     kinds = [ParameterType.PARAMETER_DOUBLE, ParameterType.PARAMETER_INTEGER,
              ParameterType.PARAMETER_BOOL, ParameterType.PARAMETER_INTEGER,
              ParameterType.PARAMETER_DOUBLE, ParameterType.PARAMETER_NOT_SET,
@@ -388,12 +394,12 @@ def test_list_describe_and_types(shared: Bridge, client: Client, facts: Facts) -
     [limits] = counts.integer_range
     assert (limits.from_value, limits.to_value, limits.step) == (0, 65535, 1)
     assert not flag.integer_range and not flag.floating_point_range
-    assert 'P112' in flag.description and 'storage ram' in flag.description
+    assert facts.address_of('flag') in flag.description and 'storage ram' in flag.description
     assert 'integer, write-only' in order.description
     [limits] = actual_ramp.floating_point_range
     assert (limits.from_value, limits.to_value, limits.step) == (-10.0, 32757.5, 0.5)
     assert not nothing.description
-    assert raw.description.startswith('raw access (P110')
+    assert raw.description.startswith(f"raw access ({facts.address_of('gain')}")
 
 
 def test_get(shared: Bridge, client: Client, facts: Facts) -> None:
@@ -414,7 +420,7 @@ def test_get(shared: Bridge, client: Client, facts: Facts) -> None:
     # one bad name takes no other along
     assert client.get(DRIVE, 'gain', absent, 'gian', *facts.no_names, 'flag') == [
         7, None, None, *[None] * len(facts.no_names), True]
-    client.wait_logged(f'conveyor: read {absent} (P115): {reason}', WARN)
+    client.wait_logged(f'conveyor: read {absent} ({facts.address(absent)}): {reason}', WARN)
     client.wait_logged('conveyor: read gian: unknown parameter gian, did you mean gain?', WARN)
     failed = int(before['parameter_requests_failed']) + 2 + len(facts.no_names)
     status = client.diagnostics(
@@ -438,28 +444,29 @@ def test_set(shared: Bridge, client: Client, facts: Facts) -> None:
     assert drive.value('ramp_time') == pytest.approx(3.0)
     assert client.set(DRIVE, order=3) == [(True, facts.order_note)]
     for name, (parameter, _) in facts.raw.items():
-        if name != 'p102':
-            assert client.set(DRIVE, **{name.replace('.', '__'): 1}) == [(True, '')], name
+        if parameter != 'ramp_time':
+            assert client.set(DRIVE, **{keyword(name): 1}) == [(True, '')], name
             assert drive.value(parameter) == 1
-    assert client.set(DRIVE, p111=-7) == [(True, '')]
+    damping = facts.raw_name('damping')
+    assert client.set(DRIVE, **{keyword(damping): -7}) == [(True, '')]
     assert drive.value('damping') == -7
-    wait_until(lambda: events[-1] == {'p111': 0x10000 - 7})
+    wait_until(lambda: events[-1] == {damping: 0x10000 - 7})
     announced = len(events)
     refused = {
         'gain': (70000, '70000 is not representable: uint16 carries 0 to 65535'),
         'ramp_time': (60.5, '60.5 is out of range: 0.01 to 60 s'),
         'actual_ramp': (1.0, 'read-only'),
         'flag': (1, 'wrong type: integer, expected bool'),
-        'p110': (1.0, 'wrong type: double, expected integer'),
-        'p102': (0, 'raw 0 of ramp_time: 0 is out of range: 0.01 to 60 s'),
+        facts.raw_name('gain'): (1.0, 'wrong type: double, expected integer'),
+        facts.raw_name('ramp_time'): (0, 'raw 0 of ramp_time: 0 is out of range: 0.01 to 60 s'),
         'gian': (1, 'unknown parameter gian, did you mean gain?'),
         'speed_setpoint': (1.0, 'sent cyclically: publish ~/command/speed_setpoint')}
-    assert client.set(DRIVE, **{name: value for name, (value, _) in refused.items()}) == [
+    assert client.set(DRIVE, **{keyword(name): value for name, (value, _) in refused.items()}) == [
         (False, reason) for _, reason in refused.values()]
     if facts.status_mapped:
         assert client.set(DRIVE, control_word=1) == [(False, 'use ~/enable')]
     absent, reason = facts.absent
-    assert client.set(DRIVE, **{absent: 1}) == [(False, reason)]
+    assert client.set(DRIVE, **{keyword(absent): 1}) == [(False, reason)]
     if facts.stuck:
         drive.set_value('gain', 7)
         drive.fault('stuck=gain')
@@ -496,7 +503,8 @@ def test_a_drive_that_is_not_there(start: Start, client: Client, facts: Facts) -
     # the first is tried, the others fail at once
     assert client.get(DRIVE, 'gain', 'flag', 'ramp_time') == [None, None, None]
     assert client.set(DRIVE, gain=1, flag=True) == [(False, 'no answer; drive offline')] * 2
-    client.wait_logged('conveyor: read gain (P110): no answer; drive offline', WARN)
+    client.wait_logged(
+        f"conveyor: read gain ({facts.address_of('gain')}): no answer; drive offline", WARN)
     assert not client.set_atomically(DRIVE, **facts.atomic)[0]
     assert client.transition(4)
     assert client.get(DRIVE, 'gain') == [None]

@@ -23,14 +23,20 @@ from drive_can_bridge.cli import main as front_end
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.resources import config_file
 from drive_can_bridge.simulation.simulation import Simulation
 from drive_can_bridge.simulation.terminal import SlcanTerminal
 
 VCAN = os.environ.get('DRIVE_CAN_SOCKETCAN', 'vcan0')
 BITRATE = 500_000
-ALL = {('datamodel_extended', 1), ('datamodel_standard', 2), ('cannord', 50), ('canopen_pkw', 5)}
-UNMISTAKABLE = {('datamodel_extended', 1), ('canopen_pkw', 5)}
+SHIPPED = configuration_from_file(config_file('all_families.yaml')).drives.values()
+ALL = {(drive.protocol, drive.station) for drive in SHIPPED}
+#: CANopen nodes, by name
+NODES = {drive.name: (drive.protocol, drive.station) for drive in SHIPPED
+         if any(claim.shared == 'NMT' for claim in FAMILIES[drive.protocol].claims(drive))}
+UNMISTAKABLE = {(protocol, station) for protocol, station in ALL
+                if FAMILIES[protocol].make_scout().unmistakable}
 
 pytestmark = pytest.mark.timeout(5 * DEADLINE)
 on_socketcan = (
@@ -133,7 +139,7 @@ def test_what_answers_is_found_and_runs(place: Place, tmp_path: Path,
         out, err = capsys.readouterr()
         assert found(out) == written(file) == UNMISTAKABLE
         # nothing that is a command to somebody: one of them is a CANopen node
-        assert 'cannord is not asked: there is a CANopen node (5)' in err
+        assert 'cannord is not asked: there is a CANopen node (5' in err
         assert not [frame for frame in place.heard
                     if not frame.extended and 0x200 <= frame.identifier < 0x400]
         assert not [drive.name for drive in simulation.drives.values() if drive.wear]
@@ -145,10 +151,10 @@ def test_what_answers_is_found_and_runs(place: Place, tmp_path: Path,
 def test_families_with_short_identifiers_are_found_when_named(
         place: Place, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / 'found.yaml'
-    with place.drives('pump') as simulation:
+    with place.drives(*NODES) as simulation:
         assert place.scan('--json', '-o', file, '--listen', 0.2, '--protocols',
                           'datamodel_standard,cannord', '--yes') == 0
-        assert found(capsys.readouterr().out) == written(file) == ALL - {('canopen_pkw', 5)}
+        assert found(capsys.readouterr().out) == written(file) == ALL - set(NODES.values())
         assert not [drive.name for drive in simulation.drives.values() if drive.wear]
 
 
