@@ -42,6 +42,7 @@ class Axes:
     :param command: what becomes of the value of the speed setpoint.
     :ivar speed_setpoint: what moves the shaft, or None: a position does, or nothing.
     :ivar setpoints: names of all parameters that are setpoints.
+    :ivar actuals: what gives the actual values that follow a setpoint, by their names.
     :ivar jitter: raw steps by which measured positions are off at the moment.
     """
 
@@ -56,39 +57,37 @@ class Axes:
         control = configuration.profile.control
         control_name = control.parameter if control else None
         pairs = names.pairs(parameters, without=control_name)
-        candidates = [pair.setpoint for pair in pairs]
-        candidates += names.setpoints(parameters, without=control_name)
-        self.setpoints = {parameter.name for parameter in candidates}
+        self.setpoints = {pair.setpoint.name for pair in pairs}
         self.ramps = {ramp.parameter.name: ramp for ramp in names.ramp_parameters(parameters)}
         # a setpoint whose actual value the profile lacks still moves the motor
-        mover, quantity = names.mover(candidates, configuration.cyclic_request, control_name)
+        mover, quantity = names.mover(pairs, configuration.cyclic_request, control_name)
         by_speed = quantity is Quantity.SPEED
         self.speed_setpoint = speed = mover if by_speed else None
         other_kind = Quantity.POSITION if by_speed else Quantity.SPEED
         self._mover = mover.name if mover else ''
         self._travels: dict[str, tuple[Parameter, Travel]] = {}     # by setpoint
         self._ramps: dict[str, tuple[Parameter, Ramp]] = {}
-        #: by the name of the actual value
         self.actuals: dict[str, Callable[[], float]] = {}
-        if quantity is Quantity.POSITION and mover is not None:
-            self._travels[mover.name] = mover, Travel()
-        for setpoint, actual in pairs:
-            kind = names.quantity_of(setpoint)
-            if setpoint is speed:
-                self.actuals[actual.name] = lambda: self.motor.speed
-            elif kind is Quantity.POSITION and kind is not other_kind:
-                _, travel = self._travels.setdefault(setpoint.name, (setpoint, Travel()))
-                self.actuals[actual.name] = partial(getattr, travel, 'position')
-            elif kind is not other_kind:
-                _, ramp = self._ramps.setdefault(setpoint.name, (setpoint, Ramp()))
-                self.actuals[actual.name] = partial(getattr, ramp, 'value')
         rated, turns = 1.0, 1.0
         if speed is not None:
             rated = scales.rated_speed(speed)
             turns = scales.revolutions_per_unit(speed, rated)
         elif mover is not None:
+            self._travels[mover.name] = mover, Travel()
             rated, turns = scales.travel_speed(mover), 1.0 / scales.per_revolution(mover)
         self.motor = Motor(rated, turns, mechanics.load)
+        for setpoint, actual in pairs:
+            kind = names.quantity_of(setpoint)
+            if actual is None or kind is other_kind and setpoint is not speed:
+                continue
+            follower: tuple[object, str] = self.motor, 'speed'
+            if setpoint is not speed and kind is Quantity.POSITION:
+                travel = self._travels.setdefault(setpoint.name, (setpoint, Travel()))[1]
+                follower = travel, 'position'
+            elif setpoint is not speed:
+                ramp = self._ramps.setdefault(setpoint.name, (setpoint, Ramp()))[1]
+                follower = ramp, 'value'
+            self.actuals[actual.name] = partial(getattr, *follower)
 
     @property
     def target(self) -> float:
@@ -99,12 +98,12 @@ class Axes:
 
     def advance(self, duration: float, operation: Operation, *, energised: bool) -> None:
         """Let time pass."""
-        if duration > 0.0 and self._mechanics.noise:
-            self.jitter = self._noise.randint(-self._mechanics.noise, self._mechanics.noise)
+        noise, sinking = self._mechanics.noise, -SINKING_SPEED * self._mechanics.load
+        if duration > 0.0 and noise:
+            self.jitter = self._noise.randint(-noise, noise)
         motor, rated = self.motor, self.motor.rated_speed
         rates, quick_stop = self._rates()
         driven = energised and not operation.stopping
-        sinking = -SINKING_SPEED * self._mechanics.load
         for name, (setpoint, ramp) in self._ramps.items():
             rate = scales.rated_speed(setpoint) / RAMP_TIME
             target = self._registers.commanded(name) if driven else 0.0
@@ -160,8 +159,7 @@ class Axes:
     def _rates(self) -> tuple[Rates, Rates]:
         """Return what the ramp parameters say: the usual rates, those of a quick stop."""
         rated = self.motor.rated_speed
-        rising = falling = rated / RAMP_TIME
-        quick: float | None = None
+        given: dict[RampUse, float] = {}
         for name, ramp in self.ramps.items():
             value = self._registers.commanded(name)
             if ramp.is_time:
@@ -169,12 +167,9 @@ class Axes:
                 rate = rated / max(seconds, RAMP_TIME_MIN)
             else:
                 rate = min(max(value, rated / 1000.0), rated / RAMP_TIME_MIN)
-            if ramp.use is RampUse.QUICK_STOP:
-                quick = rate
-            if ramp.use in (RampUse.BOTH, RampUse.RISING):
-                rising = rate
-            if ramp.use in (RampUse.BOTH, RampUse.FALLING):
-                falling = rate
-        if quick is None:
-            quick = max(rated / QUICK_STOP_TIME, falling)
+            both = RampUse.RISING, RampUse.FALLING
+            given.update(dict.fromkeys(both if ramp.use is RampUse.BOTH else (ramp.use,), rate))
+        rising, falling = (given.get(use, rated / RAMP_TIME)
+                           for use in (RampUse.RISING, RampUse.FALLING))
+        quick = given.get(RampUse.QUICK_STOP, max(rated / QUICK_STOP_TIME, falling))
         return Rates(rising, falling), Rates(quick, quick)

@@ -50,7 +50,6 @@ class InverterOperation(Operation):
         super().__init__(None)
 
     def power_on(self) -> None:
-        """Begin anew: switch-on disabled, parameter set 1."""
         self.word = _AT_POWER_ON
         self._cause_ends = -math.inf
         self._enter(State.SWITCH_ON_DISABLED)
@@ -62,7 +61,7 @@ class InverterOperation(Operation):
         rising = word & ~self.word & states.FAULT_RESET
         self.word = word
         if self.state is State.FAULT:
-            if rising and now >= self._cause_ends:
+            if rising and self.reset_allowed(now):
                 self._enter(State.SWITCH_ON_DISABLED)
         else:
             self._enter(self._after(word))
@@ -71,10 +70,6 @@ class InverterOperation(Operation):
         """Fail. The cause lasts for some seconds, or until :meth:`end_cause`."""
         self._cause_ends = now + duration
         self._enter(State.FAULT)
-
-    def end_cause(self, now: float) -> None:
-        """Let a reset help from now on."""
-        self._cause_ends = min(self._cause_ends, now)
 
     def repair(self) -> None:
         """Clear a fault by hand, at the inverter."""

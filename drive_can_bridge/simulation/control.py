@@ -23,6 +23,7 @@ class Operation:
     """
     The operating state of one simulated drive.
 
+    :param table: None: there is no control word of the profile's.
     :ivar enabled: torque is on.
     :ivar stopping: on the quick stop ramp; still enabled.
     :ivar faulted: torque is off until the fault is reset.
@@ -35,9 +36,7 @@ class Operation:
     def power_on(self) -> None:
         """Begin anew: no fault, disabled."""
         self.enabled = self._table is None
-        self.stopping = False
-        self.faulted = False
-        self._blocked = False
+        self.stopping = self.faulted = self._blocked = False
         self._word: int | None = None
         self._cause_ends = -math.inf
 
@@ -50,7 +49,7 @@ class Operation:
         if word not in (table.enable, table.quick_stop):
             self._blocked = False
         if self.faulted:
-            if word == table.reset_fault and changed and now >= self._cause_ends:
+            if word == table.reset_fault and changed and self.reset_allowed(now):
                 self.faulted = False
         elif word == table.enable:
             if not self._blocked and not self.stopping:
@@ -62,10 +61,17 @@ class Operation:
 
     def trip(self, now: float, duration: float = 0.0) -> None:
         """Fail. The cause lasts for some seconds, during which no reset helps."""
-        self.faulted = True
+        self.faulted = self._blocked = True
         self.enabled = self.stopping = False
-        self._blocked = True
         self._cause_ends = now + duration
+
+    def reset_allowed(self, now: float) -> bool:
+        """Tell whether the cause of a trip is gone."""
+        return now >= self._cause_ends
+
+    def end_cause(self, now: float) -> None:
+        """Let a reset help from some time on, at the latest."""
+        self._cause_ends = min(self._cause_ends, now)
 
     def repair(self) -> None:
         """Clear a fault by hand, at the drive."""

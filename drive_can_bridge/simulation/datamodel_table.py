@@ -61,23 +61,19 @@ class DataModelTable:
 
     # -- access -----------------------------------------------------------------------------------
 
-    def read(self, number: int, count: int, now: float) -> tuple[int, ...] | None:
+    def read(self, number: int, count: int, now: float) -> list[int] | None:
         """Read parameters; None where the drive does not answer."""
         if self._busy(now):
             self._violation('read while an EEPROM write is under way (not answered)')
             return None
-        words = []
-        for wanted in range(number, number + count):
-            word = self._word(wanted)
-            if word is None:
-                return None
-            words.append(word)
-        return tuple(words)
+        words = [self._word(wanted) for wanted in range(number, number + count)]
+        known = [word for word in words if word is not None]
+        return known if len(known) == count else None
 
     def write(self, number: int, words: Sequence[int], now: float) -> None:
         """Write parameters. A frame with a number that does not exist is ignored as a whole."""
-        parameters = [self._parameters.get(number + place) for place in range(len(words))]
-        known = [parameter for parameter in parameters if parameter is not None]
+        known = [self._parameters[wanted] for wanted in range(number, number + len(words))
+                 if wanted in self._parameters]
         if len(known) < len(words):
             return
         # one frame is one EEPROM write, however many words it has

@@ -49,26 +49,18 @@ class Ramp:
 
         :return: integral of the value over the duration.
         """
-        integral = 0.0
-        self.slope = 0.0
+        integral = self.slope = 0.0
         while duration > 0.0 and self.value != target:
-            if self.value * target < 0.0:
-                goal, rate = 0.0, rates.falling
-            elif abs(target) > abs(self.value):
-                goal, rate = target, rates.rising
-            else:
-                goal, rate = target, rates.falling
-            needed = abs(goal - self.value) / rate
+            before, goal = self.value, target if self.value * target >= 0.0 else 0.0
+            rate = rates.rising if abs(goal) > abs(before) else rates.falling
+            needed = abs(goal - before) / rate
             if needed <= duration:
-                integral += (self.value + goal) / 2.0 * needed
                 self.value = goal
-                duration -= needed
             else:
-                self.slope = math.copysign(rate, goal - self.value)
-                before = self.value
+                needed, self.slope = duration, math.copysign(rate, goal - before)
                 self.value += self.slope * duration
-                integral += (before + self.value) / 2.0 * duration
-                duration = 0.0
+            integral += (before + self.value) / 2.0 * needed
+            duration -= needed
         return integral + self.value * max(duration, 0.0)
 
 
@@ -152,11 +144,6 @@ class Motor:
     def share_of_rated_speed(self) -> float:
         """Speed as a share of the rated one, with sign."""
         return self.ramp.value / self.rated_speed
-
-    @property
-    def revolutions_per_second(self) -> float:
-        """Speed of the shaft."""
-        return self.ramp.value * self.revolutions
 
     def advance(self, duration: float, target: float, rates: Rates, *, energised: bool) -> None:
         """Let time pass on the way to a speed."""

@@ -163,6 +163,12 @@ class Registers:
         """Compute a register again that was held."""
         self._held.pop(name, None)
 
+    def end_faults(self) -> None:
+        """Let writes have their effect again, and refuse none that fits."""
+        self.stuck.clear()
+        self.refused.clear()
+        self.needs.clear()
+
     # -- for plants -------------------------------------------------------------------------------
 
     def commanded(self, name: str) -> float:

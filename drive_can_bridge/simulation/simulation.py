@@ -13,6 +13,7 @@ The end points are python-can interfaces unless ``open_bus`` says otherwise.
 
 from collections import Counter
 from collections.abc import Mapping
+from copy import copy
 import sys
 from typing import Any
 
@@ -30,8 +31,32 @@ from drive_can_bridge.transport.port import open_port
 ARRIVAL_JITTER = 0.002
 
 
+def _read(name: str) -> Any:
+    """Return a property: something of the drive, copied while nobody else touches it."""
+    def read(self: 'PlayedDrive') -> Any:
+        with self._touch():
+            return copy(getattr(self.drive, name))
+    return property(read)
+
+
 class PlayedDrive:
-    """A simulated drive on a running bus, for use from any thread."""
+    """
+    A simulated drive on a running bus, for use from any thread.
+
+    :ivar requests: requests understood.
+    :ivar answers: answers given, before faults took theirs.
+    :ivar violations: how often the other side broke a rule of the protocol, by rule.
+    :ivar wear: EEPROM cells written, by parameter.
+    :ivar eeprom_writes: EEPROM cells written.
+    :ivar faults_text: the faults in force, in words; 'ok' without any.
+    """
+
+    requests: int = _read('requests')
+    answers: int = _read('answers')
+    violations: Counter[str] = _read('violations')
+    wear: Counter[str] = _read('wear')
+    eeprom_writes: int = _read('eeprom_writes')
+    faults_text: str = _read('faults_text')
 
     def __init__(self, drive: SimulatedDrive, player: BusPlayer) -> None:
         self.drive = drive
@@ -57,39 +82,6 @@ class PlayedDrive:
         """Let an actual value that was set follow the motor again."""
         with self._touch():
             self.drive.release(name)
-
-    @property
-    def faults_text(self) -> str:
-        """The faults in force, in words; 'ok' without any."""
-        with self._touch():
-            return self.drive.faults_text
-
-    @property
-    def violations(self) -> Counter[str]:
-        """How often the other side broke a rule of the protocol, by rule."""
-        with self._touch():
-            return Counter(self.drive.violations)
-
-    @property
-    def requests(self) -> int:
-        """Requests understood."""
-        return self.drive.requests
-
-    @property
-    def answers(self) -> int:
-        """Answers given, before faults took theirs."""
-        return self.drive.answers
-
-    @property
-    def eeprom_writes(self) -> int:
-        """EEPROM cells written."""
-        return self.drive.eeprom_writes
-
-    @property
-    def wear(self) -> Counter[str]:
-        """EEPROM cells written, by parameter."""
-        with self._touch():
-            return Counter(self.drive.wear)
 
 
 class Simulation:

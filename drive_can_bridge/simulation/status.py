@@ -5,33 +5,28 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.core.profile import ControlTable, StatusPattern
+from drive_can_bridge.core.profile import ControlTable
+from drive_can_bridge.simulation.control import Operation
 
 
 class State(NamedTuple):
     """What status bits can tell."""
 
-    enabled: bool
-    stopping: bool
-    fault: bool
-    warning: bool
-    speed: float
-    setpoint_reached: bool
-
-    @property
-    def ready(self) -> bool:
-        """Could be enabled, or is."""
-        return not self.fault
+    operation: Operation
+    warning: bool = False
+    speed: float = 0.0
+    setpoint_reached: bool = False
 
 
 Condition = Callable[[State], bool]
 
 _RULES: tuple[tuple[tuple[str, ...], Condition], ...] = (
-    (('ready', 'ready_to_switch_on', 'ready_to_run', 'no_fault', 'ok'), lambda s: s.ready),
+    (('ready', 'ready_to_switch_on', 'ready_to_run', 'no_fault', 'ok'),
+     lambda s: not s.operation.faulted),
     (('enabled', 'running', 'operation_enabled', 'on', 'active', 'operating'),
-     lambda s: s.enabled),
-    (('disabled', 'switch_on_disabled'), lambda s: not s.enabled),
-    (('fault', 'error', 'alarm', 'tripped', 'failure'), lambda s: s.fault),
+     lambda s: s.operation.enabled),
+    (('disabled', 'switch_on_disabled'), lambda s: not s.operation.enabled),
+    (('fault', 'error', 'alarm', 'tripped', 'failure'), lambda s: s.operation.faulted),
     (('warning',), lambda s: s.warning),
     (('moving', 'rotating', 'motor_running'), lambda s: s.speed != 0.0),
     (('standstill', 'stopped', 'zero_speed', 'at_standstill'), lambda s: s.speed == 0.0),
@@ -39,8 +34,8 @@ _RULES: tuple[tuple[tuple[str, ...], Condition], ...] = (
     (('rotating_left', 'reverse', 'direction_reverse'), lambda s: s.speed < 0.0),
     (('setpoint_reached', 'at_setpoint', 'at_speed', 'speed_reached', 'target_reached',
       'in_position'), lambda s: s.setpoint_reached),
-    (('quick_stop', 'quick_stop_active'), lambda s: s.stopping),
-    (('no_quick_stop',), lambda s: not s.stopping),
+    (('quick_stop', 'quick_stop_active'), lambda s: s.operation.stopping),
+    (('no_quick_stop',), lambda s: not s.operation.stopping),
     (('voltage_enabled', 'power_on', 'mains_ok', 'bus_control', 'remote'), lambda s: True),
 )
 BIT_RULES: dict[str, Condition] = {name: rule for names, rule in _RULES for name in names}
@@ -56,13 +51,10 @@ class StatusWord:
     def __init__(self, parameter: Parameter, table: ControlTable | None) -> None:
         self._bits = [(1 << bit, BIT_RULES[name]) for name, bit in parameter.bits
                       if name in BIT_RULES]
-        self._patterns: list[tuple[StatusPattern, Condition]] = []
-        if table is not None and table.status_parameter == parameter.name:
-            # the later, the more important: where patterns overlap, a fault wins
-            for pattern, rule in ((table.ready, 'ready'), (table.enabled, 'enabled'),
-                                  (table.fault, 'fault')):
-                if pattern is not None:
-                    self._patterns.append((pattern, BIT_RULES[rule]))
+        # the later, the more important: where patterns overlap, a fault wins
+        found = () if table is None or table.status_parameter != parameter.name else (
+            (table.ready, 'ready'), (table.enabled, 'enabled'), (table.fault, 'fault'))
+        self._patterns = [(pattern, BIT_RULES[rule]) for pattern, rule in found if pattern]
 
     def __bool__(self) -> bool:
         """Tell whether anything of the word is known; if not, it is a plain register."""
