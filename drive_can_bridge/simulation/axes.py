@@ -91,46 +91,43 @@ class Axes:
 
     @property
     def target(self) -> float:
-        """Commanded speed."""
         if self.speed_setpoint is None:
             return 0.0
         return self._command(self._registers.commanded(self.speed_setpoint.name))
 
     def advance(self, duration: float, operation: Operation, *, energised: bool) -> None:
-        """Let time pass."""
-        noise, sinking = self._mechanics.noise, -SINKING_SPEED * self._mechanics.load
+        load, noise = self._mechanics.load, self._mechanics.noise
         if duration > 0.0 and noise:
             self.jitter = self._noise.randint(-noise, noise)
         motor, rated = self.motor, self.motor.rated_speed
         rates, quick_stop = self._rates()
         driven = energised and not operation.stopping
+        held = not energised and self._mechanics.brake
+        # where to, and how fast, as shares of the rated speed, while nothing is commanded
+        drift = 0.0 if energised or held else -SINKING_SPEED * load
+        stop = quick_stop / rated if energised else 1.0 / COAST_TIME
         for name, (setpoint, ramp) in self._ramps.items():
             rate = scales.rated_speed(setpoint) / RAMP_TIME
             target = self._registers.commanded(name) if driven else 0.0
             ramp.advance(duration, target, Rates(rate, rate))
         for name, (setpoint, travel) in self._travels.items():
             before, limit = travel.position, scales.travel_speed(setpoint)
+            if held:
+                travel.speed = 0.0
             if driven:
                 travel.go(duration, self._registers.commanded(name), limit,
                           limit * rates.rising / rated)
-            elif energised:
-                travel.run(duration, 0.0, limit * quick_stop.falling / rated)
-            elif self._mechanics.brake:
-                travel.speed = travel.slope = 0.0
             else:
-                travel.run(duration, sinking * limit, limit / COAST_TIME)
+                travel.run(duration, drift * limit, stop * limit)
             if name == self._mover:
                 motor.ramp.value, motor.ramp.slope = travel.speed, travel.slope
                 motor.moved(duration, travel.position - before, energised=energised)
         if self._mover not in self._travels:
-            target = self.target if driven else 0.0
-            if energised:
-                rates = rates if driven else quick_stop
-            else:
-                target, rates = sinking * rated, Rates(rated / COAST_TIME, rated / COAST_TIME)
-                if self._mechanics.brake:
-                    motor.ramp.value = target = 0.0
-            motor.advance(duration, target, rates, energised=energised)
+            if held:
+                motor.ramp.value = 0.0
+            motor.advance(duration, self.target if driven else drift * rated,
+                          rates if driven else Rates(stop * rated, stop * rated),
+                          energised=energised)
         if operation.stopping and motor.speed == 0.0:
             operation.standstill()
             motor.moved(0.0, 0.0, energised=operation.enabled)
@@ -156,8 +153,8 @@ class Axes:
             return self.motor.rated_speed / seconds
         return seconds * 1000.0 if parameter.unit == 'ms' else seconds
 
-    def _rates(self) -> tuple[Rates, Rates]:
-        """Return what the ramp parameters say: the usual rates, those of a quick stop."""
+    def _rates(self) -> tuple[Rates, float]:
+        """Return what the ramp parameters say: the usual rates, that of a quick stop."""
         rated = self.motor.rated_speed
         given: dict[RampUse, float] = {}
         for name, ramp in self.ramps.items():
@@ -171,5 +168,5 @@ class Axes:
             given.update(dict.fromkeys(both if ramp.use is RampUse.BOTH else (ramp.use,), rate))
         rising, falling = (given.get(use, rated / RAMP_TIME)
                            for use in (RampUse.RISING, RampUse.FALLING))
-        quick = given.get(RampUse.QUICK_STOP, max(rated / QUICK_STOP_TIME, falling))
-        return Rates(rising, falling), Rates(quick, quick)
+        quick_stop = given.get(RampUse.QUICK_STOP, max(rated / QUICK_STOP_TIME, falling))
+        return Rates(rising, falling), quick_stop

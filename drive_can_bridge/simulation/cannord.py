@@ -25,7 +25,7 @@ from drive_can_bridge.protocols.cannord.process_data import (
 )
 from drive_can_bridge.simulation.cannord_plant import InverterPlant
 from drive_can_bridge.simulation.cannord_table import CannordTable, Refused
-from drive_can_bridge.simulation.drive import ALONE, SimulatedDrive, Surroundings
+from drive_can_bridge.simulation.drive import ALONE, Ignored, SimulatedDrive, Surroundings
 from drive_can_bridge.simulation.motor_plant import FAULT_CODE
 from drive_can_bridge.simulation.plant import PlantFactory
 
@@ -62,7 +62,6 @@ class SimulatedCannordInverter(SimulatedDrive):
         self._start()
 
     def _start(self) -> None:
-        """Begin with parameter set 1, and wait for a first telegram."""
         self.table.select_set(1)
         self._length = SHORT_LENGTH
         self._silent_since = math.inf       # inf: the next telegram is not waited for
@@ -100,11 +99,9 @@ class SimulatedCannordInverter(SimulatedDrive):
 
     def _process_data(self, data: bytes, now: float, *, answered: bool) -> None:
         if len(data) == EXTRA_LENGTH and not self._options.extra_setpoints:
-            self._violation('five bytes of process data without extra_setpoints (ignored)')
-            return
+            raise Ignored('five bytes of process data without extra_setpoints')
         if len(data) not in (SHORT_LENGTH, LONG_LENGTH, EXTRA_LENGTH):
-            self._violation('process data of a length that the manual does not define (ignored)')
-            return
+            raise Ignored('process data of a length that the manual does not define')
         self.requests += 1
         self._look_at_clock(now)
         self._silent_since = now
@@ -148,13 +145,11 @@ class SimulatedCannordInverter(SimulatedDrive):
 
     def _parameter_task(self, data: bytes, now: float) -> None:
         if len(data) != LENGTH:
-            self._violation('parameter task without eight data bytes (ignored)')
-            return
+            raise Ignored('parameter task without eight data bytes')
         try:
             task = self._layout.decode(data)
         except RemoteProtocolError:
-            self._violation('parameter task that the manual does not define (ignored)')
-            return
+            raise Ignored('parameter task that the manual does not define') from None
         self.requests += 1
         if data[2 if self._layout.index_byte == 'high' else 3]:
             self._violation('byte of the sub-index that holds no information is not 0')
@@ -178,7 +173,6 @@ class SimulatedCannordInverter(SimulatedDrive):
         return min(super().next_timer(), self._silent_since + self._timeout)
 
     def handle_timer(self, now: float) -> None:
-        """Do what is due: answers that were held back, and the end of patience."""
         super().handle_timer(now)
         self._look_at_clock(now)
 

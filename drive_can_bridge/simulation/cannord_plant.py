@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.protocols.cannord.states import PARAMETER_SET_SHIFT, STATUS_BITS
+from drive_can_bridge.protocols.cannord.states import STATUS_BITS
 from drive_can_bridge.simulation import names
 from drive_can_bridge.simulation.cannord_operation import InverterOperation
 from drive_can_bridge.simulation.cannord_table import groups_of
@@ -71,7 +71,6 @@ class InverterPlant(MotorPlant):
 
     @property
     def status_word(self) -> int:
-        """The status word."""
         motor, state = self.axes.motor, self.state
         target = self.axes.target if state.enabled and not state.stopping else 0.0
         bits = {
@@ -81,10 +80,7 @@ class InverterPlant(MotorPlant):
             # at standstill the manuals' examples show "right"
             'rotating_left' if motor.speed < 0.0 else 'rotating_right': True,
         }
-        return (state.status | state.parameter_set - 1 << PARAMETER_SET_SHIFT
-                | sum(wanted << STATUS_BITS[name] for name, wanted in bits.items()))
-
-    # -- registers --------------------------------------------------------------------------------
+        return state.status | sum(wanted << STATUS_BITS[name] for name, wanted in bits.items())
 
     def initial(self, parameter: Parameter) -> int | None:
         """Return what a new inverter has in a register: the same in all parameter sets."""

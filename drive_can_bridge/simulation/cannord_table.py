@@ -19,7 +19,6 @@ examples in the manuals use plain ones. The motor obeys the values of the *activ
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-import re
 
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.cannord.parameter_frame import (
@@ -36,7 +35,6 @@ INVALID_TYPE = 5
 INVALID_TASK = 201
 CANNOT_BE_REPRESENTED = 202
 
-_RAW_NAME = re.compile(r'p([0-9]{1,4})(?:\.([0-9]{1,3}))?', re.ASCII)
 _WRITES = {int(task): how for how, task in WRITE_TASKS.items()}
 _RESPONSES = {(False, 16): Response.WORD, (False, 32): Response.DOUBLE,
               (True, 16): Response.ARRAY_WORD, (True, 32): Response.ARRAY_DOUBLE}
@@ -64,7 +62,6 @@ class Group:
 
 
 def groups_of(parameters: Mapping[str, Parameter]) -> dict[int, Group]:
-    """Collect the entries of a profile by number."""
     groups: dict[int, Group] = {}
     for parameter in parameters.values():
         if parameter.number is None or parameter.number > NUMBER_MAX:
@@ -86,8 +83,6 @@ class CannordTable:
         self._registers = registers
         self._groups = groups_of(parameters)
         self._active = 1
-
-    # -- the parameter channel --------------------------------------------------------------------
 
     def answer(self, task: ParameterFrame) -> tuple[Response, int]:
         """
@@ -131,23 +126,15 @@ class CannordTable:
             if group.sets and active is not None:
                 self._registers.stand_ins[group.members[0].name] = active.name
 
-    # -- by hand ----------------------------------------------------------------------------------
-
-    def name_of(self, name: str) -> str | None:
-        """Return the profile's name of ``p102`` and ``p102.1``, or None."""
-        match = _RAW_NAME.fullmatch(name)
-        if match is None:
-            return None
-        group = self._groups.get(int(match[1]))
-        parameter = group and group.members.get(int(match[2] or 0))
+    def name_of(self, raw: Parameter) -> str | None:
+        """Return the name of the parameter with a number and sub-index; None: there is none."""
+        parameter = self.numbered(raw.number or 0, raw.subindex or 0)
         return parameter.name if parameter else None
 
-    def numbered(self, number: int) -> Parameter | None:
-        """Return the parameter of a number, the first element of an array."""
+    def numbered(self, number: int, subindex: int = 0) -> Parameter | None:
+        """Return the parameter with a number and sub-index; None: there is none."""
         group = self._groups.get(number)
-        return group.members.get(0) if group else None
-
-    # -- inside -----------------------------------------------------------------------------------
+        return group.members.get(subindex) if group else None
 
     def _write(self, parameter: Parameter, value: int, *, double: bool, eeprom: bool) -> None:
         if (parameter.type.bits == 32) is not double:

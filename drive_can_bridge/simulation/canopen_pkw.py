@@ -22,7 +22,7 @@ from drive_can_bridge.protocols.canopen_pkw.identifiers import Identifiers
 from drive_can_bridge.simulation.canopen.node import CanopenNode
 from drive_can_bridge.simulation.canopen.sdo import Refused
 from drive_can_bridge.simulation.canopen_pkw_registers import RegisterTable
-from drive_can_bridge.simulation.drive import ALONE, SimulatedDrive, Surroundings
+from drive_can_bridge.simulation.drive import ALONE, Ignored, SimulatedDrive, Surroundings
 from drive_can_bridge.simulation.faults import Fault
 from drive_can_bridge.simulation.motor_plant import MotorPlant
 from drive_can_bridge.simulation.plant import PlantFactory
@@ -62,6 +62,7 @@ class SimulatedPkwDrive(SimulatedDrive):
         watched: float = options.heartbeat_timeout
         self.node = CanopenNode(
             configuration.station, constants=self._objects, objects=self.table,
+            send=lambda frame: self._outbox.frames.append(frame),
             heartbeat=round(1000.0 * watched / HEARTBEATS_WATCHED) if watched else HEARTBEAT)
         self._telegrams = {network.NMT_IDENTIFIER: self._obey,
                            self._identifiers.request: self._take_request,
@@ -87,9 +88,8 @@ class SimulatedPkwDrive(SimulatedDrive):
         return min(super().next_timer(), self.node.next_timer(), self._looks_at)
 
     def handle_timer(self, now: float) -> None:
-        """Do what is due: held back answers, boot-up frame, heartbeat, a look at the motor."""
         super().handle_timer(now)
-        self._outbox.frames += self.node.handle_timer(now)
+        self.node.handle_timer(now)
         self._look(now)
 
     def _look(self, now: float) -> None:
@@ -101,7 +101,7 @@ class SimulatedPkwDrive(SimulatedDrive):
             code = self.plant.trip_code if isinstance(self.plant, StarterPlant) else TEST_TRIP
             error = Emergency(TRIP_EMERGENCY, TRIP_ERROR_REGISTER,
                               code.to_bytes(2, 'little') + bytes(3))
-        self._outbox.frames += self.node.tell(error)
+        self.node.tell(error)
 
     # -- frames -----------------------------------------------------------------------------------
 
@@ -111,19 +111,20 @@ class SimulatedPkwDrive(SimulatedDrive):
             return False
         if self.node.state is NmtState.BOOT_UP:
             # whoever is ready to receive has sent its boot-up frame
-            self._outbox.frames += self.node.handle_timer(now)
+            self.node.handle_timer(now)
         found = self._telegrams.get(identifier)
-        if found is not None:
-            found(data, now)
-        self._look(now)
+        try:
+            if found is not None:
+                found(data, now)
+        finally:
+            self._look(now)
         return found is not None
 
     def _obey(self, data: bytes, now: float) -> None:
         try:
             reset = self.node.obey(data)
         except RemoteProtocolError:
-            self._violation('NMT command without two data bytes (ignored)')
-            return
+            raise Ignored('NMT command without two data bytes') from None
         if reset is NmtCommand.RESET_NODE:
             self._lose_power(now, now + RESET_TIME)
         elif reset is NmtCommand.RESET_COMMUNICATION:
@@ -131,24 +132,22 @@ class SimulatedPkwDrive(SimulatedDrive):
             self._reset_communication(self._deaf_until)
 
     def _serve(self, data: bytes, now: float) -> None:
-        """Answer an SDO."""
         if self.node.communicates:
             self.requests += 1
-            for answer in self.node.serve(data, now):
+            answer = self.node.serve(data, now)
+            if answer is not None:
                 self._answer(answer, now)
 
     def _take_request(self, data: bytes, now: float) -> None:
         if self.node.state is not NmtState.OPERATIONAL:
-            self._violation('request while the node is not operational (ignored)')
-            return
+            raise Ignored('request while the node is not operational')
         try:
             request = pkw.decode(data, self._layout)
         except RemoteProtocolError:
-            self._violation('request without eight data bytes (ignored)')
-            return
+            raise Ignored('request without eight data bytes') from None
         if request.function_byte == self._function_byte:
             if data != self.request:
-                self._violation('request with the function byte of the one before (ignored)')
+                raise Ignored('request with the function byte of the one before')
             return
         self.request, self._function_byte = data, request.function_byte
         self.requests += 1
@@ -156,7 +155,6 @@ class SimulatedPkwDrive(SimulatedDrive):
         self._answer(Frame(self._identifiers.response, self.response, False), now)
 
     def _response(self, request: pkw.Message) -> pkw.Message:
-        """Carry out a request."""
         meaning = request.meaning
         if request.code == pkw.Function.NONE:
             return pkw.response(request)

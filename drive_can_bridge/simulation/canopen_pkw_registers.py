@@ -7,7 +7,6 @@ refused access changes nothing and carries an SDO abort code.
 """
 
 from collections import Counter
-import re
 from typing import NamedTuple
 
 from drive_can_bridge.core.configuration import DriveConfiguration
@@ -18,9 +17,6 @@ from drive_can_bridge.protocols.canopen_pkw.pkw import Address, WORD_MAX
 from drive_can_bridge.simulation.canopen.sdo import checked_length, Refused
 from drive_can_bridge.simulation.registers import Refusal, Registers
 
-_RAW_NAME = re.compile(
-    r'p(?P<register>[0-9]{1,5})|x(?P<index>[0-9a-fA-F]{1,4})\.(?P<subindex>[0-9a-fA-F]{1,2})',
-    re.ASCII)
 _CODES = {
     Refusal.READ_ONLY: abort_codes.WRITE_OF_READ_ONLY,
     Refusal.OUT_OF_RANGE: abort_codes.VALUE_OUT_OF_RANGE,
@@ -65,8 +61,6 @@ class RegisterTable:
             if place is not None:
                 self._cells.setdefault(Address(place[0], place[1] + step), Cell(parameter, shift))
 
-    # -- access -----------------------------------------------------------------------------------
-
     def read(self, address: Address, count: int) -> tuple[int, ...]:
         """
         Read one register or two adjacent ones.
@@ -102,7 +96,6 @@ class RegisterTable:
             self._registers.write(name, raw, wear=wear[name])
 
     def highest_subindex(self, index: int) -> int | None:
-        """Return the highest sub-index of an object; None: there is no such object."""
         return max((address.subindex for address in self._cells
                     if address.subindex is not None and address.word == index), default=None)
 
@@ -114,23 +107,17 @@ class RegisterTable:
         return self.read(Address(index, subindex), 1)[0].to_bytes(2, 'little')
 
     def write_object(self, index: int, subindex: int, data: bytes) -> None:
-        """Write a register."""
         address = Address(index, subindex)
         if address in self._cells:
             checked_length(data, 2)
         self.write(address, (int.from_bytes(data[:2], 'little'),))
 
-    def name_of(self, raw_name: str) -> str | None:
-        """Return the profile's name for ``p455`` or ``x2004.6``; None: there is none."""
-        match = _RAW_NAME.fullmatch(raw_name)
-        if match is None:
-            return None
-        cell = self._cells.get(
-            Address(int(match['register'])) if match['register'] else
-            Address(int(match['index'], 16), int(match['subindex'], 16)))
+    def name_of(self, raw: Parameter) -> str | None:
+        """Return the name of the parameter at a register or object; None: there is none."""
+        address = Address(raw.index or 0, raw.subindex) if raw.number is None else (
+            Address(raw.number))
+        cell = self._cells.get(address)
         return None if cell is None else cell.parameter.name
-
-    # -- inside -----------------------------------------------------------------------------------
 
     def _find(self, address: Address, count: int) -> list[Cell]:
         cells = []

@@ -8,7 +8,6 @@ not define. Unused bytes of a response hold junk, since the manual calls them un
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Protocol
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import RemoteProtocolError
@@ -16,7 +15,7 @@ from drive_can_bridge.core.frame import Frame, Route, STANDARD_IDENTIFIER_MAX
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.datamodel import extended, standard
 from drive_can_bridge.simulation.datamodel_table import DataModelTable, map_parameters
-from drive_can_bridge.simulation.drive import ALONE, SimulatedDrive, Surroundings
+from drive_can_bridge.simulation.drive import ALONE, Ignored, SimulatedDrive, Surroundings
 
 #: what unused bytes of a response hold
 JUNK = bytes([0xA5]) * 8
@@ -26,46 +25,32 @@ FOREIGN = bytes([0x5A]) * 8
 Request = extended.CyclicRequest | extended.Write | extended.ReadRequest
 
 
-class Wire(Protocol):
-    """The frames of one of the protocols, for one station."""
-
-    routes: list[Route]
-
-    def decode(self, frame: Frame) -> tuple[Request | None, str] | None:
-        """
-        Read a request.
-
-        :return: the request, if it is carried out; which rule the frame breaks, or ''. None: the
-            frame is no request to this station.
-        :raises RemoteProtocolError: it is one that the manual does not define.
-        """
-
-    def answer(self, request: Frame, words: Sequence[int]) -> Frame:
-        """Make the answer to a request."""
-
-    def foreign(self, answer: Frame) -> Sequence[Iterable[Frame]]:
-        """Make frames that nobody should send."""
-
-
 class ExtendedWire:
-    """29-bit identifiers."""
+    """The frames with 29-bit identifiers, for one station."""
 
     def __init__(self, configuration: DriveConfiguration) -> None:
         self._station = configuration.station
         self._bits = self._station << extended.STATION_SHIFT
         self.routes = [extended.station_route(self._station)]
 
-    def decode(self, frame: Frame) -> tuple[Request | None, str] | None:
+    def decode(self, frame: Frame) -> tuple[Request, str] | None:
+        """
+        Read a request; None: the frame is none to this station.
+
+        :return: the request, and which rule it breaks although it is carried out, or ''.
+        :raises RemoteProtocolError: it is one that the manual does not define.
+        """
         if not frame.extended or self._bits != frame.identifier & (
                 extended.STATION_MASK | extended.DIR):
             return None
         request = extended.decode(frame, strict=True)
         if len(frame.data) != extended.PAYLOAD or not isinstance(request, Request):
-            return None, 'read request without eight data bytes (ignored)'
+            raise Ignored('read request without eight data bytes')
         odd = isinstance(request, extended.ReadRequest) and any(frame.data)
         return request, 'read request with data other than 00h' if odd else ''
 
     def answer(self, request: Frame, words: Sequence[int]) -> Frame:
+        """Make the answer to a request."""
         return _with_junk(extended.encode_answer(request.identifier, words), words)
 
     def foreign(self, answer: Frame) -> Sequence[Iterable[Frame]]:
@@ -81,7 +66,7 @@ class ExtendedWire:
 
 
 class StandardWire:
-    """11-bit identifiers: reads of one to four parameters, writes of one, nothing cyclic."""
+    """Those with 11 bits: reads of one to four parameters, writes of one, nothing cyclic."""
 
     def __init__(self, configuration: DriveConfiguration) -> None:
         options, self._station = configuration.options, configuration.station
@@ -89,7 +74,7 @@ class StandardWire:
                      for base in (options.request_id_base, options.response_id_base)]
         self.routes = [Route(each, STANDARD_IDENTIFIER_MAX, False) for each in self._own]
 
-    def decode(self, frame: Frame) -> tuple[Request | None, str] | None:
+    def decode(self, frame: Frame) -> tuple[Request, str] | None:
         if frame.extended or frame.identifier != self._own[0]:
             return None
         request = standard.decode_request(frame)
@@ -116,8 +101,7 @@ def _with_junk(answer: Frame, words: Sequence[int]) -> Frame:
     return Frame(answer.identifier, answer.data[:used] + JUNK[used:], answer.extended)
 
 
-def wire_of(configuration: DriveConfiguration) -> Wire:
-    """Return the frames of the protocol that a drive speaks."""
+def wire_of(configuration: DriveConfiguration) -> ExtendedWire | StandardWire:
     is_extended = configuration.protocol == 'datamodel_extended'
     return ExtendedWire(configuration) if is_extended else StandardWire(configuration)
 
@@ -145,19 +129,16 @@ class SimulatedDataModelDrive(SimulatedDrive):
         try:
             found = self._wire.decode(frame)
         except RemoteProtocolError:
-            found = None, 'frame that the manual does not define (ignored)'
+            raise Ignored('frame that the manual does not define') from None
         if found is None:
             return False
         request, rule = found
         if rule:
             self._violation(rule)
-        if request is None:
-            return True
         self.requests += 1
         words: Sequence[int] | None = None
         if isinstance(request, extended.CyclicRequest):
-            self.table.cyclic_write(request.words)
-            words = self.table.cyclic_read()
+            words = self.table.exchange(request.words)
         elif isinstance(request, extended.Write):
             self.table.write(request.number, request.words, now)
         else:

@@ -22,9 +22,10 @@ import math
 from typing import Protocol
 
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.errors import ValueRefused
+from drive_can_bridge.core.errors import DriveCanError, ValueRefused
 from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.core.parameters import Parameter, Value, ValueKind
+from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.simulation.faults import Fault, FaultKind, Outbox, parse_fault
 from drive_can_bridge.simulation.motor_plant import MotorPlant
 from drive_can_bridge.simulation.plant import Mechanics, PlantFactory
@@ -65,8 +66,12 @@ ALONE = Surroundings()
 class Table(Protocol):
     """What can be addressed."""
 
-    def name_of(self, raw_name: str) -> str | None:
-        """Return the name of a register for a raw name of the family; None: there is none."""
+    def name_of(self, raw: Parameter) -> str | None:
+        """Return the name of the register at an address; None: there is none."""
+
+
+class Ignored(DriveCanError):
+    """A frame that a drive leaves alone; the argument says which rule it breaks."""
 
 
 class SimulatedDrive(ABC):
@@ -112,9 +117,12 @@ class SimulatedDrive(ABC):
         if now < self._deaf_until:
             return
         self._advance(now)
-        if not self.receive(frame, now) and any(
-                route.matches(frame) for route in self.routes(self.configuration)):
-            self._violation('frame that only this drive may send')
+        try:
+            if not self.receive(frame, now) and any(
+                    route.matches(frame) for route in self.routes(self.configuration)):
+                self._violation('frame that only this drive may send')
+        except Ignored as broken:
+            self._violation(f'{broken} (ignored)')
         if self.registers.settings_written >= self._cut_at:
             self._cut_at = math.inf
             self._lose_power(now, math.inf)
@@ -203,12 +211,10 @@ class SimulatedDrive(ABC):
 
     @property
     def wear(self) -> Counter[str]:
-        """EEPROM cells written so far, by parameter."""
         return self.registers.wear
 
     @property
     def eeprom_writes(self) -> int:
-        """EEPROM cells written so far."""
         return sum(self.registers.wear.values())
 
     @property
@@ -230,7 +236,11 @@ class SimulatedDrive(ABC):
 
     @abstractmethod
     def receive(self, frame: Frame, now: float) -> bool:
-        """Take a frame while there is power. False: it is none that this drive listens to."""
+        """
+        Take a frame while there is power. False: it is none that this drive listens to.
+
+        :raises Ignored: it is one, but breaks a rule.
+        """
 
     @abstractmethod
     def foreign_frames(self, answer: Frame) -> Sequence[Iterable[Frame]]:
@@ -287,7 +297,11 @@ class SimulatedDrive(ABC):
 
         :raises ValueRefused: there is no such register.
         """
-        known = name if name in self.registers.parameters else self.table.name_of(name)
+        if name in self.registers.parameters:
+            return name
+        family = FAMILIES[self.configuration.protocol]
+        raw = family.raw_parameter(self.configuration, name)
+        known = self.table.name_of(raw) if raw else None
         if known is None:
             raise ValueRefused(f"{self.name} has no parameter '{name}'")
         return known

@@ -87,7 +87,6 @@ class Fault:
     argument: Argument | None = None
 
     def __str__(self) -> str:
-        """Write the fault as it is read."""
         return self.kind.word if self.argument is None else f'{self.kind.word}={self.argument}'
 
     @property
@@ -177,12 +176,10 @@ class Outbox:
         return self._late[0][0] if self._late else math.inf
 
     def handle_timer(self, now: float) -> None:
-        """Send the late answers that are due."""
         while self.next_timer() <= now:
             self.frames += heapq.heappop(self._late)[2]
 
     def clear(self) -> None:
-        """Forget everything that is to be sent."""
         self.frames.clear()
         self._late.clear()
 

@@ -7,7 +7,7 @@ react to what is commanded. Time is an argument; all formulas are closed, so tha
 matter how often :meth:`Motor.advance` is called.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 import math
 
 #: shares of the rated torque: at rated speed, at any speed, at one rated speed per second
@@ -64,6 +64,7 @@ class Ramp:
         return integral + self.value * max(duration, 0.0)
 
 
+@dataclass
 class Travel:
     """
     A position that goes to its target with limited speed and acceleration.
@@ -71,10 +72,9 @@ class Travel:
     :ivar slope: rate of change of the speed at the end of the last step.
     """
 
-    def __init__(self) -> None:
-        self.position = 0.0
-        self.speed = 0.0
-        self.slope = 0.0
+    position: float = 0.0
+    speed: float = 0.0
+    slope: float = 0.0
 
     def go(self, duration: float, target: float, speed_max: float, acceleration: float) -> None:
         """Go towards the target for some time, as fast as possible and without overshoot."""
@@ -112,6 +112,7 @@ class Travel:
         self.speed, self.slope = ramp.value, ramp.slope
 
 
+@dataclass
 class Motor:
     """
     Speed, position, torque, current and temperature of a motor.
@@ -125,15 +126,14 @@ class Motor:
     :ivar temperature: °C.
     """
 
-    def __init__(self, rated_speed: float, revolutions: float, load: float = 0.0) -> None:
-        self.rated_speed = rated_speed
-        self.revolutions = revolutions
-        self.load = load
-        self.ramp = Ramp()
-        self.position = 0.0
-        self.torque = 0.0
-        self.current = 0.0
-        self.temperature = AMBIENT_TEMPERATURE
+    rated_speed: float
+    revolutions: float
+    load: float = 0.0
+    ramp: Ramp = field(default_factory=Ramp)
+    position: float = 0.0
+    torque: float = 0.0
+    current: float = 0.0
+    temperature: float = AMBIENT_TEMPERATURE
 
     @property
     def speed(self) -> float:
@@ -146,7 +146,6 @@ class Motor:
         return self.ramp.value / self.rated_speed
 
     def advance(self, duration: float, target: float, rates: Rates, *, energised: bool) -> None:
-        """Let time pass on the way to a speed."""
         travelled = self.ramp.advance(duration, target, rates) if duration > 0.0 else 0.0
         self.moved(duration, travelled, energised=energised)
 

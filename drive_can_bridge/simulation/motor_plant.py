@@ -12,12 +12,11 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.simulation import names, scales
 from drive_can_bridge.simulation.axes import Axes
-from drive_can_bridge.simulation.control import Operation
+from drive_can_bridge.simulation.control import Operation, State, StatusWord
 from drive_can_bridge.simulation.names import Quantity
 from drive_can_bridge.simulation.plant import Mechanics, Plant
 from drive_can_bridge.simulation.registers import neutral_raw, Registers
 from drive_can_bridge.simulation.scales import RawRange
-from drive_can_bridge.simulation.status import State, StatusWord
 
 WARNING_TEMPERATURE = 80.0
 #: what a fault code shows while there is a fault
@@ -52,8 +51,6 @@ class MotorPlant(Plant):
     def command(self, value: float) -> float:
         """Return which speed the value of the speed setpoint stands for."""
         return value
-
-    # -- registers --------------------------------------------------------------------------------
 
     def initial(self, parameter: Parameter) -> int | None:
         span = RawRange(parameter, limits=True)
@@ -109,8 +106,6 @@ class MotorPlant(Plant):
     def written(self, name: str, before: int, raw: int) -> None:
         if name == self._control_name:
             self.operation.word_written(raw, self.now or 0.0)
-
-    # -- time and events --------------------------------------------------------------------------
 
     def move(self, duration: float) -> None:
         self.axes.advance(duration, self.operation,

@@ -168,5 +168,4 @@ def crossings(parameters: Mapping[str, Parameter]) -> dict[str, list[tuple[str, 
 
 
 def words_of(parameter: Parameter) -> frozenset[str]:
-    """Return the words between the underscores of a name."""
     return frozenset(parameter.name.split('_'))

@@ -74,8 +74,6 @@ class Registers:
                 self._sources[name] = source
         self._raw.update(self._initial)
 
-    # -- from outside -----------------------------------------------------------------------------
-
     def raw(self, name: str) -> int:
         """Return a register, as of the last time that the plant moved."""
         source = self._sources.get(name)
@@ -140,10 +138,7 @@ class Registers:
         self._held.clear()
         self._written.clear()
 
-    # -- by hand ----------------------------------------------------------------------------------
-
     def value(self, name: str) -> Value:
-        """Return a register as a physical value."""
         return self.parameters[name].value_from_raw(self.raw(name))
 
     def set_value(self, name: str, value: Value) -> None:
@@ -160,7 +155,6 @@ class Registers:
             self._store(name, raw, not self.is_volatile(parameter))
 
     def release(self, name: str) -> None:
-        """Compute a register again that was held."""
         self._held.pop(name, None)
 
     def end_faults(self) -> None:
@@ -168,8 +162,6 @@ class Registers:
         self.stuck.clear()
         self.refused.clear()
         self.needs.clear()
-
-    # -- for plants -------------------------------------------------------------------------------
 
     def commanded(self, name: str) -> float:
         """Return what counts for the motor: the value of a register or of its stand-in."""

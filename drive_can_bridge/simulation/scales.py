@@ -83,7 +83,6 @@ def per_revolution(parameter: Parameter) -> float:
 
 
 def temperature_value(parameter: Parameter, celsius: float) -> float:
-    """Express a temperature."""
     if parameter.unit == 'K':
         return celsius + 273.15
     return celsius * 1.8 + 32.0 if parameter.unit in ('°F', 'degF', 'F') else celsius
@@ -112,9 +111,7 @@ class RawRange:
             self.low = min(low, self.high)
 
     def clamp(self, raw: int) -> int:
-        """Return the allowed raw integer nearest to another one."""
         return min(max(raw, self.low), self.high)
 
     def nearest(self, value: float) -> int:
-        """Return the allowed raw integer nearest to a physical value."""
         return self.clamp(math.floor((value - self._offset) / self._scale + 0.5))

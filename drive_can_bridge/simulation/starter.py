@@ -88,7 +88,6 @@ class Starter:
 
     @property
     def ratio(self) -> float:
-        """Current as a share of the full load current."""
         return self.current / self.full_load_current
 
     @property
@@ -117,12 +116,10 @@ class Starter:
         return self.time_constant * math.log(max(self.thermal / RESET_LEVEL, 1.0))
 
     def settings(self, full_load_percent: float, trip_class: float) -> None:
-        """Take the settings of the overload protection."""
         self.full_load_current = max(full_load_percent, 1.0) / 100.0 * CONTROLLER_CURRENT
         self.time_constant = CLASS_FACTOR * max(trip_class, 1.0)
 
     def switch(self, on: bool) -> None:
-        """Close or open the contactor."""
         if not on:
             self._on_for = None
         elif self._on_for is None:

@@ -10,11 +10,13 @@ be trusted.
 from collections.abc import Callable
 from dataclasses import replace
 import math
+import struct
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.protocols.canopen_pkw.object_map import register_of
+from drive_can_bridge.simulation.control import State, StatusWord
 from drive_can_bridge.simulation.motor_plant import MAINS_RATE, MAINS_SWING
 from drive_can_bridge.simulation.plant import Mechanics, Plant
 from drive_can_bridge.simulation.registers import Registers
@@ -22,7 +24,6 @@ from drive_can_bridge.simulation.scales import RawRange
 from drive_can_bridge.simulation.starter import (
     Starter, StarterOperation, TEST_TRIP, THERMAL_OVERLOAD,
 )
-from drive_can_bridge.simulation.status import State, StatusWord
 
 GENERAL_CONFIGURATION = 601
 TRIP_CLASS = 606
@@ -42,11 +43,10 @@ SETTINGS = range(540, 700)
 #: what settings are in a new controller, by register: in configuration mode, as from the factory
 DEFAULTS = {GENERAL_CONFIGURATION: CONFIGURATION_MODE, TRIP_CLASS: 5, FULL_LOAD_RATIO: 33, 653: 33,
             682: 0, 695: 0, CONTROL_REGISTER_1: 0, CONTROL_REGISTER_2: 0}
-#: what it says of itself: port and controller firmware, serial number, ranges in 0.1 A; and its
+#: what it says of itself: port and controller firmware, serial number, ranges in 0.1 A; its
 #: commercial reference, two characters a register
 IDENTITY = {62: 10205, 76: 25003, 70: 2612, 71: 301, 72: 1, 74: int.from_bytes(b'SH', 'big'),
-            81: 270, 96: 270, **{64 + place: int.from_bytes(two, 'big') for place, two in enumerate(
-                (b'LT', b'MR', b'27', b'CF', b'M ', b'  '))}}
+            81: 270, 96: 270, **dict(enumerate(struct.unpack('>6H', b'LTMR27CFM   '), 64))}
 #: rank in the serial number: the node-ID, so that two controllers differ
 SERIAL_RANK = 73
 #: settings that take only multiples of something, by register
@@ -83,8 +83,6 @@ class StarterPlant(Plant):
                              for p in reversed(list(registers.parameters.values()))}
         self._figures = self._all_figures()
 
-    # -- what the registers accept ----------------------------------------------------------------
-
     def initial(self, parameter: Parameter) -> int | None:
         register = register_number(parameter) or 0
         return {**DEFAULTS, **IDENTITY, SERIAL_RANK: self._node}.get(register)
@@ -101,7 +99,6 @@ class StarterPlant(Plant):
         return bool(configuring) and not self.operation.enabled
 
     def written(self, name: str, before: int, raw: int) -> None:
-        """Obey the control registers and take over settings."""
         if name == self._by_register[CONTROL_REGISTER_1]:
             self.operation.word_written(raw, self.now or 0.0)
         elif name == self._by_register.get(CONTROL_REGISTER_2):
@@ -120,21 +117,17 @@ class StarterPlant(Plant):
         name = self._by_register.get(register)
         return DEFAULTS[register] if name is None else self.registers.plain(name)
 
-    # -- time and events --------------------------------------------------------------------------
-
     @property
     def trip_code(self) -> int:
         """Code of the trip; 0 without one."""
         return self._cause if self.operation.faulted else 0
 
     def move(self, duration: float) -> None:
-        """Let currents and temperature follow."""
         self.starter.switch(self.operation.enabled)
         if self.starter.advance(duration):
             self._trip(THERMAL_OVERLOAD, self.starter.time_to_reset)
 
     def trip(self, duration: float = 0.0) -> None:
-        """Trip as the test function of the controller does."""
         self._trip(TEST_TRIP, duration)
 
     def _trip(self, cause: int, duration: float) -> None:
@@ -150,8 +143,6 @@ class StarterPlant(Plant):
     def power_on(self) -> None:
         """Take over the settings that there are."""
         self.starter.settings(self._content(FULL_LOAD_RATIO), self._content(TRIP_CLASS))
-
-    # -- what the registers show ------------------------------------------------------------------
 
     def source(self, parameter: Parameter) -> Callable[[], int] | None:
         register = register_number(parameter)
@@ -202,7 +193,6 @@ class StarterPlant(Plant):
         return found
 
     def _status(self) -> int:
-        """Return system status register 1."""
         operation, ratio = self.operation, self.starter.ratio
         bits = (
             not operation.faulted,

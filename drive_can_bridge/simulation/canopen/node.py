@@ -28,17 +28,20 @@ class CanopenNode:
     :param heartbeat: ms between heartbeats after power came on; 0: none.
     :param constants: returns the content of the device's read-only objects, by address.
     :param objects: all other ones.
+    :param send: takes frames.
     :ivar state: boot-up: without power, or still starting.
     """
 
     def __init__(self, number: int, *, heartbeat: int,
-                 constants: Callable[[], dict[tuple[int, int], bytes]], objects: Objects) -> None:
+                 constants: Callable[[], dict[tuple[int, int], bytes]], objects: Objects,
+                 send: Callable[[Frame], None]) -> None:
         self.number = number
         self.state = NmtState.BOOT_UP
         self.request_identifier = REQUEST_BASE + number
         self._default_heartbeat = self._heartbeat = heartbeat
         self._constants = constants
         self._objects = objects
+        self._send = send
         self._server = SdoServer(self)
         self._error = _NO_ERROR
         #: when the boot-up frame is due; -infinity: as soon as somebody looks
@@ -81,46 +84,38 @@ class CanopenNode:
                 self.state = _STATES[NmtCommand(command)]
         return None
 
-    def serve(self, data: bytes, now: float) -> list[Frame]:
-        """Answer an SDO request."""
+    def serve(self, data: bytes, now: float) -> Frame | None:
+        """Return the answer to an SDO request; None: there is none."""
         self._now = now
         response = self._server.answer(data)
-        return [] if response is None else [Frame(RESPONSE_BASE + self.number, response, False)]
+        return None if response is None else Frame(RESPONSE_BASE + self.number, response, False)
 
-    def tell(self, error: Emergency) -> list[Frame]:
-        """Return the emergency message, unless that is what was told last."""
-        if not self.communicates or error.code == self._error.code:
-            return []
-        self._error = error
-        return [network.encode_emergency(self.number, error)]
-
-    # -- time -------------------------------------------------------------------------------------
+    def tell(self, error: Emergency) -> None:
+        """Send an emergency message, unless that is what was told last."""
+        if self.communicates and error.code != self._error.code:
+            self._error = error
+            self._send(network.encode_emergency(self.number, error))
 
     def next_timer(self) -> float:
-        """Return when :meth:`handle_timer` has something to do."""
         return min(self._boots_at, self._beats_at)
 
-    def handle_timer(self, now: float) -> list[Frame]:
-        """Return the boot-up frame or the heartbeat that is due."""
+    def handle_timer(self, now: float) -> None:
+        """Send the boot-up frame or the heartbeat that is due."""
         if self._boots_at <= now:
             self._boots_at = math.inf
             self.state = NmtState.PRE_OPERATIONAL
             self._plan_heartbeat(now)
-            return [network.encode_heartbeat(self.number, NmtState.BOOT_UP)]
-        if self._beats_at <= now:
+            self._send(network.encode_heartbeat(self.number, NmtState.BOOT_UP))
+        elif self._beats_at <= now:
             # late ones are left out, the beat is kept
             period = self._heartbeat / 1000.0
             self._beats_at += period * (math.floor((now - self._beats_at) / period) + 1)
-            return [network.encode_heartbeat(self.number, self.state)]
-        return []
+            self._send(network.encode_heartbeat(self.number, self.state))
 
     def _plan_heartbeat(self, now: float) -> None:
         self._beats_at = now + self._heartbeat / 1000.0 if self._heartbeat else math.inf
 
-    # -- the object dictionary --------------------------------------------------------------------
-
     def read_object(self, index: int, subindex: int) -> bytes:
-        """Return the content of an object. See :class:`.Objects`."""
         fixed = self._fixed(index)
         if (index, subindex) in fixed:
             return fixed[index, subindex]
@@ -129,7 +124,6 @@ class CanopenNode:
         return self._objects.read_object(index, subindex)
 
     def write_object(self, index: int, subindex: int, data: bytes) -> None:
-        """Write an object. See :class:`.Objects`."""
         fixed = self._fixed(index)
         if (index, subindex) == HEARTBEAT_TIME:
             self._heartbeat = int.from_bytes(checked_length(data, 2), 'little')

@@ -55,7 +55,6 @@ class SdoServer:
         self._toggle = 0
 
     def reset(self) -> None:
-        """Forget a transfer under way."""
         self._rest = b''
 
     def answer(self, request: bytes) -> bytes | None:
