@@ -20,7 +20,7 @@ from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.simulation import names, scales
 from drive_can_bridge.simulation.control import Operation
 from drive_can_bridge.simulation.motor import Motor, Ramp, Rates, Travel
-from drive_can_bridge.simulation.names import Quantity, RampUse
+from drive_can_bridge.simulation.names import Quantity, RampParameter, RampUse
 from drive_can_bridge.simulation.plant import Mechanics
 from drive_can_bridge.simulation.registers import Registers
 
@@ -59,6 +59,10 @@ class Axes:
         pairs = names.pairs(parameters, without=control_name)
         self.setpoints = {pair.setpoint.name for pair in pairs}
         self.ramps = {ramp.parameter.name: ramp for ramp in names.ramp_parameters(parameters)}
+        self._rising, self._falling, self._quick_stop = (
+            next((ramp for ramp in reversed(self.ramps.values()) if ramp.use in uses), None)
+            for uses in ((RampUse.BOTH, RampUse.RISING), (RampUse.BOTH, RampUse.FALLING),
+                         (RampUse.QUICK_STOP,)))
         # a setpoint whose actual value the profile lacks still moves the motor
         mover, quantity = names.mover(pairs, configuration.cyclic_request, control_name)
         by_speed = quantity is Quantity.SPEED
@@ -100,12 +104,15 @@ class Axes:
         if duration > 0.0 and noise:
             self.jitter = self._noise.randint(-noise, noise)
         motor, rated = self.motor, self.motor.rated_speed
-        rates, quick_stop = self._rates()
         driven = energised and not operation.stopping
+        falling = self._rate(self._falling, rated / RAMP_TIME)
+        rates = Rates(self._rate(self._rising, rated / RAMP_TIME), falling)
         held = not energised and self._mechanics.brake
         # where to, and how fast, as shares of the rated speed, while nothing is commanded
         drift = 0.0 if energised or held else -SINKING_SPEED * load
-        stop = quick_stop / rated if energised else 1.0 / COAST_TIME
+        stop = 1.0 / COAST_TIME
+        if energised:
+            stop = self._rate(self._quick_stop, max(rated / QUICK_STOP_TIME, falling)) / rated
         for name, (setpoint, ramp) in self._ramps.items():
             rate = scales.rated_speed(setpoint) / RAMP_TIME
             target = self._registers.commanded(name) if driven else 0.0
@@ -153,20 +160,11 @@ class Axes:
             return self.motor.rated_speed / seconds
         return seconds * 1000.0 if parameter.unit == 'ms' else seconds
 
-    def _rates(self) -> tuple[Rates, float]:
-        """Return what the ramp parameters say: the usual rates, that of a quick stop."""
-        rated = self.motor.rated_speed
-        given: dict[RampUse, float] = {}
-        for name, ramp in self.ramps.items():
-            value = self._registers.commanded(name)
-            if ramp.is_time:
-                seconds = value / 1000.0 if ramp.parameter.unit == 'ms' else value
-                rate = rated / max(seconds, RAMP_TIME_MIN)
-            else:
-                rate = min(max(value, rated / 1000.0), rated / RAMP_TIME_MIN)
-            both = RampUse.RISING, RampUse.FALLING
-            given.update(dict.fromkeys(both if ramp.use is RampUse.BOTH else (ramp.use,), rate))
-        rising, falling = (given.get(use, rated / RAMP_TIME)
-                           for use in (RampUse.RISING, RampUse.FALLING))
-        quick_stop = given.get(RampUse.QUICK_STOP, max(rated / QUICK_STOP_TIME, falling))
-        return Rates(rising, falling), quick_stop
+    def _rate(self, ramp: RampParameter | None, default: float) -> float:
+        """Return what a ramp parameter says, per s."""
+        if ramp is None:
+            return default
+        rated, value = self.motor.rated_speed, self._registers.commanded(ramp.parameter.name)
+        if not ramp.is_time:
+            return min(max(value, rated / 1000.0), rated / RAMP_TIME_MIN)
+        return rated / max(value / 1000.0 if ramp.parameter.unit == 'ms' else value, RAMP_TIME_MIN)

@@ -51,6 +51,7 @@ class SimulatedCannordInverter(SimulatedDrive):
             raise ConfigurationError([f'{self.name}: an inverter needs an InverterPlant'])
         self._options = options = configuration.options
         self.table = CannordTable(configuration.profile.parameters, self.registers)
+        self._timeout_parameter = self.table.numbered(TELEGRAM_TIMEOUT)
         # parameters of known meaning, as they leave the factory, if the profile lists them
         for number, raw in ((TELEGRAM_TIMEOUT, 0), (CAN_ADDRESS, configuration.station)):
             parameter = self.table.numbered(number)
@@ -187,7 +188,7 @@ class SimulatedCannordInverter(SimulatedDrive):
     @property
     def _timeout(self) -> float:
         """Seconds between telegrams that are allowed."""
-        parameter = self.table.numbered(TELEGRAM_TIMEOUT)
+        parameter = self._timeout_parameter
         value = 0.0 if parameter is None else float(self.registers.value(parameter.name))
         return value if value > 0.0 else math.inf
 

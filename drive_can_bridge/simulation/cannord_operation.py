@@ -35,6 +35,8 @@ _STATUS = {
 #: OFF2 and OFF3 in the control word, and how far on they stand in the status word
 _OFF = states.NO_DISABLE_VOLTAGE | states.NO_QUICK_STOP
 _OFF_SHIFT = 3
+#: the parameter set, in both
+_SET = states.PARAMETER_SETS - 1 << states.PARAMETER_SET_SHIFT
 
 
 class InverterOperation(Operation):
@@ -107,7 +109,7 @@ class InverterOperation(Operation):
     @property
     def status(self) -> int:
         """Bits 0 to 6 of the status word, and the parameter set."""
-        bits = _STATUS[self.state] | self.parameter_set - 1 << states.PARAMETER_SET_SHIFT
+        bits = _STATUS[self.state] | self.word & _SET
         if self.state in (State.SWITCH_ON_DISABLED, State.FAULT):
             bits |= (self.word & _OFF) << _OFF_SHIFT
         return bits

@@ -21,6 +21,9 @@ from drive_can_bridge.simulation.plant import Mechanics
 from drive_can_bridge.simulation.registers import initial_value, Registers
 from drive_can_bridge.simulation.scales import RawRange
 
+WARNING, SETPOINT_REACHED, BUS_CONTROL, ROTATING_RIGHT, ROTATING_LEFT = (
+    1 << STATUS_BITS[name] for name in (
+        'warning', 'setpoint_reached', 'bus_control', 'rotating_right', 'rotating_left'))
 #: what an SK 5xxE says of itself, by parameter number: version of the data base
 IDENTITY = {742: 1}
 
@@ -73,14 +76,13 @@ class InverterPlant(MotorPlant):
     def status_word(self) -> int:
         motor, state = self.axes.motor, self.state
         target = self.axes.target if state.enabled and not state.stopping else 0.0
-        bits = {
-            'warning': motor.temperature > WARNING_TEMPERATURE,
-            'setpoint_reached': motor.speed == target,
-            'bus_control': True,
-            # at standstill the manuals' examples show "right"
-            'rotating_left' if motor.speed < 0.0 else 'rotating_right': True,
-        }
-        return state.status | sum(wanted << STATUS_BITS[name] for name, wanted in bits.items())
+        word = state.status | BUS_CONTROL
+        if motor.temperature > WARNING_TEMPERATURE:
+            word |= WARNING
+        if motor.speed == target:
+            word |= SETPOINT_REACHED
+        # at standstill the manuals' examples show "right"
+        return word | (ROTATING_LEFT if motor.speed < 0.0 else ROTATING_RIGHT)
 
     def initial(self, parameter: Parameter) -> int | None:
         """Return what a new inverter has in a register: the same in all parameter sets."""

@@ -103,9 +103,6 @@ class SimulatedDrive(ABC):
         self._outbox = Outbox(self._foreign_frames)
         self._powered = True
         self._deaf_until = -math.inf
-        self._marked = {FaultKind.STUCK: self.registers.stuck,
-                        FaultKind.REFUSE: self.registers.refused}
-        self._marks: dict[tuple[FaultKind, str], Fault] = {}
         self._foreign_turn = -1
         self._cut_at = math.inf
         self._set_by_fault: set[str] = set()
@@ -185,14 +182,11 @@ class SimulatedDrive(ABC):
         kind = fault.kind
         if kind in Outbox.FAULTS:
             self._outbox.add(fault)
-        elif kind in self._marked:
-            name = self._known(str(fault.argument))
-            self._marked[kind].add(name)
-            self._marks[kind, name] = fault
+        elif kind in (FaultKind.STUCK, FaultKind.REFUSE):
+            self.registers.faults[kind, self._known(str(fault.argument)), ''] = fault
         elif kind is FaultKind.NEEDS:
             name, other = map(self._known, fault.pair)
-            self.registers.needs.add((name, other))
-            self._marks[kind, name] = fault
+            self.registers.faults[kind, name, other] = fault
         elif kind is FaultKind.SET:
             name = self._known(fault.pair[0])
             self.set_value(name, _value(self.registers.parameters[name], fault.pair[1]), now)
@@ -220,7 +214,8 @@ class SimulatedDrive(ABC):
     @property
     def faults_text(self) -> str:
         """The faults in force, in words; 'ok' without any."""
-        texts = [str(fault) for fault in (*self._outbox.faults.values(), *self._marks.values())]
+        texts = [str(fault) for fault in (
+            *self._outbox.faults.values(), *self.registers.faults.values())]
         if self.plant.operation.faulted:
             texts.append('tripped')
         if self._deaf_until == math.inf:
@@ -322,8 +317,7 @@ class SimulatedDrive(ABC):
 
     def _repair(self, now: float) -> None:
         self._outbox.faults.clear()
-        self._marks.clear()
-        self.registers.end_faults()
+        self.registers.faults.clear()
         self._cut_at = math.inf
         for name in self._set_by_fault:
             self.registers.release(name)
