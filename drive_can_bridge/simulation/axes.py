@@ -20,7 +20,7 @@ from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.simulation import names, scales
 from drive_can_bridge.simulation.control import Operation
 from drive_can_bridge.simulation.motor import Motor, Ramp, Rates, Travel
-from drive_can_bridge.simulation.names import Quantity, RampUse
+from drive_can_bridge.simulation.names import Quantity, RampParameter, RampUse
 from drive_can_bridge.simulation.plant import Mechanics
 from drive_can_bridge.simulation.registers import Registers
 
@@ -42,6 +42,7 @@ class Axes:
     :param command: what becomes of the value of the speed setpoint.
     :ivar speed_setpoint: what moves the shaft, or None: a position does, or nothing.
     :ivar setpoints: names of all parameters that are setpoints.
+    :ivar actuals: what gives the actual values that follow a setpoint, by their names.
     :ivar jitter: raw steps by which measured positions are off at the moment.
     """
 
@@ -56,82 +57,84 @@ class Axes:
         control = configuration.profile.control
         control_name = control.parameter if control else None
         pairs = names.pairs(parameters, without=control_name)
-        candidates = [pair.setpoint for pair in pairs]
-        candidates += names.setpoints(parameters, without=control_name)
-        self.setpoints = {parameter.name for parameter in candidates}
+        self.setpoints = {pair.setpoint.name for pair in pairs}
         self.ramps = {ramp.parameter.name: ramp for ramp in names.ramp_parameters(parameters)}
+        self._rising, self._falling, self._quick_stop = (
+            next((ramp for ramp in reversed(self.ramps.values()) if ramp.use in uses), None)
+            for uses in ((RampUse.BOTH, RampUse.RISING), (RampUse.BOTH, RampUse.FALLING),
+                         (RampUse.QUICK_STOP,)))
         # a setpoint whose actual value the profile lacks still moves the motor
-        mover, quantity = names.mover(candidates, configuration.cyclic_request, control_name)
+        mover, quantity = names.mover(pairs, configuration.cyclic_request, control_name)
         by_speed = quantity is Quantity.SPEED
         self.speed_setpoint = speed = mover if by_speed else None
         other_kind = Quantity.POSITION if by_speed else Quantity.SPEED
         self._mover = mover.name if mover else ''
         self._travels: dict[str, tuple[Parameter, Travel]] = {}     # by setpoint
         self._ramps: dict[str, tuple[Parameter, Ramp]] = {}
-        #: by the name of the actual value
         self.actuals: dict[str, Callable[[], float]] = {}
-        if quantity is Quantity.POSITION and mover is not None:
-            self._travels[mover.name] = mover, Travel()
-        for setpoint, actual in pairs:
-            kind = names.quantity_of(setpoint)
-            if setpoint is speed:
-                self.actuals[actual.name] = lambda: self.motor.speed
-            elif kind is Quantity.POSITION and kind is not other_kind:
-                _, travel = self._travels.setdefault(setpoint.name, (setpoint, Travel()))
-                self.actuals[actual.name] = partial(getattr, travel, 'position')
-            elif kind is not other_kind:
-                _, ramp = self._ramps.setdefault(setpoint.name, (setpoint, Ramp()))
-                self.actuals[actual.name] = partial(getattr, ramp, 'value')
         rated, turns = 1.0, 1.0
         if speed is not None:
             rated = scales.rated_speed(speed)
             turns = scales.revolutions_per_unit(speed, rated)
         elif mover is not None:
+            self._travels[mover.name] = mover, Travel()
             rated, turns = scales.travel_speed(mover), 1.0 / scales.per_revolution(mover)
         self.motor = Motor(rated, turns, mechanics.load)
+        for setpoint, actual in pairs:
+            kind = names.quantity_of(setpoint)
+            if actual is None or kind is other_kind and setpoint is not speed:
+                continue
+            follower: tuple[object, str] = self.motor, 'speed'
+            if setpoint is not speed and kind is Quantity.POSITION:
+                travel = self._travels.setdefault(setpoint.name, (setpoint, Travel()))[1]
+                follower = travel, 'position'
+            elif setpoint is not speed:
+                ramp = self._ramps.setdefault(setpoint.name, (setpoint, Ramp()))[1]
+                follower = ramp, 'value'
+            self.actuals[actual.name] = partial(getattr, *follower)
 
     @property
     def target(self) -> float:
-        """Commanded speed."""
         if self.speed_setpoint is None:
             return 0.0
         return self._command(self._registers.commanded(self.speed_setpoint.name))
 
     def advance(self, duration: float, operation: Operation, *, energised: bool) -> None:
-        """Let time pass."""
-        if duration > 0.0 and self._mechanics.noise:
-            self.jitter = self._noise.randint(-self._mechanics.noise, self._mechanics.noise)
+        load, noise = self._mechanics.load, self._mechanics.noise
+        if duration > 0.0 and noise:
+            self.jitter = self._noise.randint(-noise, noise)
         motor, rated = self.motor, self.motor.rated_speed
-        rates, quick_stop = self._rates()
         driven = energised and not operation.stopping
-        sinking = -SINKING_SPEED * self._mechanics.load
+        falling = self._rate(self._falling, rated / RAMP_TIME)
+        rates = Rates(self._rate(self._rising, rated / RAMP_TIME), falling)
+        held = not energised and self._mechanics.brake
+        # where to, and how fast, as shares of the rated speed, while nothing is commanded
+        drift = 0.0 if energised or held else -SINKING_SPEED * load
+        stop = 1.0 / COAST_TIME
+        if energised:
+            stop = self._rate(self._quick_stop, max(rated / QUICK_STOP_TIME, falling)) / rated
         for name, (setpoint, ramp) in self._ramps.items():
             rate = scales.rated_speed(setpoint) / RAMP_TIME
             target = self._registers.commanded(name) if driven else 0.0
             ramp.advance(duration, target, Rates(rate, rate))
         for name, (setpoint, travel) in self._travels.items():
             before, limit = travel.position, scales.travel_speed(setpoint)
+            if held:
+                travel.speed = 0.0
             if driven:
                 travel.go(duration, self._registers.commanded(name), limit,
                           limit * rates.rising / rated)
-            elif energised:
-                travel.run(duration, 0.0, limit * quick_stop.falling / rated)
-            elif self._mechanics.brake:
-                travel.speed = travel.slope = 0.0
             else:
-                travel.run(duration, sinking * limit, limit / COAST_TIME)
+                travel.run(duration, drift * limit, stop * limit)
             if name == self._mover:
                 motor.ramp.value, motor.ramp.slope = travel.speed, travel.slope
                 motor.moved(duration, travel.position - before, energised=energised)
         if self._mover not in self._travels:
-            target = self.target if driven else 0.0
-            if energised:
-                rates = rates if driven else quick_stop
-            else:
-                target, rates = sinking * rated, Rates(rated / COAST_TIME, rated / COAST_TIME)
-                if self._mechanics.brake:
-                    motor.ramp.value = target = 0.0
-            motor.advance(duration, target, rates, energised=energised)
+            if held:
+                motor.ramp.value = 0.0
+            motor.advance(duration, self.target if driven else drift * rated,
+                          rates if driven else Rates(stop * rated, stop * rated),
+                          energised=energised)
         if operation.stopping and motor.speed == 0.0:
             operation.standstill()
             motor.moved(0.0, 0.0, energised=operation.enabled)
@@ -157,24 +160,11 @@ class Axes:
             return self.motor.rated_speed / seconds
         return seconds * 1000.0 if parameter.unit == 'ms' else seconds
 
-    def _rates(self) -> tuple[Rates, Rates]:
-        """Return what the ramp parameters say: the usual rates, those of a quick stop."""
-        rated = self.motor.rated_speed
-        rising = falling = rated / RAMP_TIME
-        quick: float | None = None
-        for name, ramp in self.ramps.items():
-            value = self._registers.commanded(name)
-            if ramp.is_time:
-                seconds = value / 1000.0 if ramp.parameter.unit == 'ms' else value
-                rate = rated / max(seconds, RAMP_TIME_MIN)
-            else:
-                rate = min(max(value, rated / 1000.0), rated / RAMP_TIME_MIN)
-            if ramp.use is RampUse.QUICK_STOP:
-                quick = rate
-            if ramp.use in (RampUse.BOTH, RampUse.RISING):
-                rising = rate
-            if ramp.use in (RampUse.BOTH, RampUse.FALLING):
-                falling = rate
-        if quick is None:
-            quick = max(rated / QUICK_STOP_TIME, falling)
-        return Rates(rising, falling), Rates(quick, quick)
+    def _rate(self, ramp: RampParameter | None, default: float) -> float:
+        """Return what a ramp parameter says, per s."""
+        if ramp is None:
+            return default
+        rated, value = self.motor.rated_speed, self._registers.commanded(ramp.parameter.name)
+        if not ramp.is_time:
+            return min(max(value, rated / 1000.0), rated / RAMP_TIME_MIN)
+        return rated / max(value / 1000.0 if ramp.parameter.unit == 'ms' else value, RAMP_TIME_MIN)

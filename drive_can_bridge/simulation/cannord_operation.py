@@ -32,10 +32,11 @@ _STATUS = {
     State.QUICK_STOP: 0x17,
     State.FAULT: 0x08,
 }
-_VOLTAGE_ENABLED = 0x10
-_NO_QUICK_STOP = 0x20
-#: what counts before the first control word
-_AT_POWER_ON = states.NO_DISABLE_VOLTAGE | states.NO_QUICK_STOP
+#: OFF2 and OFF3 in the control word, and how far on they stand in the status word
+_OFF = states.NO_DISABLE_VOLTAGE | states.NO_QUICK_STOP
+_OFF_SHIFT = 3
+#: the parameter set, in both
+_SET = states.PARAMETER_SETS - 1 << states.PARAMETER_SET_SHIFT
 
 
 class InverterOperation(Operation):
@@ -50,34 +51,26 @@ class InverterOperation(Operation):
         super().__init__(None)
 
     def power_on(self) -> None:
-        """Begin anew: switch-on disabled, parameter set 1."""
-        self.word = _AT_POWER_ON
+        self.word = _OFF
         self._cause_ends = -math.inf
         self._enter(State.SWITCH_ON_DISABLED)
 
     def word_written(self, word: int, now: float) -> None:
-        """Obey a control word."""
         if not word & states.DATA_VALID:
             return
         rising = word & ~self.word & states.FAULT_RESET
         self.word = word
         if self.state is State.FAULT:
-            if rising and now >= self._cause_ends:
+            if rising and self.reset_allowed(now):
                 self._enter(State.SWITCH_ON_DISABLED)
         else:
             self._enter(self._after(word))
 
     def trip(self, now: float, duration: float = 0.0) -> None:
-        """Fail. The cause lasts for some seconds, or until :meth:`end_cause`."""
         self._cause_ends = now + duration
         self._enter(State.FAULT)
 
-    def end_cause(self, now: float) -> None:
-        """Let a reset help from now on."""
-        self._cause_ends = min(self._cause_ends, now)
-
     def repair(self) -> None:
-        """Clear a fault by hand, at the inverter."""
         if self.state is State.FAULT:
             self._enter(State.SWITCH_ON_DISABLED)
 
@@ -87,8 +80,6 @@ class InverterOperation(Operation):
             self._enter(State.SWITCH_ON_DISABLED)
         elif self.shutting_down:
             self._enter(State.READY_TO_SWITCH_ON)
-
-    # -- what it means for the motor --------------------------------------------------------------
 
     @property
     def shutting_down(self) -> bool:
@@ -109,26 +100,19 @@ class InverterOperation(Operation):
     @property
     def reversed(self) -> bool:
         """The setpoint changes its sign; rotation right has priority."""
-        direction = self.word & (states.ROTATE_RIGHT | states.ROTATE_LEFT)
-        return direction == states.ROTATE_LEFT
+        return bool(self.word & states.ROTATE_LEFT) and not self.word & states.ROTATE_RIGHT
 
     @property
     def parameter_set(self) -> int:
-        """The active parameter set, 1 to 4."""
         return states.parameter_set_of(self.word)
 
     @property
     def status(self) -> int:
-        """Bits 0 to 6 of the status word."""
-        bits = _STATUS[self.state]
+        """Bits 0 to 6 of the status word, and the parameter set."""
+        bits = _STATUS[self.state] | self.word & _SET
         if self.state in (State.SWITCH_ON_DISABLED, State.FAULT):
-            if self.word & states.NO_DISABLE_VOLTAGE:
-                bits |= _VOLTAGE_ENABLED
-            if self.word & states.NO_QUICK_STOP:
-                bits |= _NO_QUICK_STOP
+            bits |= (self.word & _OFF) << _OFF_SHIFT
         return bits
-
-    # -- inside -----------------------------------------------------------------------------------
 
     def _after(self, word: int) -> State:
         """Return the state that a control word leads to; the first rule that applies wins."""

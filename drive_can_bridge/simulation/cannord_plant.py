@@ -11,21 +11,19 @@ from collections.abc import Callable
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.protocols.cannord.states import STATUS_BITS
 from drive_can_bridge.simulation import names
-from drive_can_bridge.simulation.cannord_groups import groups_of
 from drive_can_bridge.simulation.cannord_operation import InverterOperation
+from drive_can_bridge.simulation.cannord_table import groups_of
 from drive_can_bridge.simulation.motor_plant import FAULT_CODE, MotorPlant, WARNING_TEMPERATURE
 from drive_can_bridge.simulation.names import Quantity
 from drive_can_bridge.simulation.plant import Mechanics
 from drive_can_bridge.simulation.registers import initial_value, Registers
 from drive_can_bridge.simulation.scales import RawRange
 
-WARNING = 0x0080
-SETPOINT_REACHED = 0x0100
-BUS_CONTROL = 0x0200
-ROTATING_RIGHT = 0x0800
-ROTATING_LEFT = 0x1000
-PARAMETER_SET_SHIFT = 14
+WARNING, SETPOINT_REACHED, BUS_CONTROL, ROTATING_RIGHT, ROTATING_LEFT = (
+    1 << STATUS_BITS[name] for name in (
+        'warning', 'setpoint_reached', 'bus_control', 'rotating_right', 'rotating_left'))
 #: what an SK 5xxE says of itself, by parameter number: version of the data base
 IDENTITY = {742: 1}
 
@@ -68,19 +66,17 @@ class InverterPlant(MotorPlant):
             return float(self._mover.value_from_raw(raw))
         return value
 
-    def advance(self, now: float) -> None:
-        """Let the motor move up to now."""
-        super().advance(now)
+    def move(self, duration: float) -> None:
+        super().move(duration)
         if self.state.shutting_down and self.axes.motor.speed == 0.0:
             self.state.standstill()
-            super().advance(now)
+            super().move(0.0)
 
     @property
     def status_word(self) -> int:
-        """The status word."""
         motor, state = self.axes.motor, self.state
         target = self.axes.target if state.enabled and not state.stopping else 0.0
-        word = state.status | BUS_CONTROL | state.parameter_set - 1 << PARAMETER_SET_SHIFT
+        word = state.status | BUS_CONTROL
         if motor.temperature > WARNING_TEMPERATURE:
             word |= WARNING
         if motor.speed == target:
@@ -88,29 +84,21 @@ class InverterPlant(MotorPlant):
         # at standstill the manuals' examples show "right"
         return word | (ROTATING_LEFT if motor.speed < 0.0 else ROTATING_RIGHT)
 
-    # -- registers --------------------------------------------------------------------------------
-
     def initial(self, parameter: Parameter) -> int | None:
         """Return what a new inverter has in a register: the same in all parameter sets."""
         first = self._of_sets.get(parameter.name)
         if first is None:
-            identity = IDENTITY.get(parameter.number or 0)
-            return super().initial(parameter) if identity is None else identity
+            return IDENTITY.get(parameter.number or 0) or super().initial(parameter)
         initial = super().initial(first)
         return initial_value(first, RawRange(first, limits=True)) if initial is None else initial
 
     def source(self, parameter: Parameter) -> Callable[[], int] | None:
-        """Return what computes a read-only register; None: it is plain memory."""
         if parameter.number is not None or names.measured(parameter) is not Quantity.SPEED:
             return super().source(parameter)
-        low, high = parameter.type.raw_range
-        share, motor = self._share, self.axes.motor
-        if share is None:
-            return lambda: 0
-        return lambda: min(max(share.nearest(motor.speed), low), high)
+        span, share, motor = RawRange(parameter, limits=False), self._share, self.axes.motor
+        return lambda: 0 if share is None else span.clamp(share.nearest(motor.speed))
 
     def measure(self, parameter: Parameter, quantity: Quantity) -> Callable[[], float]:
-        """Return what a quantity of the motor amounts to in the parameter's unit."""
         if quantity is Quantity.FAULT_CODE:
             return lambda: self.fault_code if self.operation.faulted else 0.0
         return super().measure(parameter, quantity)

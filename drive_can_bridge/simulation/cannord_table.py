@@ -2,18 +2,28 @@
 """
 The parameters of a simulated NORD inverter, by number and sub-index: sets, arrays, EEPROM.
 
+What kind of parameter a number is follows from the entries of the profile that have it:
+
+============================================ ======================================================
+entries                                      kind
+============================================ ======================================================
+one without ``subindex``                     simple
+all with ``subindex``                        array; element = sub-index
+one without, others with ``subindex``        one value per parameter set; the one without is set 1,
+                                             sub-index 1 to 3 are the sets 2 to 4
+============================================ ======================================================
+
 A sub-index counts in array tasks and in plain ones: the rule in the manuals wants array tasks,
 examples in the manuals use plain ones. The motor obeys the values of the *active* parameter set.
 """
 
 from collections.abc import Mapping
-import re
+from dataclasses import dataclass, field
 
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.cannord.parameter_frame import (
-    ParameterFrame, Response, Task, WRITE_TASKS,
+    NUMBER_MAX, ParameterFrame, Response, Task, WRITE_TASKS,
 )
-from drive_can_bridge.simulation.cannord_groups import groups_of
 from drive_can_bridge.simulation.registers import Refusal, Registers
 
 INVALID_NUMBER = 0
@@ -25,11 +35,41 @@ INVALID_TYPE = 5
 INVALID_TASK = 201
 CANNOT_BE_REPRESENTED = 202
 
-_RAW_NAME = re.compile(r'p([0-9]{1,4})(?:\.([0-9]{1,3}))?', re.ASCII)
-_WRITES = {task: how for how, task in WRITE_TASKS.items()}
+_WRITES = {int(task): how for how, task in WRITE_TASKS.items()}
+_RESPONSES = {(False, 16): Response.WORD, (False, 32): Response.DOUBLE,
+              (True, 16): Response.ARRAY_WORD, (True, 32): Response.ARRAY_DOUBLE}
 _ARRAY_READS = (Task.READ_ARRAY, Task.READ_ELEMENTS)
 _NEGATIVE = 0xFFFF
 _LIMITS = (Refusal.OUT_OF_RANGE, Refusal.CROSSED)
+
+
+@dataclass
+class Group:
+    """All entries with one number, by sub-index; one without a sub-index counts as 0."""
+
+    members: dict[int, Parameter] = field(default_factory=dict)
+    plain: bool = False
+
+    @property
+    def array(self) -> bool:
+        """Array tasks are possible."""
+        return not self.plain or len(self.members) > 1
+
+    @property
+    def sets(self) -> bool:
+        """Each parameter set has a value of its own."""
+        return self.plain and len(self.members) > 1
+
+
+def groups_of(parameters: Mapping[str, Parameter]) -> dict[int, Group]:
+    groups: dict[int, Group] = {}
+    for parameter in parameters.values():
+        if parameter.number is None or parameter.number > NUMBER_MAX:
+            continue
+        group = groups.setdefault(parameter.number, Group())
+        group.members[parameter.subindex or 0] = parameter
+        group.plain = group.plain or parameter.subindex is None
+    return groups
 
 
 class Refused(Exception):
@@ -44,8 +84,6 @@ class CannordTable:
         self._groups = groups_of(parameters)
         self._active = 1
 
-    # -- the parameter channel --------------------------------------------------------------------
-
     def answer(self, task: ParameterFrame) -> tuple[Response, int]:
         """
         Carry out a task.
@@ -53,11 +91,10 @@ class CannordTable:
         :return: response identifier, and the value, negative where it is.
         :raises Refused: with the error number of the manual.
         """
-        try:
-            what = Task(task.identifier)
-        except ValueError:
-            raise Refused(INVALID_TASK) from None
-        if what is Task.NONE:
+        what = task.identifier
+        if what not in list(Task):
+            raise Refused(INVALID_TASK)
+        if what == Task.NONE:
             return Response.NONE, 0
         group = self._groups.get(task.number)
         if group is None:
@@ -65,7 +102,7 @@ class CannordTable:
         array, double, eeprom = _WRITES.get(what, (what in _ARRAY_READS, False, False))
         if array and not group.array:
             raise Refused(NOT_AN_ARRAY)
-        if what is Task.READ_ELEMENTS:
+        if what == Task.READ_ELEMENTS:
             return Response.ELEMENTS, max(group.members) + 1
         # The manuals contradict each other on a sub-index in plain tasks: where there is something
         # to choose, it counts here, as in their examples; a simple parameter has no use for it.
@@ -76,11 +113,7 @@ class CannordTable:
             self._write(parameter, task.value, double=double, eeprom=eeprom)
         elif not parameter.readable:
             raise Refused(CANNOT_BE_REPRESENTED)
-        wide = parameter.type.bits == 32
-        if array:
-            response = Response.ARRAY_DOUBLE if wide else Response.ARRAY_WORD
-        else:
-            response = Response.DOUBLE if wide else Response.WORD
+        response = _RESPONSES[array, parameter.type.bits]
         return response, self._registers.raw(parameter.name)
 
     def select_set(self, parameter_set: int) -> None:
@@ -93,45 +126,25 @@ class CannordTable:
             if group.sets and active is not None:
                 self._registers.stand_ins[group.members[0].name] = active.name
 
-    # -- by hand ----------------------------------------------------------------------------------
-
-    def name_of(self, name: str) -> str | None:
-        """Return the profile's name of ``p102`` and ``p102.1``, or None."""
-        match = _RAW_NAME.fullmatch(name)
-        if match is None:
-            return None
-        group = self._groups.get(int(match[1]))
-        parameter = group and group.members.get(int(match[2] or 0))
+    def name_of(self, raw: Parameter) -> str | None:
+        """Return the name of the parameter with a number and sub-index; None: there is none."""
+        parameter = self.numbered(raw.number or 0, raw.subindex or 0)
         return parameter.name if parameter else None
 
-    def numbered(self, number: int) -> Parameter | None:
-        """Return the parameter of a number, the first element of an array."""
+    def numbered(self, number: int, subindex: int = 0) -> Parameter | None:
+        """Return the parameter with a number and sub-index; None: there is none."""
         group = self._groups.get(number)
-        return group.members.get(0) if group else None
-
-    # -- inside -----------------------------------------------------------------------------------
+        return group.members.get(subindex) if group else None
 
     def _write(self, parameter: Parameter, value: int, *, double: bool, eeprom: bool) -> None:
         if (parameter.type.bits == 32) is not double:
             raise Refused(INVALID_TYPE)
-        raw = value if double else _word(value)
-        # a negative number also comes without its sign in the upper half
-        raw = parameter.raw_from_word(raw) if raw >= 0 else raw
+        high, low = value >> 16, value & 0xFFFF
+        if not double and high not in (0, _NEGATIVE):
+            raise Refused(LIMIT_EXCEEDED)
+        # a negative word says so in the upper half, or comes without anything there
+        raw = low - 0x10000 if high and not double else parameter.raw_from_word(value)
         refusal = self._registers.refusal({parameter.name: raw})
         if refusal is not None:
             raise Refused(LIMIT_EXCEEDED if refusal in _LIMITS else CANNOT_BE_CHANGED)
         self._registers.write(parameter.name, raw, keep=eeprom, wear=int(eeprom))
-
-
-def _word(value: int) -> int:
-    """
-    Return the number in a word task: negative where the upper half says so.
-
-    :raises Refused: the upper half holds anything else.
-    """
-    high, low = value >> 16, value & 0xFFFF
-    if high == _NEGATIVE:
-        return low - 0x10000
-    if high:
-        raise Refused(LIMIT_EXCEEDED)
-    return low

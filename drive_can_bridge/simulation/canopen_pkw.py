@@ -8,6 +8,7 @@ manual page leaves open is done as docs/protocol_canopen_pkw.md says, which the 
 the drive can change: one file describes both ends.
 """
 
+from collections.abc import Iterable, Sequence
 import math
 
 from drive_can_bridge.core.configuration import DriveConfiguration
@@ -19,9 +20,9 @@ from drive_can_bridge.protocols.canopen.network import Emergency, NmtCommand, Nm
 from drive_can_bridge.protocols.canopen_pkw import pkw, refusals
 from drive_can_bridge.protocols.canopen_pkw.identifiers import Identifiers
 from drive_can_bridge.simulation.canopen.node import CanopenNode
-from drive_can_bridge.simulation.canopen.sdo import checked_length, Refused
+from drive_can_bridge.simulation.canopen.sdo import Refused
 from drive_can_bridge.simulation.canopen_pkw_registers import RegisterTable
-from drive_can_bridge.simulation.drive import ALONE, SimulatedDrive, Surroundings
+from drive_can_bridge.simulation.drive import ALONE, Ignored, SimulatedDrive, Surroundings
 from drive_can_bridge.simulation.faults import Fault
 from drive_can_bridge.simulation.motor_plant import MotorPlant
 from drive_can_bridge.simulation.plant import PlantFactory
@@ -60,16 +61,18 @@ class SimulatedPkwDrive(SimulatedDrive):
         self._identifiers = Identifiers.of(configuration)
         watched: float = options.heartbeat_timeout
         self.node = CanopenNode(
-            configuration.station, name=DEVICE_NAME, objects=_DeviceObjects(self),
+            configuration.station, constants=self._objects, objects=self.table,
+            send=lambda frame: self._outbox.frames.append(frame),
             heartbeat=round(1000.0 * watched / HEARTBEATS_WATCHED) if watched else HEARTBEAT)
+        self._telegrams = {network.NMT_IDENTIFIER: self._obey,
+                           self._identifiers.request: self._take_request,
+                           self.node.request_identifier: self._serve}
         self.request = self.response = bytes(pkw.PAYLOAD)
         self._function_byte = 0
         self._looks_at = math.inf
-        self._foreign_turn = 0
 
     @classmethod
     def routes(cls, configuration: DriveConfiguration) -> list[Route]:
-        """Return all identifiers of the node, and that of NMT commands."""
         identifiers = Identifiers.of(configuration)
         return [*CanopenNode.routes(configuration.station),
                 *(Route(identifier, STANDARD_IDENTIFIER_MAX, False)
@@ -82,13 +85,11 @@ class SimulatedPkwDrive(SimulatedDrive):
     # -- time -------------------------------------------------------------------------------------
 
     def next_timer(self) -> float:
-        """Return when :meth:`handle_timer` wants to be called; infinity: never."""
         return min(super().next_timer(), self.node.next_timer(), self._looks_at)
 
     def handle_timer(self, now: float) -> None:
-        """Do what is due: held back answers, boot-up frame, heartbeat, a look at the motor."""
         super().handle_timer(now)
-        self._outbox += self.node.handle_timer(now)
+        self.node.handle_timer(now)
         self._look(now)
 
     def _look(self, now: float) -> None:
@@ -100,55 +101,53 @@ class SimulatedPkwDrive(SimulatedDrive):
             code = self.plant.trip_code if isinstance(self.plant, StarterPlant) else TEST_TRIP
             error = Emergency(TRIP_EMERGENCY, TRIP_ERROR_REGISTER,
                               code.to_bytes(2, 'little') + bytes(3))
-        self._outbox += self.node.tell(error)
+        self.node.tell(error)
 
     # -- frames -----------------------------------------------------------------------------------
 
-    def receive(self, frame: Frame, now: float) -> None:
-        """Take a frame while there is power."""
-        if frame.extended:
-            return
+    def receive(self, frame: Frame, now: float) -> bool:
+        identifier, data, extended = frame
+        if extended:
+            return False
         if self.node.state is NmtState.BOOT_UP:
             # whoever is ready to receive has sent its boot-up frame
-            self._outbox += self.node.handle_timer(now)
-        identifier, data, _ = frame
-        if identifier == network.NMT_IDENTIFIER:
-            self._obey(data, now)
-        elif identifier == self._identifiers.request:
-            self._take_request(data, now)
-        elif identifier == self.node.request_identifier:
-            if self.node.communicates:
-                self.requests += 1
-                for answer in self.node.serve(data, now):
-                    self._answer(answer, now)
-        elif any(route.matches(frame) for route in self.routes(self.configuration)):
-            self._violation('frame that only this drive may send')
-        self._look(now)
+            self.node.handle_timer(now)
+        found = self._telegrams.get(identifier)
+        try:
+            if found is not None:
+                found(data, now)
+        finally:
+            self._look(now)
+        return found is not None
 
     def _obey(self, data: bytes, now: float) -> None:
         try:
             reset = self.node.obey(data)
         except RemoteProtocolError:
-            self._violation('NMT command without two data bytes (ignored)')
-            return
+            raise Ignored('NMT command without two data bytes') from None
         if reset is NmtCommand.RESET_NODE:
             self._lose_power(now, now + RESET_TIME)
         elif reset is NmtCommand.RESET_COMMUNICATION:
             self._deaf_until = now + RESET_TIME
             self._reset_communication(self._deaf_until)
 
+    def _serve(self, data: bytes, now: float) -> None:
+        if self.node.communicates:
+            self.requests += 1
+            answer = self.node.serve(data, now)
+            if answer is not None:
+                self._answer(answer, now)
+
     def _take_request(self, data: bytes, now: float) -> None:
         if self.node.state is not NmtState.OPERATIONAL:
-            self._violation('request while the node is not operational (ignored)')
-            return
+            raise Ignored('request while the node is not operational')
         try:
             request = pkw.decode(data, self._layout)
         except RemoteProtocolError:
-            self._violation('request without eight data bytes (ignored)')
-            return
+            raise Ignored('request without eight data bytes') from None
         if request.function_byte == self._function_byte:
             if data != self.request:
-                self._violation('request with the function byte of the one before (ignored)')
+                raise Ignored('request with the function byte of the one before')
             return
         self.request, self._function_byte = data, request.function_byte
         self.requests += 1
@@ -156,7 +155,6 @@ class SimulatedPkwDrive(SimulatedDrive):
         self._answer(Frame(self._identifiers.response, self.response, False), now)
 
     def _response(self, request: pkw.Message) -> pkw.Message:
-        """Carry out a request."""
         meaning = request.meaning
         if request.code == pkw.Function.NONE:
             return pkw.response(request)
@@ -175,20 +173,15 @@ class SimulatedPkwDrive(SimulatedDrive):
     # -- by hand ----------------------------------------------------------------------------------
 
     def set_value(self, name: str, value: Value, now: float | None = None) -> None:
-        """Set a register, read-only ones included; an actual value is held there."""
         super().set_value(name, value, now)
         if now is not None:
             self._look(now)
 
     def fault(self, fault: str | Fault, now: float) -> None:
-        """Play a fault. See the base class."""
         super().fault(fault, now)
         self._look(now)
 
-    # -- faults -----------------------------------------------------------------------------------
-
     def power_lost(self, back_at: float, *, forget: bool) -> None:
-        """Begin with boot-up again."""
         self._reset_communication(back_at)
 
     def _reset_communication(self, ready_at: float) -> None:
@@ -197,76 +190,36 @@ class SimulatedPkwDrive(SimulatedDrive):
         self.request = self.response = bytes(pkw.PAYLOAD)
         self._function_byte = 0
 
-    def foreign_frames(self, answer: Frame) -> list[Frame]:
+    def foreign_frames(self, answer: Frame) -> Sequence[Iterable[Frame]]:
         """
-        Return one of: the answer of an absent node, the 29-bit twin, two unasked answers.
+        Return the answer of an absent node, the 29-bit twin, two unasked answers.
 
         The unasked ones have another toggle bit, or another register, than the request, and junk
         for data.
         """
-        self._foreign_turn += 1
-        turn = self._foreign_turn % 4
-        if turn == 1:
-            return self._nobodys([
-                answer._replace(identifier=network.RESPONSE_BASE + node)
-                for node in range(1, network.NODE_MAX + 1) if node != self.node.number])
-        if turn == 2:
-            return [answer._replace(extended=True)]
-        if answer.identifier != self._identifiers.response:
-            return []
-        message = pkw.decode(answer.data, self._layout)._replace(words=JUNK)
-        if turn == 3:
-            message = message._replace(toggle=not message.toggle)
-        else:
-            message = message._replace(word=message.word ^ 1)
-        return [answer._replace(data=pkw.encode(message, self._layout))]
+        unasked: list[list[Frame]] = [[], []]
+        if answer.identifier == self._identifiers.response:
+            message = pkw.decode(answer.data, self._layout)._replace(words=JUNK)
+            unasked = [[answer._replace(data=pkw.encode(changed, self._layout))] for changed in (
+                message._replace(toggle=not message.toggle),
+                message._replace(word=message.word ^ 1))]
+        return (
+            (answer._replace(identifier=network.RESPONSE_BASE + node)
+             for node in range(1, network.NODE_MAX + 1) if node != self.node.number),
+            (answer._replace(extended=True),), *unasked)
 
-
-class _DeviceObjects:
-    """The registers, the mailbox and PDO4 of a controller, as SDOs see them."""
-
-    def __init__(self, drive: SimulatedPkwDrive) -> None:
-        self._drive = drive
-
-    def read(self, index: int, subindex: int) -> bytes:
-        fixed = self._fixed()
-        if (index, subindex) in fixed:
-            return fixed[index, subindex]
-        table = self._drive.table
-        highest = table.highest_subindex(index)
-        if subindex == 0 and highest is not None:
-            return bytes((highest,))
-        word, = table.read(self._register(index, subindex), 1)
-        return word.to_bytes(2, 'little')
-
-    def write(self, index: int, subindex: int, data: bytes) -> None:
-        if (index, subindex) in self._fixed():
-            raise Refused(abort_codes.WRITE_OF_READ_ONLY)
-        table, address = self._drive.table, self._register(index, subindex)
-        if table.name_at(address) is not None:
-            checked_length(data, 2)
-        table.write(address, (int.from_bytes(data[:2], 'little'),))
-
-    def _register(self, index: int, subindex: int) -> pkw.Address:
-        if any(place == index for place, _ in self._fixed()):
-            raise Refused(abort_codes.NO_SUCH_SUBINDEX)
-        return pkw.Address(index, subindex)
-
-    def _fixed(self) -> dict[tuple[int, int], bytes]:
-        """Return every object that is no register."""
-        drive = self._drive
-        objects = {(0x3000, 0): bytes((4,))}
-        for number, half in enumerate((drive.request[:4], drive.request[4:],
-                                       drive.response[:4], drive.response[4:]), 1):
-            objects[0x3000, number] = half
-        identifiers = Identifiers.of(drive.configuration)
-        for base, identifier, first in ((0x1400, identifiers.request, 1),
-                                        (0x1800, identifiers.response, 3)):
-            # PDO4: identifier, sent on change, and the two halves of the mailbox
-            objects[base + 3, 0] = objects[base + 0x203, 0] = bytes((2,))
-            objects[base + 3, 1] = identifier.to_bytes(4, 'little')
-            objects[base + 3, 2] = b'\xFF'
-            for half_number in (1, 2):
-                mapped = 0x30000020 | first + half_number - 1 << 8
-                objects[base + 0x203, half_number] = mapped.to_bytes(4, 'little')
+    def _objects(self) -> dict[tuple[int, int], bytes]:
+        """Return the objects beside the registers: name, mailbox, PDO4."""
+        mailbox = self.request + self.response
+        objects = {(0x1008, 0): DEVICE_NAME, (0x3000, 0): bytes((4,))}
+        for number in range(1, 5):
+            objects[0x3000, number] = mailbox[4 * number - 4:4 * number]
+        for base, identifier, first in ((0x1400, self._identifiers.request, 1),
+                                        (0x1800, self._identifiers.response, 3)):
+            # identifier, sent on change; then the two halves of the mailbox
+            for place, contents in ((base + 3, (identifier.to_bytes(4, 'little'), b'\xFF')), (
+                    base + 0x203, [(0x30000020 | half << 8).to_bytes(4, 'little')
+                                   for half in (first, first + 1)])):
+                objects[place, 0] = bytes((2,))
+                objects[place, 1], objects[place, 2] = contents
         return objects

@@ -7,22 +7,16 @@ refused access changes nothing and carries an SDO abort code.
 """
 
 from collections import Counter
-import re
 from typing import NamedTuple
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter, Storage
 from drive_can_bridge.protocols.canopen import abort_codes
 from drive_can_bridge.protocols.canopen_pkw.object_map import BLOCKS, object_of, register_of
-from drive_can_bridge.protocols.canopen_pkw.pkw import (
-    Address, value_from_words, words_from_value,
-)
-from drive_can_bridge.simulation.canopen.sdo import Refused
+from drive_can_bridge.protocols.canopen_pkw.pkw import Address, WORD_MAX
+from drive_can_bridge.simulation.canopen.sdo import checked_length, Refused
 from drive_can_bridge.simulation.registers import Refusal, Registers
 
-_RAW_NAME = re.compile(
-    r'p(?P<register>[0-9]{1,5})|x(?P<index>[0-9a-fA-F]{1,4})\.(?P<subindex>[0-9a-fA-F]{1,2})',
-    re.ASCII)
 _CODES = {
     Refusal.READ_ONLY: abort_codes.WRITE_OF_READ_ONLY,
     Refusal.OUT_OF_RANGE: abort_codes.VALUE_OUT_OF_RANGE,
@@ -33,10 +27,10 @@ _CODES = {
 
 
 class Cell(NamedTuple):
-    """One register: the parameter it belongs to, and which of its words it is."""
+    """One register: the parameter it belongs to, and the lowest bit of what it holds of it."""
 
     parameter: Parameter
-    place: int
+    shift: int
 
 
 class RegisterTable:
@@ -44,7 +38,7 @@ class RegisterTable:
 
     def __init__(self, configuration: DriveConfiguration, registers: Registers) -> None:
         self._registers = registers
-        self._word_order: str = configuration.options.word_order
+        self._word_order = configuration.options.word_order
         self._cells: dict[Address, Cell] = {}
         parameters = list(registers.parameters.values())
         # what the profile says goes before what follows from the table of the vendor
@@ -58,13 +52,14 @@ class RegisterTable:
 
     def _enter(self, parameter: Parameter, register: int | None,
                place: tuple[int, int] | None) -> None:
-        for step in range(parameter.type.bits // 16):
+        shifts = range(0, parameter.type.bits, 16)
+        if (parameter.word_order or self._word_order) == 'high_first':
+            shifts = shifts[::-1]
+        for step, shift in enumerate(shifts):
             if register is not None:
-                self._cells.setdefault(Address(register + step), Cell(parameter, step))
+                self._cells.setdefault(Address(register + step), Cell(parameter, shift))
             if place is not None:
-                self._cells.setdefault(Address(place[0], place[1] + step), Cell(parameter, step))
-
-    # -- access -----------------------------------------------------------------------------------
+                self._cells.setdefault(Address(place[0], place[1] + step), Cell(parameter, shift))
 
     def read(self, address: Address, count: int) -> tuple[int, ...]:
         """
@@ -76,7 +71,7 @@ class RegisterTable:
         for cell in self._find(address, count):
             if not cell.parameter.readable:
                 raise Refused(abort_codes.READ_OF_WRITE_ONLY)
-            words.append(self._word(cell))
+            words.append(self._value(cell.parameter) >> cell.shift & WORD_MAX)
         return tuple(words)
 
     def write(self, address: Address, words: tuple[int, ...]) -> None:
@@ -90,7 +85,7 @@ class RegisterTable:
         for cell, word in zip(self._find(address, len(words)), words, strict=True):
             parameter = cell.parameter
             value = values.get(parameter.name, self._value(parameter))
-            values[parameter.name] = self._replaced(value, cell, word)
+            values[parameter.name] = value & ~(WORD_MAX << cell.shift) | word << cell.shift
             wear[parameter.name] += parameter.storage is Storage.EEPROM
         raws = {name: self._registers.parameters[name].raw_from_word(value)
                 for name, value in values.items()}
@@ -101,25 +96,28 @@ class RegisterTable:
             self._registers.write(name, raw, wear=wear[name])
 
     def highest_subindex(self, index: int) -> int | None:
-        """Return the highest sub-index of an object; None: there is no such object."""
         return max((address.subindex for address in self._cells
                     if address.subindex is not None and address.word == index), default=None)
 
-    def name_of(self, raw_name: str) -> str | None:
-        """Return the profile's name for ``p455`` or ``x2004.6``; None: there is none."""
-        match = _RAW_NAME.fullmatch(raw_name)
-        if match is None:
-            return None
-        if match['register']:
-            return self.name_at(Address(int(match['register'])))
-        return self.name_at(Address(int(match['index'], 16), int(match['subindex'], 16)))
+    def read_object(self, index: int, subindex: int) -> bytes:
+        """Read a register, or how many of them an index has."""
+        highest = self.highest_subindex(index)
+        if subindex == 0 and highest is not None:
+            return bytes((highest,))
+        return self.read(Address(index, subindex), 1)[0].to_bytes(2, 'little')
 
-    def name_at(self, address: Address) -> str | None:
-        """Return the name of the parameter that a register belongs to; None: there is none."""
+    def write_object(self, index: int, subindex: int, data: bytes) -> None:
+        address = Address(index, subindex)
+        if address in self._cells:
+            checked_length(data, 2)
+        self.write(address, (int.from_bytes(data[:2], 'little'),))
+
+    def name_of(self, raw: Parameter) -> str | None:
+        """Return the name of the parameter at a register or object; None: there is none."""
+        address = Address(raw.index or 0, raw.subindex) if raw.number is None else (
+            Address(raw.number))
         cell = self._cells.get(address)
         return None if cell is None else cell.parameter.name
-
-    # -- inside -----------------------------------------------------------------------------------
 
     def _find(self, address: Address, count: int) -> list[Cell]:
         cells = []
@@ -141,23 +139,6 @@ class RegisterTable:
 
     def _value(self, parameter: Parameter) -> int:
         return parameter.word_from_raw(self._registers.raw(parameter.name))
-
-    def _word(self, cell: Cell) -> int:
-        value = self._value(cell.parameter)
-        if cell.parameter.type.bits == 16:
-            return value
-        return words_from_value(value, self._is_high_first(cell.parameter))[cell.place]
-
-    def _replaced(self, value: int, cell: Cell, word: int) -> int:
-        """Return a value with one of its words replaced."""
-        if cell.parameter.type.bits == 16:
-            return word
-        high_first = self._is_high_first(cell.parameter)
-        first, second = words_from_value(value, high_first)
-        return value_from_words((word, second) if cell.place == 0 else (first, word), high_first)
-
-    def _is_high_first(self, parameter: Parameter) -> bool:
-        return (parameter.word_order or self._word_order) == 'high_first'
 
 
 def _object(parameter: Parameter) -> tuple[int, int] | None:

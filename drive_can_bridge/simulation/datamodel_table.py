@@ -50,34 +50,33 @@ class DataModelTable:
             if p.number is not None}
         # what is sent again and again is volatile, unless the profile says otherwise
         self._volatile = {p.name for p in configuration.cyclic_request if p.storage is None}
-        self._request_entries = self._entries(options.request_map_base)
-        self._response_entries = self._entries(options.response_map_base)
-        self._maps = {*self._request_entries, *self._response_entries}
+        self._request_map, self._response_map = (
+            [self._parameters[base + self._offset + slot].name for slot in range(SLOTS)]
+            for base in (options.request_map_base, options.response_map_base))
+        self._maps = {*self._request_map, *self._response_map}
         self.clear_maps()
         # with 11-bit identifiers there is no mapping, and as little to configure
-        if getattr(configuration.options, 'mapping', '') != 'configure':
-            self._preset(self._request_entries, configuration.cyclic_request)
-            self._preset(self._response_entries, configuration.cyclic_response)
+        if getattr(options, 'mapping', '') != 'configure':
+            for names, mapped in ((self._request_map, configuration.cyclic_request),
+                                  (self._response_map, configuration.cyclic_response)):
+                # nor is there a limit to how many are exchanged
+                numbers = padded([(p.number or 0) + self._offset for p in mapped[:SLOTS]])
+                for name, number in zip(names, numbers, strict=True):
+                    registers.set_value(name, number)
 
-    # -- access -----------------------------------------------------------------------------------
-
-    def read(self, number: int, count: int, now: float) -> tuple[int, ...] | None:
+    def read(self, number: int, count: int, now: float) -> list[int] | None:
         """Read parameters; None where the drive does not answer."""
         if self._busy(now):
             self._violation('read while an EEPROM write is under way (not answered)')
             return None
-        words = []
-        for wanted in range(number, number + count):
-            word = self._word(wanted)
-            if word is None:
-                return None
-            words.append(word)
-        return tuple(words)
+        words = [self._word(wanted) for wanted in range(number, number + count)]
+        known = [word for word in words if word is not None]
+        return known if len(known) == count else None
 
     def write(self, number: int, words: Sequence[int], now: float) -> None:
         """Write parameters. A frame with a number that does not exist is ignored as a whole."""
-        parameters = [self._parameters.get(number + place) for place in range(len(words))]
-        known = [parameter for parameter in parameters if parameter is not None]
+        known = [self._parameters[wanted] for wanted in range(number, number + len(words))
+                 if wanted in self._parameters]
         if len(known) < len(words):
             return
         # one frame is one EEPROM write, however many words it has
@@ -92,9 +91,13 @@ class DataModelTable:
         if eeprom and not lost:
             self._eeprom_busy_until = now + self._eeprom_time
 
-    def cyclic_write(self, words: Sequence[int]) -> None:
-        """Apply a cyclic request to the parameters of the request map."""
-        for number, word in zip(self._map(self._request_entries), words, strict=False):
+    def exchange(self, words: Sequence[int]) -> list[int]:
+        """
+        Apply a cyclic request to the parameters of the request map.
+
+        :return: the words of the response; a parameter that does not exist reads 0.
+        """
+        for number, word in zip(self._mapped(self._request_map), words, strict=False):
             parameter = self._parameters.get(number)
             if parameter is None:
                 continue
@@ -105,38 +108,20 @@ class DataModelTable:
             if wears:
                 self._violation(f'EEPROM parameter {parameter.name} written cyclically')
             self._store(parameter, word, wears)
-
-    def cyclic_read(self) -> list[int]:
-        """Return the words of a cyclic response; a parameter that does not exist reads 0."""
-        return [self._word(number) or 0 for number in self._map(self._response_entries)]
+        return [self._word(number) or 0 for number in self._mapped(self._response_map)]
 
     def clear_maps(self) -> None:
-        """Forget both maps."""
         for name in self._maps:
             self._registers.set_value(name, 0)
 
-    def name_of(self, raw_name: str) -> str | None:
-        """Return the name of a register for ``p<number>``; None: there is none."""
-        digits = raw_name[1:]
-        if raw_name[:1] != 'p' or not (digits.isascii() and digits.isdigit()):
-            return None
-        parameter = self._parameters.get(int(digits) + self._offset)
+    def name_of(self, raw: Parameter) -> str | None:
+        """Return the name of the register with a number; None: there is none."""
+        parameter = self._parameters.get((raw.number or 0) + self._offset)
         return None if parameter is None else parameter.name
 
-    # -- inside -----------------------------------------------------------------------------------
-
-    def _entries(self, base: int) -> list[str]:
-        return [self._parameters[base + self._offset + slot].name for slot in range(SLOTS)]
-
-    def _preset(self, entries: Sequence[str], parameters: Sequence[Parameter]) -> None:
-        # with 11-bit identifiers there may be more of them than a map holds
-        numbers = padded([(p.number or 0) + self._offset for p in parameters[:SLOTS]])
-        for name, number in zip(entries, numbers, strict=True):
-            self._registers.set_value(name, number)
-
-    def _map(self, entries: Sequence[str]) -> tuple[int, ...]:
+    def _mapped(self, names: Sequence[str]) -> tuple[int, ...]:
         """Return the wire numbers that the slots of a telegram stand for."""
-        return effective([self._registers.raw(name) for name in entries])
+        return effective([self._registers.raw(name) for name in names])
 
     def _word(self, number: int) -> int | None:
         """Return a parameter as unsigned word; None where there is nothing to read."""

@@ -16,17 +16,17 @@ A family derives a class that knows its telegrams. The values are in its
 
 from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-import heapq
 import math
 from typing import Protocol
 
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.errors import ValueRefused
+from drive_can_bridge.core.errors import DriveCanError, ValueRefused
 from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.core.parameters import Parameter, Value, ValueKind
-from drive_can_bridge.simulation.faults import AnswerFaults, Fault, FaultKind, parse_fault
+from drive_can_bridge.protocols.families import FAMILIES
+from drive_can_bridge.simulation.faults import Fault, FaultKind, Outbox, parse_fault
 from drive_can_bridge.simulation.motor_plant import MotorPlant
 from drive_can_bridge.simulation.plant import Mechanics, PlantFactory
 from drive_can_bridge.simulation.registers import Registers
@@ -66,8 +66,12 @@ ALONE = Surroundings()
 class Table(Protocol):
     """What can be addressed."""
 
-    def name_of(self, raw_name: str) -> str | None:
-        """Return the name of a register for a raw name of the family; None: there is none."""
+    def name_of(self, raw: Parameter) -> str | None:
+        """Return the name of the register at an address; None: there is none."""
+
+
+class Ignored(DriveCanError):
+    """A frame that a drive leaves alone; the argument says which rule it breaks."""
 
 
 class SimulatedDrive(ABC):
@@ -93,47 +97,45 @@ class SimulatedDrive(ABC):
         make_plant = surroundings.plant or self.choose_plant()
         self.plant = make_plant(self.registers, configuration, surroundings.mechanics)
         self.registers.connect(self.plant)
-        self.requests = 0
-        self.answers = 0
+        self.requests = self.answers = 0
         self.violations: Counter[str] = Counter()
         self._notices: list[str] = []
-        self._outbox: list[Frame] = []
-        self._late: list[tuple[float, int, list[Frame]]] = []
-        self._late_count = 0
+        self._outbox = Outbox(self._foreign_frames)
         self._powered = True
         self._deaf_until = -math.inf
-        self._marked = {FaultKind.STUCK: self.registers.stuck,
-                        FaultKind.REFUSE: self.registers.refused}
-        self._marks: dict[tuple[FaultKind, str], Fault] = {}
-        self._answer_faults = AnswerFaults(self.foreign_frames)
-        self._cut_at: int | None = None
+        self._foreign_turn = -1
+        self._cut_at = math.inf
         self._set_by_fault: set[str] = set()
 
     # -- input and output -------------------------------------------------------------------------
 
     def receive_frame(self, frame: Frame, now: float) -> None:
         """Take a frame from the bus. Any frame; what is not for this drive is ignored."""
-        if now >= self._deaf_until:
-            self._advance(now)
-            self.receive(frame, now)
-            if self._cut_at is not None and self.registers.settings_written >= self._cut_at:
-                self._cut_at = None
-                self._lose_power(now, math.inf)
+        if now < self._deaf_until:
+            return
+        self._advance(now)
+        try:
+            if not self.receive(frame, now) and any(
+                    route.matches(frame) for route in self.routes(self.configuration)):
+                self._violation('frame that only this drive may send')
+        except Ignored as broken:
+            self._violation(f'{broken} (ignored)')
+        if self.registers.settings_written >= self._cut_at:
+            self._cut_at = math.inf
+            self._lose_power(now, math.inf)
 
     def next_timer(self) -> float:
         """Return when :meth:`handle_timer` wants to be called; infinity: never."""
-        return self._late[0][0] if self._late else math.inf
+        return self._outbox.next_timer()
 
     def handle_timer(self, now: float) -> None:
         """Do what is due: answers that were held back."""
         self._advance(now)
-        while self._late and self._late[0][0] <= now:
-            self._outbox += heapq.heappop(self._late)[2]
+        self._outbox.handle_timer(now)
 
     def take_frames(self) -> list[Frame]:
         """Return the frames that the drive sends now."""
-        frames, self._outbox = self._outbox, []
-        return frames
+        return self._outbox.take()
 
     def take_notices(self) -> list[str]:
         """Return readable lines about what is worth knowing, since the last call."""
@@ -178,62 +180,70 @@ class SimulatedDrive(ABC):
             fault = parse_fault(fault)
         self._advance(now)
         kind = fault.kind
-        if kind in AnswerFaults.KINDS:
-            self._answer_faults.add(fault)
-        elif kind in self._marked:
-            name = self._known(str(fault.argument))
-            self._marked[kind].add(name)
-            self._marks[kind, name] = fault
+        if kind in Outbox.FAULTS:
+            self._outbox.add(fault)
+        elif kind in (FaultKind.STUCK, FaultKind.REFUSE):
+            self.registers.faults[kind, self._known(str(fault.argument)), ''] = fault
         elif kind is FaultKind.NEEDS:
-            first, second = map(self._known, fault.pair)
-            self.registers.needs.add((first, second))
-            self._marks[kind, first] = fault
+            name, other = map(self._known, fault.pair)
+            self.registers.faults[kind, name, other] = fault
         elif kind is FaultKind.SET:
             name = self._known(fault.pair[0])
             self.set_value(name, _value(self.registers.parameters[name], fault.pair[1]), now)
             self._set_by_fault.add(name)
         elif kind is FaultKind.CUT_AT:
-            self._cut_at = self.registers.settings_written + int(fault.number or 1)
+            self._cut_at = self.registers.settings_written + (fault.number or 1)
         elif kind in _POWER_CUTS:
             seconds = _POWER_CUTS[kind] if fault.number is None else fault.number
             self._lose_power(now, now + seconds, forget=kind is FaultKind.FORGET)
         elif kind is FaultKind.OK:
             self._repair(now)
         elif self._powered:
-            self.plant.trip(fault.number or 0.0)
+            self.trip(now, fault.number or 0.0)
         self._notices.append(f'{self.name}: fault {fault}' if kind is not FaultKind.OK
                              else f'{self.name}: no fault any more')
 
     @property
     def wear(self) -> Counter[str]:
-        """EEPROM cells written so far, by parameter."""
         return self.registers.wear
 
     @property
     def eeprom_writes(self) -> int:
-        """EEPROM cells written so far."""
         return sum(self.registers.wear.values())
 
     @property
     def faults_text(self) -> str:
-        """The faults in force, in words."""
-        texts = [str(fault) for fault in (*self._answer_faults.active, *self._marks.values())]
+        """The faults in force, in words; 'ok' without any."""
+        texts = [str(fault) for fault in (
+            *self._outbox.faults.values(), *self.registers.faults.values())]
         if self.plant.operation.faulted:
             texts.append('tripped')
         if self._deaf_until == math.inf:
             texts.append('off')
         return ', '.join(texts) or 'ok'
 
-    # -- for the families -------------------------------------------------------------------------
-
-    @abstractmethod
-    def receive(self, frame: Frame, now: float) -> None:
-        """Take a frame while there is power."""
+    # -- what a family says -----------------------------------------------------------------------
 
     @classmethod
     @abstractmethod
     def routes(cls, configuration: DriveConfiguration) -> list[Route]:
         """Return the identifiers that belong to a drive, in both directions."""
+
+    @abstractmethod
+    def receive(self, frame: Frame, now: float) -> bool:
+        """
+        Take a frame while there is power. False: it is none that this drive listens to.
+
+        :raises Ignored: it is one, but breaks a rule.
+        """
+
+    @abstractmethod
+    def foreign_frames(self, answer: Frame) -> Sequence[Iterable[Frame]]:
+        """
+        Make frames that look like this answer and are none of anybody.
+
+        :return: kinds of them, which take turns; of each the first that is no neighbour's is sent.
+        """
 
     def own_parameters(self) -> Mapping[str, Parameter]:
         """Return what every drive of the family has, listed or not, by name."""
@@ -243,37 +253,20 @@ class SimulatedDrive(ABC):
         """Return what makes the plant, where nobody brings another one."""
         return MotorPlant
 
-    @abstractmethod
-    def foreign_frames(self, answer: Frame) -> list[Frame]:
-        """Make frames that look like this answer and are none of anybody."""
-
-    def _known(self, name: str) -> str:
-        """
-        Return the name under which a register is kept.
-
-        :raises ValueRefused: there is no such register.
-        """
-        known = name if name in self.registers.parameters else self.table.name_of(name)
-        if known is None:
-            raise ValueRefused(f"{self.name} has no parameter '{name}'")
-        return known
+    def trip(self, now: float, duration: float) -> None:
+        """Fail by itself; the cause lasts for some seconds."""
+        self.plant.trip(duration)
 
     def power_lost(  # noqa: B027  optional hook
             self, back_at: float, *, forget: bool) -> None:
         """Forget what a family keeps outside the registers; power is back at some time."""
 
+    # -- what a family uses -----------------------------------------------------------------------
+
     def _answer(self, frame: Frame, now: float) -> None:
         """Send an answer, as far as scripted faults let it."""
         self.answers += 1
-        if not self._answer_faults:
-            self._outbox.append(frame)
-            return
-        delay, frames = self._answer_faults.apply(frame)
-        if delay > 0.0:
-            self._late_count += 1
-            heapq.heappush(self._late, (now + delay, self._late_count, frames))
-        else:
-            self._outbox += frames
+        self._outbox.answer(frame, now)
 
     def _violation(self, rule: str) -> None:
         """Count a broken rule; the first one of its kind is announced."""
@@ -281,21 +274,38 @@ class SimulatedDrive(ABC):
             self._notices.append(f'{self.name}: violation: {rule}')
         self.violations[rule] += 1
 
-    def _nobodys(self, frames: Sequence[Frame]) -> list[Frame]:
-        """Return the first frame that is no neighbour's, if there is one."""
-        return [frame for frame in frames if not any(
-            route.matches(frame) for route in self.surroundings.neighbours)][:1]
-
     def _lose_power(self, now: float, back_at: float, *, forget: bool = False) -> None:
         """Lose power until some time; RAM is lost with it."""
         self._outbox.clear()
-        self._late.clear()
         self.plant.power_off()
         self.registers.lose_power()
         self._powered = False
         self._deaf_until = back_at
         self.power_lost(back_at, forget=forget)
         self._advance(now)
+
+    # -- inside -----------------------------------------------------------------------------------
+
+    def _known(self, name: str) -> str:
+        """
+        Return the name under which a register is kept.
+
+        :raises ValueRefused: there is no such register.
+        """
+        if name in self.registers.parameters:
+            return name
+        family = FAMILIES[self.configuration.protocol]
+        raw = family.raw_parameter(self.configuration, name)
+        known = self.table.name_of(raw) if raw else None
+        if known is None:
+            raise ValueRefused(f"{self.name} has no parameter '{name}'")
+        return known
+
+    def _foreign_frames(self, answer: Frame) -> list[Frame]:
+        self._foreign_turn += 1
+        kinds = self.foreign_frames(answer)
+        return [frame for frame in kinds[self._foreign_turn % len(kinds)] if not any(
+            route.matches(frame) for route in self.surroundings.neighbours)][:1]
 
     def _advance(self, now: float) -> None:
         """Let the motor move up to now; power may have come back on the way."""
@@ -306,12 +316,9 @@ class SimulatedDrive(ABC):
         self.plant.advance(now)
 
     def _repair(self, now: float) -> None:
-        self._answer_faults.clear()
-        self._marks.clear()
-        for names in self._marked.values():
-            names.clear()
-        self.registers.needs.clear()
-        self._cut_at = None
+        self._outbox.faults.clear()
+        self.registers.faults.clear()
+        self._cut_at = math.inf
         for name in self._set_by_fault:
             self.registers.release(name)
         self._set_by_fault.clear()

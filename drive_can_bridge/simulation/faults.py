@@ -9,26 +9,23 @@ A fault is written ``silent`` or ``late=0.15``. Some are states, which add up an
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
+import heapq
+from itertools import count
 import math
+from typing import TypeVar
 
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.words import nearest
 
 Argument = float | int | str
+Number = TypeVar('Number', float, int)
 
 
-def _seconds(text: str) -> float:
-    value = float(text)
-    if not (math.isfinite(value) and 0.0 <= value <= 3600.0):
-        raise ValueError
-    return value
-
-
-def _integer(low: int, high: int | None) -> Callable[[str], int]:
-    def convert(text: str) -> int:
-        value = int(text)
-        if value < low or high is not None and value > high:
+def _number(kind: type[Number], low: Number, high: float) -> Callable[[str], Number]:
+    def convert(text: str) -> Number:
+        value = kind(text)
+        if not low <= value <= high:    # nor is what is no number
             raise ValueError
         return value
     return convert
@@ -41,13 +38,17 @@ def _pair(text: str) -> str:
     return f'{first.strip()}:{second.strip()}'
 
 
+_seconds = _number(float, 0.0, 3600.0)
+_count = _number(int, 1, math.inf)
+
+
 class FaultKind(Enum):
     """What can be wrong with a drive: how it is written, what it does, its argument."""
 
     SILENT = 'silent', 'obeys, but answers nothing'
     LATE = 'late=SECONDS', 'answers that much later (0 to 3600)', _seconds
-    DROP = 'drop=N', 'every Nth answer is lost (1: all)', _integer(1, None)
-    LENGTH = 'length=BYTES', 'answers have 0 to 8 data bytes', _integer(0, 8)
+    DROP = 'drop=N', 'every Nth answer is lost (1: all)', _count
+    LENGTH = 'length=BYTES', 'answers have 0 to 8 data bytes', _number(int, 0, 8)
     FOREIGN = 'foreign', 'frames nobody should send accompany the answers'
     DUPLICATE = 'duplicate', 'each answer is sent twice'
     STUCK = 'stuck=PARAMETER', 'writes to the parameter have no effect', str
@@ -62,7 +63,7 @@ class FaultKind(Enum):
                'says', _seconds)
     POWER_CUT = 'power_cut[=SECONDS]', 'the same for 5 s, or as long as it says', _seconds
     CUT_AT = ('cut_at=N', 'the Nth write of a setting from now on is obeyed; before its answer '
-              'power is cut, until ok or restart', _integer(1, None))
+              'power is cut, until ok or restart', _count)
     FORGET = 'forget[=SECONDS]', 'restart with empty maps', _seconds
     OFF = 'off', 'no power, until ok or restart'
     OK = 'ok', 'all faults end'
@@ -86,7 +87,6 @@ class Fault:
     argument: Argument | None = None
 
     def __str__(self) -> str:
-        """Write the fault as it is read."""
         return self.kind.word if self.argument is None else f'{self.kind.word}={self.argument}'
 
     @property
@@ -125,57 +125,65 @@ def parse_fault(text: str) -> Fault:
                            f'{kind.meaning}') from None
 
 
-class AnswerFaults:
+class Outbox:
     """
-    The faults of a drive's answers.
+    What a drive sends, and the scripted faults of its answers.
 
     :param foreign_frames: makes the frames that accompany an answer under ``foreign``.
+    :ivar frames: those to be sent now; what is put here directly, no fault touches.
     """
 
-    KINDS = frozenset((FaultKind.SILENT, FaultKind.LATE, FaultKind.DROP, FaultKind.LENGTH,
-                       FaultKind.FOREIGN, FaultKind.DUPLICATE))
+    FAULTS = frozenset((FaultKind.SILENT, FaultKind.LATE, FaultKind.DROP, FaultKind.LENGTH,
+                        FaultKind.FOREIGN, FaultKind.DUPLICATE))
 
     def __init__(self, foreign_frames: Callable[[Frame], list[Frame]]) -> None:
+        self.frames: list[Frame] = []
+        self.faults: dict[FaultKind, Fault] = {}
         self._foreign_frames = foreign_frames
-        self._active: dict[FaultKind, Fault] = {}
         self._answers = 0
-
-    def __bool__(self) -> bool:
-        """Tell whether anything is wrong."""
-        return bool(self._active)
-
-    @property
-    def active(self) -> list[Fault]:
-        """The faults in force."""
-        return list(self._active.values())
+        self._late: list[tuple[float, int, list[Frame]]] = []
+        self._order = count()       # keeps answers of one time in their order
 
     def add(self, fault: Fault) -> None:
         """Put a fault into force; it replaces one of the same kind."""
-        self._active[fault.kind] = fault
+        self.faults[fault.kind] = fault
         self._answers = 0
 
-    def clear(self) -> None:
-        """End all of them."""
-        self._active.clear()
-
-    def apply(self, answer: Frame) -> tuple[float, list[Frame]]:
-        """
-        Spoil an answer.
-
-        :return: seconds to wait, and the frames to be sent then.
-        """
-        active = self._active
+    def answer(self, frame: Frame, now: float) -> None:
+        """Send an answer, as far as the faults let it."""
+        faults = self.faults
+        if not faults:
+            self.frames.append(frame)
+            return
         self._answers += 1
-        drop = active.get(FaultKind.DROP)
-        if FaultKind.SILENT in active or drop and self._answers % int(drop.number or 1) == 0:
-            return 0.0, []
-        length = active.get(FaultKind.LENGTH)
-        frame = answer
+        numbers = {kind: fault.number for kind, fault in faults.items()}
+        drop, length, late = map(numbers.get, (FaultKind.DROP, FaultKind.LENGTH, FaultKind.LATE))
+        if FaultKind.SILENT in faults or drop and self._answers % drop == 0:
+            return
+        spoilt = frame
         if length is not None:
-            size = int(length.number or 0)
-            frame = frame._replace(data=(frame.data + bytes(8))[:size])
-        frames = [frame, frame] if FaultKind.DUPLICATE in active else [frame]
-        if FaultKind.FOREIGN in active:
-            frames = self._foreign_frames(answer) + frames
-        late = active.get(FaultKind.LATE)
-        return (late.number or 0.0) if late else 0.0, frames
+            spoilt = frame._replace(data=(frame.data + bytes(8))[:int(length)])
+        frames = [spoilt, spoilt] if FaultKind.DUPLICATE in faults else [spoilt]
+        if FaultKind.FOREIGN in faults:
+            frames = self._foreign_frames(frame) + frames
+        if late:
+            heapq.heappush(self._late, (now + late, next(self._order), frames))
+        else:
+            self.frames += frames
+
+    def next_timer(self) -> float:
+        """Return when the next late answer is due; infinity: never."""
+        return self._late[0][0] if self._late else math.inf
+
+    def handle_timer(self, now: float) -> None:
+        while self.next_timer() <= now:
+            self.frames += heapq.heappop(self._late)[2]
+
+    def clear(self) -> None:
+        self.frames.clear()
+        self._late.clear()
+
+    def take(self) -> list[Frame]:
+        """Return the frames to be sent now, once."""
+        frames, self.frames = self.frames, []
+        return frames

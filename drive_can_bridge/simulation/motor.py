@@ -7,7 +7,7 @@ react to what is commanded. Time is an argument; all formulas are closed, so tha
 matter how often :meth:`Motor.advance` is called.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 import math
 
 #: shares of the rated torque: at rated speed, at any speed, at one rated speed per second
@@ -49,29 +49,22 @@ class Ramp:
 
         :return: integral of the value over the duration.
         """
-        integral = 0.0
-        self.slope = 0.0
+        integral = self.slope = 0.0
         while duration > 0.0 and self.value != target:
-            if self.value * target < 0.0:
-                goal, rate = 0.0, rates.falling
-            elif abs(target) > abs(self.value):
-                goal, rate = target, rates.rising
-            else:
-                goal, rate = target, rates.falling
-            needed = abs(goal - self.value) / rate
+            before, goal = self.value, target if self.value * target >= 0.0 else 0.0
+            rate = rates.rising if abs(goal) > abs(before) else rates.falling
+            needed = abs(goal - before) / rate
             if needed <= duration:
-                integral += (self.value + goal) / 2.0 * needed
                 self.value = goal
-                duration -= needed
             else:
-                self.slope = math.copysign(rate, goal - self.value)
-                before = self.value
+                needed, self.slope = duration, math.copysign(rate, goal - before)
                 self.value += self.slope * duration
-                integral += (before + self.value) / 2.0 * duration
-                duration = 0.0
+            integral += (before + self.value) / 2.0 * needed
+            duration -= needed
         return integral + self.value * max(duration, 0.0)
 
 
+@dataclass
 class Travel:
     """
     A position that goes to its target with limited speed and acceleration.
@@ -79,10 +72,9 @@ class Travel:
     :ivar slope: rate of change of the speed at the end of the last step.
     """
 
-    def __init__(self) -> None:
-        self.position = 0.0
-        self.speed = 0.0
-        self.slope = 0.0
+    position: float = 0.0
+    speed: float = 0.0
+    slope: float = 0.0
 
     def go(self, duration: float, target: float, speed_max: float, acceleration: float) -> None:
         """Go towards the target for some time, as fast as possible and without overshoot."""
@@ -120,6 +112,7 @@ class Travel:
         self.speed, self.slope = ramp.value, ramp.slope
 
 
+@dataclass
 class Motor:
     """
     Speed, position, torque, current and temperature of a motor.
@@ -133,15 +126,14 @@ class Motor:
     :ivar temperature: °C.
     """
 
-    def __init__(self, rated_speed: float, revolutions: float, load: float = 0.0) -> None:
-        self.rated_speed = rated_speed
-        self.revolutions = revolutions
-        self.load = load
-        self.ramp = Ramp()
-        self.position = 0.0
-        self.torque = 0.0
-        self.current = 0.0
-        self.temperature = AMBIENT_TEMPERATURE
+    rated_speed: float
+    revolutions: float
+    load: float = 0.0
+    ramp: Ramp = field(default_factory=Ramp)
+    position: float = 0.0
+    torque: float = 0.0
+    current: float = 0.0
+    temperature: float = AMBIENT_TEMPERATURE
 
     @property
     def speed(self) -> float:
@@ -153,13 +145,7 @@ class Motor:
         """Speed as a share of the rated one, with sign."""
         return self.ramp.value / self.rated_speed
 
-    @property
-    def revolutions_per_second(self) -> float:
-        """Speed of the shaft."""
-        return self.ramp.value * self.revolutions
-
     def advance(self, duration: float, target: float, rates: Rates, *, energised: bool) -> None:
-        """Let time pass on the way to a speed."""
         travelled = self.ramp.advance(duration, target, rates) if duration > 0.0 else 0.0
         self.moved(duration, travelled, energised=energised)
 

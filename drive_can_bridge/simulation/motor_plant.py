@@ -5,33 +5,32 @@ A motor behind the registers of any profile, found by the names of the parameter
 What no rule knows is plain memory; docs/simulation.md has the rules as a table.
 """
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 import math
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.simulation import names, scales
 from drive_can_bridge.simulation.axes import Axes
-from drive_can_bridge.simulation.control import Operation
+from drive_can_bridge.simulation.control import Operation, State, StatusWord
 from drive_can_bridge.simulation.names import Quantity
-from drive_can_bridge.simulation.plant import Mechanics
+from drive_can_bridge.simulation.plant import Mechanics, Plant
 from drive_can_bridge.simulation.registers import neutral_raw, Registers
 from drive_can_bridge.simulation.scales import RawRange
-from drive_can_bridge.simulation.status import State, StatusWord
 
 WARNING_TEMPERATURE = 80.0
 #: what a fault code shows while there is a fault
 FAULT_CODE = 7
 
-#: share of the link voltage by which the mains swing it, and how fast (rad/s): of a drive at rest
-#: it is the one value that moves, so that whoever looks sees that it is alive
+#: share of a voltage by which the mains swing it, and how fast (rad/s): of a drive at rest it is
+#: the one value that moves, so that whoever looks sees that it is alive
 MAINS_SWING = 0.005
 MAINS_RATE = 2.0 * math.pi * 0.3
 
 
-class MotorPlant:
+class MotorPlant(Plant):
     """
-    A motor: a :class:`~.plant.Plant` for profiles of all kinds.
+    A motor, for profiles of all kinds.
 
     :param operation: the operating state; None: that of the profile's control section.
     :param movable: parameters that may move something; None: all.
@@ -40,25 +39,20 @@ class MotorPlant:
     def __init__(self, registers: Registers, configuration: DriveConfiguration,
                  mechanics: Mechanics, *, operation: Operation | None = None,
                  movable: Mapping[str, Parameter] | None = None) -> None:
-        self.registers = registers
-        self.control = configuration.profile.control
-        self.operation = operation or Operation(self.control)
-        self.now: float | None = None
+        control = configuration.profile.control
+        super().__init__(registers, configuration, operation or Operation(control))
         self._powered = True
-        self._control_name = self.control.parameter if self.control else ''
+        self._control_name = control.parameter if control else ''
         self._shown = {p.name for p in configuration.cyclic_response}
         self.axes = Axes(registers.parameters if movable is None else movable, registers,
                          configuration, mechanics, self.command)
-        self.volatile: Collection[str] = {*self.axes.setpoints, self._control_name}
+        self.volatile = {*self.axes.setpoints, self._control_name}
 
     def command(self, value: float) -> float:
         """Return which speed the value of the speed setpoint stands for."""
         return value
 
-    # -- registers --------------------------------------------------------------------------------
-
     def initial(self, parameter: Parameter) -> int | None:
-        """Return what a new drive has in a register; None: any plausible value."""
         span = RawRange(parameter, limits=True)
         if self.control is not None and parameter.name == self._control_name:
             return self.control.disable
@@ -67,35 +61,29 @@ class MotorPlant:
         return neutral_raw(parameter, span) if parameter.name in self.axes.setpoints else None
 
     def source(self, parameter: Parameter) -> Callable[[], int] | None:
-        """Return what computes a read-only register; None: it is plain memory."""
         span = RawRange(parameter, limits=False)
         actual = self.axes.actuals.get(parameter.name)
         quantity = names.measured(parameter)
         if quantity is None and parameter.name in self._shown:
-            quantity = names.quantity_by_unit(parameter)
+            quantity = names.BY_UNIT.get(parameter.unit)
         if quantity is Quantity.POSITION:
             where = actual or (
                 lambda: scales.position_value(parameter, self.axes.motor.position))
             return lambda: span.clamp(span.nearest(where()) + self.axes.jitter)
-        if actual is not None:
-            return lambda: span.nearest(actual())
         word = StatusWord(parameter, self.control)
-        if word:
+        if actual is None and word:
             plain = self.registers.plain
             return lambda: word.compose(self._state(), plain(parameter.name))
-        if quantity is None:
-            return None
-        measure = self.measure(parameter, quantity)
-        return lambda: span.nearest(measure())
+        measure = actual or (quantity and self.measure(parameter, quantity))
+        return (lambda: span.nearest(measure())) if measure else None
 
     def measure(self, parameter: Parameter, quantity: Quantity) -> Callable[[], float]:
         """Return what a quantity of the motor amounts to in the parameter's unit."""
-        motor = self.axes.motor
+        motor, setpoint = self.axes.motor, self.axes.speed_setpoint
         if quantity is Quantity.SPEED:
-            setpoint = self.axes.speed_setpoint
             if setpoint is not None and parameter.unit == setpoint.unit:
                 return lambda: motor.speed
-            return lambda: scales.speed_value(parameter, motor.revolutions_per_second,
+            return lambda: scales.speed_value(parameter, motor.speed * motor.revolutions,
                                               motor.share_of_rated_speed)
         if quantity is Quantity.TEMPERATURE:
             return lambda: scales.temperature_value(parameter, motor.temperature)
@@ -115,49 +103,28 @@ class MotorPlant:
             share = lambda: 0.7 * abs(motor.share_of_rated_speed)  # noqa: E731
         return lambda: full * share()
 
-    def allows(self, parameter: Parameter, raw: int) -> bool:
-        """Accept any value within the limits."""
-        return True
-
-    def takes(self, parameter: Parameter) -> bool:
-        """Let every write have its effect."""
-        return True
-
     def written(self, name: str, before: int, raw: int) -> None:
-        """Obey the control word."""
         if name == self._control_name:
             self.operation.word_written(raw, self.now or 0.0)
 
-    # -- time and events --------------------------------------------------------------------------
-
-    def advance(self, now: float) -> None:
-        """Let the motor move up to now."""
-        if self.now is None:
-            self.now = now
-        duration = max(now - self.now, 0.0)
-        self.now += duration
+    def move(self, duration: float) -> None:
         self.axes.advance(duration, self.operation,
                           energised=self._powered and self.operation.enabled)
 
     def trip(self, duration: float = 0.0) -> None:
-        """Fail; the cause lasts for some seconds."""
-        self.operation.trip(self.now or 0.0, duration)
+        super().trip(duration)
         self.axes.advance(0.0, self.operation, energised=False)
 
     def power_off(self) -> None:
-        """Go on without power."""
+        super().power_off()
         self._powered = False
-        self.operation.power_on()
         self.axes.power_off()
 
     def power_on(self) -> None:
-        """Begin anew; the registers have what EEPROM kept."""
         self._powered = True
         self.axes.power_on()
 
     def _state(self) -> State:
         motor, operation = self.axes.motor, self.operation
-        return State(
-            enabled=operation.enabled, stopping=operation.stopping, fault=operation.faulted,
-            warning=motor.temperature > WARNING_TEMPERATURE, speed=motor.speed,
-            setpoint_reached=operation.enabled and motor.speed == self.axes.target)
+        return State(operation, warning=motor.temperature > WARNING_TEMPERATURE, speed=motor.speed,
+                     setpoint_reached=operation.enabled and motor.speed == self.axes.target)

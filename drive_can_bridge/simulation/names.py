@@ -31,7 +31,8 @@ class Quantity(Enum):
 
 
 _MOVING = (Quantity.SPEED, Quantity.POSITION)
-_UNITS = {
+#: what a parameter that is exchanged cyclically means, if its name does not say it
+BY_UNIT = {
     **dict.fromkeys(('rpm', '1/min', 'min-1', 'rev/s', 'rad/s', 'deg/s', 'mm/s', 'm/s'),
                     Quantity.SPEED),
     **dict.fromkeys(('rev', 'rad', 'deg', '°', 'mm', 'm'), Quantity.POSITION),
@@ -46,10 +47,10 @@ _ACTUALS = ('actual_{}', '{}_actual', 'actual_value_{}', 'motor_{}', '{}_feedbac
 
 
 class Pair(NamedTuple):
-    """A setpoint and the actual value that follows it."""
+    """A setpoint, and the actual value that follows it, where the profile has one."""
 
     setpoint: Parameter
-    actual: Parameter
+    actual: Parameter | None
 
 
 class RampUse(Enum):
@@ -81,11 +82,6 @@ def quantity_of(parameter: Parameter) -> Quantity | None:
     return next((quantity for quantity in Quantity if words.intersection(quantity.value)), None)
 
 
-def quantity_by_unit(parameter: Parameter) -> Quantity | None:
-    """Tell what a parameter that is exchanged cyclically means, if its name does not."""
-    return _UNITS.get(parameter.unit)
-
-
 def measured(parameter: Parameter) -> Quantity | None:
     """Tell what a read-only parameter shows of the motor; None for settings and the rest."""
     if parameter.writable or words_of(parameter) & _SETTING_WORDS:
@@ -93,29 +89,28 @@ def measured(parameter: Parameter) -> Quantity | None:
     return quantity_of(parameter)
 
 
-def mover(candidates: Sequence[Parameter], cyclic: Sequence[Parameter], control: str | None,
+def mover(found: Sequence[Pair], cyclic: Sequence[Parameter], control: str | None,
           ) -> tuple[Parameter | None, Quantity | None]:
     """
     Choose the setpoint that moves the shaft.
 
-    :param candidates: parameters whose names are those of setpoints.
     :param cyclic: the cyclic request, in order. What is a speed or a position there counts first,
         by its name or by its unit.
     :param control: name of the control parameter.
     :return: the setpoint, and whether it is a speed or a position.
     """
     for parameter in cyclic:
-        quantity = quantity_of(parameter) or quantity_by_unit(parameter)
+        quantity = quantity_of(parameter) or BY_UNIT.get(parameter.unit)
         if (quantity in _MOVING and parameter.name != control
                 and not words_of(parameter) & _LIMIT_WORDS):
             return parameter, quantity
-    return next(((parameter, kind) for kind in _MOVING for parameter in candidates
-                 if quantity_of(parameter) is kind), (None, None))
+    return next(((pair.setpoint, kind) for kind in _MOVING for pair in found
+                 if quantity_of(pair.setpoint) is kind), (None, None))
 
 
 def pairs(parameters: Mapping[str, Parameter], *, without: str | None = None) -> list[Pair]:
     """
-    Find setpoints and the actual values that follow them.
+    Find setpoints and the actual values that follow them; first those that have one.
 
     ``speed_setpoint`` (also ``setpoint_speed``, ``target_speed``, ``speed_reference``,
     ``speed_command``, or a writable ``speed``) goes with a read-only ``actual_speed`` (also
@@ -129,20 +124,11 @@ def pairs(parameters: Mapping[str, Parameter], *, without: str | None = None) ->
             continue
         match = _SETPOINT.fullmatch(parameter.name)
         subject = parameter.name if match is None else match['after'] or match['before']
-        for pattern in _ACTUALS:
-            actual = parameters.get(pattern.format(subject))
-            if actual is not None and not actual.writable:
-                found.append(Pair(parameter, actual))
-                break
-    return found
-
-
-def setpoints(parameters: Mapping[str, Parameter], *, without: str | None = None,
-              ) -> list[Parameter]:
-    """Return the writable parameters whose names are those of setpoints."""
-    return [parameter for parameter in parameters.values()
-            if parameter.writable and parameter.name != without
-            and _SETPOINT.fullmatch(parameter.name)]
+        actuals = (parameters.get(pattern.format(subject)) for pattern in _ACTUALS)
+        actual = next((each for each in actuals if each and not each.writable), None)
+        if match or actual:
+            found.append(Pair(parameter, actual))
+    return sorted(found, key=lambda pair: pair.actual is None)
 
 
 def ramp_parameters(parameters: Mapping[str, Parameter]) -> list[RampParameter]:
@@ -182,5 +168,4 @@ def crossings(parameters: Mapping[str, Parameter]) -> dict[str, list[tuple[str, 
 
 
 def words_of(parameter: Parameter) -> frozenset[str]:
-    """Return the words between the underscores of a name."""
     return frozenset(parameter.name.split('_'))

@@ -8,9 +8,8 @@ A family chooses a plant when a drive is made; whoever makes the drive may bring
 """
 
 from collections.abc import Callable, Collection
-from dataclasses import dataclass, fields
-import math
-from typing import Protocol, TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import ValueRefused
@@ -21,40 +20,61 @@ if TYPE_CHECKING:
     from drive_can_bridge.simulation.registers import Registers
 
 
-class Plant(Protocol):
-    """A motor, or whatever a drive moves. Time is an argument and never runs backwards."""
+class Plant:
+    """
+    A motor, or whatever a drive moves: as it stands here, nothing, behind plain memory.
 
-    @property
-    def operation(self) -> Operation:
-        """The operating state."""
+    Time is an argument and never runs backwards.
 
-    @property
-    def volatile(self) -> Collection[str]:
-        """Names of further parameters that a loss of power resets."""
+    :param operation: the operating state.
+    :ivar volatile: names of further parameters that a loss of power resets.
+    :ivar now: the time up to which it has moved.
+    """
+
+    volatile: Collection[str] = ()
+
+    def __init__(self, registers: 'Registers', configuration: DriveConfiguration,
+                 operation: Operation) -> None:
+        self.registers = registers
+        self.control = configuration.profile.control
+        self.operation = operation
+        self.now: float | None = None
 
     def initial(self, parameter: Parameter) -> int | None:
         """Return what a new drive has in a register; None: any plausible value."""
+        return None
 
     def source(self, parameter: Parameter) -> Callable[[], int] | None:
         """Return what computes a read-only register; None: it is plain memory."""
+        return None
 
     def allows(self, parameter: Parameter, raw: int) -> bool:
         """Tell whether a register accepts a value within its limits; False: it is refused."""
+        return True
 
     def takes(self, parameter: Parameter) -> bool:
         """Tell whether writes have an effect now; False: acknowledged, the value stays."""
+        return True
 
     def written(self, name: str, before: int, raw: int) -> None:
         """React to a register that was written."""
 
     def advance(self, now: float) -> None:
         """Move up to now."""
+        last = now if self.now is None else self.now
+        self.now = max(now, last)
+        self.move(self.now - last)
+
+    def move(self, duration: float) -> None:
+        """Move for some seconds, up to ``self.now``."""
 
     def trip(self, duration: float = 0.0) -> None:
         """Fail; the cause lasts for some seconds."""
+        self.operation.trip(self.now or 0.0, duration)
 
     def power_off(self) -> None:
         """Go on without power: nothing is driven any more."""
+        self.operation.power_on()
 
     def power_on(self) -> None:
         """Begin anew; the registers have what EEPROM kept."""
@@ -82,21 +102,19 @@ class Mechanics:
 
         :raises ValueRefused: says what is allowed.
         """
-        ranges = {'load': (0.0, 1.0), 'noise': (0, 100), 'brake': (0, 1)}
+        highest = {'load': 1.0, 'noise': 100, 'brake': 1}
         given: dict[str, float] = {}
         for part in text.split(','):
-            key, _, value = part.partition('=')
+            key, _, value = map(str.strip, part.partition('='))
             try:
-                low, high = ranges[key.strip()]
-                number = type(low)(value)
-                if not (math.isfinite(number) and low <= number <= high):
+                given[key] = type(highest[key])(value)
+                # not a number is neither below nor above
+                if not 0 <= given[key] <= highest[key]:
                     raise ValueError
             except (KeyError, ValueError):
-                allowed = ', '.join(f'{field.name}={ranges[field.name][0]:g}…'
-                                    f'{ranges[field.name][1]:g}' for field in fields(cls))
+                allowed = ', '.join(f'{name}=0…{most:g}' for name, most in highest.items())
                 raise ValueRefused(f"'{part.strip()}' is not possible; allowed: {allowed}",
                                    ) from None
-            given[key.strip()] = number
         return cls(**given)  # type: ignore[arg-type]  # each has the type of its range
 
 

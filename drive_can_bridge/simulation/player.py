@@ -52,7 +52,7 @@ class BusPlayer:
         self._open_bus = open_bus
         self._say = say
         self._complain = complain
-        self._show_frame = show_frame
+        self._show_frame = show_frame or (lambda *_: None)
         self._lock = threading.Lock()
         self._alarm = threading.Event()
         self._wake_at = 0.0
@@ -60,7 +60,7 @@ class BusPlayer:
         self._opened = False            # ever
         self._misconfigured: BusMisconfigured | None = None
         self._complained = False
-        self._lost_answers = 0
+        self._answer_lost = False       # ever
         self._addressees: dict[tuple[int, bool], tuple[SimulatedDrive, ...]] = {}
         # no filters: whoever looks on sees all frames
         self._link = Link(bus, (), self, send_timeout=_SEND_TIMEOUT, opener=self._open)
@@ -80,7 +80,6 @@ class BusPlayer:
         self._thread.start()
 
     def stop(self) -> None:
-        """End the threads and close the bus."""
         self._closing = True
         self._alarm.set()
         if self._thread.is_alive():
@@ -93,8 +92,6 @@ class BusPlayer:
         with self._lock:
             yield steady_now()
         self._alarm.set()
-
-    # -- the drives -------------------------------------------------------------------------------
 
     def _run(self) -> None:
         try:
@@ -121,13 +118,12 @@ class BusPlayer:
         for drive in drives:
             for frame in drive.take_frames():
                 if self._link.send(frame):
-                    if self._show_frame is not None:
-                        self._show_frame(self.bus.name, frame, True)
+                    self._show_frame(self.bus.name, frame, True)
                     continue
                 # nobody acknowledges, or the queue is full: it is lost, as on a real bus
-                if self._lost_answers == 0 and self._link.is_open:
+                if not self._answer_lost and self._link.is_open:
                     self._complain(f'bus {self.bus.name}: {self._link.last_error}')
-                self._lost_answers += 1
+                self._answer_lost = True
             notices += drive.take_notices()
         return notices
 
@@ -142,8 +138,6 @@ class BusPlayer:
                 if any(route.matches(frame) for route in drive.routes(drive.configuration)))
         return found
 
-    # -- the link's reader thread -----------------------------------------------------------------
-
     def _open(self) -> EndPoint:
         try:
             return self._open_bus(self.bus)
@@ -156,8 +150,7 @@ class BusPlayer:
 
     def frame_received(self, frame: Frame, age: float) -> None:
         """Let the drives that a frame is for answer it."""
-        if self._show_frame is not None:
-            self._show_frame(self.bus.name, frame, False)
+        self._show_frame(self.bus.name, frame, False)
         with self._lock:
             drives = self._addressees_of(frame)
             now = steady_now()
@@ -171,7 +164,6 @@ class BusPlayer:
             self._say(notice)
 
     def bus_opened(self) -> None:
-        """Take note that the bus is there (again)."""
         if self._complained:
             self._complain(f'bus {self.bus.name}: open')
         self._opened, self._complained = True, False
@@ -188,6 +180,5 @@ class BusPlayer:
         """Leave it to :meth:`start`, which tells."""
 
     def link_failed(self, reason: str) -> None:
-        """Take note of a defect of the program."""
         self.failure = f'bus {self.bus.name}: {reason}'
         self._complain(self.failure)

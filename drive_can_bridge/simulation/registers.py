@@ -15,6 +15,7 @@ import zlib
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import Access, Parameter, ParameterType, Storage, Value
 from drive_can_bridge.simulation import names
+from drive_can_bridge.simulation.faults import Fault, FaultKind
 from drive_can_bridge.simulation.plant import Plant
 from drive_can_bridge.simulation.scales import RawRange
 
@@ -35,9 +36,8 @@ class Registers:
 
     :param volatile: names of parameters that a power cycle resets although the profile does not
         say where they are stored (those exchanged cyclically live in RAM).
-    :ivar stuck: names of parameters on which writes have no effect.
-    :ivar refused: names of parameters whose writes are refused.
-    :ivar needs: name of a parameter that is refused until another one was written, and the other.
+    :ivar faults: the scripted faults in force, by kind, name and, where there is one, the name of
+        another register that has to be written first.
     :ivar settings_written: writes that had an effect, of what is not exchanged cyclically.
     :ivar wear: EEPROM writes by name.
     :ivar stand_ins: name of the register that counts for the motor instead of another one.
@@ -45,9 +45,7 @@ class Registers:
 
     def __init__(self, parameters: Mapping[str, Parameter], volatile: Collection[str]) -> None:
         self.parameters = parameters
-        self.stuck: set[str] = set()
-        self.refused: set[str] = set()
-        self.needs: set[tuple[str, str]] = set()
+        self.faults: dict[tuple[FaultKind, str, str], Fault] = {}
         self.settings_written = 0
         self.wear: Counter[str] = Counter()
         self.stand_ins: dict[str, str] = {}
@@ -74,8 +72,6 @@ class Registers:
                 self._sources[name] = source
         self._raw.update(self._initial)
 
-    # -- from outside -----------------------------------------------------------------------------
-
     def raw(self, name: str) -> int:
         """Return a register, as of the last time that the plant moved."""
         source = self._sources.get(name)
@@ -98,10 +94,11 @@ class Registers:
             parameter = self.parameters[name]
             if not parameter.writable:
                 return Refusal.READ_ONLY
-            if name in self.refused:
-                return Refusal.FORBIDDEN
-            if any(one == name and other not in self._written for one, other in self.needs):
-                return Refusal.TOO_EARLY
+            for kind, one, other in self.faults:
+                if one == name and kind is FaultKind.REFUSE:
+                    return Refusal.FORBIDDEN
+                if one == name and kind is FaultKind.NEEDS and other not in self._written:
+                    return Refusal.TOO_EARLY
             if raw != self.clamped(name, raw) or not self._plant.allows(parameter, raw):
                 return Refusal.OUT_OF_RANGE
             for ends in self._crossings.get(name, ()):
@@ -119,7 +116,9 @@ class Registers:
         :param wear: EEPROM cells that it takes.
         """
         parameter = self.parameters[name]
-        if name in self.stuck or name in self.refused or not self._plant.takes(parameter):
+        blocked = self.faults and any(
+            one == name and kind is not FaultKind.NEEDS for kind, one, _ in self.faults)
+        if blocked or not self._plant.takes(parameter):
             return
         if wear:
             self.wear[name] += wear
@@ -140,10 +139,7 @@ class Registers:
         self._held.clear()
         self._written.clear()
 
-    # -- by hand ----------------------------------------------------------------------------------
-
     def value(self, name: str) -> Value:
-        """Return a register as a physical value."""
         return self.parameters[name].value_from_raw(self.raw(name))
 
     def set_value(self, name: str, value: Value) -> None:
@@ -160,10 +156,7 @@ class Registers:
             self._store(name, raw, not self.is_volatile(parameter))
 
     def release(self, name: str) -> None:
-        """Compute a register again that was held."""
         self._held.pop(name, None)
-
-    # -- for plants -------------------------------------------------------------------------------
 
     def commanded(self, name: str) -> float:
         """Return what counts for the motor: the value of a register or of its stand-in."""

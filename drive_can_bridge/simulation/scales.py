@@ -37,7 +37,7 @@ def highest(parameter: Parameter) -> float:
     """Return the largest magnitude a parameter may have: by its limits, else by its type."""
     limits = [limit for limit in (parameter.minimum, parameter.maximum) if limit is not None]
     if parameter.maximum is None:
-        limits += [raw * parameter.scale + parameter.offset for raw in parameter.type.raw_range]
+        limits += parameter.value_range
     return max(map(abs, limits)) or 1.0
 
 
@@ -69,8 +69,7 @@ def speed_value(parameter: Parameter, revolutions: float, share: float) -> float
 def position_value(parameter: Parameter, revolutions: float) -> float:
     """Express a position; it wraps where the parameter ends, as counters do."""
     value = revolutions * per_revolution(parameter)
-    low, high = sorted(raw * parameter.scale + parameter.offset
-                       for raw in parameter.type.raw_range)
+    low, high = parameter.value_range
     if parameter.minimum is not None and parameter.maximum is not None:
         low, high = parameter.minimum, parameter.maximum
     span = high - low + abs(parameter.scale)
@@ -84,7 +83,6 @@ def per_revolution(parameter: Parameter) -> float:
 
 
 def temperature_value(parameter: Parameter, celsius: float) -> float:
-    """Express a temperature."""
     if parameter.unit == 'K':
         return celsius + 273.15
     return celsius * 1.8 + 32.0 if parameter.unit in ('°F', 'degF', 'F') else celsius
@@ -108,21 +106,12 @@ class RawRange:
     def __init__(self, parameter: Parameter, *, limits: bool) -> None:
         self._scale, self._offset = parameter.scale, parameter.offset
         self.low, self.high = parameter.type.raw_range
-        if not limits or parameter.type is ParameterType.BOOL:
-            return
-        ends = [None if limit is None else (limit - parameter.offset) / parameter.scale
-                for limit in (parameter.minimum, parameter.maximum)]
-        lower, upper = ends if parameter.scale > 0.0 else ends[::-1]
-        # rounded to the inside, except where the limit is a raw step but for float noise
-        if upper is not None:
-            self.high = max(self.low, min(self.high, math.floor(upper + 1e-6)))
-        if lower is not None:
-            self.low = min(self.high, max(self.low, math.ceil(lower - 1e-6)))
+        if limits and parameter.type is not ParameterType.BOOL:
+            low, self.high = parameter.raw_limits
+            self.low = min(low, self.high)
 
     def clamp(self, raw: int) -> int:
-        """Return the allowed raw integer nearest to another one."""
         return min(max(raw, self.low), self.high)
 
     def nearest(self, value: float) -> int:
-        """Return the allowed raw integer nearest to a physical value."""
         return self.clamp(math.floor((value - self._offset) / self._scale + 0.5))

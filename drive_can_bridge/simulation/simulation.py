@@ -13,6 +13,8 @@ The end points are python-can interfaces unless ``open_bus`` says otherwise.
 
 from collections import Counter
 from collections.abc import Mapping
+from copy import copy
+from functools import partial
 import sys
 from typing import Any
 
@@ -30,8 +32,34 @@ from drive_can_bridge.transport.port import open_port
 ARRIVAL_JITTER = 0.002
 
 
+def _read(name: str) -> Any:
+    """Return a property: something of the drive, copied while nobody else touches it."""
+    def read(self: 'PlayedDrive') -> Any:
+        with self._touch():
+            return copy(getattr(self.drive, name))
+    return property(read)
+
+
 class PlayedDrive:
-    """A simulated drive on a running bus, for use from any thread."""
+    """
+    A simulated drive on a running bus, for use from any thread.
+
+    What it does is what :class:`.SimulatedDrive` does, now.
+
+    :ivar requests: requests understood.
+    :ivar answers: answers given, before faults took theirs.
+    :ivar violations: how often the other side broke a rule of the protocol, by rule.
+    :ivar wear: EEPROM cells written, by parameter.
+    :ivar eeprom_writes: EEPROM cells written.
+    :ivar faults_text: the faults in force, in words; 'ok' without any.
+    """
+
+    requests: int = _read('requests')
+    answers: int = _read('answers')
+    violations: Counter[str] = _read('violations')
+    wear: Counter[str] = _read('wear')
+    eeprom_writes: int = _read('eeprom_writes')
+    faults_text: str = _read('faults_text')
 
     def __init__(self, drive: SimulatedDrive, player: BusPlayer) -> None:
         self.drive = drive
@@ -39,57 +67,20 @@ class PlayedDrive:
         self._touch = player.touch
 
     def fault(self, fault: str | Fault) -> None:
-        """Play a fault, ``late=0.15``; ``ok`` ends all. See :meth:`.SimulatedDrive.fault`."""
         with self._touch() as now:
             self.drive.fault(fault, now)
 
     def value(self, name: str) -> Value:
-        """Return a register as a physical value. See :meth:`.SimulatedDrive.value`."""
         with self._touch() as now:
             return self.drive.value(name, now)
 
     def set_value(self, name: str, value: Value) -> None:
-        """Set a register, read-only ones included. See :meth:`.SimulatedDrive.set_value`."""
         with self._touch() as now:
             self.drive.set_value(name, value, now)
 
     def release(self, name: str) -> None:
-        """Let an actual value that was set follow the motor again."""
         with self._touch():
             self.drive.release(name)
-
-    @property
-    def faults_text(self) -> str:
-        """The faults in force, in words; 'ok' without any."""
-        with self._touch():
-            return self.drive.faults_text
-
-    @property
-    def violations(self) -> Counter[str]:
-        """How often the other side broke a rule of the protocol, by rule."""
-        with self._touch():
-            return Counter(self.drive.violations)
-
-    @property
-    def requests(self) -> int:
-        """Requests understood."""
-        return self.drive.requests
-
-    @property
-    def answers(self) -> int:
-        """Answers given, before faults took theirs."""
-        return self.drive.answers
-
-    @property
-    def eeprom_writes(self) -> int:
-        """EEPROM cells written."""
-        return self.drive.eeprom_writes
-
-    @property
-    def wear(self) -> Counter[str]:
-        """EEPROM cells written, by parameter."""
-        with self._touch():
-            return Counter(self.drive.wear)
 
 
 class Simulation:
@@ -120,7 +111,8 @@ class Simulation:
             bus.name: BusPlayer(
                 bus, [drive for drive in drives.values() if drive.configuration.bus == bus.name],
                 open_bus=open_bus or open_port, say=say or (lambda line: None),
-                complain=complain or _to_standard_error, show_frame=show_frame)
+                complain=complain or partial(print, file=sys.stderr, flush=True),
+                show_frame=show_frame)
             for bus in configuration.buses.values()}
         self.drives = {
             name: PlayedDrive(drive, self._players[drive.configuration.bus])
@@ -140,7 +132,6 @@ class Simulation:
             raise
 
     def stop(self) -> None:
-        """End the threads and close the buses."""
         for player in self._players.values():
             player.stop()
 
@@ -150,14 +141,8 @@ class Simulation:
         return '; '.join(player.failure for player in self._players.values() if player.failure)
 
     def __enter__(self) -> 'Simulation':
-        """Start."""
         self.start()
         return self
 
     def __exit__(self, *_: Any) -> None:
-        """Stop."""
         self.stop()
-
-
-def _to_standard_error(line: str) -> None:
-    print(line, file=sys.stderr, flush=True)

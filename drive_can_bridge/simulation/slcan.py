@@ -27,9 +27,11 @@ from drive_can_bridge.core.frame import (
 
 DONE = b'\r'
 REFUSED = b'\a'
-VERSION = b'V1013\r'
-SERIAL_NUMBER = b'NSIM1\r'
-NO_FLAGS = b'F00\r'
+#: commands of which nobody here needs to know more: version, serial number, and filters, polling
+#: and serial speed by their first letters
+ANSWERS = {'V': b'V1013\r', 'N': b'NSIM1\r', 'F': b'F00\r', **dict.fromkeys('MmWXU', DONE)}
+BIT_RATES = {'S0': 10_000, 'S1': 20_000, 'S2': 50_000, 'S3': 100_000, 'S4': 125_000,
+             'S5': 250_000, 'S6': 500_000, 'S7': 750_000, 'S8': 1_000_000, 'S9': 83_300}
 # Z1 stamps wrap once a minute
 _STAMP_WRAP = 60_000
 # the longest command is a 29-bit frame with eight bytes: 26 characters
@@ -43,7 +45,6 @@ class SlcanAdapter:
     :param bitrate: of its bus, bit/s: with another one set by ``S…`` no frame passes; None: any.
     :ivar is_open: the channel is open.
     :ivar opened: how often a client opened the channel.
-    :ivar refused: commands refused.
     """
 
     def __init__(self, bitrate: int | None = None) -> None:
@@ -51,7 +52,6 @@ class SlcanAdapter:
         self._set = bitrate
         self.is_open = False
         self.opened = 0
-        self.refused = 0
         self._listen_only = False
         self._stamps = False
         self._command = bytearray()
@@ -65,15 +65,10 @@ class SlcanAdapter:
 
     def receive_bytes(self, data: bytes) -> list[Frame]:
         """Take what the client wrote; return the frames it sends. Any bytes will do."""
-        frames = []
-        for command in self._commands(data):
-            frame = self._obey(command)
-            if frame is not None:
-                frames.append(frame)
-        return frames
+        frames = [self._obey(command) for command in self._commands(data)]
+        return [frame for frame in frames if frame is not None]
 
     def take_replies(self) -> bytes:
-        """Return the answers to commands."""
         replies, self._replies = bytes(self._replies), bytearray()
         return replies
 
@@ -82,8 +77,6 @@ class SlcanAdapter:
         head = (f'T{frame.identifier:08X}' if frame.extended else f't{frame.identifier:03X}')
         stamp = f'{int(now * 1000.0) % _STAMP_WRAP:04X}' if self._stamps else ''
         return f'{head}{len(frame.data)}{frame.data.hex().upper()}{stamp}\r'.encode()
-
-    # -- inside -----------------------------------------------------------------------------------
 
     def _commands(self, data: bytes) -> list[str]:
         """Cut the stream into commands; what is too long to be one is skipped."""
@@ -99,61 +92,44 @@ class SlcanAdapter:
                 break
             if self._skipping:
                 self._skipping = False
-                self._reply(REFUSED)
+                self._replies += REFUSED
             elif self._command:
                 commands.append(self._command.decode('latin-1'))
             self._command.clear()
         return commands
 
     def _obey(self, command: str) -> Frame | None:
-        kind = command[0]
+        kind, reply = command[0], DONE
         if kind in 'tTrR':
             return self._transmit(command)
-        if kind == 'O' or kind == 'L':
+        if kind in 'OL':
             # real adapters refuse this while open; a client that crashed never closed
             self.is_open = True
             self._listen_only = kind == 'L'
             self.opened += 1
-            self._reply(DONE)
         elif kind == 'C':
             self.is_open = False
-            self._reply(DONE)
         elif kind in 'Ss':
-            wanted = command in _BIT_RATES or kind == 's' and _hexadecimal(command[1:], 4)
-            if wanted and not self.is_open and self._bitrate is not None:
-                self._set = _BIT_RATES.get(command, self._bitrate)  # s…: by somebody who knows
-            self._reply(DONE if wanted and not self.is_open else REFUSED)
-        elif command == 'V':
-            self._reply(VERSION)
-        elif command == 'N':
-            self._reply(SERIAL_NUMBER)
-        elif command == 'F':
-            self._reply(NO_FLAGS if self.is_open else REFUSED)
+            known = command in BIT_RATES or kind == 's' and _hexadecimal(command[1:], 4)
+            if self.is_open or not known:
+                reply = REFUSED
+            elif self._bitrate is not None:
+                self._set = BIT_RATES.get(command, self._bitrate)   # s…: by somebody who knows
         elif command in ('Z0', 'Z1'):
             self._stamps = command == 'Z1'
-            self._reply(DONE)
-        elif kind in 'MmWXU':
-            # filters, polling and serial speed make no difference here
-            self._reply(DONE)
+        elif command == 'F' and not self.is_open:
+            reply = REFUSED
         else:
-            self._reply(REFUSED)
+            reply = ANSWERS.get(command if kind in 'VNF' else kind, REFUSED)
+        self._replies += reply
         return None
 
     def _transmit(self, command: str) -> Frame | None:
-        """Take a frame from the client."""
         frame = _frame(command)
         if frame is None or not self.is_open or self._listen_only:
-            self._reply(REFUSED)
+            self._replies += REFUSED
             return None
         return frame if command[0] in 'tT' and self.connected else None
-
-    def _reply(self, reply: bytes) -> None:
-        self.refused += reply == REFUSED
-        self._replies += reply
-
-
-_BIT_RATES = {'S0': 10_000, 'S1': 20_000, 'S2': 50_000, 'S3': 100_000, 'S4': 125_000,
-              'S5': 250_000, 'S6': 500_000, 'S7': 750_000, 'S8': 1_000_000, 'S9': 83_300}
 
 
 def _frame(command: str) -> Frame | None:

@@ -8,7 +8,6 @@ current, a load current and a thermal image that trips. Time is an argument.
 
 import math
 
-from drive_can_bridge.core.profile import ControlTable
 from drive_can_bridge.simulation.control import Operation
 
 #: bits of control register 1
@@ -41,12 +40,7 @@ class StarterOperation(Operation):
     :ivar reverse: the contactor for the other direction is closed.
     """
 
-    def __init__(self, table: ControlTable | None) -> None:
-        self.reverse = False
-        super().__init__(table)
-
     def power_on(self) -> None:
-        """Begin anew: no trip, off."""
         super().power_on()
         self.enabled = self.reverse = False
 
@@ -63,30 +57,19 @@ class StarterOperation(Operation):
         self.enabled = run in (RUN_FORWARD, RUN_REVERSE) and not self._blocked
         self.reverse = run == RUN_REVERSE
 
-    def reset_allowed(self, now: float) -> bool:
-        """Tell whether the cause of a trip is gone."""
-        return now >= self._cause_ends
-
-    def prolong(self, until: float) -> None:
-        """Take note that the cause lasts until some time at least."""
-        self._cause_ends = max(self._cause_ends, until)
-
-    def cause_gone(self) -> None:
-        """Take note that the cause has been removed."""
-        self._cause_ends = -math.inf
-
     def repair(self) -> None:
         """Clear a trip by hand; the motor stays off until it is commanded again."""
         self.faulted = False
-        self.cause_gone()
+        self.end_cause(-math.inf)
 
 
 class Starter:
     """
     The motor behind the contactor: currents and thermal image.
 
-    :ivar current: A, mean of the three phases.
     :ivar thermal: % of the thermal capacity.
+    :ivar full_load_current: A.
+    :ivar time_constant: s, of the thermal image.
     """
 
     def __init__(self) -> None:
@@ -105,7 +88,6 @@ class Starter:
 
     @property
     def ratio(self) -> float:
-        """Current as a share of the full load current."""
         return self.current / self.full_load_current
 
     @property
@@ -131,17 +113,13 @@ class Starter:
     @property
     def time_to_reset(self) -> float:
         """Time in s until a motor that is off has cooled down enough."""
-        if self.thermal <= RESET_LEVEL:
-            return 0.0
-        return self.time_constant * math.log(self.thermal / RESET_LEVEL)
+        return self.time_constant * math.log(max(self.thermal / RESET_LEVEL, 1.0))
 
     def settings(self, full_load_percent: float, trip_class: float) -> None:
-        """Take the settings of the overload protection."""
         self.full_load_current = max(full_load_percent, 1.0) / 100.0 * CONTROLLER_CURRENT
         self.time_constant = CLASS_FACTOR * max(trip_class, 1.0)
 
     def switch(self, on: bool) -> None:
-        """Close or open the contactor."""
         if not on:
             self._on_for = None
         elif self._on_for is None:

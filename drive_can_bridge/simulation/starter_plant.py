@@ -7,21 +7,23 @@ Which register means what is partly recollection; docs/protocol_canopen_pkw.md s
 be trusted.
 """
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from dataclasses import replace
 import math
+import struct
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.protocols.canopen_pkw.object_map import register_of
-from drive_can_bridge.simulation.plant import Mechanics
+from drive_can_bridge.simulation.control import State, StatusWord
+from drive_can_bridge.simulation.motor_plant import MAINS_RATE, MAINS_SWING
+from drive_can_bridge.simulation.plant import Mechanics, Plant
 from drive_can_bridge.simulation.registers import Registers
 from drive_can_bridge.simulation.scales import RawRange
 from drive_can_bridge.simulation.starter import (
     Starter, StarterOperation, TEST_TRIP, THERMAL_OVERLOAD,
 )
-from drive_can_bridge.simulation.status import State, StatusWord
 
 GENERAL_CONFIGURATION = 601
 TRIP_CLASS = 606
@@ -41,12 +43,10 @@ SETTINGS = range(540, 700)
 #: what settings are in a new controller, by register: in configuration mode, as from the factory
 DEFAULTS = {GENERAL_CONFIGURATION: CONFIGURATION_MODE, TRIP_CLASS: 5, FULL_LOAD_RATIO: 33, 653: 33,
             682: 0, 695: 0, CONTROL_REGISTER_1: 0, CONTROL_REGISTER_2: 0}
-#: what it says of itself: port and controller firmware, serial number, ranges in 0.1 A
+#: what it says of itself: port and controller firmware, serial number, ranges in 0.1 A; its
+#: commercial reference, two characters a register
 IDENTITY = {62: 10205, 76: 25003, 70: 2612, 71: 301, 72: 1, 74: int.from_bytes(b'SH', 'big'),
-            81: 270, 96: 270}
-#: its commercial reference, two characters a register from this one on
-REFERENCE = 'LTMR27CFM   '
-REFERENCE_AT = 64
+            81: 270, 96: 270, **dict(enumerate(struct.unpack('>6H', b'LTMR27CFM   '), 64))}
 #: rank in the serial number: the node-ID, so that two controllers differ
 SERIAL_RANK = 73
 #: settings that take only multiples of something, by register
@@ -55,10 +55,9 @@ STEPS = {TRIP_CLASS: 5}
 MAINS_VOLTAGE = 400.0
 MAINS_FREQUENCY = 50.0
 POWER_FACTOR = 0.85
-#: share by which the mains swing, and how fast (rad/s)
-MAINS_SWING = 0.005
-MAINS_RATE = 2.0 * math.pi * 0.3
 NEVER = 9999
+
+Figure = Callable[[], float]
 
 
 def is_starter(profile: Profile) -> bool:
@@ -68,38 +67,27 @@ def is_starter(profile: Profile) -> bool:
     return word is not None and register_number(word) == CONTROL_REGISTER_1
 
 
-class StarterPlant:
-    """A :class:`.Starter` behind registers that is a :class:`~.plant.Plant`."""
+class StarterPlant(Plant):
+    """A :class:`.Starter` behind registers."""
 
-    volatile: Collection[str] = ()
+    operation: StarterOperation
 
     def __init__(self, registers: Registers, configuration: DriveConfiguration,
                  mechanics: Mechanics) -> None:
-        self.operation = StarterOperation(configuration.profile.control)
+        super().__init__(registers, configuration, StarterOperation(configuration.profile.control))
         self.starter = Starter()
-        self._registers = registers
         self._node = configuration.station
-        self._control = configuration.profile.control
         self._cause = 0
-        self._now: float | None = None
         # of several names for a register the first counts, as everywhere
         self._by_register = {register_number(p): p.name
                              for p in reversed(list(registers.parameters.values()))}
-
-    # -- what the registers accept ----------------------------------------------------------------
+        self._figures = self._all_figures()
 
     def initial(self, parameter: Parameter) -> int | None:
-        """Return what a new controller has in a register; None: any plausible value."""
         register = register_number(parameter) or 0
-        place = 2 * (register - REFERENCE_AT)
-        if 0 <= place < len(REFERENCE):
-            return int.from_bytes(REFERENCE[place:place + 2].encode('ascii'), 'big')
-        if register == SERIAL_RANK:
-            return self._node
-        return {**DEFAULTS, **IDENTITY}.get(register)
+        return {**DEFAULTS, **IDENTITY, SERIAL_RANK: self._node}.get(register)
 
     def allows(self, parameter: Parameter, raw: int) -> bool:
-        """Tell whether a value is one of the register's steps."""
         return raw % STEPS.get(register_number(parameter) or 0, 1) == 0
 
     def takes(self, parameter: Parameter) -> bool:
@@ -111,88 +99,70 @@ class StarterPlant:
         return bool(configuring) and not self.operation.enabled
 
     def written(self, name: str, before: int, raw: int) -> None:
-        """Obey the control registers and take over settings."""
         if name == self._by_register[CONTROL_REGISTER_1]:
-            self.operation.word_written(raw, self._now or 0.0)
+            self.operation.word_written(raw, self.now or 0.0)
         elif name == self._by_register.get(CONTROL_REGISTER_2):
-            self._clear(raw & ~before)
-        self._settings_changed()
+            appeared = raw & ~before
+            if appeared & (CLEAR_ALL | CLEAR_THERMAL_LEVEL):
+                self.starter.thermal = 0.0
+                self.operation.end_cause(-math.inf)
+            if appeared & (CLEAR_ALL | CLEAR_SETTINGS):
+                for register in (TRIP_CLASS, FULL_LOAD_RATIO, 653):
+                    if register in self._by_register:
+                        self.registers.reset(self._by_register[register])
+        self.power_on()
         self.starter.switch(self.operation.enabled)
-
-    def _clear(self, bits: int) -> None:
-        """Obey the clear commands whose bits have appeared."""
-        if bits & (CLEAR_ALL | CLEAR_THERMAL_LEVEL):
-            self.starter.thermal = 0.0
-            self.operation.cause_gone()
-        if bits & (CLEAR_ALL | CLEAR_SETTINGS):
-            for register in (TRIP_CLASS, FULL_LOAD_RATIO, 653):
-                if register in self._by_register:
-                    self._registers.reset(self._by_register[register])
-
-    def _settings_changed(self) -> None:
-        self.starter.settings(self._content(FULL_LOAD_RATIO), self._content(TRIP_CLASS))
 
     def _content(self, register: int) -> int:
         name = self._by_register.get(register)
-        return DEFAULTS[register] if name is None else self._registers.plain(name)
-
-    # -- time and events --------------------------------------------------------------------------
+        return DEFAULTS[register] if name is None else self.registers.plain(name)
 
     @property
     def trip_code(self) -> int:
         """Code of the trip; 0 without one."""
         return self._cause if self.operation.faulted else 0
 
-    def advance(self, now: float) -> None:
-        """Let currents and temperature follow up to now."""
-        last = now if self._now is None else self._now
-        self._now = max(now, last)
+    def move(self, duration: float) -> None:
         self.starter.switch(self.operation.enabled)
-        if self.starter.advance(self._now - last):
-            self._cause = THERMAL_OVERLOAD
-            self.operation.trip(now)
-            self.operation.prolong(now + self.starter.time_to_reset)
-            self.starter.switch(False)
+        if self.starter.advance(duration):
+            self._trip(THERMAL_OVERLOAD, self.starter.time_to_reset)
 
     def trip(self, duration: float = 0.0) -> None:
-        """Trip as the test function of the controller does; the cause lasts for some seconds."""
-        self._cause = TEST_TRIP
-        self.operation.trip(self._now or 0.0, duration)
+        self._trip(TEST_TRIP, duration)
+
+    def _trip(self, cause: int, duration: float) -> None:
+        self._cause = cause
+        super().trip(duration)
         self.starter.switch(False)
 
     def power_off(self) -> None:
         """Open the contactors; the thermal image is kept."""
-        self.operation.power_on()
+        super().power_off()
         self.starter.switch(False)
 
     def power_on(self) -> None:
-        """Begin anew; the registers have what EEPROM kept."""
-        self._settings_changed()
-
-    # -- what the registers show ------------------------------------------------------------------
+        """Take over the settings that there are."""
+        self.starter.settings(self._content(FULL_LOAD_RATIO), self._content(TRIP_CLASS))
 
     def source(self, parameter: Parameter) -> Callable[[], int] | None:
-        """Return what computes a read-only register; None: it is plain memory."""
         register = register_number(parameter)
         if register == STATUS_1:
             # the profile's own conditions are met in addition, whatever its bits are called
-            word = StatusWord(replace(parameter, bits=()), self._control)
-            return lambda: word.compose(self._state(), self._status())
-        figure = self._figures().get(register)
+            word = StatusWord(replace(parameter, bits=()), self.control)
+            return lambda: word.compose(State(self.operation), self._status())
+        figure = self._figures.get(register)
         if figure is None:
             return None
         span, content = RawRange(parameter, limits=False), figure
         return lambda: span.clamp(math.floor(content() + 0.5))
 
-    def _figures(self) -> dict[int | None, Callable[[], float]]:
+    def _all_figures(self) -> dict[int | None, Figure]:
         """Return what gives the contents of registers."""
         starter = self.starter
-        found: dict[int | None, Callable[[], float]] = {
+        found: dict[int | None, Figure] = {
             450: lambda: math.ceil(starter.time_to_reset) if self.operation.faulted else 0,
             451: lambda: self.trip_code,
             452: lambda: _bit_of(self.trip_code),
-            458: self._outputs,
-            459: self._outputs,
             460: lambda: THERMAL_OVERLOAD if starter.alarm else 0,
             461: lambda: _bit_of(THERMAL_OVERLOAD) if starter.alarm else 0,
             465: lambda: starter.thermal,
@@ -201,28 +171,28 @@ class StarterPlant:
             474: lambda: 100.0 * MAINS_FREQUENCY,
             475: lambda: 10.0 * (100.0 + 0.8 * starter.thermal),
             481: lambda: 100.0 * POWER_FACTOR if starter.current else 0,
-            482: lambda: self._power(POWER_FACTOR),
-            483: lambda: self._power(math.sqrt(1.0 - POWER_FACTOR ** 2)),
             511: lambda: min(starter.time_to_trip, NEVER),
             NODE_ADDRESS: lambda: self._node,
+            # no trips and alarms of these groups, no inputs, nothing to ground
+            **dict.fromkeys((453, 456, 457, 462, 463, 470, 508), lambda: 0),
+            # outputs: one for each direction
+            **dict.fromkeys((458, 459), lambda: (
+                1 << self.operation.reverse if self.operation.enabled else 0)),
         }
-        # no trips and alarms of these groups, no inputs, nothing to ground
-        found.update(dict.fromkeys((453, 456, 457, 462, 463, 470, 508), lambda: 0))
+        # active and reactive power, in 0.1 kW
+        for register, share in ((482, POWER_FACTOR), (483, math.sqrt(1.0 - POWER_FACTOR ** 2))):
+            found[register] = _scaled(math.sqrt(3.0) * MAINS_VOLTAGE * share / 100.0,
+                                      lambda: starter.current)
         # the average and the three phases, in % of the full load current, in 0.01 A, in V
         for place, share in enumerate((1.0, 1.01, 0.99, 1.0)):
             found[466 + place] = _scaled(100.0 * share, lambda: starter.ratio)
             found[500 + 2 * place] = _scaled(100.0 * share, lambda: starter.current)
         for place, share in enumerate((1.0, 0.998, 1.002, 1.0)):
-            found[476 + place] = _scaled(share, self._voltage)
+            found[476 + place] = _scaled(MAINS_VOLTAGE * share, lambda: 1.0 + (
+                MAINS_SWING * math.sin(MAINS_RATE * (self.now or 0.0))))
         return found
 
-    def _state(self) -> State:
-        operation = self.operation
-        return State(enabled=operation.enabled, stopping=False, fault=operation.faulted,
-                     warning=False, speed=0.0, setpoint_reached=False)
-
     def _status(self) -> int:
-        """Return system status register 1."""
         operation, ratio = self.operation, self.starter.ratio
         bits = (
             not operation.faulted,
@@ -230,35 +200,22 @@ class StarterPlant:
             operation.faulted,
             self.starter.alarm,
             operation.faulted,
-            operation.faulted and operation.reset_allowed(self._now or 0.0),
+            operation.faulted and operation.reset_allowed(self.now or 0.0),
             True,
             ratio > 0.1,
         )
         word = sum(1 << number for number, wanted in enumerate(bits) if wanted)
-        word |= min(math.floor(32.0 * ratio + 0.5), 63) << 8
-        return word | (1 << 15 if self.starter.starting else 0)
-
-    def _outputs(self) -> int:
-        return (1 << self.operation.reverse) if self.operation.enabled else 0
-
-    def _voltage(self) -> float:
-        return MAINS_VOLTAGE * (1.0 + MAINS_SWING * math.sin(MAINS_RATE * (self._now or 0.0)))
-
-    def _power(self, share: float) -> float:
-        """Return a power in 0.1 kW."""
-        return math.sqrt(3.0) * MAINS_VOLTAGE * self.starter.current * share / 100.0
+        return word | min(math.floor(32.0 * ratio + 0.5), 63) << 8 | self.starter.starting << 15
 
 
 def register_number(parameter: Parameter) -> int | None:
     """Return the register of a parameter, by its number or by its CANopen address."""
-    if parameter.number is not None:
+    if parameter.number is not None or parameter.index is None:
         return parameter.number
-    if parameter.index is None:
-        return None
     return register_of(parameter.index, parameter.subindex or 0)
 
 
-def _scaled(factor: float, figure: Callable[[], float]) -> Callable[[], float]:
+def _scaled(factor: float, figure: Figure) -> Figure:
     return lambda: factor * figure()
 
 

@@ -58,14 +58,13 @@ class SlcanTerminal(EndPoint):
         self._lock = threading.Lock()
         self._adapter = SlcanAdapter(bitrate)
         self._received: deque[Frame] = deque()
-        self._outgoing: deque[tuple[float, bytes]] = deque()
+        self._outgoing: deque[tuple[float, bytes]] = deque()    # with the time it has waited since
         self._started = b''         # rest of what the kernel took a part of
         self._links: list[Path] = []
         self._closed = False
 
     @property
     def is_open(self) -> bool:
-        """A client has opened the channel."""
         return self._adapter.is_open
 
     def receive(self, timeout: float) -> Frame | None:
@@ -138,8 +137,6 @@ class SlcanTerminal(EndPoint):
                 pass
         os.close(self._master)
         os.close(self._slave)
-
-    # -- inside -----------------------------------------------------------------------------------
 
     def _check_open(self) -> None:
         if self._closed:

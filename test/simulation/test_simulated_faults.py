@@ -216,6 +216,15 @@ class TestDrive:
         ask(made, '003003C1#0008000000000000', 2.0)
         assert made.value('gain') == 8
 
+    def test_each_fault_of_a_setting_is_told(self) -> None:
+        made = drive()
+        for fault in ('needs=ramp_time:torque_limit', 'needs=ramp_time:p50', 'stuck=p30'):
+            made.fault(fault, 0.0)
+        assert made.faults_text == (
+            'needs=ramp_time:torque_limit, needs=ramp_time:p50, stuck=p30')
+        made.fault('ok', 0.0)
+        assert made.faults_text == 'ok'
+
     def test_power_is_cut_at_a_write(self) -> None:
         made = drive()
         made.fault('cut_at=2', 0.0)

@@ -38,10 +38,10 @@ class Refused(DriveCanError):
 class Objects(Protocol):
     """An object dictionary. Both raise :class:`Refused`."""
 
-    def read(self, index: int, subindex: int) -> bytes:
+    def read_object(self, index: int, subindex: int) -> bytes:
         """Return the content of an object."""
 
-    def write(self, index: int, subindex: int, data: bytes) -> None:
+    def write_object(self, index: int, subindex: int, data: bytes) -> None:
         """Write an object."""
 
 
@@ -55,44 +55,43 @@ class SdoServer:
         self._toggle = 0
 
     def reset(self) -> None:
-        """Forget a transfer under way."""
         self._rest = b''
 
     def answer(self, request: bytes) -> bytes | None:
         """Return the response to a request; None: there is none."""
         if len(request) != LENGTH:
             return None
-        command = request[0] >> 5
+        head, command = request[0], request[0] >> 5
         if command != UPLOAD_SEGMENT:
             self.reset()
         if command == ABORT:
             return None
         if command != UPLOAD_SEGMENT:
             self._address = request[1:4]
-        place = int.from_bytes(self._address[:2], 'little'), self._address[2]
         try:
-            if command == UPLOAD:
-                return self._upload(self._objects.read(*place))
             if command == UPLOAD_SEGMENT:
-                return self._upload_segment(request[0])
-            if command == DOWNLOAD and request[0] & EXPEDITED:
-                unused = request[0] >> 2 & 0x03 if request[0] & SIZE_GIVEN else 0
-                self._objects.write(*place, request[4:LENGTH - unused])
-                return bytes((RESPONSE_DOWNLOAD,)) + self._address + bytes(4)
+                return self._upload_segment(head)
+            place = int.from_bytes(self._address[:2], 'little'), self._address[2]
+            if command == UPLOAD:
+                return self._upload(self._objects.read_object(*place))
+            if command == DOWNLOAD and head & EXPEDITED:
+                unused = head >> 2 & 0x03 if head & SIZE_GIVEN else 0
+                self._objects.write_object(*place, request[4:LENGTH - unused])
+                return self._response(RESPONSE_DOWNLOAD)
             raise Refused(abort_codes.UNKNOWN_COMMAND)
         except Refused as error:
             self.reset()
-            return (bytes((RESPONSE_ABORT,)) + self._address
-                    + error.code.to_bytes(4, 'little'))
+            return self._response(RESPONSE_ABORT, error.code.to_bytes(4, 'little'))
+
+    def _response(self, head: int, data: bytes = b'') -> bytes:
+        return bytes((head,)) + self._address + data.ljust(LENGTH - 4, b'\0')
 
     def _upload(self, data: bytes) -> bytes:
         if len(data) <= EXPEDITED_MAX:
             unused = EXPEDITED_MAX - len(data)
-            head = RESPONSE_UPLOAD | unused << 2 | EXPEDITED | SIZE_GIVEN
-            return bytes((head,)) + self._address + data + bytes(unused)
+            return self._response(RESPONSE_UPLOAD | unused << 2 | EXPEDITED | SIZE_GIVEN, data)
         self._rest, self._toggle = data, 0
-        return (bytes((RESPONSE_UPLOAD | SIZE_GIVEN,)) + self._address
-                + len(data).to_bytes(4, 'little'))
+        return self._response(RESPONSE_UPLOAD | SIZE_GIVEN, len(data).to_bytes(4, 'little'))
 
     def _upload_segment(self, head: int) -> bytes:
         if not self._rest:
@@ -100,10 +99,9 @@ class SdoServer:
         if head & TOGGLE != self._toggle:
             raise Refused(abort_codes.TOGGLE_NOT_ALTERNATED)
         segment, self._rest = self._rest[:SEGMENT_MAX], self._rest[SEGMENT_MAX:]
-        unused = SEGMENT_MAX - len(segment)
-        response = bytes((self._toggle | unused << 1 | (not self._rest),))
+        response = bytes((self._toggle | SEGMENT_MAX - len(segment) << 1 | (not self._rest),))
         self._toggle ^= TOGGLE
-        return response + segment + bytes(unused)
+        return response + segment.ljust(SEGMENT_MAX, b'\0')
 
 
 def checked_length(data: bytes, length: int) -> bytes:
