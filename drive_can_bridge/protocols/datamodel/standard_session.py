@@ -170,7 +170,7 @@ class StandardSession(Session):
         """Begin a period: look what is to be written, then read."""
         if self.online:
             self.expire(now)
-            self._look(now)
+            self._look(now, unanswered=self._in_round)
         if not self._in_round:
             self._book.begin(now)
             self._in_round = True
@@ -202,11 +202,17 @@ class StandardSession(Session):
             raws.insert(self._control_slot, self.control.table.disable)
         return raws
 
-    def _look(self, now: float) -> None:
-        """Find out what is to be written."""
+    def _look(self, now: float, *, unanswered: bool = False) -> None:
+        """
+        Find out what is to be written.
+
+        :param unanswered: what was asked a period ago still waits for its answer.
+        """
+        control = self.control
         # nobody knows whether the drive was off meanwhile: it is not started by a repetition
-        starts = self.control is not None and not self.control.at_rest and self._doubt
-        hold = [self._control_slot] if starts else []
+        doubt = (self._doubt or unanswered) and control is not None and not (
+            control.at_rest or control.stopping)
+        hold = [self._control_slot] if doubt else []
         hold += [index for index, parameter in enumerate(self.drive.cyclic_request)
                  if parameter.name in self.setpoints.unknown]
         self._writes.look(self._raws(), now, hold=hold)

@@ -776,7 +776,8 @@ def test_enable_is_not_repeated_before_the_status_was_read() -> None:
     for begin in (10.06, 10.08, 10.1):
         sent += round_of(talk, begin, ENABLED)
     assert ENABLE_WORD not in sent
-    talk.until(10.3)                # nobody answers the round of 10.12; the word is due since
+    # nobody answers the round of 10.12; the word is due since then
+    assert ENABLE_WORD not in [text for _, text in talk.until(10.3)]
     assert talk.session.online
     now = 10.32
     sent = [text for _, text in talk.until(now + 0.0055)]
@@ -786,6 +787,23 @@ def test_enable_is_not_repeated_before_the_status_was_read() -> None:
     found += [text for _, text in talk.until(now + 0.1)]
     assert DISABLE_WORD in found
     assert ENABLE_WORD not in found
+
+
+@pytest.mark.parametrize('action, word', [
+    (ControlAction.DISABLE, DISABLE_WORD), (ControlAction.QUICK_STOP, '3F1#0634000200000000')])
+@pytest.mark.parametrize('asked', [10.1301, 10.2301])
+def test_a_stop_does_not_wait_for_the_status(action: ControlAction, word: str,
+                                             asked: float) -> None:
+    """Neither while a read goes unanswered, nor in the silence after it."""
+    talk = controlled()
+    talk.asks(ControlAction.ENABLE, 10.01)
+    round_of(talk, 10.02, READY)
+    talk.until(10.03)
+    for begin in (10.04, 10.06, 10.08, 10.1):
+        round_of(talk, begin, ENABLED)
+    assert talk.control_outcomes() == [('enable', True, 'enabled')]
+    talk.until(asked)               # nobody answers the round of 10.12
+    assert talk.asks(action, asked + 0.001) == [word]
 
 
 # -- configuration --------------------------------------------------------------------------------
