@@ -3,7 +3,7 @@
 
 import math
 
-from builders import LIMIT, parameter, SPEED
+from builders import INT16, LIMIT, parameter, SPEED
 from hypothesis import given, strategies as st
 import pytest
 
@@ -24,6 +24,20 @@ def test_starts_neutral_unarmed_and_closed() -> None:
     assert made.waiting == list(made.items)
     assert made.changed
     assert made.command(0, 0.0, 1.0) is CommandOutcome.NOT_ARMED
+
+
+@pytest.mark.parametrize(('tolerance', 'arms', 'does_not'), [
+    (0.0, 0.5, 0.6), (0.2, 0.5, 0.6), (2.0, 2.0, 2.1)])
+@pytest.mark.parametrize('scale', [0.5, -0.5])
+def test_what_arms_a_double_is_a_step_or_the_tolerance(scale: float, tolerance: float, arms: float,
+                                                       does_not: float) -> None:
+    """Whichever is more; the edge belongs to it."""
+    coarse = parameter('coarse', 60, type=INT16, scale=scale, arming_tolerance=tolerance)
+    for sign in (1.0, -1.0):
+        made = Setpoints((coarse,), timeout=0.5, rearm_immediate=False)
+        made.enabled = True
+        assert made.command(0, sign * does_not, 1.0) is CommandOutcome.NOT_ARMED
+        assert made.command(0, sign * arms, 1.0) is CommandOutcome.ARMED
 
 
 def test_changed_says_whether_something_else_is_to_be_sent() -> None:

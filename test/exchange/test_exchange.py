@@ -119,6 +119,27 @@ def test_commands_are_taken_just_before_a_cycle() -> None:
     assert not bench.notes[0].commands
 
 
+def test_a_drive_that_comes_after_a_slow_one_has_the_time_of_its_own_turn() -> None:
+    bench = Bench(drive(name='first', station=1, mapping='assume', rearm_immediate=True),
+                  drive(name='second', station=2, mapping='assume', rearm_immediate=True))
+    bench.exchange.bus_opened()
+    bench.exchange.activate()
+    for step in range(4):
+        bench.at(10.0 + 0.01 * step)
+        for station in (1, 2):
+            bench.hears(f'{0x10 << 24 | 0x1FFFF0 + (station << 21):08X}#03E800FA00010000',
+                        10.001 + 0.01 * step)
+    assert [session.online for session in bench.sessions] == [True, True]
+    first, second = bench.notes
+
+    def take_for_long(now: float) -> None:
+        bench.now = now + 0.004
+    first.take_commands = take_for_long  # type: ignore[method-assign]
+    second.commands.append((0, 100.0))
+    bench.at(10.1)          # both are late
+    assert second.session.setpoints.items[0].commanded_at == pytest.approx(10.104)
+
+
 def test_pass_says_when_the_next_is_due() -> None:
     bench = Bench(drive())
     bench.online()
@@ -275,6 +296,38 @@ def test_silent_member_of_a_broadcast_group_goes_offline() -> None:
     assert len(lost) == 1
 
 
+def test_fault_of_one_stops_its_broadcast_group_at_once() -> None:
+    """The frame is for one session, the answer to it the business of another one's timer."""
+    setpoint = parameter('speed_setpoint', None, type=INT16, scale=0.1, unit='%')
+    bench = Bench(*[drive(
+        'cannord', name=name, station=station, broadcast='all', period=2.0, control_timeout=9.0,
+        request=(setpoint,), response=(), table=(setpoint,))
+        for name, station in (('one', 1), ('two', 2))])
+    exchange, answers = bench.exchange, {'002': '003#310B0000', '004': '005#310B0000'}
+    exchange.bus_opened()
+    exchange.activate()
+
+    def live(end: float) -> None:
+        while bench.now < end:
+            for text in bench.at(bench.now + 0.1):
+                if text[:3] in answers:
+                    bench.hears(answers[text[:3]], bench.now + 0.001)
+    live(12.5)
+    exchange.submit(bench.sessions[0], ControlRequest(ControlAction.ENABLE))
+    live(16.5)
+    answers = {'002': '003#370F0020', '004': '005#370F0020'}
+    live(20.5)
+    outcome, = [event for event in bench.notes[0].events if isinstance(event, ControlCompleted)]
+    assert outcome.success, outcome.message
+    exchange._wake_at = exchange._pass()
+    while exchange._alarm.sleep(0.0):
+        pass
+    bench.hears('005#380B0000', bench.now + 0.01)       # told unasked
+    assert exchange._alarm.ringing
+    assert [text for text in bench.at(bench.now + 0.001) if text.startswith('408')] == [
+        '408#7E040000']
+
+
 def test_deactivate_without_a_bus_is_done_at_once() -> None:
     bench = Bench()
     bench.exchange.activate()
@@ -420,8 +473,9 @@ def test_a_session_that_fails_keeps_no_other_from_its_stop(
     bench.step = 0.001
     # it cannot be said that all of them were stopped, and that is told by whoever asked
     assert bench.exchange.deactivate() is False
-    assert [text for text in bench.link.take() if text.startswith('005')] == [
-        f'005FFFF0#{ZEROS}'] * 3
+    sent = bench.link.take()
+    assert [text for text in sent if text.startswith('005')] == [f'005FFFF0#{ZEROS}'] * 3
+    assert [text for text in sent if text.startswith('003')] == [], 'it does not go on, either'
     assert bench.sessions[1].stopped
     assert bench.exchange.bus_reason == 'first: ZeroDivisionError: a defect'
 
@@ -512,3 +566,9 @@ def test_what_was_sent_is_told_on_change_and_once_a_second() -> None:
     notes.commands = [(0, 0.0), (0, 150.0)]
     assert bench.at(11.3) == ['003FFFF0#05DC000000000000']
     assert notes.told == [11.3]
+    bench.step = 0.001
+    assert bench.exchange.deactivate() is True
+    notes.told.clear()
+    for step in range(1, 5):
+        bench.at(12.0 + step)
+    assert notes.told == [], 'nothing is sent any more'

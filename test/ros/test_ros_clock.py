@@ -6,7 +6,11 @@ import time
 from bridges import CONVEYOR, parameters, StartBridge
 from clients import Client, wait_until
 import pytest
+from rclpy.clock import Clock
 from std_msgs.msg import Float64
+
+from drive_can_bridge.ros.stamps import Stamps
+from drive_can_bridge.transport.clock import steady_now
 
 REAL_TIME, REAL_TIME_NS = time.time, time.time_ns
 
@@ -39,3 +43,9 @@ def test_clock_that_is_set(bridge: StartBridge, client: Client, monkeypatch: pyt
         assert not session.setpoints.waiting
     assert client.get('/conveyor', 'ramp_time') != [None]
     assert not one.errors
+
+
+def test_a_stamp_is_that_of_the_moment_not_of_the_look() -> None:
+    before = time.time()
+    seconds, nanoseconds = Stamps(Clock()).at(steady_now() - 1000.0)
+    assert before - 1000.001 <= seconds + 1e-9 * nanoseconds <= time.time() - 999.999

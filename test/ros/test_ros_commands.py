@@ -286,6 +286,26 @@ def test_any_publisher_will_do(bridge: StartBridge, client: Client,
         arm(client, recorder)
 
 
+def test_another_publisher_has_another_clock(bridge: StartBridge, client: Client) -> None:
+    """How quick the last one was says nothing about who comes when it has gone."""
+    one = bridge(parameters(conveyor={**CONVEYOR, 'cyclic_request': ['speed_setpoint']}))
+    one.online()
+    topic, = one.node.drives['conveyor'].commands._topics._topics[:1]
+    with one.record() as recorder:
+        first = client.node.create_publisher(Float64, SPEED, 1)
+        wait_until(lambda: first.publish(Float64(data=0.0)) or math.isfinite(topic._quickest))
+        topic._quickest -= 10_000_000_000       # as if its clock had been 10 s ahead of ours
+        before = refused(one)
+        wait_until(lambda: first.publish(Float64(data=0.0)) or refused(one) > before)
+        client.wait_logged(f'conveyor: command on {SPEED} thrown away: it came 10')
+        client.node.destroy_publisher(first)
+        wait_until(lambda: topic.handle.get_publisher_count() == 0)
+        cycles_pass(one)        # it is looked up every 0.05 s
+        before = refused(one)
+        arm(client, recorder)
+    assert refused(one) == before
+
+
 def test_incompatible_publishers_are_told_about(bridge: StartBridge, client: Client) -> None:
     content = parameters()
     content['qos_overrides'] = {SPEED: {'subscription': {'reliability': 'reliable'}}}

@@ -5,14 +5,16 @@ import math
 from pathlib import Path
 from typing import Any
 
-from bridges import CONVEYOR, HASTY, parameters, StartBridge
+from bridges import Bridge, CONVEYOR, HASTY, parameters, StartBridge
 from clients import Client, ERROR, wait_until
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 import pytest
 from std_msgs.msg import Float64
 
 from drive_can_bridge.core.errors import BusUnavailable
+from drive_can_bridge.ros.diagnostics import BusReporter, DriveReporter
 from drive_can_bridge.transport import link
+from drive_can_bridge.transport.clock import steady_now
 
 BUS, DRIVE = 'drive_can_bridge: bus main', 'drive_can_bridge: drive conveyor'
 BUS_KEYS = {
@@ -89,6 +91,74 @@ def test_a_drive_slower_than_its_period_is_told(bridge: StartBridge, client: Cli
     assert 'the period is 100 ms: the drive is slow' in status['message']
     one.played['conveyor'].fault('ok')
     client.diagnostics(DRIVE, lambda drive: 'an exchange takes' not in drive['message'])
+
+
+def reporters(one: Bridge) -> tuple[BusReporter, DriveReporter]:
+    """Return what reports on the bus and the drive, when we ask for it and nobody else."""
+    diagnostics = one.node.diagnostics
+    assert diagnostics is not None
+    return diagnostics.buses[0], diagnostics.drives[0]
+
+
+def by_hand(**keys: Any) -> dict[str, Any]:
+    """Return parameters of a bridge that reports once, at its start."""
+    return {**parameters(conveyor={**CONVEYOR, **keys}), 'diagnostics_period': 3600.0}
+
+
+def test_a_round_that_users_held_up_is_no_slow_drive(bridge: StartBridge,
+                                                     client: Client) -> None:
+    one = bridge(by_hand(protocol='datamodel_standard', period=0.1))
+    one.online()
+    _, reporter = reporters(one)
+    statistics = one.node.drives['conveyor'].session.statistics
+
+    def told_of_a_long_round() -> str:
+        with one.node.exchanges['main'].lock:
+            statistics.latency.add(100.0)
+        return reporter.report(steady_now()).message
+    assert 'an exchange takes' in told_of_a_long_round()
+    assert client.get('/conveyor', 'ramp_time') != [None]
+    assert 'an exchange takes' not in told_of_a_long_round()
+    assert 'an exchange takes' in told_of_a_long_round()
+
+
+def test_what_is_over_is_not_told_again(bridge: StartBridge) -> None:
+    one = bridge(by_hand())
+    one.online()
+    bus, drive = reporters(one)
+    link = one.node.exchanges['main'].link
+    with one.record() as recorder:
+        recorder.send(0x00200000 | 30 << 4 | 1, bytes(8))
+        wait_until(lambda: one.node.drives['conveyor'].foreign_text)
+    assert 'there must be one master only' in drive.report(steady_now()).message
+    assert 'master' not in drive.report(steady_now()).message
+    link.send_failures += 2
+    link.last_error = 'send: transmit queue full'
+    report = bus.report(steady_now())
+    assert (report.level, report.message) == (
+        DiagnosticStatus.WARN, '2 frames not sent: send: transmit queue full')
+    report = bus.report(steady_now())
+    assert (report.level, report.message[:8]) == (DiagnosticStatus.OK, 'virtual ')
+    assert report.facts['send_failures'] == '2'
+
+
+def test_the_load_is_that_of_both_directions(bridge: StartBridge) -> None:
+    one = bridge(by_hand())
+    one.online()
+    bus, _ = reporters(one)
+    exchange = one.node.exchanges['main']
+
+    def frames() -> tuple[int, int]:
+        return exchange.link.frames_sent, exchange.link.frames_received
+    with exchange.lock:
+        sent, received = frames()
+        bus.report(100.0)
+    wait_until(lambda: frames()[0] > sent + 10 and frames()[1] > received + 10)
+    with exchange.lock:
+        count = sum(frames()) - sent - received
+        load = float(bus.report(101.0).facts['load_percent'])
+    # 29 bits and 8 bytes: 131 bits, 11 % more with what stuffing adds on average; 1 Mbit/s
+    assert load == pytest.approx(100 * count * 131 * 1.11 / 1_000_000, abs=0.06)
 
 
 def test_strangers_are_counted_and_told(bridge: StartBridge, client: Client) -> None:

@@ -73,9 +73,11 @@ def test_what_the_drive_does_not_have(bridge: StartBridge, client: Client) -> No
     one.online()
     before = list(editors(client, '/conveyor'))
     table: Any = one.played['conveyor'].drive
-    del table.table._parameters[30]  # ramp_time: an older drive than the profile is for
+    entry = table.table._parameters.pop(30)  # ramp_time: an older drive than the profile is for
     after = list(editors(client, '/conveyor'))
     assert after == [name for name in before if name != 'ramp_time']
+    table.table._parameters[30] = entry      # the drive was exchanged
+    assert list(editors(client, '/conveyor')) == before
 
 
 def test_wide_integers(bridge: StartBridge, client: Client, tmp_path: Path) -> None:

@@ -81,26 +81,28 @@ def test_a_drive_that_is_gone_is_left_out(bridge: StartBridge, client: Client) -
     assert len(topic.messages) == count, 'nothing is published without a joint'
 
 
-def test_the_stamp_is_that_of_the_oldest_sample(bridge: StartBridge, client: Client) -> None:
+@pytest.mark.parametrize('name, joint', [('west', 'wj'), ('east', 'ej')])   # first and last
+def test_the_stamp_is_that_of_the_oldest_sample(bridge: StartBridge, client: Client, name: str,
+                                                joint: str) -> None:
     """A drive that answers no more, but is not given up yet, makes the whole message old."""
     content = two()
-    content['drives']['east']['missed_limit'] = 1000
+    content['drives'][name]['missed_limit'] = 1000
     one = bridge(content)
     one.online()
     topic = client.topic(STATES, JointState)
     topic.wait()
-    one.played['east'].fault('silent')
-    statistics = one.node.drives['east'].session.statistics
+    one.played[name].fault('silent')
+    statistics = one.node.drives[name].session.statistics
     wait_until(lambda: statistics.missed > 5)
 
     def stamp(message: JointState) -> float:
         return float(message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec)
-    first = topic.wait(lambda m: 'ej' in m.name)
+    first = topic.wait(lambda m: joint in m.name)
     missed = statistics.missed
     wait_until(lambda: statistics.missed > missed + 25)     # half a second
-    later = topic.wait(lambda m: 'ej' in m.name)
+    later = topic.wait(lambda m: joint in m.name)
     assert abs(stamp(later) - stamp(first)) < 0.05, 'of one and the same sample'
-    one.played['east'].fault('ok')
+    one.played[name].fault('ok')
     topic.wait(lambda m: stamp(m) > stamp(first))
 
 
@@ -158,6 +160,28 @@ def test_commands_for_all_of_them(bridge: StartBridge, client: Client) -> None:
     client.publish(COMMANDS, JointState(name=['wj'], velocity=[10 * RPM]))
     wait_until(lambda: speeds(one)['west'] == 200)
     assert speeds(one)['north'] == 1000
+
+
+def test_commands_that_wait_for_a_late_exchange_are_thrown_away_and_counted(
+        bridge: StartBridge, client: Client) -> None:
+    one = bridge(two())
+    one.online()
+    client.publish(COMMANDS, JointState(name=['wj'], velocity=[0.0]))
+    wait_until(lambda: one.node.drives['west'].session.setpoints.items[0].armed)
+    exchange = one.node.exchanges['main']
+    with exchange.lock:     # as long as the exchange is late, and the process does not stand
+        until = time.monotonic() + 0.5
+        client.publish(COMMANDS, JointState(name=['wj'], velocity=[30 * RPM]))
+        while time.monotonic() < until:
+            time.sleep(0.01)
+
+    def refused() -> int:
+        return sum(one.node.drives[name].session.statistics.commands_refused
+                   for name in ('west', 'east', 'south', 'plain'))
+    wait_until(refused)
+    client.wait_logged('commands thrown away: the exchange was 0')
+    assert refused() == 1
+    assert speeds(one)['west'] == 0
 
 
 def test_array_of_another_length_is_refused_whole(bridge: StartBridge, client: Client) -> None:

@@ -150,6 +150,20 @@ def test_bits_are_latched_and_published_on_change(bridge: StartBridge, client: C
     wait_until(lambda: late.values == [True])
 
 
+def test_bits_are_told_anew_when_the_drive_is_back(bridge: StartBridge, client: Client) -> None:
+    """What was known of it was nobody's knowledge any more, although it is the same again."""
+    one = bridge(parameters(conveyor={**CONVEYOR, **HASTY}))
+    one.online()
+    one.played['conveyor'].set_value('status_word', 0b0001)
+    ready = client.latched('/conveyor/status_word/ready', Bool)
+    wait_until(lambda: ready.values[-1:] == [True])
+    count = len(ready.values)
+    one.played['conveyor'].fault('silent')
+    wait_until(lambda: not one.node.drives['conveyor'].session.online)
+    one.played['conveyor'].fault('ok')
+    wait_until(lambda: ready.values[count:] == [True])
+
+
 def test_online_is_false_from_the_start(bridge: StartBridge, client: Client) -> None:
     one = bridge(parameters(conveyor={**CONVEYOR, **HASTY}), autostart=False)
     one.played['conveyor'].fault('silent')

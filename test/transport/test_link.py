@@ -185,6 +185,16 @@ def test_loss_seen_by_the_reader(make: Callable[..., Bench]) -> None:
     assert bench.link.reconnections == 1
 
 
+def test_the_same_loss_is_told_again_when_the_bus_was_there_in_between(
+        make: Callable[..., Bench]) -> None:
+    bench = make()
+    for times in (1, 2, 3):
+        bench.opened(times)
+        bench.port.coming.append(BusUnavailable('receive: unplugged'))
+    bench.opened(4)
+    assert bench.listener.told == ['opened', 'lost: receive: unplugged'] * 3 + ['opened']
+
+
 class DeadPort(FakePort):
     """Opens, and fails at its first read: a terminal whose other end has gone."""
 
@@ -328,6 +338,26 @@ def test_one_frame_per_attempt_until_somebody_is_heard(make: Callable[..., Bench
     assert bench.link.is_open
 
 
+def test_one_frame_after_a_loss_until_somebody_is_heard(make: Callable[..., Bench]) -> None:
+    bench = make(QueuedPort)
+    bench.opened()
+    bench.port.coming.append(BusUnavailable('receive: Network is down'))
+    bench.opened(2)
+    bench.port.full = True
+    assert not bench.link.send(FRAME)
+    assert not bench.link.is_open
+
+
+def test_full_queue_is_looked_at_once_in_a_reconnect_period(make: Callable[..., Bench]) -> None:
+    bench = make(QueuedPort)
+    bench.opened()
+    bench.port.full = True
+    begun = time.monotonic()
+    bench.send_until_blocked()
+    wait_for(lambda: bench.port.looks >= 6)
+    assert time.monotonic() - begun >= 6 * BUS.reconnect_period
+
+
 def test_adapter_that_does_not_tell_is_opened_anew(make: Callable[..., Bench]) -> None:
     bench = make()
     bench.opened()
@@ -381,10 +411,14 @@ def test_figures_outlive_a_port(make: Callable[..., Bench]) -> None:
     assert set(seen) <= {'bus-off', ''}
     assert seen[0] == 'bus-off'
     assert bench.link.controller == ''
-    bench.port.error_frames = 1
-    assert (bench.link.error_frames, bench.link.overflowed_frames,
-            bench.link.bus_off_count) == (6, 7, 1)
     assert bench.link.last_bus_error == BusError('bus-off', 'bus-off', 'check the cable')
+    for times in (2, 3):        # of the port that is open, and of all before it
+        bench.opened(times)
+        second = bench.port
+        second.error_frames, second.overflowed_frames, second.bus_off_count = 1, 2, 3
+        assert (bench.link.error_frames, bench.link.overflowed_frames,
+                bench.link.bus_off_count) == (4 + times, 5 + 2 * times, 3 * times - 2)
+        second.coming.append(BusUnavailable('unplugged'))
 
 
 def test_rejected_frames_count_as_rejected(make: Callable[..., Bench]) -> None:

@@ -440,6 +440,31 @@ def test_what_a_lost_member_said_explains_nothing() -> None:
     assert message.endswith('it does not follow control word 047Eh')
 
 
+def test_a_fault_leaves_with_the_member_that_has_it() -> None:
+    bus = three()
+    bus.answers[2] = FAULT
+    bus.live(0.06)
+    assert bus.session('lift').state is DriveState.FAULT
+    del bus.answers[2]
+    bus.live(0.3)
+    assert not bus.session('hoist').online
+    assert bus.session('lift').state is DriveState.DISABLED
+    assert [event.text for name, event in bus.events(Noted) if name == 'lift'] == [
+        'fault (status words: lift 0B31h, hoist 0B38h, turn 0B31h)'], 'nobody said it is gone'
+    bus.asks(RESET_FAULT)
+    assert [success for _, success, _ in bus.outcomes()] == [True]
+
+
+def test_a_fault_that_stays_is_not_laid_to_the_inputs_of_another_member() -> None:
+    bus = three(control_timeout=0.4)
+    bus.answers = {1: '500B0000', 2: FAULT, 3: READY}       # 1: bit 5 clear, a quick stop
+    bus.live(0.06)
+    bus.asks(RESET_FAULT)
+    bus.live(0.42)
+    assert bus.outcomes() == [('reset_fault', False, 'fault still present after 0.4 s (status '
+                               'words: lift 0B50h, hoist 0B38h, turn 0B31h)')]
+
+
 def test_quick_stop_of_all() -> None:
     bus = enabled()
     bus.asks(QUICK_STOP)

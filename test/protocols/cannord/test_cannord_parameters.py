@@ -470,6 +470,18 @@ def test_telegram_time_out_that_cannot_be_read() -> None:
     assert talk.outcomes() == []
 
 
+def test_telegram_time_out_that_was_not_answered_is_looked_at_when_it_was_written() -> None:
+    """Nobody asks for ten seconds what nobody answered; but now it does answer."""
+    talk, _ = monitored(period=1.0, parameter_retries=0)
+    talk.until(10.3)
+    assert len(talk.events(Noted)) == 1
+    talk.submits(write((MONITORING, 5)), 10.4)
+    assert talk.until(10.42) == [(10.41, '202#0122000000000500')]
+    assert talk.hears('203#0112000000000500', 10.421) == ['202#0112000000000000']
+    talk.hears('203#0112000000000500', 10.422)
+    assert talk.session.warning.startswith('telegram time-out 0.5 s')
+
+
 def test_nobody_asks_for_a_time_out_that_is_not_listed() -> None:
     talk = online()
     assert talk.hears('003#310B0000', 10.003) == []

@@ -224,11 +224,35 @@ def test_refused_disable_of_a_user_is_tried_until_the_bus_takes_it() -> None:
     assert talk.control_outcomes() == [('disable', True, 'ready')]
 
 
+def test_disable_that_the_bus_takes_at_last_has_time_for_its_answer() -> None:
+    """Half of what it would have had; without, its time of 0.5 s would be over at 10.595 s."""
+    talk = running()
+    refuse(talk)
+    assert talk.asks(ControlAction.DISABLE, 10.095) == []
+    assert talk.until(10.584) == []
+    accept(talk)
+    assert talk.until(10.83) == [(10.585, DISABLE_0)]
+    talk.hears(DISABLED_0, 10.834)
+    assert talk.control_outcomes() == []        # the status is still to be read
+    assert talk.session.statistics.rejected == 0
+    assert not talk.session.told.owed
+
+
 def test_refused_enable_was_never_told() -> None:
     talk = ready()
     refuse(talk)
     assert talk.asks(ControlAction.ENABLE, 10.075) == []
     talk.bus_down(10.08)
+    assert worries(talk) == []
+
+
+def test_refused_setpoint_was_never_told() -> None:
+    talk = online(request=(SPEED,))
+    talk.commands(0, 0.0, 10.06)
+    talk.commands(0, 10.0, 10.06)
+    refuse(talk, 'C602')
+    talk.until(10.08)
+    talk.bus_down(10.09)
     assert worries(talk) == []
 
 

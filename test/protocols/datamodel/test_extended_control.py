@@ -484,3 +484,22 @@ def test_status_that_arrives_after_the_loss_is_not_believed() -> None:
     talk.hears('10200D31#0008000000000000', 10.46)
     assert talk.session.control is not None
     assert not talk.session.control.fault
+
+
+@pytest.mark.parametrize('action', [ControlAction.DISABLE, ControlAction.QUICK_STOP])
+def test_status_that_was_asked_for_before_a_stop_left_confirms_nothing(
+        action: ControlAction) -> None:
+    """The drive was not enabled yet when it was asked, and is about to be."""
+    talk = apart(period=10.0)
+    assert talk.until(10.004) == [(10.003, ASK_STATUS)]
+    talk.hears('10200D31#0001000000000000', 10.005)
+    assert talk.asks(ControlAction.ENABLE, 10.1) == [ENABLE]
+    assert talk.until(10.11) == [(10.101, ASK_STATUS)]
+    stop = DISABLE if action is ControlAction.DISABLE else QUICK_STOP
+    assert talk.asks(action, 10.12) == [stop]
+    talk.control_outcomes()
+    talk.hears('10200D31#0001000000000000', 10.121)         # answers what was asked at 10.101
+    assert talk.control_outcomes() == []
+    assert ASK_STATUS in [text for _, text in talk.until(10.13)]
+    talk.hears('10200D31#0001000000000000', 10.131)
+    assert talk.control_outcomes() == [(action.value, True, 'ready')]

@@ -450,6 +450,21 @@ def test_rewrite_that_somebody_undoes_is_not_repeated_at_once() -> None:
     assert 'rewritten before, not again within' in told[0].text
 
 
+def test_rewrites_that_somebody_undoes_now_and_then_become_rare() -> None:
+    """Maps that are right for some seconds are no reason to wear the EEPROM out."""
+    keeper = MapKeeper(99, 51, 0, 0, 209, 0, 0, 0)
+    talk = configured(keeper)
+    end = 15.0
+    for _ in range(80):
+        keeper.live(talk, end)
+        keeper.registers[122] = 99
+        end += 5.0
+    starts = [float(entry.split()[0]) for entry in keeper.trace if entry.endswith('122 := 0')]
+    pauses = [second - first for first, second in zip(starts, starts[1:])]
+    assert len(starts) <= 14
+    assert min(pauses[-4:]) >= 60.0
+
+
 def test_rewrites_after_a_quiet_minute_are_prompt_again() -> None:
     keeper = MapKeeper(99, 51, 0, 0, 209, 0, 0, 0)
     keeper.read_only = {122}

@@ -7,8 +7,11 @@ refuses frames: there is always a frame that stops it, or a warning that it may 
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 
-from builders import CONTROL, Conversation, drive, GAIN, parameter, SPEED, WORD, write
+from builders import (
+    CONTROL, Conversation, drive, GAIN, LIMIT, parameter, SPEED, TABLE, WORD, write,
+)
 from extended_builders import (
     ANSWER, ASK_REQUEST_MAP, ASK_RESPONSE_MAP, checked, cycling, exchange, NEUTRAL, online,
     REQUEST_MAP, RESPONSE_MAP, TICK,
@@ -225,6 +228,25 @@ def test_request_map_that_differs_ends_with_writes_by_number() -> None:
     assert confirmed(talk, 11.007) == []
     assert not talk.session.told.owed
     assert warnings(talk) == []
+
+
+def test_what_is_kept_in_ram_is_stopped_before_what_may_be_an_eeprom() -> None:
+    """Of two without ``storage`` the second waits 20 ms for the first; a RAM value does not."""
+    slow_word, slow_speed = replace(WORD, storage=None), replace(SPEED, storage=None)
+    table = (*(entry for entry in TABLE if entry not in (WORD, SPEED)), slow_word, slow_speed)
+    talk = online(control=CONTROL, table=table, request=(slow_speed, LIMIT))
+    talk.hears('103FFFF0#03E800FA00010000', 10.002)
+    talk.asks(ControlAction.ENABLE, 10.01)
+    for cycle in range(1, 50):
+        talk.until(10.0 + 0.02 * cycle + TICK)
+        talk.hears(ENABLED if cycle > 2 else ANSWER, 10.002 + 0.02 * cycle)
+    assert talk.control_outcomes() == [('enable', True, 'enabled')]
+    talk.until(11.0 + TICK)
+    talk.hears(ENABLED, 11.002)
+    sent = [(11.003, text) for text in talk.hears(OTHER_REQUEST, 11.003)]
+    sent += talk.until(11.1)
+    assert [text for _, text in sent if text.startswith('003')][:3] == [
+        LIMIT_ZERO, '00300341#0000000000000000', SPEED_ZERO]
 
 
 def test_maps_are_rewritten_after_the_stop() -> None:
