@@ -32,6 +32,7 @@ import tempfile
 from typing import Any
 
 from hypothesis import HealthCheck, settings
+from middleware import tell_in_messages
 import pytest
 
 PROFILE = 'DRIVE_CAN_TEST_PROFILE'
@@ -75,6 +76,7 @@ def _domain(in_process: bool) -> str:
 
 
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+tell_in_messages()
 
 #: directories and modules whose tests wait for something of their own: each test by itself
 SPREAD = ('test/system/', 'test/demo/', 'test/monitor/test_monitor_attach',

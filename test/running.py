@@ -13,6 +13,7 @@ import sys
 import termios
 from typing import Any
 
+from middleware import as_users_have_it
 from waiting import wait_for
 
 MODULES = {'drive_can': 'drive_can_bridge.cli.main',
@@ -37,7 +38,7 @@ class Running:
         directory.mkdir(exist_ok=True)
         self.out, self.err = directory / 'out', directory / 'err'
         variables: dict[str, str | None] = {
-            **os.environ, 'ROS_LOG_DIR': str(directory / 'log'), **(environment or {})}
+            **as_users_have_it(), 'ROS_LOG_DIR': str(directory / 'log'), **(environment or {})}
         with self.out.open('wb') as out, self.err.open('wb') as err:
             options = {'stdin': subprocess.DEVNULL, 'stdout': out, 'stderr': err, **options}
             self.process = subprocess.Popen(

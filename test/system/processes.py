@@ -18,6 +18,7 @@ import threading
 import time
 from typing import Any
 
+from middleware import as_users_have_it
 from waiting import DEADLINE, wait_for
 
 #: of a line of the log, s
@@ -39,7 +40,7 @@ def command_line(name: str) -> list[str]:
 def environment() -> dict[str, str]:
     """Return the environment of started processes: this tree, English, unbuffered."""
     paths = [str(ROOT), str(ROOT / 'test'), *filter(None, [os.environ.get('PYTHONPATH')])]
-    return {**os.environ, 'PYTHONPATH': os.pathsep.join(paths), 'PYTHONUNBUFFERED': '1',
+    return {**as_users_have_it(), 'PYTHONPATH': os.pathsep.join(paths), 'PYTHONUNBUFFERED': '1',
             'LC_ALL': 'C.UTF-8', 'COLUMNS': '99'}
 
 

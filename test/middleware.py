@@ -1,0 +1,28 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+How the middleware of a test process is set up, where bridges and their clients are together.
+
+Fast DDS tells the participants of one process of each other's endpoints by calling one from within
+the other. When several come and go at once on a busy machine, one of them now and then never
+learns of what another one publishes: its services get no request of that one, for ever. Between
+processes, which is how everybody but these tests uses it, that way does not exist. So here, too,
+what there is gets told in messages.
+"""
+
+from collections.abc import Mapping
+import os
+from pathlib import Path
+
+_VARIABLE = 'FASTRTPS_DEFAULT_PROFILES_FILE'
+_PROFILES = str(Path(__file__).with_name('fastdds.xml'))
+
+
+def tell_in_messages() -> None:
+    """Set this process up, before anything of ROS is imported; a file of the user's wins."""
+    os.environ.setdefault(_VARIABLE, _PROFILES)
+
+
+def as_users_have_it() -> Mapping[str, str]:
+    """Return the environment of processes that are started: none of this."""
+    return {name: value for name, value in os.environ.items()
+            if (name, value) != (_VARIABLE, _PROFILES)}
