@@ -74,7 +74,7 @@ class Session(ABC):
     """
     What all families share: setpoints, statistics, the outboxes, the life cycle.
 
-    :ivar drive: the configuration.
+    :ivar configuration: of the drive.
     :ivar setpoints: every ``cyclic_request`` parameter but the control word, in slot order.
     :ivar control: the control and status word machine, or None.
     :ivar retry: how long and how often the drive is asked.
@@ -92,7 +92,7 @@ class Session(ABC):
     """
 
     def __init__(self, drive: DriveConfiguration, control: ControlMachine | None) -> None:
-        self.drive = drive
+        self.configuration = drive
         self.control = control
         control_table = drive.profile.control
         self._control_name = control_table.parameter if control_table and control else ''
@@ -136,8 +136,8 @@ class Session(ABC):
     @property
     def request_parameters(self) -> tuple[Parameter, ...]:
         """What the drive is told: ``cyclic_request``, and a control word without a slot."""
-        mapped = self.drive.cyclic_request
-        word = self.drive.profile.parameters.get(self._control_name)
+        mapped = self.configuration.cyclic_request
+        word = self.configuration.profile.parameters.get(self._control_name)
         return mapped if word is None or word in mapped else (*mapped, word)
 
     @property
@@ -147,7 +147,7 @@ class Session(ABC):
 
         What is built in comes first: a short telegram lacks the last values, never the status.
         """
-        return (*self.builtin_parameters, *self.drive.cyclic_response)
+        return (*self.builtin_parameters, *self.configuration.cyclic_response)
 
     # -- life cycle -------------------------------------------------------------------------------
 
@@ -317,7 +317,7 @@ class Session(ABC):
         """Return the time from ``earliest`` on at which cycles may begin."""
         if self.phase is None:
             return earliest
-        return earliest + (self.phase - earliest) % self.drive.period
+        return earliest + (self.phase - earliest) % self.configuration.period
 
     def take_frames(self) -> list[Frame]:
         """Return the frames to be sent now, in order."""
@@ -413,7 +413,7 @@ class Session(ABC):
         cells = self.cells(parameter)
         received = not parameter.writable and any(
             parameter == other or cells & self.cells(other)
-            for other in self.drive.cyclic_response)
+            for other in self.configuration.cyclic_response)
         return Role.CYCLIC if received else None
 
     def cells(self, parameter: Parameter) -> Cells:
@@ -448,13 +448,13 @@ class Session(ABC):
                     parameter_timeout: float | None = None) -> None:
         """Change what may change while running; None leaves a value alone."""
         if command_timeout is not None:
-            self.drive = replace(self.drive, command_timeout=command_timeout)
+            self.configuration = replace(self.configuration, command_timeout=command_timeout)
             self.setpoints.timeout = command_timeout
         if rearm_immediate is not None:
-            self.drive = replace(self.drive, rearm_immediate=rearm_immediate)
+            self.configuration = replace(self.configuration, rearm_immediate=rearm_immediate)
             self.setpoints.rearm_immediate = rearm_immediate
         if parameter_timeout is not None:
-            self.drive = replace(self.drive, parameter_timeout=parameter_timeout)
+            self.configuration = replace(self.configuration, parameter_timeout=parameter_timeout)
             self.retry.timeout = parameter_timeout
 
     # -- control ----------------------------------------------------------------------------------
@@ -541,7 +541,7 @@ class Session(ABC):
     @property
     def stop_spacing(self) -> float:
         """Return how many s lie between two cycles of a stop, or of a pulse."""
-        return min(self.drive.period, STOP_SPACING_MAX)
+        return min(self.configuration.period, STOP_SPACING_MAX)
 
     def be_online(self) -> None:
         """Tell that the drive exchanges process data."""

@@ -90,12 +90,13 @@ class BusExchange:
         self._router: Router[Member] = Router()
         self._routes = [list(entries) for entries in routes]
         # a send may hold up every drive of the bus: never for more than half a cycle
-        shortest = min((session.drive.period for session in sessions), default=0.1)
+        periods = [session.configuration.period for session in sessions]
+        shortest = min(periods, default=0.1)
         filters = [*(route for entries in routes for route in entries), *counted]
         self.link = Link(bus, filters, self,
                          send_timeout=min(0.5 * shortest, 0.05), stations=len(self._sessions),
                          prepare_thread=prepare_thread)
-        for session, phase in zip(sessions, spread([each.drive.period for each in sessions])):
+        for session, phase in zip(sessions, spread(periods)):
             session.phase = phase
         self._alarm = Alarm()
         self._wake_at = 0.0
@@ -195,7 +196,8 @@ class BusExchange:
             self._pump(member)
         except Exception as error:  # noqa: BLE001  the last resort: it is told, and costs no other
             member.due = math.inf
-            self.bus_reason = f'{member.session.drive.name}: {type(error).__name__}: {error}'
+            name = member.session.configuration.name
+            self.bus_reason = f'{name}: {type(error).__name__}: {error}'
 
     def close(self) -> None:
         """End both threads and close the bus."""

@@ -153,7 +153,7 @@ class DriveReporter:
             return DiagnosticStatus.STALE, self.inactive
         if state is DriveState.MAPPING_DIFFERS:
             advice = 'correct the drive or the configuration'
-            if session.drive.options.mapping == 'configure':
+            if session.configuration.options.mapping == 'configure':
                 advice = f'the drive does not keep the maps that are written: {advice}'
             else:
                 advice += ', or set mapping: configure'
@@ -208,7 +208,7 @@ class DriveReporter:
         session = self._drive.session
         statistics = session.statistics
         count, total = self._latencies
-        latency, period = statistics.latency, session.drive.period
+        latency, period = statistics.latency, session.configuration.period
         # requests of users hold a round up; that is no fault of the drive
         if latency.count == count or self._requests != (
                 statistics.requests_ok + statistics.requests_failed):

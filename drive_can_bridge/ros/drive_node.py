@@ -227,7 +227,7 @@ class DriveNode:
                 self._inform('stopped')
         elif isinstance(event, SetpointsExpired):
             self.warn('command timeout',
-                      f'no command for {self.session.drive.command_timeout:g} s: '
+                      f'no command for {self.session.configuration.command_timeout:g} s: '
                       f'{", ".join(event.names)} neutral until armed again')
         elif isinstance(event, MappingDiffered):
             self._log.error(f'{self.name}: mapping differs, no cyclic frame is sent: '

@@ -193,10 +193,10 @@ def test_a_command_of_any_size_is_refused_not_a_defect() -> None:
 def test_reconfigure_changes_what_is_named() -> None:
     made = session()
     made.reconfigure()
-    assert (made.drive.command_timeout, made.drive.rearm_immediate) == (0.5, False)
+    assert (made.configuration.command_timeout, made.configuration.rearm_immediate) == (0.5, False)
     made.reconfigure(command_timeout=0.0, rearm_immediate=True, parameter_timeout=0.3)
     assert (made.setpoints.timeout, made.setpoints.rearm_immediate) == (0.0, True)
-    assert made.drive.parameter_timeout == 0.3
+    assert made.configuration.parameter_timeout == 0.3
 
 
 def test_control_requests_need_a_drive() -> None:

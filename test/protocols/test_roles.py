@@ -36,7 +36,7 @@ def session(family: str, *more: Parameter, control: bool = True, **options: Any)
 
 def raw(of: Session, name: str) -> Parameter:
     """Resolve a name as the parameter services do."""
-    configuration = of.drive
+    configuration = of.configuration
     found = ParameterDirectory(
         configuration.profile.parameters,
         lambda text: FAMILIES[configuration.protocol].raw_parameter(configuration, text),

@@ -134,7 +134,7 @@ class Cannord(Family):
         from drive_can_bridge.protocols.cannord.group import make_group
         from drive_can_bridge.protocols.cannord.session import CannordSession
         made: dict[str, Session] = {
-            session.drive.name: session for group in groups(drives)
+            session.configuration.name: session for group in groups(drives)
             for session in make_group(group)}
         return [made[drive.name] if drive.name in made else CannordSession(drive)
                 for drive in drives]

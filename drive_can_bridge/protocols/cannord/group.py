@@ -87,7 +87,7 @@ class Group:
             member = self.members[self._turn % count]
             self._turn = (self._turn + 1) % count
             leader.send(member.request_identifier, payloads)
-            member.expect_answer(now, now + leader.drive.period)
+            member.expect_answer(now, now + leader.configuration.period)
 
     def cycle_left(self) -> None:
         """Take note that a cycle has left: it told everybody the same."""
@@ -99,17 +99,17 @@ class Group:
     def member_found(self, member: CannordSession) -> None:
         """Take note that an inverter of the group came online: it must not jump."""
         self._leader.setpoints.disarm()
-        self.control.member_found(member.drive.name)
+        self.control.member_found(member.configuration.name)
 
     def member_lost(self, member: CannordSession) -> None:
         """Take note that an inverter of the group is offline."""
-        self.control.member_lost(member.drive.name)
+        self.control.member_lost(member.configuration.name)
         self._leader.tell_notes()
         self._leader.let_commands_through()
 
     def member_status(self, member: CannordSession, word: int, now: float) -> None:
         """Take the status word of an inverter that is led."""
-        self.control.status_received(word, now, member.drive.name)
+        self.control.status_received(word, now, member.configuration.name)
         self._leader.control_changed(now)
 
     # -- what the leader does for all -------------------------------------------------------------
@@ -146,7 +146,7 @@ class Group:
 
     @property
     def _others(self) -> list[DriveConfiguration]:
-        return [member.drive for member in self.members[1:]]
+        return [member.configuration for member in self.members[1:]]
 
 
 _SERVICES = {

@@ -109,7 +109,7 @@ class CannordSession(Session):
 
     @property
     def request_parameters(self) -> tuple[Parameter, ...]:
-        return (CONTROL_PARAMETER, *self.drive.cyclic_request)
+        return (CONTROL_PARAMETER, *self.configuration.cyclic_request)
 
     # -- life cycle -------------------------------------------------------------------------------
 
@@ -140,7 +140,7 @@ class CannordSession(Session):
         if self._led:
             self._timer.stop()
             return
-        self._timer.start(max(now, self._timer.began_at + self.drive.period))
+        self._timer.start(max(now, self._timer.began_at + self.configuration.period))
         if self.told.owed:
             self._timer.hurry(now)
 
@@ -225,7 +225,7 @@ class CannordSession(Session):
                 and not self._stopping):
             self._book.missed_in_row = 0
             if self.online:
-                self.lose(f'{NO_ANSWER} for {self.drive.missed_limit} cycles', now)
+                self.lose(f'{NO_ANSWER} for {self.configuration.missed_limit} cycles', now)
             self.advise(f'{NO_ANSWER}: drive silent, wrong station, bit rate or identifier '
                         'format, or P509 not set to CAN')
 
@@ -253,7 +253,7 @@ class CannordSession(Session):
                 self.reject(str(error))
         elif received in self._masters:
             self.note(ForeignMasterSeen(
-                f'another master sends to station {self.drive.station}: {frame}'))
+                f'another master sends to station {self.configuration.station}: {frame}'))
         else:
             self.reject(f'{frame}: not of this drive')
 

@@ -141,7 +141,8 @@ class PkwSession(Session):
         writes += self._setpoint_writer.neutral_writes()
         self._channel.cancel(Lane.STOP)
         self._channel.make_room(now)
-        timeout = min(self.drive.parameter_timeout, time / (STOP_ATTEMPTS * max(1, len(writes))))
+        timeout = min(self.configuration.parameter_timeout,
+                      time / (STOP_ATTEMPTS * max(1, len(writes))))
         self._stop.begin(
             procedures.write_until_answered(
                 writes, STOP_ATTEMPTS, timeout, max(timeout, in_the_end)),
@@ -219,7 +220,7 @@ class PkwSession(Session):
 
     def _stop_if_owed(self, now: float) -> None:
         if self.told.owed:
-            self._stop_now(STOP_TIME_SILENT, now, in_the_end=self.drive.parameter_timeout)
+            self._stop_now(STOP_TIME_SILENT, now, in_the_end=self.configuration.parameter_timeout)
 
     def _leave_alone(self, reason: str, now: float) -> None:
         """Handle a drive that is silent, but may be listening: it has to stand still."""
@@ -228,7 +229,7 @@ class PkwSession(Session):
         self._node.offline(now)
         self._send_nmt()
         if was_online:
-            self._stop_now(STOP_TIME_SILENT, now, in_the_end=self.drive.parameter_timeout)
+            self._stop_now(STOP_TIME_SILENT, now, in_the_end=self.configuration.parameter_timeout)
 
     def _cut_off(self, reason: str, answer: str, now: float) -> None:
         """
@@ -299,7 +300,7 @@ class PkwSession(Session):
         if not self._book.missed():
             return
         if self.online:
-            limit = self.drive.missed_limit
+            limit = self.configuration.missed_limit
             self._leave_alone(f'no complete round of reads for {limit} periods', now)
         elif not self._node.heartbeat_lost:
             self.advise(SILENT)
@@ -344,7 +345,8 @@ class PkwSession(Session):
                                      warning=ails)
             elif identifier == identifiers.request:
                 self.note(ForeignMasterSeen(
-                    f'another master sends PKW requests to node {self.drive.station}: {frame}'))
+                    f'another master sends PKW requests to node {self.configuration.station}: '
+                    f'{frame}'))
         except RemoteProtocolError as error:
             self.reject(str(error))
 
@@ -437,7 +439,7 @@ class PkwSession(Session):
         refusal = super().write_refusal(parameter)
         if refusal or parameter.listed:
             return refusal
-        return addresses.half_refusal(parameter, self.drive.profile)
+        return addresses.half_refusal(parameter, self.configuration.profile)
 
     # -- state ------------------------------------------------------------------------------------
 

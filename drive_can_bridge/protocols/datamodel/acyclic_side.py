@@ -44,7 +44,7 @@ class AcyclicSide:
     def __init__(self, session: Session, *, encode_read: Callable[[int, int], Frame],
                  encode_write: Callable[[int, Words], Frame], together: int,
                  stop_ended: Callable[[], None], polling: Polling | None = None) -> None:
-        drive, options = session.drive, session.drive.options
+        drive, options = session.configuration, session.configuration.options
         self.offset: int = options.parameter_offset
         self._session = session
         # where each of ``request_parameters`` is written by number

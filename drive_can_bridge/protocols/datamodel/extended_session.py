@@ -99,7 +99,7 @@ class ExtendedSession(Session):
 
     @property
     def map_cells(self) -> Cells:
-        return map_cells(self.drive.options)
+        return map_cells(self.configuration.options)
 
     # -- life cycle -------------------------------------------------------------------------------
 
@@ -235,7 +235,8 @@ class ExtendedSession(Session):
         self._exchange.cycles_left = -1
         self._book.stale = 0
         self._book.missed_in_row = 0
-        self._timer.start(self._next_turn(max(now, self._timer.began_at + self.drive.period)))
+        self._timer.start(self._next_turn(
+            max(now, self._timer.began_at + self.configuration.period)))
         self.advise('no cyclic response: drive silent or response identifier taken')
 
     def _cycle(self, now: float) -> None:
@@ -247,7 +248,7 @@ class ExtendedSession(Session):
         exchange = self._exchange
         exchange.put(exchange.begin(now))
         self._book.awaiting = True
-        self._channel.hold(now + 0.5 * self.drive.period)
+        self._channel.hold(now + 0.5 * self.configuration.period)
 
     def _last_cycle_left(self, now: float) -> None:
         if self._stopping:
@@ -278,7 +279,7 @@ class ExtendedSession(Session):
             self.start_over(now)
             return
         owed = self.told.owed
-        self.lose(f'no cyclic response for {self.drive.missed_limit} cycles', now)
+        self.lose(f'no cyclic response for {self.configuration.missed_limit} cycles', now)
         if owed:  # of the word that has no slot; setpoints go neutral with the next cycles
             self._side.begin_stop(now, setpoints=False)
         if self.mute:
@@ -295,13 +296,13 @@ class ExtendedSession(Session):
             return
         if frame.extended and frame.identifier & FROM_WHOM == self._request_identifier & FROM_WHOM:
             self.note(ForeignMasterSeen(
-                f'another master sends requests to station {self.drive.station}: {frame}'))
+                f'another master sends requests to station {self.configuration.station}: {frame}'))
             return
         step = self._channel.outstanding
         try:
             words = extended.decode_answer(
-                frame, self.drive.station, None if step is None else (step.number, step.count),
-                strict=self._strict)
+                frame, self.configuration.station,
+                None if step is None else (step.number, step.count), strict=self._strict)
         except RemoteProtocolError as error:
             self.reject(str(error))
             return

@@ -80,7 +80,7 @@ class StandardSession(Session):
 
     @property
     def map_cells(self) -> Cells:
-        return map_cells(self.drive.options)
+        return map_cells(self.configuration.options)
 
     # -- life cycle -------------------------------------------------------------------------------
 
@@ -107,7 +107,7 @@ class StandardSession(Session):
 
     @property
     def longest_stop(self) -> float:
-        return ATTEMPTS * (ANSWER_TIME + float(self.drive.options.quarantine))
+        return ATTEMPTS * (ANSWER_TIME + float(self.configuration.options.quarantine))
 
     def time_lost(self, now: float) -> None:
         self._expected = self._expected or self._channel.outstanding is not None
@@ -185,8 +185,8 @@ class StandardSession(Session):
     @property
     def _patience(self) -> float:
         """Return what a round may take when a read of a user and one of its own go unanswered."""
-        return 2 * (self.drive.period + self.drive.parameter_timeout
-                    + float(self.drive.options.quarantine))
+        return 2 * (self.configuration.period + self.configuration.parameter_timeout
+                    + float(self.configuration.options.quarantine))
 
     # -- setpoints --------------------------------------------------------------------------------
 
@@ -213,7 +213,7 @@ class StandardSession(Session):
         doubt = (self._doubt or unanswered) and control is not None and not (
             control.at_rest or control.stopping)
         hold = [self._control_slot] if doubt else []
-        hold += [index for index, parameter in enumerate(self.drive.cyclic_request)
+        hold += [index for index, parameter in enumerate(self.configuration.cyclic_request)
                  if parameter.name in self.setpoints.unknown]
         self._writes.look(self._raws(), now, hold=hold)
 
@@ -222,7 +222,7 @@ class StandardSession(Session):
         if not self._writes.waiting or now < self._channel.courier.free_at:
             return
         index = self._writes.next()
-        parameter, raw = self.drive.cyclic_request[index], self._raws()[index]
+        parameter, raw = self.configuration.cyclic_request[index], self._raws()[index]
         # now: a neutral value that follows the axis may be another one when the frame leaves
         runs = raw != self._neutral_raws()[index]
         # What is sent cyclically is volatile: EEPROM parameters are refused by the configuration.
@@ -279,13 +279,14 @@ class StandardSession(Session):
             result.take(chunk, words)
         return tuple(
             parameter.raw_from_word(word)
-            for parameter, (word,) in zip(self.drive.cyclic_response, result.words()))
+            for parameter, (word,) in zip(self.configuration.cyclic_response, result.words()))
 
     def _names(self, chunk: Chunk) -> str:
         """Name what a read is for."""
         numbers = range(chunk.address, chunk.address + chunk.size)
         return ', '.join(f'{parameter.name} ({parameter.address})'
-                         for parameter, place in zip(self.drive.cyclic_response, self._places)
+                         for parameter, place in zip(
+                             self.configuration.cyclic_response, self._places)
                          if place.address in numbers)
 
     def _round_done(self, raws: tuple[int, ...] | None) -> None:
@@ -321,7 +322,7 @@ class StandardSession(Session):
         if not self.online:
             self.advise(self._gap or SILENT)
         elif too_many:
-            reason = f'no complete round of reads for {self.drive.missed_limit} periods'
+            reason = f'no complete round of reads for {self.configuration.missed_limit} periods'
             self.lose(f'{reason}: {self._gap}' if self._gap else reason, now)
 
     # -- control ----------------------------------------------------------------------------------
@@ -341,7 +342,7 @@ class StandardSession(Session):
             return
         if frame.identifier == self._request_identifier:
             self.note(ForeignMasterSeen(
-                f'another master sends requests to station {self.drive.station}: {frame}'))
+                f'another master sends requests to station {self.configuration.station}: {frame}'))
             return
         step = self._channel.outstanding
         # it may have come before the question

@@ -49,7 +49,7 @@ class Bus:
             session.activate(10.0)
 
     def session(self, name: str) -> Session:
-        return next(session for session in self.sessions if session.drive.name == name)
+        return next(session for session in self.sessions if session.configuration.name == name)
 
     def pump(self) -> list[str]:
         """Fetch what all sessions give out, in the order of the exchange; return what left."""
@@ -64,15 +64,15 @@ class Bus:
         for session in self.sessions:   # a partner's events may have come after its turn
             for event in session.take_events():
                 if isinstance(event, ControlCompleted):
-                    self.controlled.append((session.drive.name, event))
+                    self.controlled.append((session.configuration.name, event))
                 else:
-                    self.log.append((session.drive.name, event))
+                    self.log.append((session.configuration.name, event))
         return sent
 
     def hears(self, text: str) -> list[str]:
         heard = frame(text)
         for session in self.sessions:
-            for claim in FAMILIES['cannord'].claims(session.drive):
+            for claim in FAMILIES['cannord'].claims(session.configuration):
                 if claim.route.matches(heard):
                     session.receive_frame(heard, self.now)
                     return self.pump()
@@ -168,7 +168,7 @@ def test_29_bit_identifiers() -> None:
 def test_the_lowest_station_leads_whatever_the_order() -> None:
     lift, hoist, turn = members()
     bus = Bus(turn, lift, hoist)
-    assert [session.drive.name for session in bus.sessions] == ['turn', 'lift', 'hoist']
+    assert [session.configuration.name for session in bus.sessions] == ['turn', 'lift', 'hoist']
     assert [len(session.setpoints.items) for session in bus.sessions] == [0, 1, 0]
     bus.live(0.07)
     assert bus.session('lift').facts() == {'broadcast': 'leads hoist, turn'}

@@ -331,7 +331,7 @@ def test_word_among_the_cyclic_requests_is_refreshed() -> None:
 @pytest.mark.parametrize('name', ['control_register_1', 'p704', 'x2008.5'])
 def test_users_do_not_write_the_word(name: str) -> None:
     talk = ready()
-    drive = talk.session.drive
+    drive = talk.session.configuration
     parameter = drive.profile.parameters.get(name) or FAMILIES['canopen_pkw'].raw_parameter(
         drive, name)
     assert parameter is not None

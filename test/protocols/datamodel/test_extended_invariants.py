@@ -221,7 +221,7 @@ class SessionMachine(AnyOrder):
         """Note what the observer may learn of the maps from an answer."""
         observer, asked = self.observer, self.observer.asked
         identifier, data, is_extended = heard
-        strict = self.session.drive.options.length_policy == 'strict'
+        strict = self.session.configuration.options.length_policy == 'strict'
         if (asked is None or not is_extended or not observer.bus
                 or identifier != (0x10200000 | asked[0] << 4 | asked[1])
                 or len(data) < (8 if strict else 2 * asked[1])

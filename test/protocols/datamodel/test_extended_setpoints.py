@@ -168,8 +168,8 @@ def test_timeout_that_is_set_while_running() -> None:
     assert talk.commands(0, 100.0, 10.03) is NOT_ARMED
     talk.session.reconfigure(rearm_immediate=True, command_timeout=0.5)
     assert talk.commands(0, 100.0, 10.03) is ARMED
-    assert talk.session.drive.command_timeout == 0.5
-    assert talk.session.drive.rearm_immediate
+    assert talk.session.configuration.command_timeout == 0.5
+    assert talk.session.configuration.rearm_immediate
 
 
 @pytest.mark.parametrize('value, reason', [

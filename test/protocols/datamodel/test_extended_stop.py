@@ -304,7 +304,7 @@ def test_stop_does_not_wait_for_an_eeprom_that_takes_minutes() -> None:
 def test_only_the_status_is_acyclic() -> None:
     talk = online(control=CONTROL, request=(WORD, SPEED), response=(CURRENT,), mapping='assume',
                   table=TABLE)
-    assert STATUS not in talk.session.drive.cyclic_response
+    assert STATUS not in talk.session.configuration.cyclic_response
     talk.deactivate(10.01)
     assert [text for _, text in talk.until(12.0)] == [NEUTRAL] * 3
     silent(talk, 13.0)
