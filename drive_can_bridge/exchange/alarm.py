@@ -17,11 +17,6 @@ class Alarm:
         self._silence = threading.Lock()
         self._silence.acquire()
 
-    @property
-    def ringing(self) -> bool:
-        """The next sleep ends at once."""
-        return not self._silence.locked()
-
     def sleep(self, timeout: float) -> bool:
         """Sleep for ``timeout`` s, or until somebody rings; tell whether somebody did."""
         return self._silence.acquire(timeout=timeout if timeout > 0.0 else 0.0)

@@ -9,25 +9,23 @@ from drive_can_bridge.exchange.alarm import Alarm
 def test_ring_before_the_sleep_is_kept() -> None:
     alarm = Alarm()
     alarm.ring()
-    assert alarm.ringing
     assert alarm.sleep(3600.0), 'somebody rang'
-    assert not alarm.ringing
+    assert not alarm.sleep(0.0)
 
 
 def test_several_rings_count_once() -> None:
     alarm = Alarm()
     for _ in range(3):
         alarm.ring()
-    alarm.sleep(3600.0)
-    alarm.sleep(0.0)  # nothing is left: this one ends by its time
-    assert not alarm.ringing
+    assert alarm.sleep(3600.0)
+    assert not alarm.sleep(0.0), 'nothing is left: this one ends by its time'
 
 
 def test_sleep_ends_by_itself_even_when_its_time_is_over() -> None:
     alarm = Alarm()
     assert not alarm.sleep(-1.0)
     assert not alarm.sleep(0.001)
-    assert not alarm.ringing
+    assert not alarm.sleep(0.0)
 
 
 def test_ring_wakes_the_sleeper() -> None:
@@ -51,4 +49,4 @@ def test_rings_of_many_threads() -> None:
         thread.join()
     alarm.sleep(0.0)
     alarm.ring()
-    assert alarm.ringing
+    assert alarm.sleep(0.0)

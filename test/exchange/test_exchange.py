@@ -323,7 +323,7 @@ def test_fault_of_one_stops_its_broadcast_group_at_once() -> None:
     while exchange._alarm.sleep(0.0):
         pass
     bench.hears('005#380B0000', bench.now + 0.01)       # told unasked
-    assert exchange._alarm.ringing
+    assert exchange._alarm.sleep(0.0)
     assert [text for text in bench.at(bench.now + 0.001) if text.startswith('408')] == [
         '408#7E040000']
 
@@ -500,17 +500,16 @@ def test_whatever_is_due_sooner_wakes_the_timer() -> None:
     exchange._wake_at = exchange._pass()
     exchange._alarm.sleep(0.0)
     exchange.submit(bench.sessions[0], read(GAIN))
-    assert exchange._alarm.ringing            # its time-out comes before the next pass
+    assert exchange._alarm.sleep(0.0)         # its time-out comes before the next pass
 
     exchange._wake_at = 10.01
-    exchange._alarm.sleep(0.0)
     bench.hears('10200281#0007000000000000', 10.003)
-    assert not exchange._alarm.ringing        # nothing to wait for any more
+    assert not exchange._alarm.sleep(0.0)     # nothing to wait for any more
     exchange._wake_at = 20.0
     bench.hears('7F1#00', 10.004)
-    assert not exchange._alarm.ringing
+    assert not exchange._alarm.sleep(0.0)
     bench.hears('102001E0#0000000000000000', 10.005)
-    assert exchange._alarm.ringing            # the next cycle comes before that
+    assert exchange._alarm.sleep(0.0)         # the next cycle comes before that
 
 
 def test_age_of_a_frame_does_not_shorten_the_pause_after_an_eeprom_write() -> None:
