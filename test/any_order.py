@@ -290,10 +290,10 @@ class AnyOrder(RuleBasedStateMachine):
     def submit(self, request: ReadRequest | WriteRequest) -> None:
         waiting = len(self.open)
         self.open.append(request)
-        self.session.submit(request, self.now)
+        self.session.users.submit(request, self.now)
         refused = any(
             isinstance(event, RequestCompleted) and event.request is request
-            and Failure(BUSY) in event.outcomes for event in self.session._events)
+            and Failure(BUSY) in event.outcomes for event in self.session.report.events)
         possible = self.observer.active and self.observer.bus and len(request) > 0
         if refused or possible and waiting == 65:   # 64 wait; one more may be under way
             assert refused and possible and waiting in (64, 65)
@@ -303,10 +303,10 @@ class AnyOrder(RuleBasedStateMachine):
 
     @rule(action=st.sampled_from(ControlAction))
     def control(self, action: ControlAction) -> None:
-        refusal = self.session.control_refusal(action)
+        refusal = self.session.users.control_refusal(action)
         request = ControlRequest(action)
         self.control_requests.append(request)
-        self.session.submit(request, self.now)
+        self.session.users.submit(request, self.now)
         if not refusal:
             assert self.observer.active
             self.wanted(action)
@@ -426,7 +426,7 @@ class AnyOrder(RuleBasedStateMachine):
     def counts_are_right(self) -> None:
         if self.session is None:
             return
-        assert self.session.waiting_requests <= 64
+        assert self.session.users.waiting <= 64
         assert self.session.online == self.observer.online or not self.observer.active
         if not self.observer.bus:
             assert not self.session.online

@@ -226,7 +226,7 @@ def test_ros_packages_are_declared() -> None:
 #: lines that a module has at most
 LINES_MAX = 400
 #: those that have more, and how many: they may shrink, and leave this table
-LARGER = {'core/session.py': 594, 'protocols/canopen_pkw/session.py': 465}
+LARGER = {'protocols/canopen_pkw/session.py': 465}
 #: steps from a class to the base of all its ancestors
 STEPS_MAX = 2
 

@@ -93,7 +93,7 @@ class DirectDrive(Drive):
 
     def role(self, name: str) -> Role | None:
         parameter = self.find(name)
-        return None if parameter is None else self._session.role(parameter)
+        return None if parameter is None else self._session.roles.role(parameter)
 
     def check(self, name: str, value: object) -> str:
         parameter = self.find(name)
@@ -105,7 +105,7 @@ class DirectDrive(Drive):
                 return 'control word: only a running bridge sends it'
             if owner is not None and owner[0] is Role.CYCLIC:
                 return f'setpoint {owner[1].name}: only a running bridge sends it'
-            refusal = self._session.write_refusal(parameter)
+            refusal = self._session.users.write_refusal(parameter)
             if refusal:
                 return refusal
         try:
@@ -167,7 +167,7 @@ class DirectDrive(Drive):
         """
         known: dict[Parameter, Outcome] = {}
         listed = [each for each in self.parameters.values()
-                  if each.readable and self._session.cells(each)]
+                  if each.readable and self._session.roles.cells(each)]
         candidates = dict.fromkeys([*wanted[:1], *listed[:TRIES], *wanted])
         outcome: Outcome = Failure(NO_ANSWER_OFFLINE)
         for candidate in list(candidates)[:TRIES]:

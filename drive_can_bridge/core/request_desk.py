@@ -5,8 +5,11 @@ from collections.abc import Callable
 from typing import Protocol
 
 from drive_can_bridge.core.events import RequestCompleted
-from drive_can_bridge.core.requests import Failure, Outcomes, Request
+from drive_can_bridge.core.requests import BUSY, Failure, Outcomes, Request
 from drive_can_bridge.core.statistics import DriveStatistics
+
+#: requests of one drive that may wait behind the one being served
+WAITING_REQUESTS_MAX = 64
 
 
 class RequestServer(Protocol):
@@ -25,16 +28,21 @@ class RequestServer(Protocol):
 
 class RequestDesk:
     """
-    Has requests served, and sees that each is answered exactly once.
+    Takes requests, has them served, and sees that each is answered exactly once.
 
     :param emit: takes the answers.
+    :param refusal: (now) -> why none are taken; '' if they are.
+    :param answered: called after an answer, unless the request failed with all others.
     """
 
     def __init__(self, server: RequestServer, statistics: DriveStatistics,
-                 emit: Callable[[RequestCompleted], None]) -> None:
+                 emit: Callable[[RequestCompleted], None], *, refusal: Callable[[float], str],
+                 answered: Callable[[Request, Outcomes], None]) -> None:
         self._server = server
         self._statistics = statistics
         self._emit = emit
+        self._refusal = refusal
+        self._answered = answered
         self._open: list[Request] = []
 
     @property
@@ -42,34 +50,36 @@ class RequestDesk:
         """How many requests wait behind the one being served."""
         return self._server.waiting
 
-    def serve(self, request: Request, answered: Callable[[Request, Outcomes], None],
-              now: float) -> None:
-        """
-        Have a request served.
-
-        :param answered: called after its answer, unless it fails with all others.
-        """
-        def done(outcomes: Outcomes) -> None:
-            self._open.remove(request)
-            self.complete(request, outcomes)
-            answered(request, outcomes)
-
-        self._open.append(request)
-        self._server.serve(request, done, now)
+    def submit(self, request: Request, now: float) -> None:
+        """Take a request; it is answered by exactly one ``RequestCompleted``."""
+        refusal = self._refusal(now)
+        if not refusal and self.waiting >= WAITING_REQUESTS_MAX:
+            refusal = BUSY
+        if refusal:
+            self._refuse(request, refusal)
+        elif not len(request):
+            self._complete(request, ())
+        else:
+            self._open.append(request)
+            self._server.serve(request, lambda outcomes: self._done(request, outcomes), now)
 
     def fail_all(self, reason: str) -> None:
         """Forget what is under way, and answer it."""
         self._server.cancel()
         requests, self._open = self._open, []
         for request in requests:
-            self.refuse(request, reason)
+            self._refuse(request, reason)
 
-    def refuse(self, request: Request, reason: str) -> None:
+    def _done(self, request: Request, outcomes: Outcomes) -> None:
+        self._open.remove(request)
+        self._complete(request, outcomes)
+        self._answered(request, outcomes)
+
+    def _refuse(self, request: Request, reason: str) -> None:
         """Answer a request with the same failure for every name."""
-        self.complete(request, (Failure(reason),) * len(request))
+        self._complete(request, (Failure(reason),) * len(request))
 
-    def complete(self, request: Request, outcomes: Outcomes) -> None:
-        """Answer a request."""
+    def _complete(self, request: Request, outcomes: Outcomes) -> None:
         for outcome in outcomes:
             if isinstance(outcome, Failure):
                 self._statistics.requests_failed += 1

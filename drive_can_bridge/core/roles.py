@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Who a drive's parameters belong to, by what they address.
+Who a drive's parameters belong to, by what they address, and so which of them users may write.
 
 A name says little: a profile may list one parameter twice, a raw name reaches it as well, and a
 double word covers its neighbour. So each family says which *cells* of the drive a parameter
@@ -8,10 +8,12 @@ addresses (words of its memory, by whatever marks them), and what shares a cell 
 word, a setpoint or a map is the bridge's own.
 """
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable
 from enum import Enum
 
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.process_image import control_word
 
 #: what a parameter addresses; empty: nothing that acyclic frames reach
 Cells = frozenset[Hashable]
@@ -25,22 +27,40 @@ class Role(Enum):
     MAP = 'map'
 
 
+def by_number(parameter: Parameter) -> Cells:
+    """Return what a parameter addresses where its number says it all."""
+    return frozenset() if parameter.number is None else frozenset([parameter.number])
+
+
+def publish_it(parameter: Parameter) -> str:
+    """Say why a setpoint is not written by request."""
+    return f'sent cyclically: publish ~/command/{parameter.name}'
+
+
 class Roles:
     """
     What the bridge itself writes on one drive.
 
+    :param controlled: a control machine looks after the control word.
     :param cells: what a parameter addresses.
-    :param control: the parameter of the control word, if acyclic frames reach it.
-    :param cyclic: what is sent cyclically.
     :param maps: what tells the drive how cyclic telegrams are to be read.
+    :param cyclic_refusal: why a setpoint is not written by request.
+    :param refusal: why a parameter that is nobody's cannot be written for other reasons.
     """
 
-    def __init__(self, cells: Callable[[Parameter], Cells], *, control: Parameter | None,
-                 cyclic: Sequence[Parameter], maps: Cells = frozenset()) -> None:
-        self._cells = cells
+    def __init__(self, drive: DriveConfiguration, *, controlled: bool,
+                 cells: Callable[[Parameter], Cells] = by_number, maps: Cells = frozenset(),
+                 cyclic_refusal: Callable[[Parameter], str] = publish_it,
+                 refusal: Callable[[Parameter], str] = lambda parameter: '') -> None:
+        self.cells = cells
+        self._cyclic_refusal = cyclic_refusal
+        self._further_refusal = refusal
+        control = control_word(drive, controlled=controlled)
         own = [] if control is None else [(Role.CONTROL, control)]
-        own += [(Role.CYCLIC, parameter) for parameter in cyclic if parameter is not control]
+        own += [(Role.CYCLIC, parameter) for parameter in drive.cyclic_request
+                if parameter is not control]
         self._own = [(role, parameter, cells(parameter)) for role, parameter in own]
+        self._received = [(parameter, cells(parameter)) for parameter in drive.cyclic_response]
         self._maps = maps
 
     def owner(self, parameter: Parameter) -> tuple[Role, Parameter] | None:
@@ -49,8 +69,33 @@ class Roles:
 
         The control word goes before setpoints, and those before maps; None: users may have it.
         """
-        cells = self._cells(parameter)
+        cells = self.cells(parameter)
         for role, other, others in self._own:
             if parameter == other or cells & others:
                 return role, other
         return (Role.MAP, parameter) if cells & self._maps else None
+
+    def role(self, parameter: Parameter) -> Role | None:
+        """Say what the bridge uses a parameter for that users cannot set for that reason."""
+        owner = self.owner(parameter)
+        if owner is not None:
+            return owner[0]
+        cells = self.cells(parameter)
+        received = not parameter.writable and any(
+            parameter == other or cells & others for other, others in self._received)
+        return Role.CYCLIC if received else None
+
+    def write_refusal(self, parameter: Parameter, *, exchanging: bool) -> str:
+        """
+        Say why users may not write a parameter; '' if they may.
+
+        :param exchanging: the bridge is in exchange with the drive, and needs its maps.
+        """
+        role, own = self.owner(parameter) or (None, parameter)
+        if role is Role.CONTROL:
+            return 'use ~/enable'
+        if role is Role.CYCLIC:
+            return self._cyclic_refusal(own)
+        if role is Role.MAP and exchanging:
+            return 'mapping parameter: not written while the bridge is active'
+        return self._further_refusal(parameter)

@@ -218,7 +218,7 @@ class BusExchange:
         member = self._member(session)
         with self.lock:
             now = self._clock()
-            session.submit(request, now)
+            session.users.submit(request, now)
             self._pump(member)
         self._ring_if_sooner(member)
 

@@ -12,6 +12,13 @@ import math
 STOP_WAIT_MAX = 0.025
 #: s between two cycles at least, however much a stop hurries
 CYCLE_SPACING_MIN = 0.005
+#: s between two cycles of a stop, or of a pulse, at most, however long the period is
+STOP_SPACING_MAX = 0.1
+
+
+def stop_spacing(period: float) -> float:
+    """Return how many s lie between two cycles, or writes, of a stop or of a pulse."""
+    return min(period, STOP_SPACING_MAX)
 
 
 class CycleTimer:
@@ -20,13 +27,15 @@ class CycleTimer:
 
     :ivar due: when the next one is to begin; infinity: never.
     :ivar began_at: when the last one did.
+    :ivar stop_spacing: s between two cycles of a stop, or of a pulse.
     """
 
-    __slots__ = ('_in_pace', '_period', 'began_at', 'due')
+    __slots__ = ('_in_pace', '_period', 'began_at', 'due', 'stop_spacing')
 
     def __init__(self, period: float) -> None:
         self.due = math.inf
         self.began_at = -math.inf
+        self.stop_spacing = stop_spacing(period)
         self._period = period
         self._in_pace = False   # the last one was due a period ago: its distance says something
 

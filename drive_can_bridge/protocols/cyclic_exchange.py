@@ -12,9 +12,11 @@ import math
 from typing import Generic, TypeVar
 
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.core.session import Session, STOP_CYCLES
+from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.exchange_book import ExchangeBook
 
+#: cyclic frames with neutral setpoints that are sent before a drive is left alone
+STOP_CYCLES = 3
 #: what the drive is told by cycles, for the books of what it was told
 CYCLE = 'cycle'
 
@@ -60,13 +62,13 @@ class CyclicExchange(Generic[TelegramT]):
     def begin(self, now: float) -> TelegramT:
         """Begin a cycle: return what is to be sent now. The fast path of the timer."""
         session = self._session
-        session.expire(now)
+        session.gate.expire(now)
         control = session.control
         telegram = self._telegram
         if (session.setpoints.changed or telegram is None
                 or control is not None and control.word != self.word):
             telegram = self._telegram = self._make()
-        self._book.begin(now, session.stop_spacing if self.cycles_left >= 0 else None)
+        self._book.begin(now, self._timer.stop_spacing if self.cycles_left >= 0 else None)
         self._frames_out = 0
         self.whole = True
         return telegram
@@ -118,7 +120,7 @@ class CyclicExchange(Generic[TelegramT]):
             if fresh or control.word != self.word:
                 session.control_changed(now)
             if control.pulsing:
-                self._timer.no_later(now + session.stop_spacing)
+                self._timer.no_later(now + self._timer.stop_spacing)
         if self._told is not None:
             self._told()
         if self.cycles_left > 0:
@@ -126,11 +128,23 @@ class CyclicExchange(Generic[TelegramT]):
             if self.cycles_left == 0:
                 self._ended(now)
 
+    def next_turn(self, earliest: float) -> float:
+        """Return the time from ``earliest`` on at which cycles may begin."""
+        phase = self._session.phase
+        if phase is None:
+            return earliest
+        return earliest + (phase - earliest) % self._session.configuration.period
+
     # -- the end ----------------------------------------------------------------------------------
+
+    @property
+    def longest_stop(self) -> float:
+        """How many s the last cycles before silence take at most."""
+        return STOP_CYCLES * self._timer.stop_spacing
 
     def stop_soon(self, now: float) -> None:
         """Let the last cycles before silence follow soon."""
-        soon = max(now, self._timer.began_at + self._session.stop_spacing)
+        soon = max(now, self._timer.began_at + self._timer.stop_spacing)
         if self._timer.due < math.inf:
             self.cycles_left = STOP_CYCLES
             self._timer.no_later(soon)

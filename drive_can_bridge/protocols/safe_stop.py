@@ -54,5 +54,5 @@ class SafeStop(Generic[StepT, ReplyT]):
             confirmed()
         elif self._owed or self._insisting:
             tail = f': {MAY_RUN}' if self._owed else ''
-            self._session.warn(f'told to stop, but {"; ".join(failed)}{tail}')
+            self._session.report.warn(f'told to stop, but {"; ".join(failed)}{tail}')
         self._ended()

@@ -10,8 +10,8 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
+from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.frame import STUFFING
-from drive_can_bridge.core.session import DriveState
 from drive_can_bridge.core.statistics import Statistic
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.core.words import value_text

@@ -121,7 +121,7 @@ class DriveNode:
         directory = ParameterDirectory(drive.profile.parameters,
                                        lambda name: family.raw_parameter(drive, name))
         ParameterServices(self.node, directory, clock, submit=self._submit,
-                          write_refusal=session.write_refusal, role=session.role,
+                          write_refusal=session.users.write_refusal, role=session.roles.role,
                           active=lambda: session.active, failed=self._parameter_failed)
         if session.control is not None:
             self._control = ControlServices(

@@ -14,7 +14,7 @@ from rclpy.task import Future
 from std_srvs.srv import Trigger
 
 from drive_can_bridge.core.configuration import BusConfiguration
-from drive_can_bridge.core.session import DriveState
+from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.ros.diagnostics import Report
 from drive_can_bridge.ros.drive_node import DriveNode

@@ -9,25 +9,27 @@ import pytest
 
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
 from drive_can_bridge.core.control_machine import ControlMachine
+from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.events import RequestCompleted, StationLost
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.requests import Failure, Request
-from drive_can_bridge.core.session import DriveState, Session
+from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.setpoints import CommandOutcome
+from drive_can_bridge.core.users import Users
 
 
 class Idle(Session):
     """Implements what has to be, and keeps what it is given."""
 
     waiting = 0
-    offline_advice = ''
     stopped = True
+    longest_stop = 0.0
 
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
         self.done: list[str] = []
-        self.serve_by(self.Server(self))
+        self.users = Users(self, self.Server(self))
 
     class Server:
         """Lets everybody wait."""
@@ -52,14 +54,14 @@ class Idle(Session):
         raise NotImplementedError
 
     def begin(self, now: float) -> None:
-        self.done.append(f'begin at {now:g}, {self._advice}')
+        self.done.append(f'begin at {now:g}, {self.report.advice}')
         self.online = True
 
     def go_idle(self, advice: str) -> None:
         self.done.append(f'idle: {advice}')
 
     def lost(self, now: float, *, was_online: bool) -> None:
-        self.done.append(f'lost: {self._advice}')
+        self.done.append(f'lost: {self.report.advice}')
 
     def time_lost(self, now: float) -> None:
         raise NotImplementedError
@@ -102,7 +104,7 @@ def test_loss_of_the_bus() -> None:
     assert made.done == ['cancel', 'lost: bus down: unplugged', 'idle: bus down: unplugged']
     assert made.take_events() == [StationLost('bus down: unplugged')]
     assert made.take_frames() == []
-    made.submit(read(GAIN), 5.0)
+    made.users.submit(read(GAIN), 5.0)
     assert [event.outcomes for event in made.take_events()] == [(Failure('bus down'),)]
 
 
@@ -111,13 +113,13 @@ def test_refusals_in_order() -> None:
     reasons = []
     for change in (lambda: None, lambda: made.activate(1.0), lambda: made.bus_up(2.0)):
         change()
-        made.submit(read(GAIN), 3.0)
+        made.users.submit(read(GAIN), 3.0)
         reasons += [event.outcomes for event in made.take_events()]
     assert reasons == [(Failure('bridge inactive'),), (Failure('bus down'),)]
     assert made.waiting == 1
     made.waiting = 63
-    made.submit(read(GAIN), 4.0)
-    made.submit(read(GAIN, SPEED), 4.0)
+    made.users.submit(read(GAIN), 4.0)
+    made.users.submit(read(GAIN, SPEED), 4.0)
     assert [event.outcomes for event in made.take_events()] == [(Failure('busy'),) * 2]
     assert made.statistics.requests_failed == 4
 
@@ -127,7 +129,7 @@ def test_empty_request_is_answered_at_once() -> None:
     made.activate(1.0)
     made.bus_up(1.0)
     empty = read()
-    made.submit(empty, 2.0)
+    made.users.submit(empty, 2.0)
     assert made.take_events() == [RequestCompleted(empty, ())]
     assert made.waiting == 0
 
@@ -148,14 +150,14 @@ def test_states() -> None:
     assert made.control is not None
     made.activate(0.5)
     made.bus_available = True
-    made.submit(ControlRequest(ControlAction.ENABLE), 1.0)
+    made.users.submit(ControlRequest(ControlAction.ENABLE), 1.0)
     for raw in (1, 3):
-        assert made.command(0, 1.0, 1.0) is CommandOutcome.DISABLED
+        assert made.users.command(0, 1.0, 1.0) is CommandOutcome.DISABLED
         made.control.word_sent(1.0)
         made.control.status_received(raw, 1.0)
         made.control_changed(1.0)
     assert made.state is DriveState.NOT_ARMED
-    assert made.command(0, 1.0, 1.0) is CommandOutcome.ARMED
+    assert made.users.command(0, 1.0, 1.0) is CommandOutcome.ARMED
     assert made.state is DriveState.ONLINE
     made.control.status_received(8, 1.0)
     assert made.state is DriveState.FAULT
@@ -166,19 +168,19 @@ def test_states() -> None:
 def test_control_word_that_no_control_uses_is_a_setpoint() -> None:
     plain = session(request=(WORD, SPEED))
     assert [item.parameter for item in plain.setpoints.items] == [WORD, SPEED]
-    assert plain.write_refusal(WORD) == 'sent cyclically: publish ~/command/control_word'
+    assert plain.users.write_refusal(WORD) == 'sent cyclically: publish ~/command/control_word'
     controlled = session(request=(WORD, SPEED), control=CONTROL)
-    assert controlled.write_refusal(WORD) == 'use ~/enable'
-    assert session(control=CONTROL).write_refusal(WORD) == 'use ~/enable'
-    assert controlled.write_refusal(STATUS) == ''
+    assert controlled.users.write_refusal(WORD) == 'use ~/enable'
+    assert session(control=CONTROL).users.write_refusal(WORD) == 'use ~/enable'
+    assert controlled.users.write_refusal(STATUS) == ''
 
 
 def test_refused_commands_are_counted() -> None:
     made = session()
     for value in (math.nan, 1e9, True):
         with pytest.raises(ValueRefused):
-            made.command(0, value, 1.0)
-    made.command(0, 5.0, 1.0)
+            made.users.command(0, value, 1.0)
+    made.users.command(0, 5.0, 1.0)
     assert made.statistics.commands_refused == 3
 
 
@@ -186,7 +188,7 @@ def test_a_command_of_any_size_is_refused_not_a_defect() -> None:
     made = session(request=(parameter('free', 60, scale=0.01),))
     for value in (1.7e308, -1.7e308):
         with pytest.raises(ValueRefused):
-            made.command(0, value, 1.0)
+            made.users.command(0, value, 1.0)
     assert made.statistics.commands_refused == 2
 
 
@@ -202,10 +204,10 @@ def test_reconfigure_changes_what_is_named() -> None:
 def test_control_requests_need_a_drive() -> None:
     made = session(control=CONTROL)
     made.active = made.bus_available = made.online = True
-    made.submit(ControlRequest(ControlAction.DISABLE), 1.0)
+    made.users.submit(ControlRequest(ControlAction.DISABLE), 1.0)
     assert made.take_events() == [], 'it waits for the drive'
     request = ControlRequest(ControlAction.DISABLE)
     without = session()
-    without.submit(request, 1.0)
+    without.users.submit(request, 1.0)
     assert without.take_events() == [
         ControlCompleted(request, False, 'the profile has no control section')]

@@ -56,7 +56,7 @@ class DriveNotes:
         if self.failing:
             raise ZeroDivisionError('a defect')
         for index, value in self.commands:
-            self.session.command(index, value, now)
+            self.session.users.command(index, value, now)
         self.commands.clear()
 
     def request_sent(self, now: float) -> None:

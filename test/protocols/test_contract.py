@@ -20,6 +20,7 @@ import pytest
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.events import (
     FrameRejected, Noted, ProcessDataReceived, RequestCompleted, SetpointsExpired, StationFound,
@@ -27,7 +28,6 @@ from drive_can_bridge.core.events import (
 )
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.core.session import DriveState
 from drive_can_bridge.core.setpoints import CommandOutcome
 from drive_can_bridge.protocols.families import FAMILIES
 
@@ -628,7 +628,7 @@ def test_requests_end_with_the_bus_or_with_activity(partner: Partner) -> None:
 
 
 def test_what_users_may_not_write(partner: Partner) -> None:
-    refusal = partner.talk.session.write_refusal
+    refusal = partner.talk.session.users.write_refusal
     assert refusal(partner.own(SPEED)) == 'sent cyclically: publish ~/command/speed_setpoint'
     assert [refusal(partner.own(parameter)) for parameter in (GAIN, RAMP, ORDER, LIMIT)] == [
         ''] * 4

@@ -152,7 +152,7 @@ def test_no_read_ever_gives_what_was_overwritten(kind: type[Partner], seed: int)
                 if chance.random() < 0.5 else
                 ReadRequest(tuple(chance.sample(REGISTERS, chance.randint(1, 2)))))
             submitted[id(request)] = now
-            session.submit(request, now)
+            session.users.submit(request, now)
         for frame in session.take_frames():
             partner.hear(frame, now)
         session.frames_left(now)

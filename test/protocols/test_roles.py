@@ -52,29 +52,29 @@ def test_another_name_of_a_setpoint(family: str) -> None:
     one, = make_sessions([drive(family, table=table, request=table[:1],
                                 response=(partner.own(ACTUAL),))])
     for name in ('speed_setpoint', 'jog', partner.raw_name(50)):
-        assert one.write_refusal(raw(one, name)) == CYCLIC, name
-        assert one.role(raw(one, name)) is Role.CYCLIC, name
+        assert one.users.write_refusal(raw(one, name)) == CYCLIC, name
+        assert one.roles.role(raw(one, name)) is Role.CYCLIC, name
     for name in ('gain', partner.raw_name(40)):
-        assert one.write_refusal(raw(one, name)) == '', name
-        assert one.role(raw(one, name)) is None, name
+        assert one.users.write_refusal(raw(one, name)) == '', name
+        assert one.roles.role(raw(one, name)) is None, name
     # what is received is nobody's business, unless it cannot be written anyway
-    assert one.role(raw(one, 'speed')) is Role.CYCLIC
-    assert one.write_refusal(raw(one, 'speed')) == ''
+    assert one.roles.role(raw(one, 'speed')) is Role.CYCLIC
+    assert one.users.write_refusal(raw(one, 'speed')) == ''
 
 
 @pytest.mark.parametrize('family', [*DATAMODEL, 'canopen_pkw'])
 def test_another_name_of_the_control_word(family: str) -> None:
     one = session(family, WORD_ALIAS)
     for name in ('control_word', 'start', 'p52'):
-        assert one.write_refusal(raw(one, name)) == 'use ~/enable', name
-        assert one.role(raw(one, name)) is Role.CONTROL, name
+        assert one.users.write_refusal(raw(one, name)) == 'use ~/enable', name
+        assert one.roles.role(raw(one, name)) is Role.CONTROL, name
 
 
 def test_a_double_word_that_covers_one_of_ours() -> None:
     one = session('canopen_pkw', WIDE_WORD, WIDE_BEFORE, WIDE_SPEED)
-    assert one.write_refusal(raw(one, 'wide_word')) == 'use ~/enable'
-    assert one.write_refusal(raw(one, 'wide_before')) == 'use ~/enable'
-    assert one.write_refusal(raw(one, 'wide_speed')) == CYCLIC
+    assert one.users.write_refusal(raw(one, 'wide_word')) == 'use ~/enable'
+    assert one.users.write_refusal(raw(one, 'wide_before')) == 'use ~/enable'
+    assert one.users.write_refusal(raw(one, 'wide_speed')) == CYCLIC
 
 
 def test_a_word_inside_one_of_ours() -> None:
@@ -83,7 +83,7 @@ def test_a_word_inside_one_of_ours() -> None:
     one, = make_sessions([drive('canopen_pkw', table=(*TABLE, wide, low), request=(wide,),
                                 response=(ACTUAL,))])
     for name in ('position', 'position_low', 'p60', 'p61'):
-        assert one.write_refusal(raw(one, name)) == (
+        assert one.users.write_refusal(raw(one, name)) == (
             'sent cyclically: publish ~/command/position'), name
 
 
@@ -95,14 +95,14 @@ def test_a_register_and_its_object() -> None:
     one, = make_sessions([drive('canopen_pkw', table=(*TABLE, word, by_object), control=table,
                                 request=(SPEED,), response=(ACTUAL,))])
     for name in ('p704', 'x2008.5', 'by_object'):
-        assert one.write_refusal(raw(one, name)) == 'use ~/enable', name
+        assert one.users.write_refusal(raw(one, name)) == 'use ~/enable', name
 
 
 def test_the_first_element_of_an_array_is_the_parameter_itself() -> None:
     one = session('cannord', control=False)
     for name in ('p50', 'p50.0'):
-        assert one.write_refusal(raw(one, name)) == CYCLIC, name
-    assert one.write_refusal(raw(one, 'p50.1')) == ''
+        assert one.users.write_refusal(raw(one, name)) == CYCLIC, name
+    assert one.users.write_refusal(raw(one, 'p50.1')) == ''
     assert not raw(one, 'p209.0').writable
     assert raw(one, 'p209.1').writable
 
@@ -112,19 +112,19 @@ def test_maps(family: str) -> None:
     copy = parameter('map_of_slot_2', 123)
     one = session(family, copy, control=False)
     for name in ('p122', 'map_of_slot_2', 'p129'):
-        assert one.role(raw(one, name)) is Role.MAP
-        assert one.write_refusal(raw(one, name)) == ''
+        assert one.roles.role(raw(one, name)) is Role.MAP
+        assert one.users.write_refusal(raw(one, name)) == ''
         one.active = True
-        assert one.write_refusal(raw(one, name)) == (
+        assert one.users.write_refusal(raw(one, name)) == (
             'mapping parameter: not written while the bridge is active')
         one.active = False
-    assert one.role(raw(one, 'p121')) is one.role(raw(one, 'p130')) is None
+    assert one.roles.role(raw(one, 'p121')) is one.roles.role(raw(one, 'p130')) is None
 
 
 def test_process_data_without_a_number() -> None:
     frequency = parameter('frequency', None, storage=None)
     one, = make_sessions([drive('cannord', table=(*TABLE, frequency), request=(frequency,),
                                 response=(ACTUAL,))])
-    assert one.write_refusal(frequency) == 'sent cyclically: publish ~/command/frequency'
-    assert one.role(frequency) is Role.CYCLIC
-    assert one.role(WORD) is one.role(GAIN) is None
+    assert one.users.write_refusal(frequency) == 'sent cyclically: publish ~/command/frequency'
+    assert one.roles.role(frequency) is Role.CYCLIC
+    assert one.roles.role(WORD) is one.roles.role(GAIN) is None

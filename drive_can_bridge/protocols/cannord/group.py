@@ -19,11 +19,12 @@ import math
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.core.session import DRIVE_OFFLINE, STOP_CYCLES
+from drive_can_bridge.core.users import DRIVE_OFFLINE
 from drive_can_bridge.protocols.cannord.broadcast import broadcast_identifier
 from drive_can_bridge.protocols.cannord.control import make_control
 from drive_can_bridge.protocols.cannord.process_data import values_needed
 from drive_can_bridge.protocols.cannord.session import CannordSession
+from drive_can_bridge.protocols.cyclic_exchange import STOP_CYCLES
 
 
 def make_group(drives: Sequence[DriveConfiguration]) -> list[CannordSession]:
@@ -104,8 +105,7 @@ class Group:
     def member_lost(self, member: CannordSession) -> None:
         """Take note that an inverter of the group is offline."""
         self.control.member_lost(member.configuration.name)
-        self._leader.tell_notes()
-        self._leader.let_commands_through()
+        self._leader.gate.follow()
 
     def member_status(self, member: CannordSession, word: int, now: float) -> None:
         """Take the status word of an inverter that is led."""

@@ -12,6 +12,7 @@ from drive_can_bridge.core.requests import (
     Failure, NOT_SENT, Outcome, Outcomes, ReadValue, Written,
 )
 from drive_can_bridge.core.retry import RetryPolicy
+from drive_can_bridge.core.roles import Cells
 from drive_can_bridge.core.words import value_text
 from drive_can_bridge.protocols.access import Access, Found, Item
 from drive_can_bridge.protocols.cannord.channel import Ask, Reply
@@ -24,6 +25,17 @@ PROCESS_DATA_ONLY = 'exists in process data only'
 NOT_ATOMIC = ('cannot be written in one frame, nothing was written: a CANnord frame carries one '
               'parameter')
 _DOUBLE = (Response.DOUBLE, Response.ARRAY_DOUBLE)
+
+
+def cells(parameter: Parameter) -> Cells:
+    """Return what a parameter addresses: a task without sub-index acts on the first element."""
+    return (frozenset() if parameter.number is None
+            else frozenset([(parameter.number, parameter.subindex or 0)]))
+
+
+def write_refusal(parameter: Parameter) -> str:
+    """Say why no task writes a parameter; '' if one can."""
+    return PROCESS_DATA_ONLY if parameter.number is None else ''
 
 
 class TaskAccess(Access[Parameter, Ask, Reply]):

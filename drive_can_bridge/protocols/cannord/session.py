@@ -16,6 +16,7 @@ is a sample like any other. Tasks of the parameter channel go out whenever there
 data beside them: lower identifiers win on the bus.
 """
 
+from dataclasses import replace
 import math
 from typing import TYPE_CHECKING
 
@@ -24,11 +25,10 @@ from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.events import ForeignMasterSeen, ProcessDataReceived
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.core.requests import Outcomes, Request
-from drive_can_bridge.core.roles import Cells
+from drive_can_bridge.core.process_image import ProcessImage
+from drive_can_bridge.core.roles import publish_it, Roles
 from drive_can_bridge.core.session import Session
-from drive_can_bridge.core.setpoints import Setpoints
+from drive_can_bridge.core.users import Users
 from drive_can_bridge.protocols.access import ChannelServer
 from drive_can_bridge.protocols.cannord import procedures
 from drive_can_bridge.protocols.cannord.channel import TaskChannel
@@ -62,13 +62,21 @@ class CannordSession(Session):
 
     def __init__(self, drive: DriveConfiguration, group: 'Group | None' = None) -> None:
         options, self._group = drive.options, group
-        self._led = group is not None and not group.is_leader(drive)
+        led_by = None if group is None or group.is_leader(drive) else group
+        self._led = led_by is not None
         self._member = drive.name if group is not None and not self._led else ''
         self._machine = group.control if group is not None and not self._led else make_control(
             parameter_set=options.parameter_set, timeout=drive.control_timeout)
-        super().__init__(drive, self._machine)
-        if self._led:
-            self.setpoints = Setpoints((), timeout=0.0, rearm_immediate=False)
+        image = ProcessImage.of(
+            drive, controlled=True, word=(CONTROL_PARAMETER,), status=(STATUS_PARAMETER,))
+        super().__init__(
+            drive, self._machine, image=replace(image, setpoints=()) if self._led else image,
+            roles=Roles(drive, controlled=True, cells=procedures.cells,
+                        refusal=procedures.write_refusal,
+                        cyclic_refusal=publish_it if led_by is None else led_by.cyclic_refusal),
+            leader=None if group is None else group.control)
+        if led_by is not None:
+            self.how_to_enable = led_by.how_to_enable
         self._extended: bool = options.extended_identifiers
         self.request_identifier, self._response_identifier, self._task_identifier, \
             self._task_response_identifier = (
@@ -89,8 +97,10 @@ class CannordSession(Session):
         # what only a master sends
         self._masters = {self.request_identifier, self._task_identifier,
                          group and group.broadcast}
-        self.serve_by(ChannelServer(self._channel, self._access))
-        self._timeout = TimeoutWatch(drive, self._channel, self._access, self.note)
+        self._timeout = TimeoutWatch(drive, self._channel, self._access, self.report.note)
+        self.users = Users(
+            self, ChannelServer(self._channel, self._access),
+            control_refusal=self._control_refusal, answered=self._timeout.request_answered)
         self._book = ExchangeBook(drive, self.statistics)
         self._timer = self._book.timer
         self._exchange = CyclicExchange(
@@ -102,14 +112,6 @@ class CannordSession(Session):
         self._extra_missing = False
         self._last_sample: tuple[int, ...] = ()
         self._answer_due = math.inf
-
-    @property
-    def builtin_parameters(self) -> tuple[Parameter, ...]:
-        return (STATUS_PARAMETER,)
-
-    @property
-    def request_parameters(self) -> tuple[Parameter, ...]:
-        return (CONTROL_PARAMETER, *self.configuration.cyclic_request)
 
     # -- life cycle -------------------------------------------------------------------------------
 
@@ -126,10 +128,15 @@ class CannordSession(Session):
     def stopped(self) -> bool:
         return not self._cycling
 
+    @property
+    def longest_stop(self) -> float:
+        return self._exchange.longest_stop
+
     def time_lost(self, now: float) -> None:
         self._channel.time_lost(now)
         if self._cycling and not self._stopping:
             self.stood_still(now)
+            self.start_over(now)
 
     def begin(self, now: float) -> None:
         self._stopping = False
@@ -226,8 +233,8 @@ class CannordSession(Session):
             self._book.missed_in_row = 0
             if self.online:
                 self.lose(f'{NO_ANSWER} for {self.configuration.missed_limit} cycles', now)
-            self.advise(f'{NO_ANSWER}: drive silent, wrong station, bit rate or identifier '
-                        'format, or P509 not set to CAN')
+            self.report.advice = (f'{NO_ANSWER}: drive silent, wrong station, bit rate or '
+                                  'identifier format, or P509 not set to CAN')
 
     def _expect_nothing(self) -> None:
         """Expect no answer any more; one that is on its way is no surprise, though."""
@@ -240,7 +247,7 @@ class CannordSession(Session):
     def receive_frame(self, frame: Frame, now: float, age: float = 0.0) -> None:
         received, data, extended = frame
         if extended != self._extended:
-            self.reject(f'{frame}: not of this drive')
+            self.report.reject(f'{frame}: not of this drive')
         elif received == self._response_identifier:
             if len(data) == EXTRA_LENGTH:
                 self._receive_extra(data)
@@ -250,19 +257,19 @@ class CannordSession(Session):
             try:
                 self._channel.receive(data, now)
             except RemoteProtocolError as error:
-                self.reject(str(error))
+                self.report.reject(str(error))
         elif received in self._masters:
-            self.note(ForeignMasterSeen(
+            self.report.note(ForeignMasterSeen(
                 f'another master sends to station {self.configuration.station}: {frame}'))
         else:
-            self.reject(f'{frame}: not of this drive')
+            self.report.reject(f'{frame}: not of this drive')
 
     def _receive_main(self, data: bytes, now: float, received_at: float) -> None:
         """Take status word and actual values. The fast path of the reader."""
         try:
             word, values = decode_main(data, swap=self._swap)
         except RemoteProtocolError as error:
-            self.reject(str(error))
+            self.report.reject(str(error))
             return
         book = self._book
         asked = book.awaiting
@@ -271,7 +278,7 @@ class CannordSession(Session):
         elif not (is_faulted(word) and self.online):
             # a fault while offline is told again by the first exchange
             if not book.take_stale() and not is_faulted(word):
-                self.reject('process data that nobody asked for')
+                self.report.reject('process data that nobody asked for')
             return
         if not self.online and not self._stopping:
             self.be_online()
@@ -290,7 +297,7 @@ class CannordSession(Session):
         raws = (word, *(parameter.raw_from_word(value)
                         for parameter, value in zip(wanted, values)))
         if len(values) < len(wanted):
-            self.reject(f'process data with {len(values)} values, {len(wanted)} needed')
+            self.report.reject(f'process data with {len(values)} values, {len(wanted)} needed')
         elif asked and len(data) < self._length:
             self.statistics.short += 1
         if self._held is not None:      # its values 4 and 5 would come after these
@@ -306,7 +313,7 @@ class CannordSession(Session):
         """Take actual values 4 and 5."""
         if not self._awaiting_extra:
             if not self._book.take_stale():
-                self.reject('additional process data that nobody asked for')
+                self.report.reject('additional process data that nobody asked for')
             return
         self._awaiting_extra = False
         held, self._held = self._held, None
@@ -322,9 +329,9 @@ class CannordSession(Session):
             self._publish(held)
 
     def _publish(self, sample: ProcessDataReceived) -> None:
-        self.measured(sample.raws)
+        self.gate.measured(sample.raws)
         self._last_sample = (*sample.raws, *self._last_sample[len(sample.raws):])
-        self._events.append(sample)
+        self.report.note(sample)
 
     # -- parameters -------------------------------------------------------------------------------
 
@@ -334,20 +341,6 @@ class CannordSession(Session):
             if parameter.name == name:
                 return raw
         return None
-
-    def request_answered(self, request: Request, outcomes: Outcomes) -> None:
-        self._timeout.request_answered(request, outcomes)
-
-    def cells(self, parameter: Parameter) -> Cells:
-        # a task without sub-index acts on the first element
-        return (frozenset() if parameter.number is None
-                else frozenset([(parameter.number, parameter.subindex or 0)]))
-
-    def write_refusal(self, parameter: Parameter) -> str:
-        refusal = super().write_refusal(parameter)
-        if not refusal and parameter.number is None:
-            return procedures.PROCESS_DATA_ONLY
-        return refusal
 
     # -- timer ------------------------------------------------------------------------------------
 
@@ -377,23 +370,9 @@ class CannordSession(Session):
 
     # -- as one of a broadcast group --------------------------------------------------------------
 
-    @property
-    def operating(self) -> bool:
-        return (self._machine if self._group is None else self._group.control).operating
-
-    def control_refusal(self, action: ControlAction) -> str:
-        refusal = super().control_refusal(action)
+    def _control_refusal(self, action: ControlAction, refusal: str) -> str:
         return refusal if self._group is None else self._group.control_refusal(
             self, action, refusal)
-
-    def cyclic_refusal(self, parameter: Parameter) -> str:
-        return (self._group.cyclic_refusal(parameter) if self._group is not None and self._led
-                else super().cyclic_refusal(parameter))
-
-    @property
-    def how_to_enable(self) -> str:
-        return (self._group.how_to_enable if self._group is not None and self._led
-                else super().how_to_enable)
 
     def facts(self) -> dict[str, str]:
         return {} if self._group is None else {'broadcast': self._group.fact(self)}

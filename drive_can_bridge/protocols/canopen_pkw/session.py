@@ -34,8 +34,9 @@ from drive_can_bridge.core.events import (
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.core.roles import Cells
+from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.session import LOOKING, Session
+from drive_can_bridge.core.users import Users
 from drive_can_bridge.protocols.access import ChannelServer
 from drive_can_bridge.protocols.canopen import network
 from drive_can_bridge.protocols.canopen.node import Change, Node
@@ -80,36 +81,42 @@ class PkwSession(Session):
         control: ControlMachine | None = None
         if table is not None:
             control = ControlMachine(table, timeout=drive.control_timeout, pulse=1)
-        super().__init__(drive, control)
+        super().__init__(drive, control, roles=Roles(
+            drive, controlled=control is not None, cells=addresses.keys,
+            refusal=lambda parameter: '' if parameter.listed else addresses.half_refusal(
+                parameter, drive.profile)))
         options = drive.options
         self._identifiers = Identifiers.of(drive)
         self._layout = Layout(options.layout)
         self._addressing: str = options.addressing
         self._word_order: str = options.word_order
-        self._notes = PacedNotes(self.note)
+        self._notes = PacedNotes(self.report.note)
         self._node = Node(drive.station, nmt_start=options.nmt_start,
                           heartbeat_timeout=options.heartbeat_timeout)
         self._channel = MailboxChannel(MailboxCourier(
             self._send, order=options.abort_code_order, retry=self.retry))
-        self.serve_by(ChannelServer(self._channel, procedures.RegisterAccess(
-            self.retry, addressing=self._addressing, word_order=self._word_order)))
+        self.users = Users(
+            self, ChannelServer(self._channel, procedures.RegisterAccess(
+                self.retry, addressing=self._addressing, word_order=self._word_order)),
+            blocked=self._blocked, control_refusal=self._control_refusal)
         self._stop: SafeStop[Step, Reply] = SafeStop(self, self._channel, self._stop_ended)
         self._setpoint_writer = SetpointWriter(
-            self._channel, self.setpoints, self.warn, self.told, addressing=self._addressing,
+            self._channel, self.setpoints, self.report.warn, self.told,
+            addressing=self._addressing,
             word_order=self._word_order, refresh=options.refresh_interval)
         self._control_writer: ControlWriter | None = None
         self._status: Parameter | None = None
         if control is not None and table is not None:
             word = drive.profile.parameters[table.parameter]
             self._control_writer = ControlWriter(
-                self._channel, control, word, self.control_changed, self.warn, self.told,
+                self._channel, control, word, self.control_changed, self.report.warn, self.told,
                 disable=table.disable, addressing=self._addressing,
                 word_order=self._word_order,
                 refresh=options.refresh_interval if word in drive.cyclic_request else 0.0)
             self._status = drive.profile.parameters.get(table.status_parameter or '')
         self._writes = SentWrites(
             self.sent, addressing=self._addressing, word_order=self._word_order)
-        self._round = Round(drive, self._status, self.warn)
+        self._round = Round(drive, self._status, self.report.warn)
         self._book = ExchangeBook(drive, self.statistics)
         self._timer = self._book.timer
         self._phase = Phase.IDLE
@@ -149,7 +156,7 @@ class PkwSession(Session):
             self._stop_confirmed, now, insist=self._phase is Phase.STOPPING)
 
     def _stop_confirmed(self) -> None:
-        if not self.mute:
+        if not self.gate.mute:
             self.told.stopped()
 
     def _stop_ended(self) -> None:
@@ -176,9 +183,10 @@ class PkwSession(Session):
         self._channel.time_lost(now)
         if self._phase is Phase.RUNNING:
             self.stood_still(now)
+            self.start_over(now)
 
     def begin(self, now: float) -> None:
-        self.advise(LOOKING)
+        self.report.advice = LOOKING
         self._phase = Phase.RUNNING
         self._forget_exchange()
         self._round.start_over()
@@ -239,7 +247,7 @@ class PkwSession(Session):
         """
         self._send_nmt()    # a stop that comes before it is lost
         self.lose(reason, now)
-        self.fail_requests(answer)
+        self.users.fail_all(answer)
         if self._channel.is_idle(Lane.STOP):
             self._channel.clear()
             self._stop_if_owed(now)
@@ -284,16 +292,16 @@ class PkwSession(Session):
         if not self.online:
             if self._node.heartbeat_lost:
                 return
-            self.measured(raws)   # before anything is written
+            self.gate.measured(raws)   # before anything is written
             self._found(now)
             self._take_status(words)
             self.control_changed(now)
             self._status_known = False
-        self.measured(raws)
+        self.gate.measured(raws)
         if None in raws:
             return  # something was refused: there is no complete sample
         self._book.answered(self._received_at)
-        self.note(ProcessDataReceived(
+        self.report.note(ProcessDataReceived(
             tuple(raw for raw in raws if raw is not None), self._received_at))
 
     def _miss(self, now: float) -> None:
@@ -303,10 +311,10 @@ class PkwSession(Session):
             limit = self.configuration.missed_limit
             self._leave_alone(f'no complete round of reads for {limit} periods', now)
         elif not self._node.heartbeat_lost:
-            self.advise(SILENT)
+            self.report.advice = SILENT
 
     def _write_expired(self, now: float) -> None:
-        if self.expire(now):
+        if self.gate.expire(now):
             self._setpoint_writer.look(now)
 
     # -- frames -----------------------------------------------------------------------------------
@@ -334,7 +342,7 @@ class PkwSession(Session):
                 self._received_at = now - age
                 message = pkw.decode(data, self._layout)
                 if not self._channel.receive(message, now):
-                    self.reject(f'PKW response that nobody asked for: {message}')
+                    self.report.reject(f'PKW response that nobody asked for: {message}')
             elif identifier == identifiers.heartbeat:
                 self._heartbeat(network.decode_heartbeat(data), now)
             elif identifier == identifiers.emergency:
@@ -344,11 +352,11 @@ class PkwSession(Session):
                     self._notes.note('emergency' if ails else 'emergency over', text, now,
                                      warning=ails)
             elif identifier == identifiers.request:
-                self.note(ForeignMasterSeen(
+                self.report.note(ForeignMasterSeen(
                     f'another master sends PKW requests to node {self.configuration.station}: '
                     f'{frame}'))
         except RemoteProtocolError as error:
-            self.reject(str(error))
+            self.report.reject(str(error))
 
     def _heartbeat(self, state: network.NmtState, now: float) -> None:
         running = self._phase is Phase.RUNNING
@@ -360,7 +368,7 @@ class PkwSession(Session):
         if change is Change.RESTARTED:
             self._notes.note('boot-up', 'boot-up: the device has started', now)
             self._cut_off('the device restarted', 'no answer: the device restarted', now)
-            self.advise('the device restarted: waiting for it to answer')
+            self.report.advice = 'the device restarted: waiting for it to answer'
         elif change is Change.NOT_OPERATIONAL:
             text = self._node.refusal(now)
             self._cut_off(text, f'drive offline: {text}', now)
@@ -409,13 +417,13 @@ class PkwSession(Session):
 
     # -- control ----------------------------------------------------------------------------------
 
-    def control_refusal(self, action: ControlAction) -> str:
+    def _control_refusal(self, action: ControlAction, refusal: str) -> str:
         if action is ControlAction.ENABLE:
             for setpoint in self.setpoints.held:    # the drive has another position than this
-                refusal = self._setpoint_writer.refusals.get(setpoint.parameter.name)
-                if refusal:
-                    return f'it would jump: write of {refusal}'
-        return super().control_refusal(action)
+                refused = self._setpoint_writer.refusals.get(setpoint.parameter.name)
+                if refused:
+                    return f'it would jump: write of {refused}'
+        return refusal
 
     def see_to_control_word(self, now: float) -> None:
         if not self.online:
@@ -428,18 +436,9 @@ class PkwSession(Session):
 
     # -- users ------------------------------------------------------------------------------------
 
-    def request_refusal(self, now: float) -> str:
+    def _blocked(self, now: float) -> str:
         blocked = self._node.refusal(now) if self._phase is Phase.RUNNING else ''
         return f'drive offline: {blocked}' if blocked else ''
-
-    def cells(self, parameter: Parameter) -> Cells:
-        return addresses.keys(parameter)
-
-    def write_refusal(self, parameter: Parameter) -> str:
-        refusal = super().write_refusal(parameter)
-        if refusal or parameter.listed:
-            return refusal
-        return addresses.half_refusal(parameter, self.configuration.profile)
 
     # -- state ------------------------------------------------------------------------------------
 

@@ -12,7 +12,9 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.roles import Cells
 from drive_can_bridge.core.session import Session
+from drive_can_bridge.core.users import Users
 from drive_can_bridge.protocols.access import ChannelServer
+from drive_can_bridge.protocols.cycle_timer import stop_spacing
 from drive_can_bridge.protocols.datamodel import procedures
 from drive_can_bridge.protocols.datamodel.acyclic_control import CONTROL_WORD, make_acyclic_control
 from drive_can_bridge.protocols.datamodel.channel import (
@@ -55,7 +57,7 @@ class AcyclicSide:
             encode_read=encode_read, encode_write=encode_write, send=session.outbox.put,
             wrote=self._note_write, retry=session.retry,
             eeprom_gap=options.eeprom_write_gap, polling=polling)
-        session.serve_by(ChannelServer(self.channel, procedures.ParameterAccess(
+        session.users = Users(session, ChannelServer(self.channel, procedures.ParameterAccess(
             session.retry, verify=drive.verify_writes, offset=self.offset, together=together)))
         table = drive.profile.control
         word_name = table.parameter if table is not None else ''
@@ -67,7 +69,7 @@ class AcyclicSide:
             drive, self.channel, session.control, session.control_changed, session.told,
             word=word_name if self.control_slot is None else '',
             status=status_name if self.status_slot is None else '',
-            spacing=session.stop_spacing)
+            spacing=stop_spacing(drive.period))
         self.stop: SafeStop[Step, Reply] = SafeStop(session, self.channel, stop_ended)
 
     def _note_write(self, write: Write) -> None:

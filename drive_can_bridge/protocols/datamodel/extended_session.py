@@ -23,13 +23,14 @@ import math
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control_machine import ControlMachine
+from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.events import (
     Event, ForeignMasterSeen, MappingDiffered, Noted, ProcessDataReceived,
 )
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.core.roles import Cells
-from drive_can_bridge.core.session import DriveState, Session
+from drive_can_bridge.core.roles import Roles
+from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.cyclic_exchange import CYCLE, CyclicExchange
 from drive_can_bridge.protocols.datamodel import extended
 from drive_can_bridge.protocols.datamodel.acyclic_side import AcyclicSide, map_cells
@@ -61,9 +62,10 @@ class ExtendedSession(Session):
 
     def __init__(self, drive: DriveConfiguration) -> None:
         table = drive.profile.control
-        super().__init__(drive, None if table is None else ControlMachine(
-            table, timeout=drive.control_timeout))
         station, options = drive.station, drive.options
+        control = None if table is None else ControlMachine(table, timeout=drive.control_timeout)
+        super().__init__(drive, control, roles=Roles(
+            drive, controlled=table is not None, maps=map_cells(options)))
         self._side = AcyclicSide(
             self,
             encode_read=lambda number, count: extended.encode_read_request(
@@ -97,10 +99,6 @@ class ExtendedSession(Session):
         self._stopping = False
         self._differs = False  # what the last look at the maps found
 
-    @property
-    def map_cells(self) -> Cells:
-        return map_cells(self.configuration.options)
-
     # -- life cycle -------------------------------------------------------------------------------
 
     def prepare_stop(self, now: float) -> bool:
@@ -124,12 +122,13 @@ class ExtendedSession(Session):
 
     @property
     def longest_stop(self) -> float:
-        return super().longest_stop + ATTEMPTS * ANSWER_TIME
+        return self._exchange.longest_stop + ATTEMPTS * ANSWER_TIME
 
     def time_lost(self, now: float) -> None:
         self._channel.time_lost(now)
         if self._phase is not Phase.IDLE and not self._stopping:
             self.stood_still(now)
+            self.start_over(now)
 
     def begin(self, now: float) -> None:
         self._stopping = False
@@ -177,13 +176,14 @@ class ExtendedSession(Session):
             self.lose(f'mapping differs: {text}', now)
             self._book.expect_nothing()
             # a request map that is right still takes neutral cycles, unless it is to be rewritten
-            by_cycles = owed and self._maps.request_agrees and not self.mute
+            by_cycles = owed and self._maps.request_agrees and not self.gate.mute
             if owed:
                 self._side.begin_stop(now, setpoints=not by_cycles)
             if by_cycles:
                 if self._phase is not Phase.LEAVING:
                     self._phase = Phase.LEAVING
-                    self._exchange.run_out(max(now, self._timer.began_at + self.stop_spacing))
+                    self._exchange.run_out(max(
+                        now, self._timer.began_at + self._timer.stop_spacing))
             else:
                 self._phase = Phase.DIFFERS
                 self._timer.stop()
@@ -191,17 +191,17 @@ class ExtendedSession(Session):
             self._maps.look_at = math.inf  # that comes after the last neutral cycle
         elif self._phase is Phase.CYCLIC:  # there, the cyclic answers tell who is there
             if self._silent_looks == SILENT_LOOKS:
-                self.note(Noted(self._maps_unknown, warning=True))
+                self.report.note(Noted(self._maps_unknown, warning=True))
         else:
             self._phase = Phase.CHECKING
-            self.advise('no answer to mapping read: drive silent, wrong station, bit rate '
-                        'or identifier mode')
+            self.report.advice = ('no answer to mapping read: drive silent, wrong station, bit '
+                                  'rate or identifier mode')
             self._maps.look_at = now  # paced by the time-out of the read
 
     def _maps_reported(self, event: Event) -> None:
         if isinstance(event, MappingDiffered):
-            self.advise(f'mapping differs: {event.text}')
-        self.note(event)
+            self.report.advice = f'mapping differs: {event.text}'
+        self.report.note(event)
 
     # -- cyclic exchange --------------------------------------------------------------------------
 
@@ -210,7 +210,7 @@ class ExtendedSession(Session):
         if self.setpoints.held and self._phase is Phase.LEAVING:
             return  # a stop takes its course
         # a drive that was told to run has to be told ``disable``, whatever is known of its axes
-        at_once = self.setpoints.ever_known and not self._verify and not self.mute
+        at_once = self.setpoints.ever_known and not self._verify and not self.gate.mute
         if self.setpoints.known or at_once:
             self._start_cycling(now)
         else:
@@ -222,7 +222,7 @@ class ExtendedSession(Session):
         if self.setpoints.known:
             self._start_cycling(now)
             return
-        self.advise(self.setpoints.untold_text)
+        self.report.advice = self.setpoints.untold_text
         if answered:    # but the setpoint cannot carry it
             self._positions.due = now + PAUSE
         elif self._verify:  # it may have started anew meanwhile, with other maps
@@ -235,9 +235,9 @@ class ExtendedSession(Session):
         self._exchange.cycles_left = -1
         self._book.stale = 0
         self._book.missed_in_row = 0
-        self._timer.start(self._next_turn(
+        self._timer.start(self._exchange.next_turn(
             max(now, self._timer.began_at + self.configuration.period)))
-        self.advise('no cyclic response: drive silent or response identifier taken')
+        self.report.advice = 'no cyclic response: drive silent or response identifier taken'
 
     def _cycle(self, now: float) -> None:
         """Send one cyclic request. The fast path of the timer."""
@@ -282,7 +282,7 @@ class ExtendedSession(Session):
         self.lose(f'no cyclic response for {self.configuration.missed_limit} cycles', now)
         if owed:  # of the word that has no slot; setpoints go neutral with the next cycles
             self._side.begin_stop(now, setpoints=False)
-        if self.mute:
+        if self.gate.mute:
             self.start_over(now)
         elif self._verify:  # it may still be listening, before it is left alone
             self._phase = Phase.LEAVING
@@ -295,7 +295,7 @@ class ExtendedSession(Session):
             self._receive_cyclic(frame[1], now, now - age)
             return
         if frame.extended and frame.identifier & FROM_WHOM == self._request_identifier & FROM_WHOM:
-            self.note(ForeignMasterSeen(
+            self.report.note(ForeignMasterSeen(
                 f'another master sends requests to station {self.configuration.station}: {frame}'))
             return
         step = self._channel.outstanding
@@ -304,7 +304,7 @@ class ExtendedSession(Session):
                 frame, self.configuration.station,
                 None if step is None else (step.number, step.count), strict=self._strict)
         except RemoteProtocolError as error:
-            self.reject(str(error))
+            self.report.reject(str(error))
             return
         if len(frame.data) != extended.PAYLOAD:
             self.statistics.short += 1
@@ -315,11 +315,11 @@ class ExtendedSession(Session):
         book = self._book
         if not book.awaiting:
             if not book.take_stale():
-                self.reject('cyclic response that nobody asked for')
+                self.report.reject('cyclic response that nobody asked for')
             return
         raws, wrong = self._codec.decode_response(data)
         if wrong:
-            self.reject(f'cyclic response with {wrong}')
+            self.report.reject(f'cyclic response with {wrong}')
             if not raws:
                 return
         elif len(data) != extended.PAYLOAD:
@@ -336,8 +336,8 @@ class ExtendedSession(Session):
         if self.control is not None and slot is not None:
             self.control.status_received(raws[slot] if slot < len(raws) else None, now)
             self.control_changed(now)
-        self.measured(raws)
-        self._events.append(ProcessDataReceived(raws, received_at))
+        self.gate.measured(raws)
+        self.report.note(ProcessDataReceived(raws, received_at))
         self._channel.release(now)
 
     # -- timer ------------------------------------------------------------------------------------

@@ -18,7 +18,7 @@ from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.events import ForeignMasterSeen, ProcessDataReceived
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.core.roles import Cells
+from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.datamodel import standard
 from drive_can_bridge.protocols.datamodel.acyclic_side import AcyclicSide, map_cells
@@ -44,8 +44,9 @@ class StandardSession(Session):
 
     def __init__(self, drive: DriveConfiguration) -> None:
         table, options = drive.profile.control, drive.options
-        super().__init__(drive, None if table is None else ControlMachine(
-            table, timeout=drive.control_timeout))
+        control = None if table is None else ControlMachine(table, timeout=drive.control_timeout)
+        super().__init__(drive, control, roles=Roles(
+            drive, controlled=table is not None, maps=map_cells(options)))
         request = standard.identifier(options.request_id_base, drive.station)
         self._side = AcyclicSide(
             self,
@@ -77,10 +78,6 @@ class StandardSession(Session):
         self._expected = False  # the answer of a read that nobody wants any more may come
         self._doubt = False  # a read went unanswered since the status was read
         self._gap = ''  # what the last round asked for in vain, though others were answered
-
-    @property
-    def map_cells(self) -> Cells:
-        return map_cells(self.configuration.options)
 
     # -- life cycle -------------------------------------------------------------------------------
 
@@ -114,11 +111,11 @@ class StandardSession(Session):
         self._void = self._in_round
         self._channel.time_lost(now)
         if self._phase is Phase.POLLING:
-            self.lose('the bridge stood still', now)
+            self.stood_still(now)
             self._timer.start(now)
 
     def begin(self, now: float) -> None:
-        self.advise(SILENT)
+        self.report.advice = SILENT
         self._gap = ''
         self._phase = Phase.POLLING
         self._book.missed_in_row = 0
@@ -169,7 +166,7 @@ class StandardSession(Session):
     def _tick(self, now: float) -> None:
         """Begin a period: look what is to be written, then read."""
         if self.online:
-            self.expire(now)
+            self.gate.expire(now)
             self._look(now, unanswered=self._in_round)
         if not self._in_round:
             self._book.begin(now)
@@ -245,7 +242,7 @@ class StandardSession(Session):
         if raw == control.word:
             control.word_sent(now)
             if control.pulsing:
-                self._pulse_at = now + self.stop_spacing
+                self._pulse_at = now + self._timer.stop_spacing
             self.control_changed(now)
 
     def see_to_control_word(self, now: float) -> None:
@@ -300,15 +297,15 @@ class StandardSession(Session):
         self._doubt = False
         self._book.answered(self._received_at)
         if not self.online:
-            self.measured(raws)    # before anything is written
+            self.gate.measured(raws)    # before anything is written
             self._found(now)
         # a status that was asked for before the word left says nothing about the word
         if (self.control is not None and self._status_slot is not None
                 and self._status_asked_at > self._word_written_at):
             self.control.status_received(raws[self._status_slot], now)
             self.control_changed(now)
-        self.measured(raws)
-        self.note(ProcessDataReceived(raws, self._received_at))
+        self.gate.measured(raws)
+        self.report.note(ProcessDataReceived(raws, self._received_at))
 
     def _found(self, now: float) -> None:
         self.be_online()
@@ -320,7 +317,7 @@ class StandardSession(Session):
         too_many = self._book.missed()
         self._doubt = True
         if not self.online:
-            self.advise(self._gap or SILENT)
+            self.report.advice = self._gap or SILENT
         elif too_many:
             reason = f'no complete round of reads for {self.configuration.missed_limit} periods'
             self.lose(f'{reason}: {self._gap}' if self._gap else reason, now)
@@ -338,10 +335,10 @@ class StandardSession(Session):
 
     def receive_frame(self, frame: Frame, now: float, age: float = 0.0) -> None:
         if frame.extended or frame.identifier not in self._identifiers:
-            self.reject(f'{frame}: of somebody else')
+            self.report.reject(f'{frame}: of somebody else')
             return
         if frame.identifier == self._request_identifier:
-            self.note(ForeignMasterSeen(
+            self.report.note(ForeignMasterSeen(
                 f'another master sends requests to station {self.configuration.station}: {frame}'))
             return
         step = self._channel.outstanding
@@ -351,12 +348,12 @@ class StandardSession(Session):
             if self._expected:
                 self._expected = False
             else:
-                self.reject(f'{frame}: nobody asked for it')
+                self.report.reject(f'{frame}: nobody asked for it')
             return
         try:
             words = standard.decode_read_response(frame, step.count, strict=self._strict)
         except RemoteProtocolError as error:
-            self.reject(str(error))
+            self.report.reject(str(error))
             return
         if len(frame.data) != standard.PAYLOAD:
             self.statistics.short += 1

@@ -6,8 +6,8 @@ from cannord_session_builders import exchange, FAULT, online, READY, RUNNING
 import pytest
 
 from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import Noted
-from drive_can_bridge.core.session import DriveState
 from drive_can_bridge.protocols.cannord.control import hint
 
 ENABLE, DISABLE = ControlAction.ENABLE, ControlAction.DISABLE
@@ -221,6 +221,6 @@ def test_stop_disables() -> None:
 def test_refused_while_offline_or_inactive() -> None:
     talk = online()
     talk.until(10.2)
-    assert talk.session.control_refusal(ENABLE) == 'drive offline'
+    assert talk.session.users.control_refusal(ENABLE) == 'drive offline'
     talk.deactivate(10.2)
-    assert talk.session.control_refusal(ENABLE) == 'bridge inactive'
+    assert talk.session.users.control_refusal(ENABLE) == 'bridge inactive'

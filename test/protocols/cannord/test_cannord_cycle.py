@@ -12,11 +12,11 @@ from cannord_session_builders import (
 import pytest
 
 from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import (
     ForeignMasterSeen, FrameRejected, Noted, ProcessDataReceived, SetpointsExpired, StationFound,
     StationLost,
 )
-from drive_can_bridge.core.session import DriveState
 from drive_can_bridge.core.setpoints import CommandOutcome
 
 

@@ -14,12 +14,13 @@ import pytest
 
 from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
+from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import (
     Event, ForeignMasterSeen, Noted, ProcessDataReceived, RequestCompleted, StationFound,
     StationLost,
 )
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.core.session import DriveState, Session
+from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.setpoints import CommandOutcome
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.protocols.cannord.control import make_control
@@ -105,8 +106,8 @@ class Bus:
         return [(name, event) for name, event in found if isinstance(event, kinds)]
 
     def asks(self, action: ControlAction, name: str = 'lift') -> None:
-        assert not self.session(name).control_refusal(action)
-        self.session(name).submit(ControlRequest(action), self.now)
+        assert not self.session(name).users.control_refusal(action)
+        self.session(name).users.submit(ControlRequest(action), self.now)
         self.pump()
 
     def outcomes(self, name: str = 'lift') -> list[tuple[str, bool, str]]:
@@ -209,9 +210,9 @@ def test_setpoints_and_extra_values_of_all() -> None:
         bus.hears(f'{number:03X}#0000000000')
     assert bus.outcomes() == [('enable', True, 'operation enabled')]
     for index in range(5):
-        lift.command(index, 0.0, bus.now)
-    lift.command(0, 50.0, bus.now)
-    lift.command(4, -50.0, bus.now)
+        lift.users.command(index, 0.0, bus.now)
+    lift.users.command(0, 50.0, bus.now)
+    lift.users.command(4, -50.0, bus.now)
     assert [text for _, text in bus.live(0.02)] == [
         '400#7F04004000000000', '400#000000E000', '002#7F04004000000000', '002#000000E000']
 
@@ -266,26 +267,26 @@ def test_the_leader_commands_all() -> None:
     bus = enabled()
     lift = bus.session('lift')
     assert lift.state is DriveState.NOT_ARMED
-    assert lift.command(0, 0.0, bus.now) is CommandOutcome.ARMED
-    assert lift.command(0, 25.0, bus.now) is CommandOutcome.ACCEPTED
+    assert lift.users.command(0, 0.0, bus.now) is CommandOutcome.ARMED
+    assert lift.users.command(0, 25.0, bus.now) is CommandOutcome.ACCEPTED
     assert [session.state for session in bus.sessions] == [DriveState.ONLINE] * 3
     assert sorted(text for _, text in bus.live(0.06)) == [
         '002#7F040020', '004#7F040020', '006#7F040020', *['400#7F040020'] * 3]
-    assert bus.session('hoist').write_refusal(FREQUENCY) == (
+    assert bus.session('hoist').users.write_refusal(FREQUENCY) == (
         'sent cyclically by the broadcast group: publish lift/command/frequency_setpoint')
-    assert bus.session('hoist').write_refusal(OFFSET) == ''
+    assert bus.session('hoist').users.write_refusal(OFFSET) == ''
 
 
 def test_a_member_that_comes_back_disarms_all() -> None:
     bus = enabled()
     lift = bus.session('lift')
-    lift.command(0, 0.0, bus.now)
-    lift.command(0, 25.0, bus.now)
+    lift.users.command(0, 0.0, bus.now)
+    lift.users.command(0, 25.0, bus.now)
     del bus.answers[3]
     bus.live(0.2)
     assert not bus.session('turn').online
-    assert lift.command(0, 0.0, bus.now) is CommandOutcome.DISABLED
-    assert lift.command(0, 25.0, bus.now) is CommandOutcome.DISABLED
+    assert lift.users.command(0, 0.0, bus.now) is CommandOutcome.DISABLED
+    assert lift.users.command(0, 25.0, bus.now) is CommandOutcome.DISABLED
     bus.answers[3] = RUNNING
     bus.live(0.07)
     assert bus.session('turn').online
@@ -296,7 +297,7 @@ def test_a_member_that_comes_back_disarms_all() -> None:
 
 def test_parameters_are_everybodys_own() -> None:
     bus = three()
-    bus.session('hoist').submit(read(OFFSET), bus.now)
+    bus.session('hoist').users.submit(read(OFFSET), bus.now)
     assert bus.pump() == ['204#9B11000000000000']
     bus.hears('205#9B11000000000700')
     (name, event), = bus.events(RequestCompleted)
@@ -490,7 +491,7 @@ def test_a_member_that_drops_out_by_itself_stops_all() -> None:
 def test_a_member_that_is_lost_stops_all(station: int) -> None:
     bus = enabled()
     lift = bus.session('lift')
-    lift.command(0, 0.0, bus.now)
+    lift.users.command(0, 0.0, bus.now)
     del bus.answers[station]
     bus.live(0.22)
     assert not bus.session(NAMES[station - 1]).online
@@ -509,7 +510,7 @@ def test_a_member_that_is_lost_stops_all(station: int) -> None:
 
 def test_members_name_their_leader() -> None:
     bus = three()
-    texts = [bus.session('hoist').control_refusal(action) for action in ControlAction]
+    texts = [bus.session('hoist').users.control_refusal(action) for action in ControlAction]
     assert texts == [f'lift leads the broadcast group: call ~/{name} of lift'
                      for name in ('enable', 'enable', 'quick_stop', 'reset_fault')]
     control = bus.session('hoist').control
@@ -522,7 +523,7 @@ def test_refused_when_nobody_is_there() -> None:
     bus = Bus(*members())
     bus.answers = {}
     bus.live(0.5)
-    assert bus.session('lift').control_refusal(ENABLE) == 'drive offline'
+    assert bus.session('lift').users.control_refusal(ENABLE) == 'drive offline'
 
 
 # -- stops ----------------------------------------------------------------------------------------
@@ -532,8 +533,8 @@ def driven(**options: Any) -> Bus:
     """Return a group that runs at 25 Hz."""
     bus = enabled(**options)
     lift = bus.session('lift')
-    assert lift.command(0, 0.0, bus.now) is CommandOutcome.ARMED
-    assert lift.command(0, 25.0, bus.now) is CommandOutcome.ACCEPTED
+    assert lift.users.command(0, 0.0, bus.now) is CommandOutcome.ARMED
+    assert lift.users.command(0, 25.0, bus.now) is CommandOutcome.ACCEPTED
     assert '400#7F040020' in [text for _, text in bus.live(0.06)]
     bus.events()
     return bus
@@ -552,12 +553,12 @@ def test_commands_count_from_the_last_operation_enabled_on() -> None:
     bus.answers = {1: RUNNING, 2: RUNNING, 3: '330B0000'}
     bus.live(0.1)
     assert [session.state for session in bus.sessions] == [DriveState.DISABLED] * 3
-    assert lift.command(0, 0.0, bus.now) is CommandOutcome.DISABLED, 'turn is switched on'
+    assert lift.users.command(0, 0.0, bus.now) is CommandOutcome.DISABLED, 'turn is switched on'
     bus.answers[3] = RUNNING
     bus.live(0.06)
     assert bus.outcomes() == [('enable', True, 'operation enabled')]
-    assert lift.command(0, 25.0, bus.now) is CommandOutcome.NOT_ARMED
-    assert lift.command(0, 0.0, bus.now) is CommandOutcome.ARMED
+    assert lift.users.command(0, 25.0, bus.now) is CommandOutcome.NOT_ARMED
+    assert lift.users.command(0, 0.0, bus.now) is CommandOutcome.ARMED
 
 
 def test_a_member_that_comes_back_running_arms_nobody() -> None:
@@ -567,7 +568,7 @@ def test_a_member_that_comes_back_running_arms_nobody() -> None:
     assert bus.session('lift').state is DriveState.DISABLED
     bus.answers[2] = RUNNING
     bus.live(0.1)
-    assert bus.session('lift').command(0, 0.0, bus.now) is CommandOutcome.DISABLED
+    assert bus.session('lift').users.command(0, 0.0, bus.now) is CommandOutcome.DISABLED
     assert words(bus.live(0.02)) == ['7E04']
 
 
@@ -580,8 +581,8 @@ def test_stop_of_a_slow_group_is_brought_forward() -> None:
     bus.live(0.3)           # 10.65
     assert bus.outcomes() == [('enable', True, 'operation enabled')]
     lift = bus.session('lift')
-    lift.command(0, 0.0, bus.now)
-    lift.command(0, 25.0, bus.now)
+    lift.users.command(0, 0.0, bus.now)
+    lift.users.command(0, 25.0, bus.now)
     assert (10.7, '400#7F040020') in bus.live(0.08)     # 10.73
     bus.asks(QUICK_STOP)
     when, text = bus.live(0.01)[0]
@@ -730,8 +731,8 @@ def test_stop_reaches_everybody() -> None:
 def test_enabled_group_is_disabled_by_the_stop() -> None:
     bus = enabled()
     lift = bus.session('lift')
-    lift.command(0, 0.0, bus.now)
-    lift.command(0, 50.0, bus.now)
+    lift.users.command(0, 0.0, bus.now)
+    lift.users.command(0, 50.0, bus.now)
     for session in bus.sessions:
         session.deactivate(bus.now)
     assert {text.split('#')[1] for _, text in bus.live(1.0)} == {'7E040000'}

@@ -19,6 +19,7 @@ from hypothesis.stateful import initialize, precondition, rule
 import pytest
 
 from drive_can_bridge.core.control import ControlAction, ControlCompleted
+from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.events import (
     ProcessDataReceived, RequestCompleted, StationFound, StationLost,
@@ -26,7 +27,6 @@ from drive_can_bridge.core.events import (
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.core.requests import Failure, ReadRequest, ReadValue, Written
-from drive_can_bridge.core.session import DriveState
 from drive_can_bridge.protocols.families import FAMILIES
 
 TIMEOUT = 0.1
@@ -291,7 +291,7 @@ class SessionMachine(AnyOrder):
         # the status in an answer that nobody asked for does not count
         self.observer.faulted = self.session.state is DriveState.FAULT
         try:
-            outcome = self.session.command(index, value, self.now)
+            outcome = self.session.users.command(index, value, self.now)
         except ValueRefused:
             assert not 0 <= value <= 25 or value is True
             return
@@ -345,7 +345,7 @@ def test_no_frame_ever_raises(frames: list[tuple[int, bytes, bool]], state: str,
             Frame(3 << shift, bytes.fromhex('310B000000000000'), extended), 1.001)
         assert session.online
     if state == 'asking':
-        session.submit(ReadRequest((OFFSET, POSITION, FLAG, FAULT_NUMBER)), 1.001)
+        session.users.submit(ReadRequest((OFFSET, POSITION, FLAG, FAULT_NUMBER)), 1.001)
     if state == 'stopping':
         session.deactivate(1.001)
     for place, (identifier, data, is_extended) in enumerate(frames):

@@ -330,7 +330,7 @@ def test_process_data_are_read_without_a_frame() -> None:
 
 def test_process_data_are_not_written() -> None:
     talk = online(request=SETPOINTS[:1], response=VALUES[:1])
-    refusal = talk.session.write_refusal
+    refusal = talk.session.users.write_refusal
     assert refusal(FREQUENCY) == 'sent cyclically: publish ~/command/frequency_setpoint'
     assert refusal(SETPOINTS[1]) == 'exists in process data only'
     assert refusal(ACCELERATION) == ''

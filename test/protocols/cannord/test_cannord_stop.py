@@ -12,8 +12,8 @@ from cannord_session_builders import (
 import pytest
 
 from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import Noted
-from drive_can_bridge.core.session import DriveState
 from drive_can_bridge.core.setpoints import CommandOutcome
 
 ENABLE, DISABLE = ControlAction.ENABLE, ControlAction.DISABLE

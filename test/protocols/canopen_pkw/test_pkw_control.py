@@ -12,9 +12,9 @@ from pkw_builders import (
 import pytest
 
 from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import Noted, StationLost
 from drive_can_bridge.core.parameters import Access
-from drive_can_bridge.core.session import DriveState
 from drive_can_bridge.protocols.families import FAMILIES
 
 
@@ -105,7 +105,7 @@ def test_enabling_while_tripped_is_refused() -> None:
 
 def test_offline_drive_is_not_enabled() -> None:
     talk = started(control=CONTROL)
-    assert talk.session.control_refusal(ControlAction.ENABLE) == 'drive offline'
+    assert talk.session.users.control_refusal(ControlAction.ENABLE) == 'drive offline'
 
 
 # -- lost answers ---------------------------------------------------------------------------------
@@ -335,4 +335,4 @@ def test_users_do_not_write_the_word(name: str) -> None:
     parameter = drive.profile.parameters.get(name) or FAMILIES['canopen_pkw'].raw_parameter(
         drive, name)
     assert parameter is not None
-    assert talk.session.write_refusal(parameter) == 'use ~/enable'
+    assert talk.session.users.write_refusal(parameter) == 'use ~/enable'

@@ -11,10 +11,10 @@ from pkw_builders import (
 )
 import pytest
 
+from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import (
     FrameRejected, Noted, ProcessDataReceived, StationFound, StationLost,
 )
-from drive_can_bridge.core.session import DriveState
 
 READ_SINGLE_0 = '505#C701002500000000'
 

@@ -11,8 +11,8 @@ from pkw_builders import (
 )
 import pytest
 
+from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import Noted, SetpointsExpired, StationLost
-from drive_can_bridge.core.session import DriveState
 from drive_can_bridge.core.setpoints import CommandOutcome
 
 WITHDRAWN = Noted('enable withdrawn: bridge inactive; only ~/enable starts the drive again')

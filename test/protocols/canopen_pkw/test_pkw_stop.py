@@ -15,9 +15,9 @@ from pkw_builders import (
 import pytest
 
 from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import Noted
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.core.session import DriveState
 from drive_can_bridge.core.setpoints import CommandOutcome
 
 READ_CLASS_0 = '505#5E02002500000000'

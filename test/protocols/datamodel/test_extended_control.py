@@ -13,8 +13,8 @@ from extended_builders import (
 import pytest
 
 from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import FrameRejected, Noted, StationLost
-from drive_can_bridge.core.session import DriveState
 from drive_can_bridge.core.setpoints import CommandOutcome
 
 READY, ENABLED, FAULT = (
@@ -198,15 +198,15 @@ def test_time_out_of_a_request() -> None:
 
 def test_refusals() -> None:
     plain = online()
-    assert plain.session.control_refusal(ControlAction.ENABLE) == (
+    assert plain.session.users.control_refusal(ControlAction.ENABLE) == (
         'the profile has no control section')
     assert plain.control_outcomes() == []
     talk = Conversation(drive(control=CONTROL))
-    assert talk.session.control_refusal(ControlAction.ENABLE) == 'bridge inactive'
+    assert talk.session.users.control_refusal(ControlAction.ENABLE) == 'bridge inactive'
     talk.activate(2.0)
-    assert talk.session.control_refusal(ControlAction.ENABLE) == 'bus down'
+    assert talk.session.users.control_refusal(ControlAction.ENABLE) == 'bus down'
     talk.bus_up(3.0)
-    assert talk.session.control_refusal(ControlAction.ENABLE) == 'drive offline'
+    assert talk.session.users.control_refusal(ControlAction.ENABLE) == 'drive offline'
 
 
 # -- written --------------------------------------------------------------------------------------

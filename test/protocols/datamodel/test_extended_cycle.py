@@ -12,10 +12,10 @@ from extended_builders import (
 )
 import pytest
 
+from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import (
     ForeignMasterSeen, FrameRejected, ProcessDataReceived, StationFound, StationLost,
 )
-from drive_can_bridge.core.session import DriveState
 
 # -- pace -----------------------------------------------------------------------------------------
 

@@ -314,12 +314,12 @@ def test_enable_waits_for_the_position() -> None:
     assert not talk.session.online
     talk.hears('103FFFF0#00010000', 10.081)     # too short for the position
     assert talk.session.online
-    assert talk.session.control_refusal(ControlAction.ENABLE) == (
+    assert talk.session.users.control_refusal(ControlAction.ENABLE) == (
         'it would jump: position_setpoint does not have the value of actual_position yet, which '
         'is not known or which it cannot carry')
     assert talk.until(10.1 + 1e-6)[-1][1] == request(0, 70)
     talk.hears('103FFFF0#0001000000210000', 10.102)
-    assert talk.session.control_refusal(ControlAction.ENABLE) == (
+    assert talk.session.users.control_refusal(ControlAction.ENABLE) == (
         'it would jump: position_setpoint does not have the value of actual_position yet')
     assert talk.until(10.12 + 1e-6)[-1][1] == request(0, 33)
     talk.hears('103FFFF0#0001000000210000', 10.122)

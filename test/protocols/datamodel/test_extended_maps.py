@@ -10,11 +10,11 @@ from extended_builders import (
 )
 import pytest
 
+from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import (
     FrameRejected, MappingDiffered, MappingWritten, Noted, ProcessDataReceived, StationFound,
     StationLost,
 )
-from drive_can_bridge.core.session import DriveState
 
 OTHER_REQUEST_MAP = '102007A4#0033003200000000'
 

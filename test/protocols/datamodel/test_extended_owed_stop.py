@@ -19,8 +19,8 @@ from extended_builders import (
 import pytest
 
 from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import Noted
-from drive_can_bridge.core.session import DriveState
 
 RUNNING = '003FFFF0#03E8000000000000'
 #: speed_setpoint (50) and torque_limit (51) by number, and what asks for them

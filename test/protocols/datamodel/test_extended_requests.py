@@ -416,7 +416,7 @@ def test_every_request_is_answered_by_itself() -> None:
 
 def test_what_may_not_be_written() -> None:
     talk = online(control=CONTROL)
-    refusal = talk.session.write_refusal
+    refusal = talk.session.users.write_refusal
     assert refusal(SPEED) == 'sent cyclically: publish ~/command/speed_setpoint'
     assert refusal(LIMIT) == 'sent cyclically: publish ~/command/torque_limit'
     assert refusal(WORD) == 'use ~/enable'
@@ -436,7 +436,7 @@ def test_moved_maps_are_guarded_too() -> None:
     talk.bus_up(9.0)
     talk.activate(10.0)
     refused = [number for number in range(100, 400)
-               if talk.session.write_refusal(parameter(f'p{number}', number, listed=False))]
+               if talk.session.users.write_refusal(parameter(f'p{number}', number, listed=False))]
     assert refused == [300, 301, 302, 303, 310, 311, 312, 313]
 
 

@@ -10,10 +10,10 @@ from builders import (
 from extended_builders import ANSWER, checked, exchange, NEUTRAL, online, TICK
 import pytest
 
+from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.events import SetpointsExpired
 from drive_can_bridge.core.parameters import Value
-from drive_can_bridge.core.session import DriveState
 from drive_can_bridge.core.setpoints import CommandOutcome
 
 ACCEPTED, ARMED, NOT_ARMED = (

@@ -13,12 +13,12 @@ from standard_builders import (
 )
 
 from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import (
     ForeignMasterSeen, FrameRejected, Noted, ProcessDataReceived, SetpointsExpired, StationFound,
     StationLost,
 )
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.core.session import DriveState
 from drive_can_bridge.core.setpoints import CommandOutcome
 from drive_can_bridge.protocols.families import FAMILIES
 
@@ -454,9 +454,9 @@ def test_users_get_one_step_a_round_however_long_it_is() -> None:
 
 def test_mapping_parameters_are_left_alone_here_too() -> None:
     talk = online()
-    assert talk.session.write_refusal(parameter('map', 124)) == (
+    assert talk.session.users.write_refusal(parameter('map', 124)) == (
         'mapping parameter: not written while the bridge is active')
-    assert talk.session.write_refusal(ORDER) == ''
+    assert talk.session.users.write_refusal(ORDER) == ''
 
 
 # -- stopping -------------------------------------------------------------------------------------

@@ -1,0 +1,106 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+Whether the commands of users reach a drive.
+
+Setpoints move a drive only while its control word lets them: a drive that is commanded while it is
+disabled would jump at the moment of ``~/enable``. So commands are taken while the drive exchanges
+process data and operates, and everything is neutral otherwise. What is neutral for an axis that
+has to stay where it is depends on where it is, and on nothing driving it.
+"""
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from drive_can_bridge.core.control_machine import ControlMachine
+from drive_can_bridge.core.drive_state import DriveState
+from drive_can_bridge.core.events import Noted
+from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.reporter import Reporter
+from drive_can_bridge.core.setpoints import Setpoints
+
+
+class Presence(Protocol):
+    """Where a session stands with its drive; the session itself."""
+
+    active: bool
+    online: bool
+
+
+class CommandGate:
+    """
+    The setpoints of one drive, behind its control word.
+
+    :param control: its control and status word machine, if it has one.
+    :param sample: what is measured, in the order of samples.
+    :param leader: the machine of the drive whose control word it obeys, if that is another one.
+    """
+
+    def __init__(self, presence: Presence, setpoints: Setpoints, control: ControlMachine | None,
+                 sample: Sequence[Parameter], report: Reporter,
+                 leader: ControlMachine | None = None) -> None:
+        self._presence = presence
+        self._setpoints = setpoints
+        self._control = control
+        self._obeyed = leader or control
+        self._report = report
+        self._status_in_sample = control is not None and any(
+            parameter.name == control.table.status_parameter for parameter in sample)
+
+    @property
+    def state(self) -> DriveState:
+        """The state of the drive in one word, as far as commands are concerned."""
+        if not self._presence.online:
+            return DriveState.OFFLINE
+        if self._control is not None and self._control.fault:
+            return DriveState.FAULT
+        if not self._operating:
+            return DriveState.DISABLED
+        return DriveState.NOT_ARMED if self._setpoints.waiting else DriveState.ONLINE
+
+    @property
+    def _operating(self) -> bool:
+        """Setpoints may move the drive, as far as its control word is concerned."""
+        return self._obeyed is None or self._obeyed.operating
+
+    @property
+    def mute(self) -> bool:
+        """Nothing may be sent: where the axis is, nobody knows, and it would go there."""
+        return self._control is None and not self._setpoints.known
+
+    def follow(self) -> None:
+        """Tell what the control machine noted, and take commands as it lets them."""
+        if self._control is not None:
+            for note in self._control.take_notes():
+                # during a stop, it is what everybody expects
+                self._report.note(Noted(note, warning=self._presence.active))
+        self._allow()
+
+    def _allow(self) -> None:
+        """Take commands while they may move the drive, and only then: otherwise it is neutral."""
+        presence = self._presence
+        self._setpoints.allow(presence.active and presence.online and self._operating)
+
+    def withdraw(self, reason: str, now: float) -> None:
+        """Go neutral, and back to ``disable``."""
+        self._setpoints.allow(False)
+        if self._control is not None:
+            self._control.withdraw(reason, now)
+            self.follow()
+
+    def measured(self, raws: Sequence[int | None]) -> None:
+        """Take a sample, for setpoints that stay where the axis is; after its status word."""
+        if not self._setpoints.held:
+            return
+        control = self._control
+        # once the word may have started the drive, only a status as new as the position tells
+        free = control is not None and control.off and (
+            control.at_rest or self._status_in_sample)
+        if self._setpoints.measure(raws, driven=not free):
+            self._allow()
+
+    def expire(self, now: float) -> bool:
+        """Let setpoints go neutral that no fresh command keeps; tell whether there were any."""
+        expired = self._setpoints.expire(now)
+        if expired:
+            self._report.expired(expired)
+        return bool(expired)

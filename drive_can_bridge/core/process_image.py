@@ -1,0 +1,53 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""What a drive is told, and what it tells, in every exchange: as parameters, in order."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.parameters import Parameter
+
+
+def control_word(drive: DriveConfiguration, *, controlled: bool) -> Parameter | None:
+    """
+    Return the control word as a parameter of the profile; None: users may have it as any other.
+
+    :param controlled: a control machine looks after it.
+    """
+    table = drive.profile.control
+    if table is None or not controlled:
+        return None
+    return drive.profile.parameters.get(table.parameter)
+
+
+@dataclass(frozen=True, slots=True)
+class ProcessImage:
+    """
+    The process data of one drive.
+
+    :param setpoints: every ``cyclic_request`` parameter but the control word, in slot order.
+    :param request: all that the drive is told: what is sent cyclically, and a control word that
+        has no slot there.
+    :param sample: what the drive tells, in the order of ``ProcessDataReceived.raws``. What is
+        built in comes first: a short telegram lacks the last values, never the status.
+    """
+
+    setpoints: tuple[Parameter, ...]
+    request: tuple[Parameter, ...]
+    sample: tuple[Parameter, ...]
+
+    @classmethod
+    def of(cls, drive: DriveConfiguration, *, controlled: bool,
+           word: Sequence[Parameter] = (), status: Sequence[Parameter] = ()) -> 'ProcessImage':
+        """
+        Return that of a configured drive.
+
+        :param controlled: a control machine looks after the control word.
+        :param word: the control word of a telegram that has it built in.
+        :param status: the status word, likewise.
+        """
+        control, listed = control_word(drive, controlled=controlled), drive.cyclic_request
+        apart = () if control is None or control in listed else (control,)
+        return cls(
+            setpoints=tuple(each for each in listed if each != control),
+            request=(*word, *listed, *apart), sample=(*status, *drive.cyclic_response))

@@ -1,0 +1,67 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+What a session has to tell: events, in order, and what is missing while its drive is offline.
+
+It is the counterpart of the outbox: frames go to the drive, this goes to people.
+"""
+
+from collections.abc import Iterable
+
+from drive_can_bridge.core.events import (
+    Event, FrameRejected, Noted, SetpointsExpired, StationFound, StationLost,
+)
+from drive_can_bridge.core.holding import Setpoint
+from drive_can_bridge.core.statistics import DriveStatistics
+
+
+class Reporter:
+    """
+    The reports of one session.
+
+    :param statistics: counts the frames that were rejected.
+    :ivar events: what happened since they were taken last.
+    :ivar advice: while the drive is not online: what is missing, and what to look at; '' else.
+    """
+
+    __slots__ = ('_statistics', 'advice', 'events')
+
+    def __init__(self, statistics: DriveStatistics, advice: str) -> None:
+        self.events: list[Event] = []
+        self.advice = advice
+        self._statistics = statistics
+
+    def take(self) -> list[Event]:
+        """Return what happened since the last call."""
+        events = self.events
+        if events:
+            self.events = []
+        return events
+
+    def note(self, event: Event) -> None:
+        """Tell what happened."""
+        self.events.append(event)
+
+    def warn(self, text: str) -> None:
+        """Tell people what is not as it should be."""
+        self.events.append(Noted(text, warning=True))
+
+    def reject(self, text: str) -> None:
+        """Count and tell a frame of the drive that is malformed or unasked."""
+        self._statistics.rejected += 1
+        self.events.append(FrameRejected(text))
+
+    def found(self) -> None:
+        """Tell that the drive exchanges process data."""
+        self.advice = ''
+        self.events.append(StationFound())
+
+    def lost(self, reason: str, *, was_online: bool) -> None:
+        """Tell why the drive is offline; people hear of it when it was not."""
+        self.advice = reason
+        if was_online:
+            self.events.append(StationLost(reason))
+
+    def expired(self, setpoints: Iterable[Setpoint]) -> None:
+        """Tell that no fresh command keeps these setpoints: they went neutral."""
+        self.events.append(SetpointsExpired(
+            tuple(setpoint.parameter.name for setpoint in setpoints)))

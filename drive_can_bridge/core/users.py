@@ -1,0 +1,139 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+What users want of one drive: commands, requests, control; and why they cannot have it.
+
+A command is judged at once. A request is answered by an event: refused at once, or when it has
+been served (:mod:`.request_desk`), or when the control machine says so.
+"""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
+from drive_can_bridge.core.drive_state import DriveState
+from drive_can_bridge.core.events import RequestCompleted
+from drive_can_bridge.core.parameters import Parameter, Value
+from drive_can_bridge.core.request_desk import RequestDesk, RequestServer
+from drive_can_bridge.core.requests import (
+    BRIDGE_INACTIVE, BUS_DOWN, is_answer, Outcomes, Request,
+)
+from drive_can_bridge.core.setpoints import CommandOutcome
+
+if TYPE_CHECKING:
+    from drive_can_bridge.core.session import Session
+
+DRIVE_OFFLINE = 'drive offline'
+
+
+def _as_usual(action: ControlAction, refusal: str) -> str:
+    return refusal
+
+
+def _take_no_note(request: Request, outcomes: Outcomes) -> None:
+    pass
+
+
+class Users:
+    """
+    The users' side of one session.
+
+    :param server: serves requests for parameters.
+    :param blocked: (now) -> what of the drive itself forbids these; '' if nothing.
+    :param control_refusal: (action, refusal) -> what is said instead of the usual refusal of a
+        control action, '' meaning that it is not refused.
+    :param answered: called after the answer of a request that was served.
+    """
+
+    def __init__(self, session: 'Session', server: RequestServer, *,
+                 blocked: Callable[[float], str] = lambda now: '',
+                 control_refusal: Callable[[ControlAction, str], str] = _as_usual,
+                 answered: Callable[[Request, Outcomes], None] = _take_no_note) -> None:
+        self._session = session
+        self._blocked = blocked
+        self._judge = control_refusal
+        self._desk = RequestDesk(
+            server, session.statistics, self._completed, refusal=self._refusal,
+            answered=answered)
+
+    # -- commands ---------------------------------------------------------------------------------
+
+    def command(self, index: int, value: Value, now: float) -> CommandOutcome:
+        """
+        Take a setpoint command (index into ``setpoints.items``).
+
+        :raises ValueRefused: the value cannot be sent; counted, nothing else changes.
+        """
+        session = self._session
+        try:
+            outcome = session.setpoints.command(index, value, now)
+        except ValueError:
+            session.statistics.commands_refused += 1
+            raise
+        if outcome is CommandOutcome.NOT_ARMED and session.state is DriveState.DISABLED:
+            return CommandOutcome.DISABLED
+        return outcome
+
+    # -- requests ---------------------------------------------------------------------------------
+
+    def submit(self, request: Request | ControlRequest, now: float) -> None:
+        """
+        Take a request.
+
+        It is answered by exactly one ``RequestCompleted``, or ``ControlCompleted``.
+        """
+        if not isinstance(request, ControlRequest):
+            self._desk.submit(request, now)
+            return
+        session = self._session
+        refusal = self.control_refusal(request.action)
+        if refusal or session.control is None:
+            session.report.note(ControlCompleted(request, False, refusal))
+            return
+        session.control.request(request, now)
+        session.control_changed(now)
+
+    @property
+    def waiting(self) -> int:
+        """How many requests for parameters wait behind the one being served."""
+        return self._desk.waiting
+
+    def fail_all(self, reason: str) -> None:
+        """Forget the requests for parameters that are under way, and answer them."""
+        self._desk.fail_all(reason)
+
+    def _completed(self, event: RequestCompleted) -> None:
+        session = self._session
+        if session.serving and event.outcomes:
+            session.online = any(map(is_answer, event.outcomes))
+        session.report.note(event)
+
+    # -- refusals ---------------------------------------------------------------------------------
+
+    def _refusal(self, now: float) -> str:
+        """Say why requests for parameters are not taken now; '' if they are."""
+        return self._blocked(now) or self._absence
+
+    @property
+    def _absence(self) -> str:
+        if not self._session.active:
+            return BRIDGE_INACTIVE
+        return '' if self._session.bus_available else BUS_DOWN
+
+    def control_refusal(self, action: ControlAction) -> str:
+        """Say why a control action cannot be asked for now; '' if it can."""
+        session = self._session
+        if session.control is None:
+            refusal = 'the profile has no control section'
+        elif self._absence:
+            refusal = self._absence
+        elif not session.online:
+            refusal = DRIVE_OFFLINE
+        else:
+            refusal = session.setpoints.untold_text if action is ControlAction.ENABLE else ''
+        return self._judge(action, refusal)
+
+    def write_refusal(self, parameter: Parameter) -> str:
+        """Say why users may not write this parameter now; '' if they may."""
+        session = self._session
+        return session.roles.write_refusal(
+            parameter, exchanging=session.active and not session.serving)

@@ -1,0 +1,44 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""What a session has to tell."""
+
+from builders import SPEED
+
+from drive_can_bridge.core.events import (
+    FrameRejected, Noted, SetpointsExpired, StationFound, StationLost,
+)
+from drive_can_bridge.core.reporter import Reporter
+from drive_can_bridge.core.setpoints import Setpoints
+from drive_can_bridge.core.statistics import DriveStatistics
+
+
+def test_events_in_order_and_once() -> None:
+    statistics = DriveStatistics()
+    report = Reporter(statistics, 'not activated')
+    report.warn('look at it')
+    report.reject('too short')
+    report.note(Noted('just so'))
+    report.expired(Setpoints((SPEED,), timeout=0.5, rearm_immediate=True).items)
+    assert statistics.rejected == 1
+    assert report.take() == [
+        Noted('look at it', warning=True), FrameRejected('too short'), Noted('just so'),
+        SetpointsExpired(('speed_setpoint',))]
+    assert report.take() == []
+
+
+def test_what_was_taken_stays_as_it_was() -> None:
+    report = Reporter(DriveStatistics(), '')
+    report.warn('first')
+    taken = report.take()
+    report.warn('second')
+    assert taken == [Noted('first', warning=True)]
+
+
+def test_advice_while_the_drive_is_offline() -> None:
+    report = Reporter(DriveStatistics(), 'not activated')
+    assert report.advice == 'not activated'
+    report.found()
+    assert report.advice == ''
+    report.lost('silent', was_online=True)
+    report.lost('bus down', was_online=False)
+    assert report.advice == 'bus down'
+    assert report.take() == [StationFound(), StationLost('silent')], 'nobody is lost twice'
