@@ -2,6 +2,7 @@
 """Which of the writes that left are setpoints and control words: what the drive was told last."""
 
 from drive_can_bridge.core.last_sent import LastSent
+from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.protocols.canopen_pkw import addresses
 from drive_can_bridge.protocols.canopen_pkw.addresses import Span
 from drive_can_bridge.protocols.canopen_pkw.pkw import Message
@@ -20,7 +21,15 @@ class SentWrites:
         self._places = {addresses.span_of(parameter, addressing): place
                         for place, parameter in enumerate(sent.parameters)}
 
-    def note(self, message: Message) -> None:
+    def noting(self, message: Message, left: Left) -> Left:
+        """Take note of a request when it leaves, before ``left`` is told what became of it."""
+        def told(sent: bool, now: float) -> None:
+            if sent:
+                self._note(message)
+            left(sent, now)
+        return told
+
+    def _note(self, message: Message) -> None:
         """Take note of a request that left, if it writes what the drive is told by us."""
         meaning = message.meaning
         if meaning is None or not meaning.writes:

@@ -22,47 +22,32 @@ setpoints again after ``refresh_interval``.
 
 from collections.abc import Collection
 from enum import Enum
-import math
 
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.errors import RemoteProtocolError
-from drive_can_bridge.core.events import (
-    ForeignMasterSeen, ProcessDataReceived,
-)
+from drive_can_bridge.core.events import ForeignMasterSeen
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.outbox import Left
-from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.session import LOOKING, Session
 from drive_can_bridge.core.users import Users
 from drive_can_bridge.protocols.access import ChannelServer
 from drive_can_bridge.protocols.canopen import network
 from drive_can_bridge.protocols.canopen.node import Change, Node
-from drive_can_bridge.protocols.canopen.notes import PacedNotes
+from drive_can_bridge.protocols.canopen.node_report import NodeReport
 from drive_can_bridge.protocols.canopen_pkw import addresses, pkw, procedures
-from drive_can_bridge.protocols.canopen_pkw.addresses import Span
-from drive_can_bridge.protocols.canopen_pkw.control_writer import ControlWriter
 from drive_can_bridge.protocols.canopen_pkw.identifiers import Identifiers
-from drive_can_bridge.protocols.canopen_pkw.mailbox import (
-    MailboxChannel, MailboxCourier, Reply, Step,
-)
-from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Layout, Message
-from drive_can_bridge.protocols.canopen_pkw.round import Round
+from drive_can_bridge.protocols.canopen_pkw.mailbox import MailboxChannel, MailboxCourier
+from drive_can_bridge.protocols.canopen_pkw.pkw import Layout, Message
+from drive_can_bridge.protocols.canopen_pkw.polled_exchange import PolledExchange
 from drive_can_bridge.protocols.canopen_pkw.sent_writes import SentWrites
-from drive_can_bridge.protocols.canopen_pkw.setpoint_writer import SetpointWriter
+from drive_can_bridge.protocols.canopen_pkw.writers import Writers
 from drive_can_bridge.protocols.channel import Lane
-from drive_can_bridge.protocols.exchange_book import ExchangeBook
-from drive_can_bridge.protocols.safe_stop import SafeStop
 
-#: how often a drive is told to stand still
-STOP_ATTEMPTS = 3
-#: s that this may take all together: of a drive that answers, and of one that has fallen silent
+#: s that a stop may take all together: of a drive that answers, and of one that has fallen silent
 STOP_TIME = 3.0
 STOP_TIME_SILENT = 0.4
-SILENT = ('no complete round of reads: drive silent, not operational, or other COB-IDs than '
-          'configured')
 
 
 class Phase(Enum):
@@ -88,40 +73,21 @@ class PkwSession(Session):
         options = drive.options
         self._identifiers = Identifiers.of(drive)
         self._layout = Layout(options.layout)
-        self._addressing: str = options.addressing
-        self._word_order: str = options.word_order
-        self._notes = PacedNotes(self.report.note)
         self._node = Node(drive.station, nmt_start=options.nmt_start,
                           heartbeat_timeout=options.heartbeat_timeout)
+        self._node_report = NodeReport(self._node, self.report)
         self._channel = MailboxChannel(MailboxCourier(
             self._send, order=options.abort_code_order, retry=self.retry))
+        self._sent_writes = SentWrites(
+            self.sent, addressing=options.addressing, word_order=options.word_order)
+        self._writers = Writers(self, self._channel, self._stop_ended)
+        self._exchange = PolledExchange(
+            self, self._channel, self._node, found=self._found, silent=self._leave_alone)
         self.users = Users(
             self, ChannelServer(self._channel, procedures.RegisterAccess(
-                self.retry, addressing=self._addressing, word_order=self._word_order)),
-            blocked=self._blocked, control_refusal=self._control_refusal)
-        self._stop: SafeStop[Step, Reply] = SafeStop(self, self._channel, self._stop_ended)
-        self._setpoint_writer = SetpointWriter(
-            self._channel, self.setpoints, self.report.warn, self.told,
-            addressing=self._addressing,
-            word_order=self._word_order, refresh=options.refresh_interval)
-        self._control_writer: ControlWriter | None = None
-        self._status: Parameter | None = None
-        if control is not None and table is not None:
-            word = drive.profile.parameters[table.parameter]
-            self._control_writer = ControlWriter(
-                self._channel, control, word, self.control_changed, self.report.warn, self.told,
-                disable=table.disable, addressing=self._addressing,
-                word_order=self._word_order,
-                refresh=options.refresh_interval if word in drive.cyclic_request else 0.0)
-            self._status = drive.profile.parameters.get(table.status_parameter or '')
-        self._writes = SentWrites(
-            self.sent, addressing=self._addressing, word_order=self._word_order)
-        self._round = Round(drive, self._status, self.report.warn)
-        self._book = ExchangeBook(drive, self.statistics)
-        self._timer = self._book.timer
+                self.retry, addressing=options.addressing, word_order=options.word_order)),
+            blocked=self._blocked, control_refusal=self._writers.control_refusal)
         self._phase = Phase.IDLE
-        self._status_known = False  # it was read just now
-        self._received_at = -math.inf
 
     # -- life cycle -------------------------------------------------------------------------------
 
@@ -131,33 +97,11 @@ class PkwSession(Session):
 
     def begin_stop(self, now: float) -> bool:
         self._node.stop()
-        self._timer.stop()
+        self._exchange.timer.stop()
         self._channel.drop(now)
         self._phase = Phase.STOPPING
-        self._stop_now(self._stop_time, now)
+        self._writers.stop(self._stop_time, now, insist=True)
         return True
-
-    def _stop_now(self, time: float, now: float, *, in_the_end: float = 0.0) -> None:
-        """
-        Tell the drive to stand still, within so many s.
-
-        :param in_the_end: s that the answer to the last attempt is waited for at least: a device
-            may be slow, and nobody waits for the end of this stop.
-        """
-        writes = [] if self._control_writer is None else [self._control_writer.disable_write()]
-        writes += self._setpoint_writer.neutral_writes()
-        self._channel.cancel(Lane.STOP)
-        self._channel.make_room(now)
-        timeout = min(self.configuration.parameter_timeout,
-                      time / (STOP_ATTEMPTS * max(1, len(writes))))
-        self._stop.begin(
-            procedures.write_until_answered(
-                writes, STOP_ATTEMPTS, timeout, max(timeout, in_the_end)),
-            self._stop_confirmed, now, insist=self._phase is Phase.STOPPING)
-
-    def _stop_confirmed(self) -> None:
-        if not self.gate.mute:
-            self.told.stopped()
 
     def _stop_ended(self) -> None:
         if self._phase is Phase.STOPPING:
@@ -189,7 +133,7 @@ class PkwSession(Session):
         self.report.advice = LOOKING
         self._phase = Phase.RUNNING
         self._forget_exchange()
-        self._round.start_over()
+        self._exchange.forget()
         self._node.begin(now)
         self._follow_node(now)
         self._stop_if_owed(now)
@@ -197,10 +141,9 @@ class PkwSession(Session):
     def go_idle(self, advice: str) -> None:
         self._phase = Phase.IDLE
         self._node.stop()
-        self._timer.stop()
         self._channel.clear()
-        self._notes.flush(self._channel.now)
-        self._round.refusals.clear()
+        self._node_report.flush(self._channel.now)
+        self._exchange.stop()
         self.be_offline(advice)
 
     # -- online and offline -----------------------------------------------------------------------
@@ -208,27 +151,28 @@ class PkwSession(Session):
     def _found(self, now: float) -> None:
         self._node.online()
         self.be_online()
-        self._setpoint_writer.forget()
-        if self._control_writer is not None:
-            self._control_writer.forget()
+        self._writers.forget()
         self.control_changed(now)
-        self._setpoint_writer.look(now)
+        self._writers.write_setpoints(now)
 
     def lost(self, now: float, *, was_online: bool) -> None:
         self._forget_exchange()
 
     def _forget_exchange(self) -> None:
         """Forget the round and the writes that are under way."""
-        for lane in (Lane.OWN, Lane.SETPOINTS, Lane.CONTROL):
-            self._channel.cancel(lane)
-        self._book.missed_in_row = 0
+        self._exchange.cancel()
+        self._writers.cancel()
 
     def withdrawn(self, now: float) -> None:
         """Leave it to the stop to write ``disable``."""
 
     def _stop_if_owed(self, now: float) -> None:
         if self.told.owed:
-            self._stop_now(STOP_TIME_SILENT, now, in_the_end=self.configuration.parameter_timeout)
+            self._stop_silent(now)
+
+    def _stop_silent(self, now: float) -> None:
+        self._writers.stop(
+            STOP_TIME_SILENT, now, in_the_end=self.configuration.parameter_timeout)
 
     def _leave_alone(self, reason: str, now: float) -> None:
         """Handle a drive that is silent, but may be listening: it has to stand still."""
@@ -237,7 +181,7 @@ class PkwSession(Session):
         self._node.offline(now)
         self._send_nmt()
         if was_online:
-            self._stop_now(STOP_TIME_SILENT, now, in_the_end=self.configuration.parameter_timeout)
+            self._stop_silent(now)
 
     def _cut_off(self, reason: str, answer: str, now: float) -> None:
         """
@@ -256,76 +200,22 @@ class PkwSession(Session):
         for frame in self._node.take_frames():
             self.outbox.put(frame)
 
-    # -- the round --------------------------------------------------------------------------------
-
-    def _start_round(self, now: float) -> None:
-        self._write_expired(now)
-        self._book.begin(now)
-        if self.online:
-            self._setpoint_writer.look(now)
-            self.see_to_control_word(now)
-        self._channel.run(
-            procedures.read_round(self._round.plan, self._read_answered, self._round.refused),
-            self._round_ended, now)
-
-    def _read_answered(self, span: Span, words: tuple[int, ...]) -> None:
-        """Take an answer of the round; the status counts from the moment it was read."""
-        self._round.refusals.pop(span, None)
-        if self.online:
-            self._take_status(dict(zip(span.addresses, words)))
-            self.control_changed(self._channel.now)
-            self._status_known = False
-
-    def _take_status(self, words: dict[Address, int]) -> None:
-        raw = self._round.status(words)
-        if raw is not None and self.control is not None:
-            self._status_known = True
-            self.control.status_received(raw, self._channel.now)
-
-    def _round_ended(self, words: procedures.RoundResult) -> None:
-        now = self._channel.now
-        if words is None:
-            self._miss(now)
-            return
-        self._book.missed_in_row = 0
-        raws = self._round.raws(words)
-        if not self.online:
-            if self._node.heartbeat_lost:
-                return
-            self.gate.measured(raws)   # before anything is written
-            self._found(now)
-            self._take_status(words)
-            self.control_changed(now)
-            self._status_known = False
-        self.gate.measured(raws)
-        if None in raws:
-            return  # something was refused: there is no complete sample
-        self._book.answered(self._received_at)
-        self.report.note(ProcessDataReceived(
-            tuple(raw for raw in raws if raw is not None), self._received_at))
-
-    def _miss(self, now: float) -> None:
-        if not self._book.missed():
-            return
-        if self.online:
-            limit = self.configuration.missed_limit
-            self._leave_alone(f'no complete round of reads for {limit} periods', now)
-        elif not self._node.heartbeat_lost:
-            self.report.advice = SILENT
+    # -- what the device is told ------------------------------------------------------------------
 
     def _write_expired(self, now: float) -> None:
         if self.gate.expire(now):
-            self._setpoint_writer.look(now)
+            self._writers.write_setpoints(now)
+
+    def see_to_control_word(self, now: float) -> None:
+        if self.online:
+            self._writers.write_control(now, known=self._exchange.status_known)
 
     # -- frames -----------------------------------------------------------------------------------
 
     def _send(self, message: Message, left: Left) -> None:
-        def told(sent: bool, now: float) -> None:
-            if sent:
-                self._writes.note(message)
-            left(sent, now)
-        self.outbox.put(Frame(self._identifiers.request, pkw.encode(message, self._layout),
-                               False), told)
+        request = pkw.encode(message, self._layout)
+        self.outbox.put(Frame(self._identifiers.request, request, False),
+                        self._sent_writes.noting(message, left))
 
     def frames_left(self, now: float, refused: Collection[int] = ()) -> None:
         super().frames_left(now, refused)
@@ -339,18 +229,14 @@ class PkwSession(Session):
             return
         try:
             if identifier == identifiers.response:
-                self._received_at = now - age
+                self._exchange.received_at = now - age
                 message = pkw.decode(data, self._layout)
                 if not self._channel.receive(message, now):
                     self.report.reject(f'PKW response that nobody asked for: {message}')
             elif identifier == identifiers.heartbeat:
                 self._heartbeat(network.decode_heartbeat(data), now)
             elif identifier == identifiers.emergency:
-                text = self._node.receive_emergency(network.decode_emergency(data))
-                if text:
-                    ails = self._node.emergency is not None
-                    self._notes.note('emergency' if ails else 'emergency over', text, now,
-                                     warning=ails)
+                self._node_report.emergency(data, now)
             elif identifier == identifiers.request:
                 self.report.note(ForeignMasterSeen(
                     f'another master sends PKW requests to node {self.configuration.station}: '
@@ -366,7 +252,7 @@ class PkwSession(Session):
         if not running:
             return
         if change is Change.RESTARTED:
-            self._notes.note('boot-up', 'boot-up: the device has started', now)
+            self._node_report.restarted(now)
             self._cut_off('the device restarted', 'no answer: the device restarted', now)
             self.report.advice = 'the device restarted: waiting for it to answer'
         elif change is Change.NOT_OPERATIONAL:
@@ -386,13 +272,13 @@ class PkwSession(Session):
         free_at = self._node.free_at
         self._channel.hold(free_at)
         if not self.online and (fresh or now < free_at):
-            self._timer.start(max(now, free_at))
+            self._exchange.timer.start(max(now, free_at))
         self._channel.advance(now)
 
     # -- timer ------------------------------------------------------------------------------------
 
     def handle_timer(self, now: float) -> None:
-        self._notes.handle_timer(now)
+        self._node_report.handle_timer(now)
         if self._phase is Phase.RUNNING:
             if now >= self._node.next_timer():
                 if self._node.handle_timer(now) is Change.HEARTBEAT_LOST:
@@ -403,36 +289,20 @@ class PkwSession(Session):
                 self.control_changed(now)
             self._write_expired(now)
         self._channel.advance(now)
-        if now >= self._timer.due and self._channel.is_idle(Lane.OWN):
-            self._start_round(now)
+        if now >= self._exchange.due:
+            self._write_expired(now)
+            if self.online:
+                self._writers.write_setpoints(now)
+                self.see_to_control_word(now)
+            self._exchange.begin(now)
 
     def next_timer(self) -> float:
         soonest = self._channel.next_timer()
         if self._phase is not Phase.RUNNING:
             return soonest
-        if self._channel.is_idle(Lane.OWN):
-            soonest = min(soonest, self._timer.due)
-        soonest = min(soonest, self._node.next_timer(), self._notes.next_timer())
+        soonest = min(soonest, self._exchange.due, self._node.next_timer(),
+                      self._node_report.next_timer())
         return soonest if self.control is None else min(soonest, self.control.next_timer())
-
-    # -- control ----------------------------------------------------------------------------------
-
-    def _control_refusal(self, action: ControlAction, refusal: str) -> str:
-        if action is ControlAction.ENABLE:
-            for setpoint in self.setpoints.held:    # the drive has another position than this
-                refused = self._setpoint_writer.refusals.get(setpoint.parameter.name)
-                if refused:
-                    return f'it would jump: write of {refused}'
-        return refusal
-
-    def see_to_control_word(self, now: float) -> None:
-        if not self.online:
-            return
-        if self._control_writer is not None:
-            self._control_writer.update(
-                now, known=self._status_known or self._status is None)
-        if self.setpoints.changed and not self.setpoints.enabled:
-            self._setpoint_writer.look(now)     # neutral follows the word at once
 
     # -- users ------------------------------------------------------------------------------------
 
@@ -444,21 +314,9 @@ class PkwSession(Session):
 
     @property
     def warning(self) -> str:
-        texts = []
-        if self._node.emergency is not None:
-            texts.append(f'emergency {self._node.emergency.text}: remove its cause')
-        texts += [f'poll of {text}: correct cyclic_response or the profile'
-                  for text in self._round.refusals.values()]
-        texts += [f'write of {text}: correct cyclic_request, the command or the profile'
-                  for text in self._setpoint_writer.refusals.values()]
-        if self._control_writer is not None and self._control_writer.refusal:
-            texts.append(f'write of {self._control_writer.refusal}: look at the device')
-        if (self._node.heartbeat_timeout > 0.0 and not self._node.heard_heartbeat):
-            texts.append('no heartbeat although heartbeat_timeout is set: configure the '
-                         "device's heartbeat producer (1017h)")
-        return '; '.join(texts)
+        return '; '.join(filter(None, (
+            self._node_report.ailing, *self._exchange.warnings(), *self._writers.warnings(),
+            self._node_report.missing)))
 
     def facts(self) -> dict[str, str]:
-        emergency = self._node.emergency
-        return {'nmt_state': self._node.state_text,
-                'emergency': 'none' if emergency is None else emergency.text}
+        return self._node_report.facts()
