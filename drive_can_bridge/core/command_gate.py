@@ -53,14 +53,9 @@ class CommandGate:
             return DriveState.OFFLINE
         if self._control is not None and self._control.fault:
             return DriveState.FAULT
-        if not self._operating:
+        if self._obeyed is not None and not self._obeyed.operating:
             return DriveState.DISABLED
         return DriveState.NOT_ARMED if self._setpoints.waiting else DriveState.ONLINE
-
-    @property
-    def _operating(self) -> bool:
-        """Setpoints may move the drive, as far as its control word is concerned."""
-        return self._obeyed is None or self._obeyed.operating
 
     @property
     def mute(self) -> bool:
@@ -77,8 +72,9 @@ class CommandGate:
 
     def _allow(self) -> None:
         """Take commands while they may move the drive, and only then: otherwise it is neutral."""
-        presence = self._presence
-        self._setpoints.allow(presence.active and presence.online and self._operating)
+        presence, obeyed = self._presence, self._obeyed
+        self._setpoints.allow(presence.online and presence.active and (
+            obeyed is None or obeyed.operating))
 
     def withdraw(self, reason: str, now: float) -> None:
         """Go neutral, and back to ``disable``."""

@@ -136,7 +136,9 @@ class ControlMachine:
 
     def take_notes(self) -> list[str]:
         """Return what the log should say of the drive since the last call."""
-        notes, self._notes = self._notes, []
+        notes = self._notes
+        if notes:   # seldom, and asked for with every status
+            self._notes = []
         return notes
 
     # -- inputs -----------------------------------------------------------------------------------
@@ -394,6 +396,5 @@ class ControlMachine:
         under_way, raw = self._operation, self._reports.telling
         hint = '' if self._wording is None or raw is None else self._wording.hint(raw)
         pulsed = under_way is not None and under_way.pulsed
-        text = stuck_text(self._reports, self._table, self.state, self._timeout,
-                          f'control word {self.word:04X}h', sent=self._sent, pulsed=pulsed)
-        return f'{text}{hint}'
+        return stuck_text(self._reports, self._table, self.state, self._timeout,
+                          f'control word {self.word:04X}h', sent=self._sent, pulsed=pulsed) + hint
