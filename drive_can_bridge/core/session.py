@@ -70,13 +70,11 @@ class Session(ABC):
     :ivar report: events, and what is missing while the drive is offline.
     :ivar online: the drive exchanges process data.
     :ivar ever_online: it did so at least once since activation.
-    :ivar serving: parameter requests are all that it cares for; ``online`` says then whether the
-        drive answered the last one.
+    :ivar serving: it only cares for parameter requests; ``online``: the last one was answered.
     :ivar how_to_enable: what to do about a drive that is disabled.
-    :ivar partners: sessions on the same bus whose timers and events may change with any call of
-        this one.
-    :ivar phase: s, when in each period of the steady clock this drive has its turn, for drives
-        that share a bus; None: whenever it is ready.
+    :ivar partners: sessions on this bus whose timers and events any call of this one may change.
+    :ivar phase: s, when in each period of the steady clock this drive has its turn among those
+        that share its bus; None: whenever it is ready.
     """
 
     users: Users
@@ -102,8 +100,7 @@ class Session(ABC):
         self.retry = RetryPolicy(
             timeout=drive.parameter_timeout, attempts=drive.parameter_retries + 1,
             offline=lambda: self.state is DriveState.OFFLINE)
-        self.online = self.ever_online = False
-        self.active = self.serving = self.bus_available = False
+        self.active = self.serving = self.bus_available = self.online = self.ever_online = False
         self.how_to_enable = 'call ~/enable'
         self.partners: Sequence[Session] = ()
         self.phase: float | None = None
