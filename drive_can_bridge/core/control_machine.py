@@ -10,7 +10,7 @@ of each request to whoever asked. What it makes of a request stands in :mod:`.co
 from collections.abc import Sequence
 import math
 
-from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
+from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.core.control_operation import Answers, Operation
 from drive_can_bridge.core.control_texts import (
     disregard_text, no_word_text, state_text, stuck_text, success_text,
@@ -29,7 +29,7 @@ class ControlMachine:
     """
     Bring one drive to the state that was asked for, by the words and conditions of a table.
 
-    After any call, look at :attr:`word`, :meth:`take_completed`, :meth:`take_notes`,
+    After any call, look at :attr:`word`, :attr:`take_completed`, :meth:`take_notes`,
     :meth:`next_timer`. Time is that of a steady clock, in s.
 
     :param timeout: seconds until an unconfirmed request fails.
@@ -37,6 +37,7 @@ class ControlMachine:
     :param members: names of the drives, where several share the control word.
     :param wording: what the family knows of status words.
     :ivar table: the words and conditions.
+    :ivar take_completed: returns the outcomes since the last call; asked after every frame.
     """
 
     def __init__(self, table: ControlTable, *, timeout: float, pulse: int = RESET_CYCLES,
@@ -59,6 +60,7 @@ class ControlMachine:
         self._disregard = Disregard(timeout)
         self._operation: Operation | None = None
         self._answers = Answers()
+        self.take_completed = self._answers.take
         self._notes: list[str] = []
 
     # -- what the session and diagnostics look at -------------------------------------------------
@@ -129,10 +131,6 @@ class ControlMachine:
     def disregard(self) -> str:
         """How the drive goes on running although it shall not, and what to do; '' if not."""
         return self._disregard.text
-
-    def take_completed(self) -> list[ControlCompleted]:
-        """Return the outcomes since the last call."""
-        return self._answers.take()
 
     def take_notes(self) -> list[str]:
         """Return what the log should say of the drive since the last call."""

@@ -39,5 +39,7 @@ class Answers:
 
     def take(self) -> list[ControlCompleted]:
         """Return the outcomes since the last call."""
-        completed, self._completed = self._completed, []
+        completed = self._completed
+        if completed:
+            self._completed = []
         return completed
