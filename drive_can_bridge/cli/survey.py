@@ -11,7 +11,7 @@ from collections.abc import Callable
 import time
 
 from drive_can_bridge.core.configuration import BusConfiguration
-from drive_can_bridge.core.errors import TransportError
+from drive_can_bridge.core.errors import BusUnavailable, TransportError
 from drive_can_bridge.core.frame import bits_on_bus, Frame, STUFFING
 from drive_can_bridge.protocols.canopen_pkw.scout import CanopenScout
 from drive_can_bridge.protocols.families import FAMILIES
@@ -114,7 +114,7 @@ class Survey:
             try:
                 self._port.send(question, _SEND_TIMEOUT)
                 refused = 0
-            except TransportError as error:
+            except (TransportError, BusUnavailable) as error:
                 refused += 1
                 if refused >= _REFUSED_MAX:
                     self.trouble = f'{error}: no other node acknowledges'
