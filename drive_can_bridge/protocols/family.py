@@ -67,8 +67,8 @@ class Family(ABC):
     cyclic: bool
     #: knows control and status word by itself; profiles have no ``control`` section
     control_built_in: bool = False
-    #: the keys that only this family has
-    options_type: type[FamilyOptions] = FamilyOptions
+    #: the keys that only this family has: a frozen dataclass
+    options_type: type[Any] = FamilyOptions
     #: keys that all families have, but whose default is another one here
     drive_defaults: Mapping[str, Any] = MappingProxyType({})
 

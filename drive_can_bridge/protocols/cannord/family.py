@@ -60,7 +60,6 @@ class Cannord(Family):
     options_type = CannordOptions
 
     def check(self, drive: DriveConfiguration) -> Iterator[Complaint]:
-        """Yield everything that this family cannot do with the drive as configured."""
         if not 0 <= drive.station <= ADDRESS_MAX:
             yield Complaint('station', f'{drive.station} is out of range, '
                                        f'allowed is 0 to {ADDRESS_MAX} ({self.name})')
@@ -77,7 +76,6 @@ class Cannord(Family):
                     yield member, complaint
 
     def warnings(self, drive: DriveConfiguration) -> Iterator[Complaint]:
-        """Yield what is allowed but suspicious."""
         if drive.period < ANSWER_TIME:
             yield Complaint('period', f'{drive.period:g} s is short: inverters take 1 to '
                                       f'{1e3 * ANSWER_TIME:g} ms to answer; recommended is at '
@@ -129,7 +127,6 @@ class Cannord(Family):
         return self.make_sessions([drive])[0]
 
     def make_sessions(self, drives: Sequence[DriveConfiguration]) -> list[Session]:
-        """Make the sessions of all drives of this family on one bus, in the same order."""
         # Imported late: configuration checks read this table without any need of sessions.
         from drive_can_bridge.protocols.cannord.group import make_group
         from drive_can_bridge.protocols.cannord.session import CannordSession
@@ -147,12 +144,10 @@ class Cannord(Family):
         return [CannordObserver(drive, emit, leads=drive.name in leaders) for drive in drives]
 
     def make_scout(self) -> Scout:
-        """Make what looks for drives of this family."""
         from drive_can_bridge.protocols.cannord.scout import CannordScout
         return CannordScout()
 
     def make_prober(self, drive: DriveConfiguration) -> Prober:
-        """Make what settles the open keys of a drive."""
         from drive_can_bridge.protocols.cannord.prober import CannordProber
         return CannordProber(drive)
 

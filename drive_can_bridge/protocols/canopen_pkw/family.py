@@ -40,7 +40,6 @@ class CanopenPkw(Family):
         return options
 
     def check(self, drive: DriveConfiguration) -> Iterator[Complaint]:
-        """Yield everything that this family cannot do with the drive as configured."""
         if not 1 <= drive.station <= network.NODE_MAX:
             yield Complaint('station', f'{drive.station} is out of range, '
                                        f'allowed is 1 to {network.NODE_MAX} ({self.name})')
@@ -52,7 +51,6 @@ class CanopenPkw(Family):
             yield from self._check_request(drive)
 
     def claims(self, drive: DriveConfiguration) -> list[Claim]:
-        """Return all identifiers of the drive on its bus, both directions."""
         node = drive.station
         identifiers = Identifiers.of(drive)
         purposes = {
@@ -106,7 +104,6 @@ class CanopenPkw(Family):
         return raw
 
     def make_session(self, drive: DriveConfiguration) -> Session:
-        """Make the drive's session. Nothing is sent before ``activate``."""
         # Imported late: configuration checks read this table without any need of sessions.
         from drive_can_bridge.protocols.canopen_pkw.session import PkwSession
         return PkwSession(drive)
@@ -119,12 +116,10 @@ class CanopenPkw(Family):
                 NmtObserver({drive.station: drive.name for drive in drives}, emit)]
 
     def make_scout(self) -> Scout:
-        """Make what looks for drives of this family."""
         from drive_can_bridge.protocols.canopen_pkw.scout import CanopenScout
         return CanopenScout()
 
     def make_prober(self, drive: DriveConfiguration) -> Prober:
-        """Make what settles the open keys of a drive."""
         from drive_can_bridge.protocols.canopen_pkw.prober import PkwProber
         return PkwProber(drive)
 
