@@ -111,7 +111,8 @@ class CanopenPkw(Family):
     def make_observers(self, drives: Sequence[DriveConfiguration], emit: Emit,
                        ) -> list[DriveObserver]:
         """Make what watches devices, and what is said to all nodes."""
-        from drive_can_bridge.protocols.canopen_pkw.observer import NmtObserver, PkwObserver
+        from drive_can_bridge.protocols.canopen.observer import NmtObserver
+        from drive_can_bridge.protocols.canopen_pkw.observer import PkwObserver
         return [*(PkwObserver(drive, emit) for drive in drives),
                 NmtObserver({drive.station: drive.name for drive in drives}, emit)]
 
