@@ -70,8 +70,8 @@ class DataModelExtended(Family):
         return ExtendedScout()
 
     def make_prober(self, drive: DriveConfiguration) -> Prober:
-        from drive_can_bridge.protocols.datamodel.prober import ExtendedProber
-        return ExtendedProber(drive)
+        from drive_can_bridge.protocols.datamodel.prober import extended_prober
+        return extended_prober(drive)
 
     def _check_slots(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         offset = drive.options.parameter_offset

@@ -64,8 +64,8 @@ class DataModelStandard(Family):
         return StandardScout()
 
     def make_prober(self, drive: DriveConfiguration) -> Prober:
-        from drive_can_bridge.protocols.datamodel.prober import StandardProber
-        return StandardProber(drive)
+        from drive_can_bridge.protocols.datamodel.prober import standard_prober
+        return standard_prober(drive)
 
     def _check_station(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         bases = _bases(drive)
