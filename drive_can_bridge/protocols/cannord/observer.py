@@ -43,7 +43,7 @@ class CannordObserver(DriveObserver):
     :param leads: the inverter takes the commands for its broadcast group.
     """
 
-    def __init__(self, drive: DriveConfiguration, emit: Emit, *, leads: bool) -> None:
+    def __init__(self, drive: DriveConfiguration, emit: Emit, *, leads: bool = False) -> None:
         super().__init__(drive.name, emit)
         options = drive.options
         self._extended: bool = options.extended_identifiers

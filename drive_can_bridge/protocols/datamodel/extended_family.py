@@ -1,12 +1,11 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The row of the family table for the DataModel protocol with 29-bit identifiers."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Route
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.datamodel.checks import (
     check_parameters, check_period_and_maps, raw_parameter,
 )
@@ -14,10 +13,7 @@ from drive_can_bridge.protocols.datamodel.extended import (
     SLOTS, STATION_MASK, STATION_MAX, STATION_SHIFT,
 )
 from drive_can_bridge.protocols.datamodel.options import ExtendedOptions, NUMBER_MAX
-from drive_can_bridge.protocols.family import Claim, Complaint, Family
-from drive_can_bridge.protocols.observer import DriveObserver, Emit
-from drive_can_bridge.protocols.prober import Prober
-from drive_can_bridge.protocols.scout import Scout
+from drive_can_bridge.protocols.family import Claim, Complaint, Family, Talk
 
 #: worst-case stuffing, eight bytes, 29-bit identifier, with the interframe space
 FRAME_BITS = 160
@@ -55,23 +51,12 @@ class DataModelExtended(Family):
             return exchange
         return exchange + MAPPING_CHECK_BITS
 
-    def make_session(self, drive: DriveConfiguration) -> Session:
-        # Imported late: configuration checks read this table without any need of sessions.
+    def talk(self) -> Talk:
         from drive_can_bridge.protocols.datamodel.extended_session import ExtendedSession
-        return ExtendedSession(drive)
-
-    def make_observers(self, drives: Sequence[DriveConfiguration], emit: Emit,
-                       ) -> list[DriveObserver]:
         from drive_can_bridge.protocols.datamodel.observer import ExtendedObserver
-        return [ExtendedObserver(drive, emit) for drive in drives]
-
-    def make_scout(self) -> Scout:
-        from drive_can_bridge.protocols.datamodel.scout import ExtendedScout
-        return ExtendedScout()
-
-    def make_prober(self, drive: DriveConfiguration) -> Prober:
         from drive_can_bridge.protocols.datamodel.prober import extended_prober
-        return extended_prober(drive)
+        from drive_can_bridge.protocols.datamodel.scout import ExtendedScout
+        return Talk(ExtendedSession, ExtendedObserver, ExtendedScout, extended_prober)
 
     def _check_slots(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         offset = drive.options.parameter_offset
