@@ -2,9 +2,8 @@
 """What observers watch: cycles, questions, rounds of reads, the pace of EEPROM writes."""
 
 from collections.abc import Callable, Hashable, Sequence
-from itertools import takewhile
 import math
-from typing import Generic, NamedTuple, TypeVar
+from typing import Generic, TypeVar
 
 from drive_can_bridge.protocols.observer import (
     Direction, DriveObserver, Kind, Observed, Verdict,
@@ -93,13 +92,6 @@ class CyclicWatch:
         self._observed.missed += 1
 
 
-class Asked(NamedTuple):
-    """A request that waits for its answer."""
-
-    at: float
-    due: float
-
-
 class Questions(Generic[Key]):
     """
     Requests under way, by what their answers will say.
@@ -116,7 +108,7 @@ class Questions(Generic[Key]):
         self._timeout = timeout
         self._unanswered = unanswered
         self._certain_from = math.nan
-        self._open: dict[Key, Asked] = {}
+        self._open: dict[Key, float] = {}       # key -> when it was asked
         self._given_up: dict[Key, float] = {}   # key -> when it was asked
         observer.watches.append(self)
 
@@ -126,14 +118,14 @@ class Questions(Generic[Key]):
         if self._certain_from != self._certain_from:    # NaN
             self._certain_from = due
         self._open.pop(key, None)
-        self._open[key] = Asked(now, due)
+        self._open[key] = now
         self._observer.due(due)
 
     def answer(self, key: Key, now: float) -> tuple[Verdict, float]:
         """Return what an answer is, and s since it was asked for (NaN: it was not)."""
         asked = self._open.pop(key, None)
         if asked is not None:
-            return Verdict.NORMAL, now - asked.at
+            return Verdict.NORMAL, now - asked
         late = self._given_up.pop(key, None)
         if late is not None and now - late <= LATE_TIME:
             return Verdict.LATE, now - late
@@ -143,18 +135,18 @@ class Questions(Generic[Key]):
 
     def expire(self, now: float) -> float:
         """Give up what is overdue; return when to look again."""
-        if not self._open:
-            return math.inf
-        # in the order asked: all have the same time-out
-        found = list(takewhile(lambda item: item[1].due <= now, self._open.items()))
-        for key, asked in found:
+        while self._open:
+            key, asked = next(iter(self._open.items()))     # the oldest: all have the same time
+            due = asked + self._timeout
+            if due > now:
+                return due
             del self._open[key]
-            self._given_up[key] = asked.at
-            self._unanswered(key, asked.due)
-        if found and len(self._given_up) > 64:
-            self._given_up = {key: at for key, at in self._given_up.items()
-                              if now - at <= LATE_TIME}
-        return next((asked.due for asked in self._open.values()), math.inf)
+            self._given_up[key] = asked
+            self._unanswered(key, due)
+            if len(self._given_up) > 64:
+                self._given_up = {key: at for key, at in self._given_up.items()
+                                  if now - at <= LATE_TIME}
+        return math.inf
 
 
 class WriteGap:

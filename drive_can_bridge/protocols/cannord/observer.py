@@ -6,6 +6,7 @@ An answer to process data counts for the last frame that the inverter was sent. 
 group that is the individual frame of its turn; nobody answers the broadcast.
 """
 
+from collections.abc import Sequence
 from functools import partial
 
 from drive_can_bridge.core.configuration import DriveConfiguration
@@ -16,7 +17,7 @@ from drive_can_bridge.protocols.cannord.parameter_frame import (
     error_text, ParameterFrame, ParameterLayout, Response, RESPONSES, Task, WRITE_TASKS,
 )
 from drive_can_bridge.protocols.cannord.process_data import (
-    decode_extra, decode_main, EXTRA_LENGTH, MAIN_VALUES,
+    decode_extra, decode_main, EXTRA_LENGTH, MAIN_VALUES, ProcessData,
 )
 from drive_can_bridge.protocols.cannord.states import (
     CONTROL_PARAMETER, is_faulted, state_of, STATUS_PARAMETER,
@@ -91,22 +92,22 @@ class CannordObserver(DriveObserver):
         self._show_request(data, now, 'cyclic request')
 
     def _show_request(self, data: bytes, now: float, title: str) -> None:
-        if len(data) == EXTRA_LENGTH:
-            self.tell(now, _REQUEST, _CYCLIC, title, self._request_extra,
-                      raws_of(self._request_extra, decode_extra(data)))
-            return
-        content = self.decoded(self._decode_main, data, now, _REQUEST, _CYCLIC, title)
+        content = self._main(data, now, _REQUEST, title, self._request_extra)
         if content is not None:
             self.tell(now, _REQUEST, _CYCLIC, title, self._request_main,
                       raws_of(self._request_main, (content.word, *content.values)))
 
+    def _main(self, data: bytes, now: float, direction: Direction, title: str,
+              extra: Sequence[Parameter]) -> ProcessData | None:
+        """Return what a main frame holds; None: it is an extra one, or malformed, and told."""
+        if len(data) == EXTRA_LENGTH:
+            self.tell(now, direction, _CYCLIC, title, extra, raws_of(extra, decode_extra(data)))
+            return None
+        return self.decoded(self._decode_main, data, now, direction, _CYCLIC, title)
+
     def _take_response(self, data: bytes, now: float) -> None:
         title = 'cyclic response'
-        if len(data) == EXTRA_LENGTH:
-            self.tell(now, _RESPONSE, _CYCLIC, title, self._response_extra,
-                      raws_of(self._response_extra, decode_extra(data)))
-            return
-        content = self.decoded(self._decode_main, data, now, _RESPONSE, _CYCLIC, title)
+        content = self._main(data, now, _RESPONSE, title, self._response_extra)
         if content is None:
             return
         raws = raws_of(self._response_main, (content.word, *content.values))
