@@ -225,8 +225,8 @@ def test_ros_packages_are_declared() -> None:
 
 #: lines that a module has at most
 LINES_MAX = 400
-#: steps from a class to the base of all its ancestors
-STEPS_MAX = 2
+#: steps from a class to the base of all its ancestors in this package: a base, and its subclasses
+STEPS_MAX = 1
 
 
 class Class(NamedTuple):
@@ -275,12 +275,6 @@ def test_no_class_has_many_generations_above_it() -> None:
     deep = [f'{name}: {other.name}' for name in CLASSES
             for steps, other in ancestors(name) if steps > STEPS_MAX]
     assert not deep
-
-
-def test_no_session_inherits_from_another() -> None:
-    assert not [f'{name}: {other.name}' for name in CLASSES
-                for steps, other in ancestors(name) if steps > 1
-                and any(each.name == 'Session' for _, each in ancestors(name))]
 
 
 def test_private_methods_are_overridden_inside_their_package_only() -> None:

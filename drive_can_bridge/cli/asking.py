@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 import time
 
 from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration
-from drive_can_bridge.core.errors import DriveCanError, TransportError
+from drive_can_bridge.core.errors import BusUnavailable, DriveCanError, TransportError
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.protocols.prober import Finding, Prober, Question
@@ -64,7 +64,8 @@ class Asker:
         Ask all questions of a prober.
 
         :raises AnotherMaster: somebody else asks, too.
-        :raises TransportError: the bus takes nothing, or is lost.
+        :raises TransportError: the bus takes nothing.
+        :raises BusUnavailable: it is lost.
         """
         conversation = prober.converse()
         answer: Frame | None = None
@@ -84,13 +85,13 @@ class Asker:
 
         :param timeout: s for each time.
         """
-        refusal: TransportError | None = None
+        refusal: DriveCanError | None = None
         for _ in range(retries + 1):
             self._drain()
             try:
                 self._port.send(question.frame, _SEND_TIMEOUT)
                 refusal = None
-            except TransportError as error:
+            except (TransportError, BusUnavailable) as error:
                 refusal = error
             end = self._clock() + timeout
             while self._clock() < end:

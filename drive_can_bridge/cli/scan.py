@@ -67,7 +67,7 @@ def run(args: Namespace) -> int:
     Scan.
 
     :return: 0 found something, 1 nothing, 2 wrong usage.
-    :raises TransportError: the bus cannot be used.
+    :raises DriveCanError: the bus cannot be used.
     :raises OSError: the output cannot be written.
     """
     reason = check_interface(args.interface)

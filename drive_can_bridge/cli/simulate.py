@@ -20,7 +20,7 @@ import time
 from typing import Any, TextIO, TypeVar
 
 from drive_can_bridge.core.configuration import BridgeConfiguration, BusConfiguration
-from drive_can_bridge.core.errors import TransportError, ValueRefused
+from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, ValueRefused
 from drive_can_bridge.simulation.console import Console, describe, help_lines, LineReader
 from drive_can_bridge.simulation.faults import Fault, parse_fault
 from drive_can_bridge.simulation.plant import Mechanics
@@ -96,7 +96,7 @@ def run(args: argparse.Namespace) -> int:
     except _WrongUsage as error:
         _complain(str(error))
         return WRONG_USAGE
-    except TransportError as error:
+    except (BusMisconfigured, BusUnavailable) as error:
         _complain(str(error))
         return FAILED
 

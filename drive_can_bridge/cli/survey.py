@@ -11,9 +11,8 @@ from collections.abc import Callable
 import time
 
 from drive_can_bridge.core.configuration import BusConfiguration
-from drive_can_bridge.core.errors import TransportError
+from drive_can_bridge.core.errors import BusUnavailable, TransportError
 from drive_can_bridge.core.frame import bits_on_bus, Frame, STUFFING
-from drive_can_bridge.protocols.canopen_pkw.scout import CanopenScout
 from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.protocols.scout import all_sightings, Scout, Sighting
 from drive_can_bridge.transport.end_point import EndPoint
@@ -56,11 +55,8 @@ class Survey:
     @property
     def nodes(self) -> dict[int, str]:
         """CANopen nodes, whatever they are."""
-        found: dict[int, str] = {}
-        for scout in self.scouts.values():
-            if isinstance(scout, CanopenScout):
-                found.update(scout.nodes)
-        return found
+        return {node: text for scout in self.scouts.values()
+                for node, text in scout.nodes.items()}
 
     @property
     def sightings(self) -> list[Sighting]:
@@ -114,7 +110,7 @@ class Survey:
             try:
                 self._port.send(question, _SEND_TIMEOUT)
                 refused = 0
-            except TransportError as error:
+            except (TransportError, BusUnavailable) as error:
                 refused += 1
                 if refused >= _REFUSED_MAX:
                     self.trouble = f'{error}: no other node acknowledges'

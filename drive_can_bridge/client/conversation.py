@@ -36,7 +36,7 @@ class BusConversation:
 
     :param drives: those that will be asked.
     :param neighbours: all drives that are known on the bus: no other master may talk to them.
-    :raises TransportError: the bus cannot be opened.
+    :raises DriveCanError: the bus cannot be opened.
     """
 
     def __init__(self, bus: BusConfiguration, drives: Sequence[DriveConfiguration],

@@ -5,14 +5,13 @@ The errors of the package.
 .. code-block:: text
 
     DriveCanError
-     +-- ConfigurationError             a parameter file or profile is wrong; nothing was opened
-     +-- ProtocolError
-     |    +-- LocalProtocolError        we were about to break a rule (also a ValueError)
-     |    +-- RemoteProtocolError       the other side did
-     +-- ValueRefused                   a setpoint or parameter value cannot be sent (ValueError)
-     +-- TransportError
-          +-- BusUnavailable            device absent, busy or lost: try again (also an OSError)
-          +-- BusMisconfigured          unknown interface, driver missing, impossible bit rate
+     +-- ConfigurationError     a parameter file or profile is wrong; nothing was opened
+     +-- LocalProtocolError     we were about to break a rule (also a ValueError)
+     +-- RemoteProtocolError    the other side did
+     +-- ValueRefused           a setpoint or parameter value cannot be sent (also a ValueError)
+     +-- TransportError         the bus is there, and does not take a frame
+     +-- BusUnavailable         device absent, busy or lost: try again (also an OSError)
+     +-- BusMisconfigured       unknown interface, driver missing, impossible bit rate
 
 Every message is a sentence for a user, without a trailing period, in the manuals' own terms.
 """
@@ -34,15 +33,11 @@ class ConfigurationError(DriveCanError):
         self.problems = problems
 
 
-class ProtocolError(DriveCanError):
-    """A frame and its protocol do not agree."""
-
-
-class LocalProtocolError(ProtocolError, ValueError):
+class LocalProtocolError(DriveCanError, ValueError):
     """We were asked to send what the protocol does not allow."""
 
 
-class RemoteProtocolError(ProtocolError):
+class RemoteProtocolError(DriveCanError):
     """A received frame breaks the protocol."""
 
 
@@ -51,12 +46,12 @@ class ValueRefused(DriveCanError, ValueError):
 
 
 class TransportError(DriveCanError):
-    """The bus cannot be used."""
+    """A frame was not sent, but the bus is still there: its queue is full."""
 
 
-class BusUnavailable(TransportError, OSError):
+class BusUnavailable(DriveCanError, OSError):
     """The device is absent, busy or lost. Worth another attempt."""
 
 
-class BusMisconfigured(TransportError):
+class BusMisconfigured(DriveCanError):
     """No attempt will ever succeed: the configuration of the bus is wrong."""

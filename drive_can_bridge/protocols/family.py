@@ -7,7 +7,7 @@ through the row in :mod:`drive_can_bridge.protocols.families`.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -58,6 +58,15 @@ class Claim(NamedTuple):
                 and not (self.shared and self.shared == other.shared))
 
 
+class Talk(NamedTuple):
+    """What makes those who talk to the drives of a family, or listen to them."""
+
+    session: Callable[[DriveConfiguration], Session]
+    observer: Callable[[DriveConfiguration, Emit], DriveObserver]
+    scout: Callable[[], Scout]
+    prober: Callable[[DriveConfiguration], Prober]
+
+
 class Family(ABC):
     """One protocol family."""
 
@@ -67,8 +76,8 @@ class Family(ABC):
     cyclic: bool
     #: knows control and status word by itself; profiles have no ``control`` section
     control_built_in: bool = False
-    #: the keys that only this family has
-    options_type: type[FamilyOptions] = FamilyOptions
+    #: the keys that only this family has: a frozen dataclass
+    options_type: type[Any] = FamilyOptions
     #: keys that all families have, but whose default is another one here
     drive_defaults: Mapping[str, Any] = MappingProxyType({})
 
@@ -143,15 +152,20 @@ class Family(ABC):
         """
         return None
 
+    # -- who talks and listens --------------------------------------------------------------------
+
     @abstractmethod
+    def talk(self) -> Talk:
+        """Import who talks and listens to drives: checks of a configuration need none of it."""
+
     def make_session(self, drive: DriveConfiguration) -> Session:
         """Make the drive's session. Nothing is sent before ``activate``."""
+        return self.talk().session(drive)
 
     def make_sessions(self, drives: Sequence[DriveConfiguration]) -> list[Session]:
         """Make the sessions of all drives of this family on one bus, in the same order."""
         return [self.make_session(drive) for drive in drives]
 
-    @abstractmethod
     def make_observers(self, drives: Sequence[DriveConfiguration], emit: Emit,
                        ) -> list[DriveObserver]:
         """
@@ -161,11 +175,12 @@ class Family(ABC):
         :return: one for each drive, in the same order; then those of frames that are of no drive
             in particular, whose name is ''.
         """
+        return [self.talk().observer(drive, emit) for drive in drives]
 
-    @abstractmethod
     def make_scout(self) -> Scout:
         """Make what looks for drives of this family on a bus that nobody has described."""
+        return self.talk().scout()
 
-    @abstractmethod
     def make_prober(self, drive: DriveConfiguration) -> Prober:
         """Make what settles the open keys of a drive by harmless reads."""
+        return self.talk().prober(drive)

@@ -15,7 +15,7 @@ _TYPES = {bool: 'boolean', int: 'integer', float: 'number'}
 
 @dataclass(frozen=True, slots=True)
 class FamilyOptions:
-    """The keys of a family that has none of its own."""
+    """What stands there for a family that has no keys of its own."""
 
 
 def option(default: Any, description: str, *, minimum: float | None = None,
@@ -31,7 +31,7 @@ def option(default: Any, description: str, *, minimum: float | None = None,
         **{key: limit for key, limit in limits.items() if limit is not None}})
 
 
-def options_schema(options: type[FamilyOptions]) -> dict[str, Any]:
+def options_schema(options: type[Any]) -> dict[str, Any]:
     """Return the JSON Schema properties of the keys, the family's own before shared ones."""
     ordered = sorted(fields(options), key=lambda entry: entry.name not in options.__annotations__)
     return {entry.name: _schema(entry) for entry in ordered}
@@ -50,7 +50,7 @@ def _schema(entry: 'Field[Any]') -> dict[str, Any]:
     return schema
 
 
-def make_options(options: type[FamilyOptions], given: Mapping[str, Any]) -> Any:
+def make_options(options: type[Any], given: Mapping[str, Any]) -> Any:
     """Make the options from values that fit the schema; an integer is accepted for a number."""
     numbers = {entry.name for entry in fields(options) if entry.type is float}
     return options(**{key: float(value) if key in numbers else value

@@ -47,22 +47,19 @@ class Prober(ABC):
     """
     Asks one drive.
 
+    :ivar requests: what only a master of the drive sends.
     :ivar hazard: what its questions would mean to devices that the file does not name, or ''.
     :ivar notes: what else was seen.
     :ivar answered: there was an answer to some question.
     """
 
-    hazard = ''
-
-    def __init__(self, drive: DriveConfiguration) -> None:
+    def __init__(self, drive: DriveConfiguration, requests: list[Route],
+                 hazard: str = '') -> None:
         self.drive = drive
+        self.requests = requests
+        self.hazard = hazard
         self.notes: list[str] = []
         self.answered = False
-
-    @property
-    @abstractmethod
-    def requests(self) -> list[Route]:
-        """Return what only a master of the drive sends."""
 
     def start_frame(self) -> Frame | None:
         """Return what makes the drive answer at all, sent only when asked for; None: nothing."""
@@ -71,6 +68,27 @@ class Prober(ABC):
     @abstractmethod
     def converse(self) -> Conversation:
         """Ask; every question may be asked again where there is no answer."""
+
+    def ask(self, question: Question) -> Generator[Question, Frame | None, bytes | None]:
+        """Ask one question; return the data of the answer."""
+        frame = yield question
+        if frame is None:
+            return None
+        self.answered = True
+        return frame.data
+
+
+def conclude(key: str, votes: dict[str, list[str]], *, what: str, missing: str) -> Finding:
+    """
+    Return what votes, each with what it rests on, say about a key: they should all agree.
+
+    :param what: whose votes they are, in the plural.
+    :param missing: what there was none of.
+    """
+    told = '; '.join(text for texts in votes.values() for text in texts)
+    if len(votes) == 1:
+        return Finding(key, next(iter(votes)), told)
+    return Finding(key, None, f'{what} contradict each other: {told}' if votes else missing)
 
 
 def spaced(data: bytes) -> str:

@@ -47,6 +47,7 @@ class Scout(ABC):
 
     :ivar protocol: name of the family.
     :ivar sightings: by station.
+    :ivar nodes: what is known of devices that may take what other families ask for commands.
     :ivar master: what somebody else asked last; '': nobody did.
     :ivar unmistakable: its questions mean nothing to devices of any other family.
     :ivar hazard: what its questions would mean to devices of others.
@@ -58,6 +59,7 @@ class Scout(ABC):
 
     def __init__(self) -> None:
         self.sightings: dict[int, Sighting] = {}
+        self.nodes: dict[int, str] = {}
         self.master = ''
         self._asked: dict[int, tuple[float, bytes, bool]] = {}
         self._ours = False      # what is heard now is a question of our own
@@ -74,9 +76,9 @@ class Scout(ABC):
     def begin(self) -> None:
         """Prepare the first questions to all stations that may exist."""
 
-    @abstractmethod
     def settings(self, station: int) -> dict[str, Any]:
         """Return the drive keys of a parameter file that follow from what was seen."""
+        return {}
 
     def asked(self, frame: Frame, now: float) -> None:
         """Take note of a question of our own: its answer is no sign of a master."""

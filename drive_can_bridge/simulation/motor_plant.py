@@ -5,7 +5,7 @@ A motor behind the registers of any profile, found by the names of the parameter
 What no rule knows is plain memory; docs/simulation.md has the rules as a table.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 import math
 
 from drive_can_bridge.core.configuration import DriveConfiguration
@@ -14,7 +14,7 @@ from drive_can_bridge.simulation import names, scales
 from drive_can_bridge.simulation.axes import Axes
 from drive_can_bridge.simulation.control import Operation, State, StatusWord
 from drive_can_bridge.simulation.names import Quantity
-from drive_can_bridge.simulation.plant import Mechanics, Plant
+from drive_can_bridge.simulation.plant import Mechanics
 from drive_can_bridge.simulation.registers import neutral_raw, Registers
 from drive_can_bridge.simulation.scales import RawRange
 
@@ -28,25 +28,28 @@ MAINS_SWING = 0.005
 MAINS_RATE = 2.0 * math.pi * 0.3
 
 
-class MotorPlant(Plant):
+class MotorPlant:
     """
     A motor, for profiles of all kinds.
 
     :param operation: the operating state; None: that of the profile's control section.
     :param movable: parameters that may move something; None: all.
+    :ivar now: the time up to which it has moved.
     """
 
     def __init__(self, registers: Registers, configuration: DriveConfiguration,
                  mechanics: Mechanics, *, operation: Operation | None = None,
                  movable: Mapping[str, Parameter] | None = None) -> None:
-        control = configuration.profile.control
-        super().__init__(registers, configuration, operation or Operation(control))
+        self.registers = registers
+        self.control = control = configuration.profile.control
+        self.operation = operation or Operation(control)
+        self.now: float | None = None
         self._powered = True
         self._control_name = control.parameter if control else ''
         self._shown = {p.name for p in configuration.cyclic_response}
         self.axes = Axes(registers.parameters if movable is None else movable, registers,
                          configuration, mechanics, self.command)
-        self.volatile = {*self.axes.setpoints, self._control_name}
+        self.volatile: Collection[str] = {*self.axes.setpoints, self._control_name}
 
     def command(self, value: float) -> float:
         """Return which speed the value of the speed setpoint stands for."""
@@ -103,20 +106,32 @@ class MotorPlant(Plant):
             share = lambda: 0.7 * abs(motor.share_of_rated_speed)  # noqa: E731
         return lambda: full * share()
 
+    def allows(self, parameter: Parameter, raw: int) -> bool:
+        return True
+
+    def takes(self, parameter: Parameter) -> bool:
+        return True
+
     def written(self, name: str, before: int, raw: int) -> None:
         if name == self._control_name:
             self.operation.word_written(raw, self.now or 0.0)
 
+    def advance(self, now: float) -> None:
+        last = now if self.now is None else self.now
+        self.now = max(now, last)
+        self.move(self.now - last)
+
     def move(self, duration: float) -> None:
+        """Move for some seconds, up to ``self.now``."""
         self.axes.advance(duration, self.operation,
                           energised=self._powered and self.operation.enabled)
 
     def trip(self, duration: float = 0.0) -> None:
-        super().trip(duration)
+        self.operation.trip(self.now or 0.0, duration)
         self.axes.advance(0.0, self.operation, energised=False)
 
     def power_off(self) -> None:
-        super().power_off()
+        self.operation.power_on()
         self._powered = False
         self.axes.power_off()
 

@@ -9,7 +9,7 @@ A family chooses a plant when a drive is made; whoever makes the drive may bring
 
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Protocol, TYPE_CHECKING
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import ValueRefused
@@ -20,61 +20,40 @@ if TYPE_CHECKING:
     from drive_can_bridge.simulation.registers import Registers
 
 
-class Plant:
-    """
-    A motor, or whatever a drive moves: as it stands here, nothing, behind plain memory.
+class Plant(Protocol):
+    """A motor, or whatever a drive moves. Time is an argument and never runs backwards."""
 
-    Time is an argument and never runs backwards.
+    @property
+    def operation(self) -> Operation:
+        """The operating state."""
 
-    :param operation: the operating state.
-    :ivar volatile: names of further parameters that a loss of power resets.
-    :ivar now: the time up to which it has moved.
-    """
-
-    volatile: Collection[str] = ()
-
-    def __init__(self, registers: 'Registers', configuration: DriveConfiguration,
-                 operation: Operation) -> None:
-        self.registers = registers
-        self.control = configuration.profile.control
-        self.operation = operation
-        self.now: float | None = None
+    @property
+    def volatile(self) -> Collection[str]:
+        """Names of further parameters that a loss of power resets."""
 
     def initial(self, parameter: Parameter) -> int | None:
         """Return what a new drive has in a register; None: any plausible value."""
-        return None
 
     def source(self, parameter: Parameter) -> Callable[[], int] | None:
         """Return what computes a read-only register; None: it is plain memory."""
-        return None
 
     def allows(self, parameter: Parameter, raw: int) -> bool:
         """Tell whether a register accepts a value within its limits; False: it is refused."""
-        return True
 
     def takes(self, parameter: Parameter) -> bool:
         """Tell whether writes have an effect now; False: acknowledged, the value stays."""
-        return True
 
     def written(self, name: str, before: int, raw: int) -> None:
         """React to a register that was written."""
 
     def advance(self, now: float) -> None:
         """Move up to now."""
-        last = now if self.now is None else self.now
-        self.now = max(now, last)
-        self.move(self.now - last)
-
-    def move(self, duration: float) -> None:
-        """Move for some seconds, up to ``self.now``."""
 
     def trip(self, duration: float = 0.0) -> None:
         """Fail; the cause lasts for some seconds."""
-        self.operation.trip(self.now or 0.0, duration)
 
     def power_off(self) -> None:
         """Go on without power: nothing is driven any more."""
-        self.operation.power_on()
 
     def power_on(self) -> None:
         """Begin anew; the registers have what EEPROM kept."""

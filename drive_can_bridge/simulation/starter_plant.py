@@ -7,7 +7,7 @@ Which register means what is partly recollection; docs/protocol_canopen_pkw.md s
 be trusted.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import replace
 import math
 import struct
@@ -18,7 +18,7 @@ from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.protocols.canopen_pkw.object_map import register_of
 from drive_can_bridge.simulation.control import State, StatusWord
 from drive_can_bridge.simulation.motor_plant import MAINS_RATE, MAINS_SWING
-from drive_can_bridge.simulation.plant import Mechanics, Plant
+from drive_can_bridge.simulation.plant import Mechanics
 from drive_can_bridge.simulation.registers import Registers
 from drive_can_bridge.simulation.scales import RawRange
 from drive_can_bridge.simulation.starter import (
@@ -67,14 +67,17 @@ def is_starter(profile: Profile) -> bool:
     return word is not None and register_number(word) == CONTROL_REGISTER_1
 
 
-class StarterPlant(Plant):
+class StarterPlant:
     """A :class:`.Starter` behind registers."""
 
-    operation: StarterOperation
+    volatile: Collection[str] = ()
 
     def __init__(self, registers: Registers, configuration: DriveConfiguration,
                  mechanics: Mechanics) -> None:
-        super().__init__(registers, configuration, StarterOperation(configuration.profile.control))
+        self.registers = registers
+        self.control = configuration.profile.control
+        self.operation = StarterOperation(self.control)
+        self._now: float | None = None
         self.starter = Starter()
         self._node = configuration.station
         self._cause = 0
@@ -100,7 +103,7 @@ class StarterPlant(Plant):
 
     def written(self, name: str, before: int, raw: int) -> None:
         if name == self._by_register[CONTROL_REGISTER_1]:
-            self.operation.word_written(raw, self.now or 0.0)
+            self.operation.word_written(raw, self._now or 0.0)
         elif name == self._by_register.get(CONTROL_REGISTER_2):
             appeared = raw & ~before
             if appeared & (CLEAR_ALL | CLEAR_THERMAL_LEVEL):
@@ -122,9 +125,11 @@ class StarterPlant(Plant):
         """Code of the trip; 0 without one."""
         return self._cause if self.operation.faulted else 0
 
-    def move(self, duration: float) -> None:
+    def advance(self, now: float) -> None:
+        last = now if self._now is None else self._now
+        self._now = max(now, last)
         self.starter.switch(self.operation.enabled)
-        if self.starter.advance(duration):
+        if self.starter.advance(self._now - last):
             self._trip(THERMAL_OVERLOAD, self.starter.time_to_reset)
 
     def trip(self, duration: float = 0.0) -> None:
@@ -132,12 +137,12 @@ class StarterPlant(Plant):
 
     def _trip(self, cause: int, duration: float) -> None:
         self._cause = cause
-        super().trip(duration)
+        self.operation.trip(self._now or 0.0, duration)
         self.starter.switch(False)
 
     def power_off(self) -> None:
         """Open the contactors; the thermal image is kept."""
-        super().power_off()
+        self.operation.power_on()
         self.starter.switch(False)
 
     def power_on(self) -> None:
@@ -189,7 +194,7 @@ class StarterPlant(Plant):
             found[500 + 2 * place] = _scaled(100.0 * share, lambda: starter.current)
         for place, share in enumerate((1.0, 0.998, 1.002, 1.0)):
             found[476 + place] = _scaled(MAINS_VOLTAGE * share, lambda: 1.0 + (
-                MAINS_SWING * math.sin(MAINS_RATE * (self.now or 0.0))))
+                MAINS_SWING * math.sin(MAINS_RATE * (self._now or 0.0))))
         return found
 
     def _status(self) -> int:
@@ -200,7 +205,7 @@ class StarterPlant(Plant):
             operation.faulted,
             self.starter.alarm,
             operation.faulted,
-            operation.faulted and operation.reset_allowed(self.now or 0.0),
+            operation.faulted and operation.reset_allowed(self._now or 0.0),
             True,
             ratio > 0.1,
         )

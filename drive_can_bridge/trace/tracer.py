@@ -227,10 +227,10 @@ class Tracer:
 
     def _expire(self, bus: BusTrace, now: float) -> None:
         self._sent = None
-        for observer in sorted(bus.observers, key=lambda each: each.deadline):
-            if observer.deadline <= now:
-                observer.expire(now)
-        bus.deadline = min((observer.deadline for observer in bus.observers), default=math.inf)
+        due = [observer for observer in bus.observers if observer.deadline <= now]
+        for observer in sorted(due, key=lambda each: each.deadline):
+            observer.expire(now)
+        bus.deadline = min([observer.deadline for observer in bus.observers], default=math.inf)
 
     def _take_other(self, bus: BusTrace, record: Record) -> None:
         if record.kind is RecordKind.ERROR:

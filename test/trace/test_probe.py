@@ -266,6 +266,13 @@ def test_datamodel_maps_by_the_bytes_of_the_manual() -> None:
         'the maps of the file are there, 122 and 126 on: 50 51 0 0 | 209 210 211 0')
 
 
+def test_datamodel_maps_of_11_bits_are_low_byte_first() -> None:
+    answers = {'037A000400000000': '3200330000000000', '037E000400000000': 'D100D200D3000000'}
+    found = Bench(scripted(answers, 0x3F1, 0x7F1)).probe(ELEVEN)
+    assert found['parameter_offset'].reason == (
+        'the maps of the file are there, 122 and 126 on: 50 51 0 0 | 209 210 211 0')
+
+
 @pytest.mark.parametrize(('request_map', 'response_map', 'moved'), [
     ('0031003200000000', '00D000D100D20000', -1), ('0033003400000000', '00D200D300D40000', 1)])
 def test_datamodel_moved(request_map: str, response_map: str, moved: int) -> None:

@@ -35,7 +35,7 @@ class FakePort:
         self.sent: list[Frame] = []
         self.timeouts: list[float] = []
         self.full = False
-        self.failure: TransportError | None = None
+        self.failure: Exception | None = None
         #: None: the adapter does not tell
         self.has_room: bool | None = None
         self.looks = 0

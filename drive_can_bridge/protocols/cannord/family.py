@@ -18,10 +18,8 @@ from drive_can_bridge.protocols.cannord.process_data import (
     EXTRA_LENGTH, EXTRA_VALUES, main_length, MAIN_VALUES,
 )
 from drive_can_bridge.protocols.cannord.states import STATUS_WORD
-from drive_can_bridge.protocols.family import Claim, Complaint, Family
+from drive_can_bridge.protocols.family import Claim, Complaint, Family, Talk
 from drive_can_bridge.protocols.observer import DriveObserver, Emit
-from drive_can_bridge.protocols.prober import Prober
-from drive_can_bridge.protocols.scout import Scout
 
 #: s that an inverter takes at most to answer process data (BU 0060 page 50)
 ANSWER_TIME = 0.003
@@ -60,7 +58,6 @@ class Cannord(Family):
     options_type = CannordOptions
 
     def check(self, drive: DriveConfiguration) -> Iterator[Complaint]:
-        """Yield everything that this family cannot do with the drive as configured."""
         if not 0 <= drive.station <= ADDRESS_MAX:
             yield Complaint('station', f'{drive.station} is out of range, '
                                        f'allowed is 0 to {ADDRESS_MAX} ({self.name})')
@@ -77,7 +74,6 @@ class Cannord(Family):
                     yield member, complaint
 
     def warnings(self, drive: DriveConfiguration) -> Iterator[Complaint]:
-        """Yield what is allowed but suspicious."""
         if drive.period < ANSWER_TIME:
             yield Complaint('period', f'{drive.period:g} s is short: inverters take 1 to '
                                       f'{1e3 * ANSWER_TIME:g} ms to answer; recommended is at '
@@ -124,19 +120,23 @@ class Cannord(Family):
         return timeout_parameter(drive.profile) or self.raw_parameter(
             drive, f'p{TIMEOUT_NUMBER}')
 
+    def talk(self) -> Talk:
+        from drive_can_bridge.protocols.cannord.observer import CannordObserver
+        from drive_can_bridge.protocols.cannord.prober import CannordProber
+        from drive_can_bridge.protocols.cannord.scout import CannordScout
+        from drive_can_bridge.protocols.cannord.session import CannordSession
+        return Talk(CannordSession, CannordObserver, CannordScout, CannordProber)
+
     def make_session(self, drive: DriveConfiguration) -> Session:
         """Make the session of a drive that is alone, or alone in its broadcast group."""
         return self.make_sessions([drive])[0]
 
     def make_sessions(self, drives: Sequence[DriveConfiguration]) -> list[Session]:
-        """Make the sessions of all drives of this family on one bus, in the same order."""
-        # Imported late: configuration checks read this table without any need of sessions.
         from drive_can_bridge.protocols.cannord.group import make_group
-        from drive_can_bridge.protocols.cannord.session import CannordSession
         made: dict[str, Session] = {
             session.configuration.name: session for group in groups(drives)
             for session in make_group(group)}
-        return [made[drive.name] if drive.name in made else CannordSession(drive)
+        return [made[drive.name] if drive.name in made else self.talk().session(drive)
                 for drive in drives]
 
     def make_observers(self, drives: Sequence[DriveConfiguration], emit: Emit,
@@ -145,16 +145,6 @@ class Cannord(Family):
         from drive_can_bridge.protocols.cannord.observer import CannordObserver
         leaders = {group[0].name for group in groups(drives)}
         return [CannordObserver(drive, emit, leads=drive.name in leaders) for drive in drives]
-
-    def make_scout(self) -> Scout:
-        """Make what looks for drives of this family."""
-        from drive_can_bridge.protocols.cannord.scout import CannordScout
-        return CannordScout()
-
-    def make_prober(self, drive: DriveConfiguration) -> Prober:
-        """Make what settles the open keys of a drive."""
-        from drive_can_bridge.protocols.cannord.prober import CannordProber
-        return CannordProber(drive)
 
     # -- parts ------------------------------------------------------------------------------------
 

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 from drive_can_bridge.protocols.cannord.states import PARAMETER_SETS
-from drive_can_bridge.protocols.options import FamilyOptions, option
+from drive_can_bridge.protocols.options import option
 
 
 @dataclass(frozen=True, slots=True)
-class CannordOptions(FamilyOptions):
+class CannordOptions:
     """How an inverter is addressed, and how its frames are laid out."""
 
     extended_identifiers: bool = option(

@@ -12,14 +12,16 @@ from collections.abc import Generator, Iterator
 from typing import NamedTuple
 
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.frame import Frame, Route
+from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.protocols.cannord.identifiers import (
     all_identifier, group_identifier, identifier, MessageObject, route,
 )
 from drive_can_bridge.protocols.cannord.parameter_frame import (
     error_text, ERRORS, LENGTH, NUMBER_MAX, ParameterLayout, Response, RESPONSES, Task,
 )
-from drive_can_bridge.protocols.prober import Conversation, Finding, Prober, Question, spaced
+from drive_can_bridge.protocols.prober import (
+    conclude, Conversation, Finding, Prober, Question, spaced,
+)
 
 #: what to ask where the profile names no parameter of that kind
 SIMPLE = (514, 513)
@@ -67,20 +69,15 @@ class CannordProber(Prober):
     """Asks one inverter."""
 
     def __init__(self, drive: DriveConfiguration) -> None:
-        super().__init__(drive)
-        self._extended: bool = drive.options.extended_identifiers
-        self._task = self._identifier(MessageObject.PARAMETER_TASK)
-        self._response = self._identifier(MessageObject.PARAMETER_RESPONSE)
-
-    def _identifier(self, kind: MessageObject) -> int:
-        return identifier(kind, self.drive.station, extended=self._extended)
-
-    @property
-    def requests(self) -> list[Route]:
-        own = (self._task, self._identifier(MessageObject.PROCESS_REQUEST),
-               group_identifier(self.drive.station, extended=self._extended),
-               all_identifier(extended=self._extended))
-        return [route(each, extended=self._extended) for each in own]
+        station, extended = drive.station, drive.options.extended_identifiers
+        self._task, self._response, process_request = (
+            identifier(kind, station, extended=extended) for kind in (
+                MessageObject.PARAMETER_TASK, MessageObject.PARAMETER_RESPONSE,
+                MessageObject.PROCESS_REQUEST))
+        super().__init__(drive, [route(each, extended=extended) for each in (
+            self._task, process_request, group_identifier(station, extended=extended),
+            all_identifier(extended=extended))])
+        self._extended: bool = extended
 
     def converse(self) -> Conversation:
         timeout = yield from self._ask(Task.READ, TELEGRAM_TIMEOUT)
@@ -110,11 +107,8 @@ class CannordProber(Prober):
                     f'read of P{number}: {value.alone[0]} ({spaced(value.data)})')
             if refusal.error == _NOT_AN_ARRAY:
                 break
-        told = '; '.join(text for texts in votes.values() for text in texts)
-        if len(votes) == 1:
-            return Finding('value_order', next(iter(votes)), told)
-        return Finding('value_order', None, f'answers contradict each other: {told}' if votes else
-                       'no array read was refused with an error number')
+        return conclude('value_order', votes, what='answers',
+                        missing='no array read was refused with an error number')
 
     def _index_byte(self) -> Generator[Question, Frame | None, Finding]:
         told = 'no parameter is an array'
@@ -148,11 +142,9 @@ class CannordProber(Prober):
                     and int.from_bytes(frame.data[_NUMBER_AND_TASK], 'little') & 0xFFF == number
                     and frame.data[1] >> 4 in expected)
 
-        frame = yield Question(Frame(self._task, data, self._extended), answers)
-        if frame is None:
-            return None
-        self.answered = True
-        return _Answer(frame.data)
+        answer = yield from self.ask(
+            Question(Frame(self._task, data, self._extended), answers))
+        return None if answer is None else _Answer(answer)
 
     def _twice(self, task: Task, number: int, ind: int = 0) -> _Asking:
         """Ask twice: a stale answer comes once; values may change, refusals do not."""

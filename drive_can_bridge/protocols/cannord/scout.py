@@ -1,8 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Finding CANnord inverters: by requests and answers that follow each other, or by a read."""
 
-from typing import Any
-
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.protocols.cannord.identifiers import (
@@ -33,9 +31,8 @@ class CannordScout(Scout):
 
     def begin(self) -> None:
         data = ParameterLayout().encode(Task.READ, PARAMETER)
-        for address in range(ADDRESS_MAX + 1):
-            self._questions.append(
-                Frame(identifier(MessageObject.PARAMETER_TASK, address), data, False))
+        self._questions += [Frame(identifier(MessageObject.PARAMETER_TASK, address), data, False)
+                            for address in range(ADDRESS_MAX + 1)]
 
     def hear_request(self, frame: Frame, now: float) -> None:
         self.hear(frame, now)
@@ -62,9 +59,6 @@ class CannordScout(Scout):
             if self._answers(-1 - station, now,
                              lambda request: _number(request) == _number(data)):
                 self._pair(station, f'answers to tasks for P{_number(data)}')
-
-    def settings(self, station: int) -> dict[str, Any]:
-        return {}
 
 
 def _number(data: bytes) -> int:

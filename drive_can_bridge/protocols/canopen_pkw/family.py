@@ -7,17 +7,14 @@ from typing import Any
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Route, STANDARD_IDENTIFIER_MAX
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.canopen import network
 from drive_can_bridge.protocols.canopen_pkw import addresses, pkw
 from drive_can_bridge.protocols.canopen_pkw.addresses import Span
 from drive_can_bridge.protocols.canopen_pkw.identifiers import Identifiers
 from drive_can_bridge.protocols.canopen_pkw.options import PkwOptions
-from drive_can_bridge.protocols.family import Claim, Complaint, Family
+from drive_can_bridge.protocols.family import Claim, Complaint, Family, Talk
 from drive_can_bridge.protocols.observer import DriveObserver, Emit
 from drive_can_bridge.protocols.polling import round_time
-from drive_can_bridge.protocols.prober import Prober
-from drive_can_bridge.protocols.scout import Scout
 
 #: worst-case stuffing, eight bytes, 11-bit identifier, with the interframe space
 FRAME_BITS = 135
@@ -40,7 +37,6 @@ class CanopenPkw(Family):
         return options
 
     def check(self, drive: DriveConfiguration) -> Iterator[Complaint]:
-        """Yield everything that this family cannot do with the drive as configured."""
         if not 1 <= drive.station <= network.NODE_MAX:
             yield Complaint('station', f'{drive.station} is out of range, '
                                        f'allowed is 1 to {network.NODE_MAX} ({self.name})')
@@ -69,7 +65,6 @@ class CanopenPkw(Family):
                                      'says that this one was')
 
     def claims(self, drive: DriveConfiguration) -> list[Claim]:
-        """Return all identifiers of the drive on its bus, both directions."""
         node = drive.station
         identifiers = Identifiers.of(drive)
         purposes = {
@@ -122,28 +117,19 @@ class CanopenPkw(Family):
                                  index=other.index, subindex=other.subindex)
         return raw
 
-    def make_session(self, drive: DriveConfiguration) -> Session:
-        """Make the drive's session. Nothing is sent before ``activate``."""
-        # Imported late: configuration checks read this table without any need of sessions.
+    def talk(self) -> Talk:
+        from drive_can_bridge.protocols.canopen_pkw.observer import PkwObserver
+        from drive_can_bridge.protocols.canopen_pkw.prober import PkwProber
+        from drive_can_bridge.protocols.canopen_pkw.scout import CanopenScout
         from drive_can_bridge.protocols.canopen_pkw.session import PkwSession
-        return PkwSession(drive)
+        return Talk(PkwSession, PkwObserver, CanopenScout, PkwProber)
 
     def make_observers(self, drives: Sequence[DriveConfiguration], emit: Emit,
                        ) -> list[DriveObserver]:
         """Make what watches devices, and what is said to all nodes."""
-        from drive_can_bridge.protocols.canopen_pkw.observer import NmtObserver, PkwObserver
-        return [*(PkwObserver(drive, emit) for drive in drives),
+        from drive_can_bridge.protocols.canopen.observer import NmtObserver
+        return [*super().make_observers(drives, emit),
                 NmtObserver({drive.station: drive.name for drive in drives}, emit)]
-
-    def make_scout(self) -> Scout:
-        """Make what looks for drives of this family."""
-        from drive_can_bridge.protocols.canopen_pkw.scout import CanopenScout
-        return CanopenScout()
-
-    def make_prober(self, drive: DriveConfiguration) -> Prober:
-        """Make what settles the open keys of a drive."""
-        from drive_can_bridge.protocols.canopen_pkw.prober import PkwProber
-        return PkwProber(drive)
 
     # -- parts ------------------------------------------------------------------------------------
 

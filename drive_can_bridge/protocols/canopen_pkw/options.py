@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 from drive_can_bridge.core.frame import STANDARD_IDENTIFIER_MAX
-from drive_can_bridge.protocols.options import FamilyOptions, option
+from drive_can_bridge.protocols.options import option
 
 
 @dataclass(frozen=True, slots=True)
-class PkwOptions(FamilyOptions):
+class PkwOptions:
     """Where the mailbox is, how its bytes are laid out, and who looks after the node."""
 
     layout: Literal['word_le', 'dword_swapped', 'word_be'] = option(

@@ -25,7 +25,9 @@ from drive_can_bridge.protocols.canopen_pkw import pkw
 from drive_can_bridge.protocols.canopen_pkw.identifiers import Identifiers
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Layout, Message
 from drive_can_bridge.protocols.canopen_pkw.refusals import describe
-from drive_can_bridge.protocols.prober import Conversation, Finding, Prober, Question, spaced
+from drive_can_bridge.protocols.prober import (
+    conclude, Conversation, Finding, Prober, Question, spaced,
+)
 
 STATUS = Address(455)
 #: registers that no device should have; their bytes are no function that writes, in any layout
@@ -61,15 +63,11 @@ class PkwProber(Prober):
     """Asks one node."""
 
     def __init__(self, drive: DriveConfiguration) -> None:
-        super().__init__(drive)
         self._identifiers = Identifiers.of(drive)
         self._toggle = False
-
-    @property
-    def requests(self) -> list[Route]:
-        return [Route(each, STANDARD_IDENTIFIER_MAX, False) for each in (
-            self._identifiers.request, sdo.REQUEST_BASE + self.drive.station,
-            network.NMT_IDENTIFIER)]
+        super().__init__(drive, [Route(each, STANDARD_IDENTIFIER_MAX, False) for each in (
+            self._identifiers.request, sdo.REQUEST_BASE + drive.station,
+            network.NMT_IDENTIFIER)])
 
     def start_frame(self) -> Frame | None:
         return network.encode_nmt(network.NmtCommand.START, self.drive.station)
@@ -125,7 +123,7 @@ class PkwProber(Prober):
 
     def _word_order(self, layout: Layout) -> Generator[Question, Frame | None, Finding]:
         votes: dict[str, list[str]] = {}
-        certain = False
+        certain, again = False, '; try again while the motor runs'
         for parameter in self._wide():
             answer = yield from self._ask(self._address(parameter), 2, layout)
             if answer is None or answer[1].code == pkw.Function.ERROR:
@@ -139,15 +137,12 @@ class PkwProber(Prober):
                     f'{parameter.name} reads {spaced(answer[0][4:])}: {" and not ".join(values)}')
                 if certain or len(votes[order]) > _AGREEING:
                     break
-        told = '; '.join(text for texts in votes.values() for text in texts)
-        if len(votes) == 1 and (certain or len(next(iter(votes.values()))) >= _AGREEING):
-            return Finding('word_order', next(iter(votes)), told)
-        if len(votes) > 1:
-            return Finding('word_order', None, f'values contradict each other: {told}')
-        return Finding('word_order', None, (
-            f'one value is not enough: {told}' if told else
-            'no value of 32 bits has one half that is 0 and one that is not')
-            + '; try again while the motor runs')
+        texts = [text for each in votes.values() for text in each]
+        if len(texts) == 1 and not certain:
+            return Finding('word_order', None, f'one value is not enough: {texts[0]}{again}')
+        return conclude(
+            'word_order', votes, what='values',
+            missing=f'no value of 32 bits has one half that is 0 and one that is not{again}')
 
     # -- asking -----------------------------------------------------------------------------------
 
@@ -165,14 +160,11 @@ class PkwProber(Prober):
         data = pkw.encode(request, layout)
         if not harmless(data):
             return None
-        frame = yield Question(
+        answer = yield from self.ask(Question(
             Frame(self._identifiers.request, data, False),
             lambda frame: self._comes(frame) and pkw.answers(pkw.decode(frame.data, layout),
-                                                             request))
-        if frame is None:
-            return None
-        self.answered = True
-        return frame.data, pkw.decode(frame.data, layout)
+                                                             request)))
+        return None if answer is None else (answer, pkw.decode(answer, layout))
 
     def _wide(self) -> list[Parameter]:
         found: Iterator[Parameter] = (

@@ -1,8 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Finding CANopen nodes, and among them devices with a PKW mailbox."""
 
-from typing import Any
-
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.protocols.canopen import network, sdo
@@ -33,13 +31,12 @@ class CanopenScout(Scout):
 
     def __init__(self) -> None:
         super().__init__()
-        self.nodes: dict[int, str] = {}     # what is known of nodes, mailbox or not
         self._mailboxes: set[int] = set()
         self._facts: dict[int, dict[str, str]] = {}
 
     def begin(self) -> None:
-        for node in range(1, network.NODE_MAX + 1):
-            self._questions.append(sdo.encode_upload(node, sdo.DEVICE_TYPE, 0))
+        self._questions += [sdo.encode_upload(node, sdo.DEVICE_TYPE, 0)
+                            for node in range(1, network.NODE_MAX + 1)]
 
     def hear_request(self, frame: Frame, now: float) -> None:
         if frame.identifier & 0x780 == network.REQUEST_BASE:
@@ -103,9 +100,6 @@ class CanopenScout(Scout):
             self._see(node, told, Certainty.CERTAIN)
         elif facts.get('PKW'):
             self._see(node, told, Certainty.LIKELY)
-
-    def settings(self, station: int) -> dict[str, Any]:
-        return {}
 
 
 def _repeats(request: bytes, answer: bytes) -> bool:

@@ -11,13 +11,12 @@ The status word is read twice a second, and twenty times while a request is unde
 slot in the cyclic telegrams is none of this module's business.
 """
 
-from collections.abc import Callable
 import math
 
-from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.parameters import Parameter, Storage
-from drive_can_bridge.core.told import Told
+from drive_can_bridge.core.session import Session
+from drive_can_bridge.protocols.cycle_timer import stop_spacing
 from drive_can_bridge.protocols.datamodel.channel import AcyclicChannel, Procedure, Read, Write
 
 #: s between two looks at the status word, while a request is under way and otherwise
@@ -36,30 +35,24 @@ CONTROL_WORD = 'control word'
 
 class AcyclicControl:
     """
-    Control by acyclic frames.
+    Control by acyclic frames, of a session that has control.
 
     :param word: parameter of the control word; None: it is sent cyclically.
     :param status: parameter of the status word; None: it comes cyclically, or there is none.
-    :param offset: added to parameter numbers on the wire.
-    :param changed: called after anything that may have changed the control word.
-    :param told: takes note of the words that left.
-    :param spacing: s between the writes of a pulse.
     :ivar look_at: when the status word is to be read; infinity: not planned.
     :ivar retry_at: when a word that the bus refused, or a pulse, is to be written again.
     """
 
-    def __init__(self, channel: AcyclicChannel, control: ControlMachine, *,
-                 word: Parameter | None, status: Parameter | None, offset: int,
-                 changed: Callable[[float], None], told: Told, spacing: float) -> None:
+    def __init__(self, session: Session, control: ControlMachine, channel: AcyclicChannel, *,
+                 word: Parameter | None, status: Parameter | None) -> None:
         self.look_at = self.retry_at = math.inf
-        self._channel = channel
+        self._session = session
         self._control = control
+        self._channel = channel
         self._word = word
         self._status = status
-        self._offset = offset
-        self._changed = changed
-        self._told = told
-        self._spacing = spacing
+        self._spacing = stop_spacing(session.configuration.period)
+        self._offset: int = session.configuration.options.parameter_offset
         self._written: int | None = None
         self._repeat_at = math.inf
         self._repeats = 0
@@ -134,14 +127,14 @@ class AcyclicControl:
                 self._written = None
                 self.retry_at = now + REFUSED_PAUSE
             return
-        self._told.note(CONTROL_WORD, runs=runs)
+        self._session.told.note(CONTROL_WORD, runs=runs)
         self._outdated = self._reading
         self._repeat_at = now + min(REPEAT_FIRST * 2 ** min(self._repeats, 10), REPEAT_LAST)
         if word == self._control.word:
             self._control.word_sent(now)
             if self._control.pulsing:
                 self._repeat_at = self.retry_at = now + self._spacing
-        self._changed(now)
+        self._session.control_changed(now)
 
     def _read(self, status: Parameter) -> Procedure:
         words = yield Read((status.number or 0) + self._offset)
@@ -154,25 +147,6 @@ class AcyclicControl:
             return
         if raw is not None and not self._outdated:
             self._control.status_received(raw, now)
-            self._changed(now)
+            self._session.control_changed(now)
         self.look_at = now if self._outdated else min(self.look_at, now + (
             STATUS_PERIOD_PENDING if self._control.pending else STATUS_PERIOD))
-
-
-def make_acyclic_control(drive: DriveConfiguration, channel: AcyclicChannel,
-                    control: ControlMachine | None, changed: Callable[[float], None],
-                    told: Told, *, word: str, status: str,
-                    spacing: float) -> AcyclicControl | None:
-    """
-    Return what looks after the words that have no slot; None where there are none.
-
-    :param word: name of the control word's parameter; '' where it has its slot.
-    :param status: name of the status word's parameter; '' likewise, or where there is none.
-    :param spacing: s between the writes of a pulse.
-    """
-    parameters = drive.profile.parameters
-    if control is None or not word and not status:
-        return None
-    return AcyclicControl(channel, control, word=parameters.get(word),
-                          status=parameters.get(status), changed=changed, told=told,
-                          spacing=spacing, offset=drive.options.parameter_offset)

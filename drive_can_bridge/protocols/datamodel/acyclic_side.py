@@ -14,9 +14,8 @@ from drive_can_bridge.core.roles import Cells
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.users import Users
 from drive_can_bridge.protocols.access import ChannelServer
-from drive_can_bridge.protocols.cycle_timer import stop_spacing
 from drive_can_bridge.protocols.datamodel import procedures
-from drive_can_bridge.protocols.datamodel.acyclic_control import CONTROL_WORD, make_acyclic_control
+from drive_can_bridge.protocols.datamodel.acyclic_control import AcyclicControl, CONTROL_WORD
 from drive_can_bridge.protocols.datamodel.channel import (
     AcyclicChannel, Polling, Reply, Step, Words, Write,
 )
@@ -65,11 +64,12 @@ class AcyclicSide:
         self._word = drive.profile.parameters.get(word_name)
         self.control_slot = slot_of(drive.cyclic_request, word_name)
         self.status_slot = slot_of(drive.cyclic_response, status_name)
-        self.control_writer = make_acyclic_control(
-            drive, self.channel, session.control, session.control_changed, session.told,
-            word=word_name if self.control_slot is None else '',
-            status=status_name if self.status_slot is None else '',
-            spacing=stop_spacing(drive.period))
+        word = word_name if self.control_slot is None else ''
+        status = status_name if self.status_slot is None else ''
+        self.control_writer = None if session.control is None or not word + status else (
+            AcyclicControl(session, session.control, self.channel,
+                           word=drive.profile.parameters.get(word),
+                           status=drive.profile.parameters.get(status)))
         self.stop: SafeStop[Step, Reply] = SafeStop(session, self.channel, stop_ended)
 
     def _note_write(self, write: Write) -> None:

@@ -11,8 +11,8 @@ step                result sent back
 =================== ==================================================================
 
 As nobody answers writes, some of them are no exchange. A control word goes before all procedures,
-and takes the place of one that has not left yet (:meth:`~AcyclicChannel.write_first`). What stops
-a drive waits for nothing but the spacing of frames (:meth:`~AcyclicChannel.write_now`).
+and takes the place of one that has not left yet (:meth:`~ParameterCourier.write_first`). What
+stops a drive waits for nothing but the spacing of frames (:meth:`~ParameterCourier.write_now`).
 
 Pace: at least 20 ms lie between two EEPROM writes to a station and between such a write and the
 next read (manual, "Scrittura di un parametro": "almeno 20msec"); a frame leaves only while no
@@ -223,12 +223,23 @@ class ParameterCourier(Courier[Step, Reply]):
         self._emit(self._encode_write(write.number, write.words), left)
 
     def write_first(self, write: Write, left: Left, now: float) -> None:
-        """See :meth:`AcyclicChannel.write_first`."""
+        """
+        Write something before everything that waits.
+
+        It takes the place of such a write that has not left yet: what is outdated is not sent.
+
+        :param left: called when the bus has taken or refused the frame.
+        """
         self._first = write, left
         self.wake(now)
 
     def write_now(self, write: Write, left: Left, now: float) -> None:
-        """See :meth:`AcyclicChannel.write_now`."""
+        """
+        Write what stops a drive: after nothing but other such writes, whatever is under way.
+
+        What waits with :meth:`write_first`, or to be written to the same parameter, is outdated:
+        it is not sent any more.
+        """
         self._first = None
         self._urgent = deque(each for each in self._urgent if each[0].number != write.number)
         self._urgent.append((write, left))
@@ -281,6 +292,7 @@ class AcyclicChannel(Channel[Step, Reply]):
         self.courier = ParameterCourier(
             encode_read, encode_write, send, retry=retry,
             eeprom_gap=eeprom_gap, wrote=wrote, polling=polling)
+        self.write_first, self.write_now = self.courier.write_first, self.courier.write_now
         super().__init__(self.courier, own_to_end=polling is not None)
 
     @property
@@ -292,22 +304,3 @@ class AcyclicChannel(Channel[Step, Reply]):
         """Take the answer of the outstanding read (the caller has matched it)."""
         self.courier.answered(now)
         self.ended(words, now)
-
-    def write_first(self, write: Write, left: Left, now: float) -> None:
-        """
-        Write something before everything that waits.
-
-        It takes the place of such a write that has not left yet: what is outdated is not sent.
-
-        :param left: called when the bus has taken or refused the frame.
-        """
-        self.courier.write_first(write, left, now)
-
-    def write_now(self, write: Write, left: Left, now: float) -> None:
-        """
-        Write what stops a drive: after nothing but other such writes, whatever is under way.
-
-        What waits with :meth:`write_first`, or to be written to the same parameter, is outdated:
-        it is not sent any more.
-        """
-        self.courier.write_now(write, left, now)

@@ -1,21 +1,19 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The row of the family table for the DataModel protocol with 29-bit identifiers."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Route
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.core.session import Session
-from drive_can_bridge.protocols.datamodel.common_family import DataModelFamily
+from drive_can_bridge.protocols.datamodel.checks import (
+    check_parameters, check_period_and_maps, raw_parameter,
+)
 from drive_can_bridge.protocols.datamodel.extended import (
     SLOTS, STATION_MASK, STATION_MAX, STATION_SHIFT,
 )
 from drive_can_bridge.protocols.datamodel.options import ExtendedOptions, NUMBER_MAX
-from drive_can_bridge.protocols.family import Claim, Complaint
-from drive_can_bridge.protocols.observer import DriveObserver, Emit
-from drive_can_bridge.protocols.prober import Prober
-from drive_can_bridge.protocols.scout import Scout
+from drive_can_bridge.protocols.family import Claim, Complaint, Family, Talk
 
 #: worst-case stuffing, eight bytes, 29-bit identifier, with the interframe space
 FRAME_BITS = 160
@@ -23,12 +21,23 @@ FRAME_BITS = 160
 MAPPING_CHECK_BITS = 4 * FRAME_BITS
 
 
-class DataModelExtended(DataModelFamily):
+class DataModelExtended(Family):
     """DataModel, 29-bit identifiers: a cyclic service of four words each way, acyclic access."""
 
     name = 'datamodel_extended'
     cyclic = True
     options_type = ExtendedOptions
+
+    def check(self, drive: DriveConfiguration) -> Iterator[Complaint]:
+        if not 1 <= drive.station <= STATION_MAX:
+            yield Complaint('station', f'{drive.station} is out of range, '
+                                       f'allowed is 1 to {STATION_MAX} ({self.name})')
+        yield from check_period_and_maps(drive)
+        yield from self._check_slots(drive)
+        yield from check_parameters(drive, self.name)
+
+    def raw_parameter(self, drive: DriveConfiguration, name: str) -> Parameter | None:
+        return raw_parameter(drive, name)
 
     def claims(self, drive: DriveConfiguration) -> list[Claim]:
         """Return all identifiers of the drive on its bus: every frame of its station."""
@@ -42,36 +51,14 @@ class DataModelExtended(DataModelFamily):
             return exchange
         return exchange + MAPPING_CHECK_BITS
 
-    def make_session(self, drive: DriveConfiguration) -> Session:
-        """Make the drive's session. Nothing is sent before ``activate``."""
-        # Imported late: configuration checks read this table without any need of sessions.
+    def talk(self) -> Talk:
         from drive_can_bridge.protocols.datamodel.extended_session import ExtendedSession
-        return ExtendedSession(drive)
-
-    def make_observers(self, drives: Sequence[DriveConfiguration], emit: Emit,
-                       ) -> list[DriveObserver]:
-        """Make what watches drives."""
         from drive_can_bridge.protocols.datamodel.observer import ExtendedObserver
-        return [ExtendedObserver(drive, emit) for drive in drives]
-
-    def make_scout(self) -> Scout:
-        """Make what looks for drives of this family."""
+        from drive_can_bridge.protocols.datamodel.prober import extended_prober
         from drive_can_bridge.protocols.datamodel.scout import ExtendedScout
-        return ExtendedScout()
+        return Talk(ExtendedSession, ExtendedObserver, ExtendedScout, extended_prober)
 
-    def make_prober(self, drive: DriveConfiguration) -> Prober:
-        """Make what settles the open keys of a drive."""
-        from drive_can_bridge.protocols.datamodel.prober import ExtendedProber
-        return ExtendedProber(drive)
-
-    # -- parts of the check -----------------------------------------------------------------------
-
-    def _check_station(self, drive: DriveConfiguration) -> Iterator[Complaint]:
-        if not 1 <= drive.station <= STATION_MAX:
-            yield Complaint('station', f'{drive.station} is out of range, '
-                                       f'allowed is 1 to {STATION_MAX} ({self.name})')
-
-    def _check_lists(self, drive: DriveConfiguration) -> Iterator[Complaint]:
+    def _check_slots(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         offset = drive.options.parameter_offset
         for key in ('cyclic_request', 'cyclic_response'):
             listed: tuple[Parameter, ...] = getattr(drive, key)
@@ -82,4 +69,3 @@ class DataModelExtended(DataModelFamily):
                 if parameter.number is not None and parameter.number + offset == 0:
                     yield Complaint(key, f"'{parameter.name}' has number 0 on the wire, which "
                                          f'ends a map; allowed is 1 to {NUMBER_MAX}')
-        yield from super()._check_lists(drive)

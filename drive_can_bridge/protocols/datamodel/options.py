@@ -8,7 +8,7 @@ from drive_can_bridge.core.frame import STANDARD_IDENTIFIER_MAX
 from drive_can_bridge.protocols.datamodel.extended import SLOTS
 from drive_can_bridge.protocols.datamodel.mapping import REQUEST_MAP_BASE, RESPONSE_MAP_BASE
 from drive_can_bridge.protocols.datamodel.standard import REQUEST_ID_BASE, RESPONSE_ID_BASE
-from drive_can_bridge.protocols.options import FamilyOptions, option
+from drive_can_bridge.protocols.options import option
 
 #: the manual's least time between two EEPROM writes
 EEPROM_WRITE_GAP = 0.02
@@ -16,7 +16,7 @@ NUMBER_MAX = 0xFFFF
 
 
 @dataclass(frozen=True, slots=True)
-class DataModelOptions(FamilyOptions):
+class DataModelOptions:
     """What both protocols have in common."""
 
     request_map_base: int = option(

@@ -7,8 +7,7 @@ numbers that the file configures, moved like themselves. Where they hold others,
 that a drive does not answer for parameters that it has not.
 """
 
-from abc import abstractmethod
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from typing import NamedTuple
 
 from drive_can_bridge.core.configuration import DriveConfiguration
@@ -37,18 +36,22 @@ _Asking = Generator[Question, Frame | None, tuple[int, ...] | None]
 
 
 class DataModelProber(Prober):
-    """Asks one drive, whatever its identifiers."""
+    """
+    Asks one drive, whatever its identifiers.
 
-    #: the maps are those of cyclic telegrams
-    maps_count = True
+    :param question: the read of four parameters, from the number on.
+    :param words: what the data of its answer hold.
+    :param maps_count: the maps are those of cyclic telegrams.
+    """
 
-    @abstractmethod
-    def question(self, number: int) -> Question:
-        """Return the read of four parameters."""
-
-    @abstractmethod
-    def words(self, frame: Frame) -> tuple[int, ...]:
-        """Return the words of its answer."""
+    def __init__(self, drive: DriveConfiguration, requests: list[Route],
+                 question: Callable[[int], Question],
+                 words: Callable[[bytes], tuple[int, ...]], *, hazard: str = '',
+                 maps_count: bool = True) -> None:
+        super().__init__(drive, requests, hazard)
+        self._question = question
+        self._words = words
+        self._maps_count = maps_count
 
     def converse(self) -> Conversation:
         options = self.drive.options
@@ -62,7 +65,7 @@ class DataModelProber(Prober):
         if not self.answered:
             reason = 'no answer: check station and bit rate'
         findings = [Finding('parameter_offset', offset_found, reason)]
-        if self.maps_count:
+        if self._maps_count:
             findings += self._map_findings(
                 offset_found, None if offset_found is None else seen[offset_found])
         return findings
@@ -116,58 +119,47 @@ class DataModelProber(Prober):
     def _ask(self, number: int) -> _Asking:
         if not 1 <= number <= NUMBER_MAX - SLOTS:
             return None
-        frame = yield self.question(number)
-        if frame is None:
-            return None
-        self.answered = True
-        return self.words(frame)
+        data = yield from self.ask(self._question(number))
+        return None if data is None else self._words(data)
 
 
-class ExtendedProber(DataModelProber):
-    """29-bit identifiers."""
+def extended_prober(drive: DriveConfiguration) -> DataModelProber:
+    """Return who asks a drive with 29-bit identifiers."""
+    station = drive.station << extended.STATION_SHIFT
 
-    @property
-    def requests(self) -> list[Route]:
-        return [Route(self.drive.station << extended.STATION_SHIFT,
-                      extended.DIR | extended.STATION_MASK, True)]
-
-    def question(self, number: int) -> Question:
-        frame = extended.encode_read_request(self.drive.station, number, SLOTS)
-        return Question(frame, lambda answer: answer.extended and len(
-            answer.data) == extended.PAYLOAD and (
-            answer.identifier == frame.identifier | extended.DIR))
-
-    def words(self, frame: Frame) -> tuple[int, ...]:
-        return extended.unpack_words(frame.data, SLOTS)
+    def question(number: int) -> Question:
+        frame = extended.encode_read_request(drive.station, number, SLOTS)
+        return Question(frame, lambda answer: (
+            answer.extended and len(answer.data) == extended.PAYLOAD
+            and answer.identifier == frame.identifier | extended.DIR))
+    return DataModelProber(
+        drive, [Route(station, extended.DIR | extended.STATION_MASK, True)], question,
+        lambda data: extended.unpack_words(data, SLOTS))
 
 
-class StandardProber(DataModelProber):
-    """11-bit identifiers, where there is no cyclic telegram: the maps only tell the offset."""
+def standard_prober(drive: DriveConfiguration) -> DataModelProber:
+    """
+    Return who asks a drive with 11-bit identifiers.
 
-    maps_count = False
+    There is no cyclic telegram: the maps only tell the offset.
+    """
+    options = drive.options
+    request = standard.identifier(options.request_id_base, drive.station)
+    response = standard.identifier(options.response_id_base, drive.station)
 
-    def __init__(self, drive: DriveConfiguration) -> None:
-        super().__init__(drive)
-        self._request = standard.identifier(drive.options.request_id_base, drive.station)
-        self._response = standard.identifier(drive.options.response_id_base, drive.station)
-        if not self._request & 1 and self._request in _CANNORD_TASKS:
-            # bytes 0 and 1 are 03h 7Ah: task 7, a write to EEPROM, of P515
-            self.hazard = (f'a read of the maps on {self._request:03X}h is a write of a parameter '
-                           'in EEPROM to a CANnord inverter that has it as its identifier for '
-                           'parameter tasks')
-
-    @property
-    def requests(self) -> list[Route]:
-        return [Route(self._request, STANDARD_IDENTIFIER_MAX, False)]
-
-    def question(self, number: int) -> Question:
-        frame = standard.encode_read_request(self._request, number, SLOTS)
+    def question(number: int) -> Question:
         return Question(
-            frame, lambda answer: not answer.extended and answer.identifier == self._response
-            and len(answer.data) == standard.PAYLOAD, self.drive.options.quarantine)
-
-    def words(self, frame: Frame) -> tuple[int, ...]:
-        return standard.decode_read_response(frame, SLOTS)
+            standard.encode_read_request(request, number, SLOTS), lambda answer: (
+                not answer.extended and answer.identifier == response
+                and len(answer.data) == standard.PAYLOAD), options.quarantine)
+    # bytes 0 and 1 are 03h 7Ah: task 7, a write to EEPROM, of P515
+    hazard = '' if request & 1 or request not in _CANNORD_TASKS else (
+        f'a read of the maps on {request:03X}h is a write of a parameter in EEPROM to a CANnord '
+        'inverter that has it as its identifier for parameter tasks')
+    return DataModelProber(
+        drive, [Route(request, STANDARD_IDENTIFIER_MAX, False)], question,
+        lambda data: standard.decode_read_response(Frame(response, data, False), SLOTS),
+        hazard=hazard, maps_count=False)
 
 
 def _numbers(numbers: tuple[int, ...]) -> str:

@@ -33,9 +33,9 @@ class ExtendedScout(Scout):
         self.maps: dict[int, dict[int, tuple[int, ...]]] = {}
 
     def begin(self) -> None:
-        for station in range(1, extended.STATION_MAX + 1):
-            self._questions.append(
-                extended.encode_read_request(station, REQUEST_MAP_BASE, extended.SLOTS))
+        self._questions += [
+            extended.encode_read_request(station, REQUEST_MAP_BASE, extended.SLOTS)
+            for station in range(1, extended.STATION_MAX + 1)]
 
     def hear(self, frame: Frame, now: float) -> None:
         try:
@@ -83,9 +83,9 @@ class StandardScout(Scout):
               'stations like a task that reads, to CANnord inverters 249 to 255')
 
     def begin(self) -> None:
-        for station in range(1, STANDARD_STATION_MAX + 1):
-            self._questions.append(standard.encode_read_request(
-                standard.REQUEST_ID_BASE + station, HARMLESS_NUMBER, 1))
+        self._questions += [
+            standard.encode_read_request(standard.REQUEST_ID_BASE + station, HARMLESS_NUMBER, 1)
+            for station in range(1, STANDARD_STATION_MAX + 1)]
 
     def hear_request(self, frame: Frame, now: float) -> None:
         station = frame.identifier - standard.REQUEST_ID_BASE

@@ -1,26 +1,33 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The row of the family table for the DataModel protocol with 11-bit identifiers."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Route, STANDARD_IDENTIFIER_MAX
-from drive_can_bridge.core.session import Session
+from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.datamodel import standard_round
-from drive_can_bridge.protocols.datamodel.common_family import DataModelFamily
+from drive_can_bridge.protocols.datamodel.checks import (
+    check_parameters, check_period_and_maps, raw_parameter,
+)
 from drive_can_bridge.protocols.datamodel.options import StandardOptions
-from drive_can_bridge.protocols.family import Claim, Complaint
-from drive_can_bridge.protocols.observer import DriveObserver, Emit
-from drive_can_bridge.protocols.prober import Prober
-from drive_can_bridge.protocols.scout import Scout
+from drive_can_bridge.protocols.family import Claim, Complaint, Family, Talk
 
 
-class DataModelStandard(DataModelFamily):
+class DataModelStandard(Family):
     """DataModel, 11-bit identifiers: single reads and writes, from which an exchange is made."""
 
     name = 'datamodel_standard'
     cyclic = False
     options_type = StandardOptions
+
+    def check(self, drive: DriveConfiguration) -> Iterator[Complaint]:
+        yield from self._check_station(drive)
+        yield from check_period_and_maps(drive)
+        yield from check_parameters(drive, self.name)
+
+    def raw_parameter(self, drive: DriveConfiguration, name: str) -> Parameter | None:
+        return raw_parameter(drive, name)
 
     def claims(self, drive: DriveConfiguration) -> list[Claim]:
         """Return both identifiers of the drive."""
@@ -38,29 +45,12 @@ class DataModelStandard(DataModelFamily):
         """Return the time of a round of reads in which every setpoint changes."""
         return standard_round.shortest_period(drive, bitrate)
 
-    def make_session(self, drive: DriveConfiguration) -> Session:
-        """Make the drive's session. Nothing is sent before ``activate``."""
-        # Imported late: configuration checks read this table without any need of sessions.
+    def talk(self) -> Talk:
         from drive_can_bridge.protocols.datamodel.standard_session import StandardSession
-        return StandardSession(drive)
-
-    def make_observers(self, drives: Sequence[DriveConfiguration], emit: Emit,
-                       ) -> list[DriveObserver]:
-        """Make what watches drives."""
         from drive_can_bridge.protocols.datamodel.observer import StandardObserver
-        return [StandardObserver(drive, emit) for drive in drives]
-
-    def make_scout(self) -> Scout:
-        """Make what looks for drives of this family."""
+        from drive_can_bridge.protocols.datamodel.prober import standard_prober
         from drive_can_bridge.protocols.datamodel.scout import StandardScout
-        return StandardScout()
-
-    def make_prober(self, drive: DriveConfiguration) -> Prober:
-        """Make what settles the open keys of a drive."""
-        from drive_can_bridge.protocols.datamodel.prober import StandardProber
-        return StandardProber(drive)
-
-    # -- parts of the check -----------------------------------------------------------------------
+        return Talk(StandardSession, StandardObserver, StandardScout, standard_prober)
 
     def _check_station(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         bases = _bases(drive)
