@@ -7,7 +7,7 @@ it left (:meth:`~ControlMachine.word_sent`) and what status words come back, and
 of each request to whoever asked. What it makes of a request stands in :mod:`.control`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 import math
 
 from drive_can_bridge.core.control import ControlAction, ControlRequest
@@ -35,13 +35,15 @@ class ControlMachine:
     :param timeout: seconds until an unconfirmed request fails.
     :param pulse: how often the reset word leaves.
     :param members: names of the drives, where several share the control word.
+    :param unheard: says which of them may run without answering any more; '' if none.
     :param wording: what the family knows of status words.
     :ivar table: the words and conditions.
     :ivar take_completed: returns the outcomes since the last call; asked after every frame.
     """
 
     def __init__(self, table: ControlTable, *, timeout: float, pulse: int = RESET_CYCLES,
-                 members: Sequence[str] = (), wording: Wording | None = None) -> None:
+                 members: Sequence[str] = (), unheard: Callable[[], str] = str,
+                 wording: Wording | None = None) -> None:
         self.table = self._table = table
         self._timeout = timeout
         self._pulse = pulse
@@ -52,6 +54,7 @@ class ControlMachine:
             ControlAction.RESET_FAULT: table.reset_fault}
         self._words = {action: word for action, word in words.items() if word is not None}
         self._reports = StatusReports(table, members)
+        self._unheard = unheard
         self._wording = wording
         self._sending = ControlAction.DISABLE   # by name: two words may have the same bits
         self._sent = False                      # the current word left at least once
@@ -293,7 +296,7 @@ class ControlMachine:
                     self._send(ControlAction.ENABLE)
             elif self._confirmed(table.enabled, True):
                 self._reached = True
-                self._end(True, self._success_text())
+                self._end(True, success_text(table, self._sending, self.state))
         elif under_way.action is ControlAction.RESET_FAULT:
             if self.pulsing:
                 if self._pulses_left <= 0:
@@ -306,11 +309,12 @@ class ControlMachine:
                 self._end(True, self.state if table.fault is not None else
                           'reset_fault sent; the drive does not report faults')
         elif self._confirmed_off():
-            message = self._success_text()
+            message = success_text(table, self._sending, self.state)
+            unheard = self._unheard()
             if table.enabled is None and self._sending is ControlAction.QUICK_STOP:
                 self._answers.answer(under_way, True, message)      # keeps braking
             else:
-                self._end(True, message)
+                self._end(not unheard, unheard or message)
 
     def _watch_fault(self, raw: int) -> None:
         """Note a fault that comes or goes; it ends everything but stops and resets."""
@@ -385,9 +389,6 @@ class ControlMachine:
             if success and under_way.action is ControlAction.ENABLE:
                 return
         self._send(ControlAction.DISABLE)
-
-    def _success_text(self) -> str:
-        return success_text(self._table, self._sending, self.state)
 
     def _overdue_text(self) -> str:
         """Say where the drive is stuck, and what usually keeps one there."""

@@ -129,13 +129,19 @@ class Session(ABC):
     def deactivate(self, now: float) -> None:
         """Begin the safe stop: neutral setpoints, ``disable``; then silence."""
         self.active = False
+        unheard = not self.online and self.told.doubt()
         owes = self.prepare_stop(now)
         self.users.fail_all(BRIDGE_INACTIVE)
         self.withdraw(BRIDGE_INACTIVE, now)
         if owes and self.begin_stop(now):
             return
-        if owes or not self.bus_available:
+        if owes or unheard or not self.bus_available:
             self._leave_owing('could not be told to stop')
+        self.go_idle('deactivated')
+
+    def stop_left(self) -> None:
+        """End a stop that nobody acknowledges: send nothing more."""
+        self._leave_owing('told to stop, but it does not answer')
         self.go_idle('deactivated')
 
     @property

@@ -10,6 +10,8 @@ whether it still owes the drive a stop.
 from collections.abc import Hashable
 
 MAY_RUN = 'it may still be running'
+#: what a drive that does not answer was told
+_UNHEARD = object()
 
 
 class Told:
@@ -44,6 +46,17 @@ class Told:
         elif self.owed:
             self._running.discard(what)
             self.owed = bool(self._running)
+
+    def doubt(self) -> bool:
+        """Take note that the drive does not answer; tell whether it may run for that reason."""
+        if self.ran:
+            self.note(_UNHEARD, runs=True)
+        return self.ran
+
+    def answered(self) -> None:
+        """Take note of an answer to what was told last: that has arrived."""
+        if self._running <= {_UNHEARD}:
+            self.stopped()
 
     def stopped(self) -> None:
         """Take note that the drive has confirmed to have nothing but neutral and ``disable``."""

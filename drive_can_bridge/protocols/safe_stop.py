@@ -55,4 +55,6 @@ class SafeStop(Generic[StepT, ReplyT]):
         elif self._owed or self._insisting:
             tail = f': {MAY_RUN}' if self._owed else ''
             self._session.report.warn(f'told to stop, but {"; ".join(failed)}{tail}')
+            if not self._session.active:    # which ends with it: there is no more to be said
+                self._session.told.stopped()
         self._ended()

@@ -16,7 +16,7 @@ A broadcast group has one control word for several inverters: a condition holds 
 all of them, and a fault of one is a fault of the group.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.profile import ControlTable, StatusPattern
@@ -44,16 +44,18 @@ def control_table(parameter_set: int) -> ControlTable:
 
 
 def make_control(*, parameter_set: int, timeout: float,
-                 members: Sequence[str] = ()) -> ControlMachine:
+                 members: Sequence[str] = (),
+                 unheard: Callable[[], str] = str) -> ControlMachine:
     """
     Make the machine for one inverter, or for the inverters of a broadcast group.
 
     :param parameter_set: 1 to 4, bits 14 and 15 of every control word.
     :param timeout: seconds until an unconfirmed request fails.
     :param members: names of the inverters of a group, the leader's first.
+    :param unheard: says which of them may run without answering any more; '' if none.
     """
     return ControlMachine(control_table(parameter_set), timeout=timeout, members=members,
-                          wording=Wording(lambda status: state_of(status).value, hint))
+                          unheard=unheard, wording=Wording(lambda status: state_of(status).value, hint))
 
 
 def hint(status: int) -> str:

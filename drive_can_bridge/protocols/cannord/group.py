@@ -19,12 +19,13 @@ import math
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.told import MAY_RUN
 from drive_can_bridge.core.users import DRIVE_OFFLINE
 from drive_can_bridge.protocols.cannord.broadcast import broadcast_identifier
 from drive_can_bridge.protocols.cannord.control import make_control
 from drive_can_bridge.protocols.cannord.process_data import values_needed
 from drive_can_bridge.protocols.cannord.session import CannordSession
-from drive_can_bridge.protocols.cyclic_exchange import STOP_CYCLES
+from drive_can_bridge.protocols.cyclic_exchange import CYCLE, STOP_CYCLES
 
 
 def make_group(drives: Sequence[DriveConfiguration]) -> list[CannordSession]:
@@ -56,7 +57,7 @@ class Group:
         self.places = max(values_needed(drive) for drive in drives)
         self.control = make_control(
             parameter_set=own.options.parameter_set, timeout=own.control_timeout,
-            members=[drive.name for drive in drives])
+            members=[drive.name for drive in drives], unheard=self._unheard)
         self._turn = 0
         self._turn_begun = 0    # what it was when this cycle began
         self.members: list[CannordSession] = []
@@ -65,6 +66,11 @@ class Group:
     def is_leader(self, drive: DriveConfiguration) -> bool:
         """Tell whether an inverter leads the group."""
         return drive is self._lead
+
+    @property
+    def led(self) -> bool:
+        """The leader is online."""
+        return self._leader.online
 
     @property
     def _leader(self) -> CannordSession:
@@ -92,8 +98,12 @@ class Group:
 
     def cycle_left(self) -> None:
         """Take note that a cycle has left: it told everybody the same."""
+        leader = self._leader
+        runs = leader.told.runs(CYCLE)
         for member in self.members[1:]:
-            member.sent.raws = self._leader.sent.raws
+            member.sent.raws = leader.sent.raws
+            member.told.note(CYCLE, runs=runs)
+            member.told.ran = member.told.ran or runs
 
     # -- what becomes of its members --------------------------------------------------------------
 
@@ -111,6 +121,12 @@ class Group:
         """Take the status word of an inverter that is led."""
         self.control.status_received(word, now, member.configuration.name)
         self._leader.control_changed(now)
+
+    def _unheard(self) -> str:
+        """Say which inverters were told to run, and have not answered since they were stopped."""
+        names = [member.configuration.name for member in self.members
+                 if member.told.ran and not member.online]
+        return f'{", ".join(names)} offline: {MAY_RUN}' if names else ''
 
     # -- what the leader does for all -------------------------------------------------------------
 

@@ -106,7 +106,7 @@ class CannordSession(Session):
         self._exchange = CyclicExchange(
             self, self._book, self._encode, slot=0,
             left=None if group is None else group.cycle_left,
-            ended=lambda _: self.go_idle('deactivated'))
+            ended=lambda _: self.stop_left())
         self._cycling = self._stopping = self._awaiting_extra = False
         self._held: ProcessDataReceived | None = None   # until values 4 and 5 arrive
         self._extra_missing = False
@@ -114,6 +114,11 @@ class CannordSession(Session):
         self._answer_due = math.inf
 
     # -- life cycle -------------------------------------------------------------------------------
+
+    def deactivate(self, now: float) -> None:
+        if self._group is not None and self._led and not self._group.led:
+            self.told.stopped()     # all were lost: the leader's last cycles are for all
+        super().deactivate(now)
 
     def prepare_stop(self, now: float) -> bool:
         self._clear_acyclic()
@@ -275,6 +280,8 @@ class CannordSession(Session):
         asked = book.awaiting
         if asked:
             book.answered(received_at)
+            if self.told.ran:
+                self.told.answered()
         elif not (is_faulted(word) and self.online):
             # a fault while offline is told again by the first exchange
             if not book.take_stale() and not is_faulted(word):

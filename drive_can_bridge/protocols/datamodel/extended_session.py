@@ -165,8 +165,8 @@ class ExtendedSession(Session):
             self._differs = False
             if self._phase is not Phase.CYCLIC:
                 self._begin_cycles(now)
-            elif self.online and not self.told.owed:
-                self.told.ran = False
+            elif self.online:
+                self.told.answered()
         elif verdict is Verdict.DIFFER:
             self._differs = True
             if self.told.ran:   # neutral cycles since may have reached others, or nobody
@@ -245,8 +245,7 @@ class ExtendedSession(Session):
             self._miss(now)
             if self._timer.due == math.inf:
                 return
-        exchange = self._exchange
-        exchange.put(exchange.begin(now))
+        self._exchange.put(self._exchange.begin(now))
         self._book.awaiting = True
         self._channel.hold(now + 0.5 * self.configuration.period)
 
@@ -262,7 +261,7 @@ class ExtendedSession(Session):
     def _stop_ended(self) -> None:
         if (self._stopping and not self._side.stop.running
                 and (self._exchange.cycles_left == 0 or self._phase is Phase.STOPPING)):
-            self.go_idle('deactivated')
+            self.stop_left()
 
     def _miss(self, now: float) -> None:
         too_many = self._book.missed()
@@ -325,6 +324,8 @@ class ExtendedSession(Session):
         elif len(data) != extended.PAYLOAD:
             self.statistics.short += 1
         book.answered(received_at)
+        if self.told.ran and not self._verify:  # otherwise the maps tell who has heard it
+            self.told.answered()
         if not self.online and not self._stopping:
             if self._phase is Phase.LEAVING:
                 if not self._differs:  # it is back: look at its maps before anything else

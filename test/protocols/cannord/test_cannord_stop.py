@@ -55,9 +55,19 @@ def test_signal_right_after_a_stall() -> None:
     talk = running()
     assert talk.time_lost(15.0) == []
     assert talk.deactivate(15.0) == []
-    assert talk.until(16.0) == [(15.0, READY_FRAME), (15.02, READY_FRAME), (15.04, READY_FRAME)]
+    assert exchange(talk, 15.0) == READY_FRAME
+    assert talk.until(16.0) == [(15.02, READY_FRAME), (15.04, READY_FRAME)]
     assert talk.session.stopped
     assert warnings(talk) == []
+
+
+def test_signal_right_after_a_stall_to_a_drive_that_does_not_answer() -> None:
+    talk = running()
+    assert talk.time_lost(15.0) == []
+    assert talk.deactivate(15.0) == []
+    assert [text for _, text in talk.until(16.0)] == [READY_FRAME] * 3
+    assert talk.session.stopped
+    assert warnings(talk) == ['told to stop, but it does not answer: it may still be running']
 
 
 def test_signal_that_comes_before_anybody_noticed_the_stall() -> None:
@@ -74,7 +84,8 @@ def test_signal_right_after_the_bus_came_back() -> None:
         'the bus was lost before it could be told to stop: it may still be running']
     assert talk.bus_up(12.0) == []
     assert talk.deactivate(12.0) == []
-    assert talk.until(13.0) == [(12.0, READY_FRAME), (12.02, READY_FRAME), (12.04, READY_FRAME)]
+    assert exchange(talk, 12.0) == READY_FRAME
+    assert talk.until(13.0) == [(12.02, READY_FRAME), (12.04, READY_FRAME)]
     assert warnings(talk) == []
 
 
@@ -94,6 +105,17 @@ def test_end_while_the_bus_is_lost() -> None:
     assert talk.deactivate(11.0) == []
     assert talk.session.stopped
     assert warnings(talk) == ['could not be told to stop: it may still be running']
+
+
+def test_end_while_a_drive_that_ran_is_lost() -> None:
+    """It has answered none of the frames that stop it."""
+    talk = running()
+    talk.until(11.0)
+    assert not talk.session.online
+    talk.deactivate(11.01)
+    assert [text for _, text in talk.until(12.0)][-3:] == [READY_FRAME] * 3
+    assert talk.session.stopped
+    assert warnings(talk)[-1].endswith('it may still be running')
 
 
 def test_drive_that_was_told_nothing_but_neutral_is_no_worry() -> None:

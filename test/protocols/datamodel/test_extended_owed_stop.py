@@ -305,6 +305,20 @@ def test_drive_that_was_deaf_comes_back_with_another_map() -> None:
     assert talk.session.state is DriveState.MAPPING_DIFFERS
 
 
+def test_end_while_a_drive_that_ran_is_lost() -> None:
+    """Its neutral cycles were heard by nobody: the cable may be in its place again any time."""
+    talk = running()
+    last = [text for _, text in talk.until(12.0)]
+    assert last.count(NEUTRAL) == 3
+    assert not talk.session.online
+    talk.events()
+    sent = talk.deactivate(12.05)
+    sent += [text for _, text in talk.until(13.0)]
+    assert SPEED_ZERO in sent and LIMIT_ZERO in sent    # no map can misroute these
+    assert talk.session.stopped
+    assert warnings(talk)[-1].endswith(MAY_RUN)
+
+
 def test_end_while_maps_differ_and_the_stop_is_not_confirmed() -> None:
     talk = running()
     look(talk)
