@@ -14,13 +14,14 @@ from sensor_msgs.msg import JointState
 
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.text import printable
+from drive_can_bridge.exchange.errand import Errand
 from drive_can_bridge.ros.commands import Column, CommandIntake, joint_columns
 from drive_can_bridge.ros.drive_node import DriveNode
 from drive_can_bridge.ros.joint_states import JointStates
 from drive_can_bridge.ros.log import Log
-from drive_can_bridge.ros.periodic_thread import PeriodicThread
 from drive_can_bridge.ros.polled_topics import PolledTopics
 from drive_can_bridge.ros.throttle import Throttle
+from drive_can_bridge.transport.clock import steady_now
 
 COMMANDS = '~/joint_commands'
 #: so many joints of others are told of
@@ -39,7 +40,7 @@ class Joints:
         self._throttle = Throttle(log.warning)
         self._taken: list[PolledTopics] = []
         self._states: JointStates | None = None
-        self._thread: PeriodicThread | None = None
+        self._errand: Errand | None = None
         ordered = [drives[name] for name in configuration.drives]
         known = {drive.drive.joint.name for drive in ordered if drive.drive.joint is not None}
         for bus in configuration.buses:
@@ -57,20 +58,21 @@ class Joints:
             for drive in here:
                 drive.joint_commands = taken
         if configuration.joint_state_rate > 0.0:
-            self._states = JointStates(node, ordered)
-            self._thread = PeriodicThread(
-                'joint states', 1.0 / configuration.joint_state_rate, self._states.publish,
-                lambda text: log.error(f'joint_states: {text}'))
+            self._period = 1.0 / configuration.joint_state_rate
+            self._states = JointStates(node, ordered, self._throttle)
+            self._errand = Errand(self._states.publish)
+            for drive in ordered:
+                drive.exchange.errand = self._errand
 
     def start(self) -> None:
         """Begin to publish."""
-        if self._thread is not None:
-            self._thread.start()
+        if self._errand is not None:
+            self._errand.begin(self._period, steady_now())
 
     def stop(self) -> None:
         """Publish nothing any more."""
-        if self._thread is not None:
-            self._thread.stop()
+        if self._errand is not None:
+            self._errand.end()
 
     def destroy(self) -> None:
         """Take the topics out of the node. Nobody may take commands any more."""
