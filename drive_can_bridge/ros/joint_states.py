@@ -23,8 +23,8 @@ from sensor_msgs.msg import JointState
 
 from drive_can_bridge.core.configuration import JointConfiguration
 from drive_can_bridge.ros.audience import Audience
-from drive_can_bridge.ros.commands import QUANTITIES
 from drive_can_bridge.ros.drive_node import DriveNode
+from drive_can_bridge.ros.joint_reader import QUANTITIES
 from drive_can_bridge.ros.prepared import PreparedMessage
 from drive_can_bridge.ros.quality import overriding, state_quality
 from drive_can_bridge.ros.stamps import Stamps
