@@ -40,7 +40,8 @@ class LastSent:
         :param first: place of the first of them in ``parameters``.
         """
         widths = self._widths[first:] if first else self._widths
-        fresh = tuple([((word & mask) ^ sign) - sign for word, (mask, sign) in zip(words, widths)])
+        fresh: tuple[int | None, ...] = tuple([
+            ((word & mask) ^ sign) - sign for word, (mask, sign) in zip(words, widths)])
         known = self.raws
         if len(fresh) < len(known):
             fresh = known[:first] + fresh + known[first + len(fresh):]
