@@ -45,7 +45,8 @@ class Measured:
         exchanges = self.bridge.exchanges.values()
         self._threads = {'timer': [exchange._thread for exchange in exchanges],
                          'reader': [exchange.link._thread for exchange in exchanges],
-                         'services': [self._spinner._thread]}
+                         'services': [self._spinner._thread,
+                                      *self.bridge._parameter_thread._threads]}
         self._joints = self.bridge._joints and self.bridge._joints._errand
         self._before: dict[str, Any] = {}
 

@@ -70,13 +70,10 @@ class Joints:
         if self._errand is not None:
             self._errand.begin(self._period, steady_now())
 
-    def stop(self) -> None:
-        """Publish nothing any more."""
-        if self._errand is not None:
-            self._errand.end()
-
     def destroy(self) -> None:
         """Take the topics out of the node. Nobody may take commands any more."""
+        if self._errand is not None:
+            self._errand.end()
         while self._taken:
             self._taken.pop().unsubscribe()
         if self._states is not None:
