@@ -9,7 +9,7 @@ the take of as many as can wait (:mod:`.polled_topics`). The subscriptions stand
 group that no executor ever runs.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 
 from rclpy.node import Node
