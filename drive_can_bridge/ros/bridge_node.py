@@ -80,7 +80,7 @@ class BridgeNode(LifecycleNode):
         self._transition_lock = threading.RLock()
         self._mailbox = Mailbox(self)
         self._control_thread = ServiceThread('control', self.context, self.log.error,
-                                             raise_priority)
+                                             raise_priority, share=1.0)
         self._parameter_thread = ServiceThread('parameters', self.context, self.log.error)
         self._diagnostics: Diagnostics | None = None
         self._flight: FlightWatch | None = None

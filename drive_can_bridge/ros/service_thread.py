@@ -22,10 +22,14 @@ from rclpy.exceptions import InvalidHandle
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.service import Service
 
+from drive_can_bridge.ros.pace import Pace
+
 RCLError = rclpy_implementation.RCLError
 
 #: s between two failures: one that comes at once again must not take the machine
 ERROR_PAUSE = 0.05
+#: share of the processor's time for a thread that anybody can keep busy
+MODEST = 0.3
 #: calls of one service that are taken in a row
 TAKE_MAX = 8
 
@@ -43,11 +47,14 @@ class ServiceThread:
 
     :param report: takes one line about an exception that a callback let escape.
     :param prepare_thread: called first in the thread that takes requests.
+    :param share: of the processor's time that each of its two threads may use; 1: all of it.
     """
 
     def __init__(self, name: str, context: Context, report: Callable[[str], None],
-                 prepare_thread: Callable[[], object] = lambda: None) -> None:
+                 prepare_thread: Callable[[], object] = lambda: None, *,
+                 share: float = MODEST) -> None:
         self._name = name
+        self._share = share
         self._context = context
         self._report = report
         self._prepare_thread = prepare_thread
@@ -110,16 +117,17 @@ class ServiceThread:
 
     def _take_all(self) -> None:
         self._prepare_thread()
+        pace = Pace(self._share)
         while not self._ending.is_set() and self._context.ok():
             try:
-                self._take_while_unchanged()
+                self._take_while_unchanged(pace)
             except Exception as error:  # noqa: BLE001  outermost loop: no failure is silent
                 if self._ending.is_set():
                     return
                 self._report(f'internal error in a callback: {type(error).__name__}: {error}')
                 self._ending.wait(ERROR_PAUSE)
 
-    def _take_while_unchanged(self) -> None:
+    def _take_while_unchanged(self, pace: Pace) -> None:
         """Take what comes until something else is to be served."""
         self._changed = False
         context_handle: Any = self._context.handle
@@ -143,6 +151,7 @@ class ServiceThread:
                 waiting.wait(-1)
                 for pointer in waiting.get_ready_entities('service'):
                     self._take(present[pointer])
+                pace.keep()
 
     def _take(self, service: Service) -> None:
         kind: Any = service.srv_type
@@ -173,8 +182,17 @@ class ServiceThread:
             answered()
 
     def _answer_all(self) -> None:
-        while (job := self._jobs.get()) is not None:
-            try:
-                job()
-            except Exception as error:  # noqa: BLE001  outermost loop: no failure is silent
-                self._report(f'internal error in an answer: {type(error).__name__}: {error}')
+        pace = Pace(self._share)
+        while self._do_one_job():
+            pace.keep()
+
+    def _do_one_job(self) -> bool:
+        """Do what comes next; the job is forgotten then, and with it the drive that it was for."""
+        job = self._jobs.get()
+        if job is None:
+            return False
+        try:
+            job()
+        except Exception as error:  # noqa: BLE001  outermost loop: no failure is silent
+            self._report(f'internal error in an answer: {type(error).__name__}: {error}')
+        return True
