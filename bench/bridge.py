@@ -25,6 +25,7 @@ from drive_can_bridge.ros import bridge_node
 from drive_can_bridge.ros.bridge_node import BridgeNode
 from drive_can_bridge.ros.executor_thread import ExecutorThread
 from drive_can_bridge.ros.middleware import begin_with_small_histories
+from drive_can_bridge.transport.clock import steady_now
 
 ONLINE_TIMEOUT = 30.0
 #: s until something that is not to happen
@@ -44,10 +45,9 @@ class Measured:
         exchanges = self.bridge.exchanges.values()
         self._threads = {'timer': [exchange._thread for exchange in exchanges],
                          'reader': [exchange.link._thread for exchange in exchanges],
-                         'services': [self._spinner._thread]}
-        self._joints = self.bridge._joints and self.bridge._joints._thread
-        if self._joints:
-            self._threads['joints'] = [self._joints._thread]
+                         'services': [self._spinner._thread,
+                                      *self.bridge._parameter_thread._threads]}
+        self._joints = self.bridge._joints and self.bridge._joints._errand
         self._before: dict[str, Any] = {}
 
     def clear(self) -> bool:
@@ -77,7 +77,7 @@ class Measured:
     def joints(self, rate: float) -> bool:
         """Have the message of all joints published at so many Hz; 0: not at all."""
         assert self._joints is not None
-        self._joints.set_period(1.0 / rate if rate else NEVER)
+        self._joints.begin(1.0 / rate if rate else NEVER, steady_now())
         return True
 
     def trace(self) -> dict[str, float]:

@@ -246,15 +246,17 @@ def joints_figures(found: dict[str, Any]) -> list[Figure]:
     shares = {name: [result['process_cpu'] / result['elapsed'] for result in found[name]]
               for name in ('without', 'states', 'states and commands')}
     missed = {name: sum(result['missed'] for result in found[name]) for name in shares}
-    own = [result['cpu']['joints'] / result['elapsed'] for result in found['states']]
+    errors = {name: 1e3 * p99([error for result in found[name]
+                               for error in result['period_errors']]) for name in shares}
     figures = []
     for name, goal in (('states', 1.05), ('states and commands', 1.3)):
         ratios = [with_it / without for with_it, without in zip(shares[name], shares['without'])]
         figures.append(Figure(
             f'CPU with all joints in one message, 100 Hz, {name}',
-            f'{100 * median(shares[name]):.1f} % ({missed[name]} missed; thread of its own '
-            f'{100 * median(own):.2f} %)',
-            f'without {100 * median(shares["without"]):.1f} % ({missed["without"]} missed)',
+            f'{100 * median(shares[name]):.1f} % ({missed[name]} missed, period error p99 '
+            f'{errors[name]:.2f} ms)',
+            f'without {100 * median(shares["without"]):.1f} % ({missed["without"]} missed, '
+            f'{errors["without"]:.2f} ms)',
             median(ratios), goal))
     return figures
 

@@ -39,11 +39,14 @@ class LastSent:
         :param words: raw integers, or the words on the wire.
         :param first: place of the first of them in ``parameters``.
         """
-        end = first + len(words)
-        raws = (*self.raws[:first], *[
-            ((word & mask) ^ sign) - sign
-            for (mask, sign), word in zip(self._widths[first:end], words)], *self.raws[end:])
-        for place in range(first, min(end, len(self.times))):
-            self.times[place] += 1
-        if raws != self.raws:
-            self.raws = raws
+        widths = self._widths[first:] if first else self._widths
+        fresh: tuple[int | None, ...] = tuple([
+            ((word & mask) ^ sign) - sign for word, (mask, sign) in zip(words, widths)])
+        known = self.raws
+        if len(fresh) < len(known):
+            fresh = known[:first] + fresh + known[first + len(fresh):]
+        times = self.times
+        for place in range(first, first + min(len(words), len(widths))):
+            times[place] += 1
+        if fresh != known:
+            self.raws = fresh

@@ -26,6 +26,7 @@ from drive_can_bridge.core.frame import bits_on_bus, Frame, Route
 from drive_can_bridge.core.requests import Request
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.exchange.alarm import Alarm
+from drive_can_bridge.exchange.errand import Errand
 from drive_can_bridge.exchange.listeners import BusListener, DriveListener
 from drive_can_bridge.exchange.phases import spread
 from drive_can_bridge.exchange.router import Router
@@ -71,6 +72,7 @@ class BusExchange:
     :param counted: further identifiers, on which nobody else should send.
     :param prepare_thread: called first in each of the two threads.
     :param note: sees every frame that was sent or received: (frame, time, sent).
+    :ivar errand: what its timer thread sees to beside its drives; to be set before ``open``.
     """
 
     def __init__(self, bus: BusConfiguration, sessions: Sequence[Session],
@@ -98,6 +100,7 @@ class BusExchange:
                          prepare_thread=prepare_thread)
         for session, phase in zip(sessions, spread(periods)):
             session.phase = phase
+        self.errand: Errand | None = None
         self._alarm = Alarm()
         self._wake_at = 0.0
         self._meant_at = 0.0    # when the next pass was to be
@@ -246,6 +249,8 @@ class BusExchange:
             while not self._closing:
                 with self.lock:
                     self._wake_at = self._pass()
+                if self.errand is not None:
+                    self._wake_at = min(self._wake_at, self.errand.run(self._clock()))
                 self._alarm.sleep(self._wake_at - self._clock())
         except Exception as error:  # noqa: BLE001  outermost loop: no failure is silent
             self._fail(f'{type(error).__name__}: {error}')

@@ -80,7 +80,8 @@ class BridgeNode(LifecycleNode):
         self._transition_lock = threading.RLock()
         self._mailbox = Mailbox(self)
         self._control_thread = ServiceThread('control', self.context, self.log.error,
-                                             raise_priority)
+                                             raise_priority, share=1.0)
+        self._parameter_thread = ServiceThread('parameters', self.context, self.log.error)
         self._diagnostics: Diagnostics | None = None
         self._flight: FlightWatch | None = None
         self._joints: Joints | None = None
@@ -247,7 +248,7 @@ class BridgeNode(LifecycleNode):
             for drive, session, family in zip(drives, sessions, families):
                 node = DriveNode(
                     self, drive, session, family, exchange, self._mailbox, self._spinner, self.log,
-                    self._control_thread,
+                    self._control_thread, self._parameter_thread,
                     partial(self._node_parameters.announce, identity_name(drive.name)))
                 self.drives[drive.name] = node
                 exchange.attach(session, node)
@@ -294,8 +295,6 @@ class BridgeNode(LifecycleNode):
         if self._diagnostics is not None:
             self._diagnostics.destroy()
             self._diagnostics = None
-        if self._joints is not None:
-            self._joints.stop()
         for exchange in self.exchanges.values():
             exchange.close()
         if self._ownership is not None:
@@ -354,6 +353,7 @@ class BridgeNode(LifecycleNode):
         while self._leaving:
             self._leaving.pop().destroy()
         self._control_thread.stop()
+        self._parameter_thread.stop()
 
     def destroy_node(self) -> None:
         """Take the node out of the graph, when everything is written that it had to say."""

@@ -13,6 +13,7 @@ process that stood still, a network that was away) is told from a fresh one by t
 """
 
 from collections.abc import Callable
+from functools import partial
 import math
 import struct
 import time
@@ -45,10 +46,12 @@ class CommandTopic:
     :param use: takes each message (of the types with one number: the number) and ``now``.
     :param late: takes by how many s a command that is thrown away came too late.
     :param unreadable: takes why a message cannot be read.
+    :param read: makes of the bytes what ``use`` takes; None: the number, or a message of the type.
     """
 
     def __init__(self, subscription: Subscription, *, use: Callable[[Any, float], None],
-                 late: Callable[[float], None], unreadable: Callable[[str], None]) -> None:
+                 late: Callable[[float], None], unreadable: Callable[[str], None],
+                 read: Callable[[bytes], Any] | None = None) -> None:
         self.handle: Any = subscription.handle
         self._type: Any = subscription.msg_type
         # more than can wait came meanwhile: that is for the next time
@@ -59,6 +62,7 @@ class CommandTopic:
         self._late = late
         self._unreadable = unreadable
         code = _CODES.get(self._type)
+        self._read = read or partial(deserialize_message, message_type=self._type)
         self._structs = [struct.Struct(order + code) for order in '><'] if code else []
         self._quickest = math.inf
 
@@ -113,5 +117,5 @@ class CommandTopic:
                 return code.unpack_from(data, HEADER)[0]
         if len(data) > LENGTH_MAX:
             raise ValueError(f'{len(data)} bytes, at most {LENGTH_MAX} are looked at')
-        message = deserialize_message(data, self._type)
+        message = self._read(data)
         return message.data if self._structs else message

@@ -9,7 +9,7 @@ the take of as many as can wait (:mod:`.polled_topics`). The subscriptions stand
 group that no executor ever runs.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 
 from rclpy.node import Node
@@ -21,19 +21,12 @@ from drive_can_bridge.core.parameters import Value, ValueKind
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.setpoints import CommandOutcome
 from drive_can_bridge.core.words import value_text
+from drive_can_bridge.ros.joint_reader import JointMessage, JointReader, QUANTITIES
 from drive_can_bridge.ros.polled_topics import PolledTopics, Warn
 from drive_can_bridge.ros.values import TOPIC_TYPES
 
-#: what a JointState carries beside names
-QUANTITIES = ('position', 'velocity', 'effort')
-#: one of them, and its values for all joints of a message
-Column = tuple[str, Sequence[float]]
-
-
-def joint_columns(message: JointState) -> list[Column]:
-    """Return what a message carries: an empty array leaves that quantity alone."""
-    return [(quantity, values) for quantity in QUANTITIES
-            if len(values := getattr(message, quantity))]
+#: a global name is found sooner than a member of an enum
+_ACCEPTED = CommandOutcome.ACCEPTED
 
 
 class CommandIntake:
@@ -64,7 +57,8 @@ class CommandIntake:
                         self._joint_targets[quantity] = (
                             index, joint.factors[name], kind is ValueKind.INTEGER)
             if joint is not None:
-                self._topics.subscribe(JointState, '~/joint_command', self._take_joint)
+                self._topics.subscribe(JointState, '~/joint_command', self._take_joint,
+                                       JointReader())
         except BaseException:
             self.destroy()
             raise
@@ -101,6 +95,8 @@ class CommandIntake:
             name = session.setpoints.items[index].parameter.name
             self._warn(f'refused {name}', f'command {name} refused: {error}')
             return
+        if outcome is _ACCEPTED:    # nearly all of them
+            return
         if outcome is CommandOutcome.DISABLED:
             name = session.setpoints.items[index].parameter.name
             self._warn('disabled', f'command {name} has no effect: disabled, '
@@ -113,38 +109,39 @@ class CommandIntake:
                        f'command {parameter.name} has no effect: not armed, send {neutral} '
                        f'once first')
 
-    def _take_joint(self, message: JointState, now: float) -> None:
+    def _take_joint(self, message: JointMessage, now: float) -> None:
         joint = self._joint
         if joint is None:
             return
         try:
-            entry = list(message.name).index(joint.name)
+            entry = message.names.index(joint.name)
         except ValueError:
             self._session.statistics.commands_refused += 1
             self._warn('joint name', f'joint_command without an entry named {joint.name}',
                        once=True)
             return
-        self.take_entry(joint_columns(message), entry, now)
-
-    def take_entry(self, columns: Sequence[Column], entry: int, now: float) -> None:
-        """Take one joint's part of a message."""
-        for quantity, values in columns:
+        for quantity, values in message.columns:
             if entry < len(values):
-                value = values[entry]
-                if value != value:      # NaN: left alone
-                    continue
-            target = self._joint_targets.get(quantity)
-            if target is None:
-                self._tell_ignored(quantity)
-            elif entry >= len(values):
+                self.take_quantity(quantity, values[entry], now)
+            elif quantity in self._joint_targets:
                 self.refuse(f'joint {quantity}',
                             f'joint_command has fewer {quantity} values than names')
             else:
-                index, factor, integer = target
-                physical: Value = value / factor
-                if integer:
-                    physical = round(physical) if abs(physical) < 1e15 else physical
-                self._command(index, physical, now)
+                self._tell_ignored(quantity)
+
+    def take_quantity(self, quantity: str, value: float, now: float) -> None:
+        """Take a command for one quantity of the joint, in SI units; NaN leaves it alone."""
+        if value != value:
+            return
+        target = self._joint_targets.get(quantity)
+        if target is None:
+            self._tell_ignored(quantity)
+            return
+        index, factor, integer = target
+        physical: Value = value / factor
+        if integer:
+            physical = round(physical) if abs(physical) < 1e15 else physical
+        self._command(index, physical, now)
 
     def _tell_ignored(self, quantity: str) -> None:
         if quantity not in self._told:

@@ -2,11 +2,12 @@
 """
 The node of one drive: what its session says becomes topics, what users want goes to the session.
 
-Samples are published in the thread that received the frame; parameter services are served in the
-executor thread and get their answers through the mailbox, control services in a thread of theirs.
+Samples are published in the thread that received the frame; parameter services and control
+services are served in threads of theirs.
 """
 
 from collections.abc import Callable
+from functools import partial
 
 from rclpy.clock import Clock
 from rclpy.exceptions import InvalidHandle
@@ -14,7 +15,6 @@ from rclpy.executors import Executor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.parameter import Parameter as NodeParameter
-from rclpy.task import Future
 from std_msgs.msg import Bool
 
 from drive_can_bridge.core.configuration import DriveConfiguration
@@ -34,6 +34,7 @@ from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.protocols.family import Family
 from drive_can_bridge.ros.commands import CommandIntake
 from drive_can_bridge.ros.control_services import ControlServices
+from drive_can_bridge.ros.coroutine_services import Question
 from drive_can_bridge.ros.event_topic import RequestTopic
 from drive_can_bridge.ros.identity import IdentityReader
 from drive_can_bridge.ros.log import Log
@@ -48,6 +49,9 @@ from drive_can_bridge.ros.throttle import Throttle
 
 RCLError = rclpy_implementation.RCLError
 
+#: takes what became of a request
+Completed = Callable[[tuple[Outcome, ...]], None]
+
 
 class DriveNode:
     """
@@ -56,6 +60,7 @@ class DriveNode:
     :param bridge: the bridge's node; the drive lives in its namespace.
     :param log: of the bridge.
     :param control_thread: serves ``~/enable`` and its like.
+    :param parameter_thread: serves the parameter services.
     :param identified: takes the drive's identity in words whenever it changes.
     :ivar joint_commands: the commands for all joints of its bus, which whichever of its drives is
         served next takes for all of them; None: there are none.
@@ -63,7 +68,8 @@ class DriveNode:
 
     def __init__(self, bridge: Node, drive: DriveConfiguration, session: Session, family: Family,
                  exchange: BusExchange, mailbox: Mailbox, executor: Executor, log: Log,
-                 control_thread: ServiceThread, identified: Callable[[str], None]) -> None:
+                 control_thread: ServiceThread, parameter_thread: ServiceThread,
+                 identified: Callable[[str], None]) -> None:
         self.drive = drive
         self.session = session
         self.exchange = exchange
@@ -72,9 +78,8 @@ class DriveNode:
         self._executor = executor
         self._log = log
         self._throttle = Throttle(self._warn_now)
-        self._requests: dict[int, tuple[Request, Future]] = {}
+        self._requests: dict[int, tuple[Request, Completed]] = {}
         self._control: ControlServices | None = None
-        self._calls = 0  # service calls that wait for their answer
         self.requests_refused = 0
         self._identity = IdentityReader(
             drive.profile, submit=self._submit_quietly, online=lambda: session.online,
@@ -94,7 +99,7 @@ class DriveNode:
         try:
             self.commands = CommandIntake(self.node, drive, session, self.warn, self._inform)
             try:
-                self._populate(bridge.get_clock(), family, control_thread)
+                self._populate(bridge.get_clock(), family, control_thread, parameter_thread)
             except BaseException:
                 self.commands.destroy()
                 raise
@@ -105,10 +110,12 @@ class DriveNode:
     def serve(self) -> None:
         """Begin to serve: the exchange knows of the drive from now on."""
         self._executor.add_node(self.node)
+        self._parameters.serve()
         if self._control is not None:
             self._control.serve()
 
-    def _populate(self, clock: Clock, family: Family, control_thread: ServiceThread) -> None:
+    def _populate(self, clock: Clock, family: Family, control_thread: ServiceThread,
+                  parameter_thread: ServiceThread) -> None:
         """Make the topics and services."""
         drive, session = self.drive, self.session
         stamps = Stamps(clock)
@@ -120,9 +127,11 @@ class DriveNode:
         self._online.publish(Bool(data=False))
         directory = ParameterDirectory(drive.profile.parameters,
                                        lambda name: family.raw_parameter(drive, name))
-        ParameterServices(self.node, directory, clock, submit=self._submit,
-                          write_refusal=session.users.write_refusal, role=session.roles.role,
-                          active=lambda: session.active, failed=self._parameter_failed)
+        self._parameters = ParameterServices(
+            self.node, parameter_thread, directory, clock,
+            submit=lambda request: Question(partial(self._submit, request)),
+            write_refusal=session.users.write_refusal, role=session.roles.role,
+            active=lambda: session.active, failed=self._parameter_failed).services
         if session.control is not None:
             self._control = ControlServices(
                 self.node, control_thread,
@@ -144,15 +153,21 @@ class DriveNode:
         :return: all calls are answered, and the node may go.
         """
         while self._requests:
-            request, future = self._requests.popitem()[1]
-            self._mailbox.complete(future, (Failure(BRIDGE_INACTIVE),) * len(request))
+            request, completed = self._requests.popitem()[1]
+            completed((Failure(BRIDGE_INACTIVE),) * len(request))
         answered = self._control is None or self._control.answer_all()
         return answered and not self._calls
+
+    @property
+    def _calls(self) -> int:
+        """How many calls of parameter services wait for their answer."""
+        return self._parameters.calls
 
     def destroy(self) -> None:
         """Take the drive out of the graph. The exchange must be closed."""
         self._executor.remove_node(self.node)
         self.commands.destroy()
+        self._parameters.destroy()
         if self._control is not None:
             self._control.destroy()
         self.node.destroy_node()
@@ -210,8 +225,8 @@ class DriveNode:
 
     def _handle_event(self, event: Event) -> None:
         if isinstance(event, RequestCompleted):
-            _, future = self._requests.pop(id(event.request))
-            self._mailbox.complete(future, event.outcomes)
+            _, completed = self._requests.pop(id(event.request))
+            completed(event.outcomes)
         elif isinstance(event, StationFound):
             self._online.publish(Bool(data=True))
             self._throttle.reset()
@@ -253,26 +268,16 @@ class DriveNode:
         if self.node.context.ok():
             self.warn('publish', f'cannot publish: {error}')
 
-    # -- from the executor: users -----------------------------------------------------------------
+    # -- users ------------------------------------------------------------------------------------
 
-    async def _submit(self, request: Request) -> tuple[Outcome, ...]:
-        future = Future(executor=self._executor)
-        self._requests[id(request)] = (request, future)
-        self._calls += 1
-        try:
-            self.exchange.submit(self.session, request)
-            outcomes: tuple[Outcome, ...] = await future
-        finally:
-            self._calls -= 1
-        return outcomes
-
-    def _submit_quietly(self, request: ReadRequest,
-                        completed: Callable[[tuple[Outcome, ...]], None]) -> None:
-        """Submit a request of our own; nobody waits for its answer."""
-        future = Future(executor=self._executor)
-        future.add_done_callback(lambda done: completed(done.result()))
-        self._requests[id(request)] = (request, future)
+    def _submit(self, request: Request, completed: Completed) -> None:
+        """Hand a request to the session; what became of it is told from any thread."""
+        self._requests[id(request)] = request, completed
         self.exchange.submit(self.session, request)
+
+    def _submit_quietly(self, request: ReadRequest, completed: Completed) -> None:
+        """Submit a request of our own, whose answer is for the executor."""
+        self._submit(request, partial(self._mailbox.post, completed))
 
     def _parameter_failed(self, what: str, reason: str, uncounted: int) -> None:
         text = printable(f'{what}: {reason}')

@@ -4,16 +4,17 @@
 
 Drives answer one after the other, each with a stamp of its own; what reads joints wants all of
 them in one message (the hardware interface of ros2_control keeps the latest message only). So at a
-rate of its own the newest sample of each is taken together, under the stamp of the oldest.
+rate of its own the newest sample of each is taken together, under the stamp of the oldest; by the
+timer thread of an exchange, which is awake in any case (:mod:`~drive_can_bridge.exchange.errand`).
 
 A joint whose drive is not online is left out: nobody is told a position that nobody has measured.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
-from itertools import chain
+from itertools import accumulate
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 from rclpy.exceptions import InvalidHandle
 from rclpy.impl.implementation_singleton import rclpy_implementation
@@ -22,34 +23,29 @@ from sensor_msgs.msg import JointState
 
 from drive_can_bridge.core.configuration import JointConfiguration
 from drive_can_bridge.ros.audience import Audience
-from drive_can_bridge.ros.commands import QUANTITIES
 from drive_can_bridge.ros.drive_node import DriveNode
+from drive_can_bridge.ros.joint_reader import QUANTITIES
 from drive_can_bridge.ros.prepared import PreparedMessage
 from drive_can_bridge.ros.quality import overriding, state_quality
 from drive_can_bridge.ros.stamps import Stamps
-from drive_can_bridge.transport.clock import steady_now
 
 RCLError = rclpy_implementation.RCLError
 
 TOPIC = '~/joint_states'
 
 
-class _Cell(NamedTuple):
-    """One number of the message: whose sample it is in, where in it, and the way to SI units."""
-
-    row: int
-    slot: int
-    scale: float
-    offset: float
-    factor: float
+#: one number of the message: its place in the samples one after the other, and the way to SI units
+_Cell = tuple[int, float, float, float]
 
 
 class _Joint:
     """
     A joint that is measured.
 
-    :ivar width: how many values of a sample it looks at.
+    :ivar width: how many values its samples have.
     """
+
+    __slots__ = ('_places', 'name', 'samples', 'session', 'width')
 
     def __init__(self, drive: DriveNode, joint: JointConfiguration) -> None:
         self.session = drive.session
@@ -57,19 +53,19 @@ class _Joint:
         self.name = joint.name
         parameters = {parameter.name: (slot, parameter) for slot, parameter
                       in enumerate(drive.session.sample_parameters)}
-        self._places: dict[str, tuple[int, float, float, float]] = {}
+        self.width = len(parameters)
+        self._places: dict[str, _Cell] = {}
         for quantity in QUANTITIES:
             name = getattr(joint, quantity)
             if name is not None:
                 slot, parameter = parameters[name]
                 linear = (parameter.scale, parameter.offset) if parameter.scaled else (1.0, 0.0)
                 self._places[quantity] = (slot, *linear, joint.factors[name])
-        self.width = 1 + max(slot for slot, *_ in self._places.values())
 
-    def cell(self, quantity: str, row: int) -> _Cell:
-        """Return where a quantity is when the sample is in this row; NaN: this joint lacks it."""
+    def cell(self, quantity: str, first: int) -> _Cell:
+        """Return where a quantity is when the sample begins there; NaN: this joint lacks it."""
         slot, scale, offset, factor = self._places.get(quantity, (0, math.nan, 0.0, 1.0))
-        return _Cell(row, slot, scale, offset, factor)
+        return first + slot, scale, offset, factor
 
 
 class JointStates:
@@ -77,9 +73,11 @@ class JointStates:
     Publishes the message.
 
     :param drives: in the order of the configuration; those without a measured joint are left out.
+    :param warn: takes (topic of the warning, text); throttling is its business.
     """
 
-    def __init__(self, node: Node, drives: Sequence[DriveNode]) -> None:
+    def __init__(self, node: Node, drives: Sequence[DriveNode],
+                 warn: Callable[[str, str], None]) -> None:
         joints = [(drive, drive.drive.joint) for drive in drives]
         self._quantities = [quantity for quantity in QUANTITIES if any(
             joint is not None and getattr(joint, quantity) for _, joint in joints)]
@@ -87,23 +85,24 @@ class JointStates:
             _Joint(drive, joint) for drive, joint in joints
             if joint is not None and any(getattr(joint, each) for each in QUANTITIES)]
         self._node = node
+        self._warn = warn
         self._stamps = Stamps(node.get_clock())
         self.publisher = node.create_publisher(
             JointState, TOPIC, state_quality(), qos_overriding_options=overriding(node, TOPIC))
         self._present: list[_Joint] = []
-        self._columns: list[list[_Cell]] = []
+        self._cells: list[_Cell] = []
         self._message = JointState()
         self._prepared: PreparedMessage | None = None
         self._audience = Audience(self.publisher)
 
-    def publish(self) -> None:
+    def publish(self, now: float) -> None:
         """Publish what is known now, if anything is and somebody listens."""
         try:
-            if self._audience.listens(steady_now()):
+            if self._audience.listens(now):
                 self._publish()
-        except (InvalidHandle, RCLError):
+        except (InvalidHandle, RCLError) as error:
             if self._node.context.ok():
-                raise
+                self._warn('joint states', f'joint_states cannot be published: {error}')
 
     def destroy(self) -> None:
         """Take the publisher out of its node."""
@@ -111,41 +110,42 @@ class JointStates:
 
     def _publish(self) -> None:
         present: list[_Joint] = []
-        rows: list[tuple[float, ...]] = []
+        raws: list[float] = []
         oldest = math.inf
         for joint in self._joints:
             last = joint.samples.last
             if last is None or not joint.session.online:
                 continue
-            received_at = last[1]
-            raws: tuple[float, ...] = last[0]
-            if len(raws) < joint.width:     # a short response: what has not arrived is not known
-                raws += (math.nan,) * (joint.width - len(raws))
+            sample, received_at = last
             present.append(joint)
-            rows.append(raws)
+            raws += sample
+            if len(sample) < joint.width:   # a short response: what has not arrived is not known
+                raws += [math.nan] * (joint.width - len(sample))
             if received_at < oldest:
                 oldest = received_at
         if not present:
             return
         if present != self._present:
             self._prepare(present)
-        columns = [[(rows[row][slot] * scale + offset) * factor
-                    for row, slot, scale, offset, factor in column] for column in self._columns]
+        numbers = [(raws[place] * scale + offset) * factor
+                   for place, scale, offset, factor in self._cells]
         stamp = self._stamps.at(oldest)
         if self._prepared is not None:
-            self._prepared.publish([*stamp, *chain.from_iterable(columns)])
+            self._prepared.publish([*stamp, *numbers])
             return
         message = self._message
         message.header.stamp.sec, message.header.stamp.nanosec = stamp
-        for quantity, values in zip(self._quantities, columns):
-            setattr(message, quantity, values)
+        for column, quantity in enumerate(self._quantities):
+            setattr(message, quantity,
+                    numbers[column * len(present):(column + 1) * len(present)])
         self.publisher.publish(message)
 
     def _prepare(self, present: list[_Joint]) -> None:
         """Prepare the message for these joints: others than before are online."""
         self._present = present
-        self._columns = [[joint.cell(quantity, row) for row, joint in enumerate(present)]
-                         for quantity in self._quantities]
+        firsts = [0, *accumulate(joint.width for joint in present)]
+        self._cells = [joint.cell(quantity, first) for quantity in self._quantities
+                       for joint, first in zip(present, firsts)]
         message = self._message = JointState(name=[joint.name for joint in present])
         stamp = message.header.stamp
         numbers: list[Any] = [('i', partial(setattr, stamp, 'sec')),

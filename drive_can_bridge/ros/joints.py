@@ -14,13 +14,15 @@ from sensor_msgs.msg import JointState
 
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.text import printable
-from drive_can_bridge.ros.commands import Column, CommandIntake, joint_columns
+from drive_can_bridge.exchange.errand import Errand
+from drive_can_bridge.ros.commands import CommandIntake
 from drive_can_bridge.ros.drive_node import DriveNode
+from drive_can_bridge.ros.joint_reader import Column, JointMessage, JointReader
 from drive_can_bridge.ros.joint_states import JointStates
 from drive_can_bridge.ros.log import Log
-from drive_can_bridge.ros.periodic_thread import PeriodicThread
 from drive_can_bridge.ros.polled_topics import PolledTopics
 from drive_can_bridge.ros.throttle import Throttle
+from drive_can_bridge.transport.clock import steady_now
 
 COMMANDS = '~/joint_commands'
 #: so many joints of others are told of
@@ -39,7 +41,7 @@ class Joints:
         self._throttle = Throttle(log.warning)
         self._taken: list[PolledTopics] = []
         self._states: JointStates | None = None
-        self._thread: PeriodicThread | None = None
+        self._errand: Errand | None = None
         ordered = [drives[name] for name in configuration.drives]
         known = {drive.drive.joint.name for drive in ordered if drive.drive.joint is not None}
         for bus in configuration.buses:
@@ -53,27 +55,25 @@ class Joints:
                 node, self._throttle, _refusing(joints, self._throttle if first else None))
             self._taken.append(taken)
             taken.subscribe(JointState, COMMANDS, _Taker(
-                joints, known, self._throttle if first else None, log.info))
+                joints, known, self._throttle if first else None, log.info), JointReader())
             for drive in here:
                 drive.joint_commands = taken
         if configuration.joint_state_rate > 0.0:
-            self._states = JointStates(node, ordered)
-            self._thread = PeriodicThread(
-                'joint states', 1.0 / configuration.joint_state_rate, self._states.publish,
-                lambda text: log.error(f'joint_states: {text}'))
+            self._period = 1.0 / configuration.joint_state_rate
+            self._states = JointStates(node, ordered, self._throttle)
+            self._errand = Errand(self._states.publish)
+            for drive in ordered:
+                drive.exchange.errand = self._errand
 
     def start(self) -> None:
         """Begin to publish."""
-        if self._thread is not None:
-            self._thread.start()
-
-    def stop(self) -> None:
-        """Publish nothing any more."""
-        if self._thread is not None:
-            self._thread.stop()
+        if self._errand is not None:
+            self._errand.begin(self._period, steady_now())
 
     def destroy(self) -> None:
         """Take the topics out of the node. Nobody may take commands any more."""
+        if self._errand is not None:
+            self._errand.end()
         while self._taken:
             self._taken.pop().unsubscribe()
         if self._states is not None:
@@ -110,12 +110,11 @@ class _Taker:
         self._strangers: set[str] = set()
         #: names of the last message that was in order, and who takes which entry of such a one
         self._names: list[str] | None = None
-        self._parts: list[tuple[int, CommandIntake]] = []
+        self._parts: list[tuple[int, Callable[[str, float, float], None]]] = []
 
-    def __call__(self, message: JointState, now: float) -> None:
+    def __call__(self, message: JointMessage, now: float) -> None:
         """Hand each joint its part."""
-        names = list(message.name)
-        columns = joint_columns(message)
+        names, columns = message
         wrong = self._problem(names, columns)
         if wrong:
             for name in self._joints.keys() & set(names):
@@ -125,13 +124,14 @@ class _Taker:
             return
         if names != self._names:
             self._names = names
-            self._parts = [(entry, self._joints[name]) for entry, name in enumerate(names)
-                           if name in self._joints]
+            self._parts = [(entry, self._joints[name].take_quantity)
+                           for entry, name in enumerate(names) if name in self._joints]
             for name in names:
                 if name not in self._known and self._warn is not None:
                     self._tell_stranger(name)
-        for entry, intake in self._parts:
-            intake.take_entry(columns, entry, now)
+        for quantity, values in columns:
+            for entry, take in self._parts:
+                take(quantity, values[entry], now)
 
     def _problem(self, names: list[str], columns: Sequence[Column]) -> str:
         for quantity, values in columns:

@@ -3,11 +3,11 @@
 A drive's parameters as the parameters of its node.
 
 The six standard services, so that ``ros2 param`` and rqt_reconfigure work on a drive. Reading and
-writing goes over acyclic frames: the callbacks are coroutines that wait for the session's answer
-without holding up the executor.
+writing goes over acyclic frames: the callbacks are coroutines, which wait for the session's answer
+without holding up anybody (:mod:`.coroutine_services`).
 """
 
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from rcl_interfaces.msg import (
@@ -18,10 +18,9 @@ from rcl_interfaces.srv import (
     DescribeParameters, GetParameters, GetParameterTypes, ListParameters, SetParameters,
     SetParametersAtomically,
 )
-from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock
 from rclpy.node import Node
-from rclpy.qos import qos_profile_parameter_events, qos_profile_parameters
+from rclpy.qos import qos_profile_parameter_events
 
 from drive_can_bridge.core.directory import NAME_SHOWN, ParameterDirectory
 from drive_can_bridge.core.errors import ValueRefused
@@ -32,6 +31,8 @@ from drive_can_bridge.core.requests import (
 )
 from drive_can_bridge.core.roles import Role
 from drive_can_bridge.core.text import printable, TEXT_MAX
+from drive_can_bridge.ros.coroutine_services import CoroutineServices, Question
+from drive_can_bridge.ros.service_thread import ServiceThread
 from drive_can_bridge.ros.values import (
     descriptor, PARAMETER_TYPES, parameter_value, value_of,
 )
@@ -50,8 +51,10 @@ class ParameterServices:
     """
     The parameter services of one drive.
 
+    :ivar services: to be begun, and let go of.
     :param clock: for the stamps of what is announced.
-    :param submit: hands a request to the drive's session; awaitable of one outcome per parameter.
+    :param thread: serves them.
+    :param submit: hands a request to the drive's session; answered by one outcome per parameter.
     :param write_refusal: why users may not write a parameter now, or ''.
     :param role: what the bridge itself uses a parameter for.
     :param active: tells whether the bridge is active; nothing is sent otherwise.
@@ -59,8 +62,8 @@ class ParameterServices:
         failed without having reached the session, which counts the others.
     """
 
-    def __init__(self, node: Node, directory: ParameterDirectory, clock: Clock, *,
-                 submit: Callable[[Request], Awaitable[tuple[Outcome, ...]]],
+    def __init__(self, node: Node, thread: ServiceThread, directory: ParameterDirectory,
+                 clock: Clock, *, submit: Callable[[Request], Question[tuple[Outcome, ...]]],
                  write_refusal: Callable[[Parameter], str],
                  role: Callable[[Parameter], Role | None],
                  active: Callable[[], bool],
@@ -75,17 +78,13 @@ class ParameterServices:
         self._failed = failed
         self._unreadable: set[str] = set()  # what the drive did not give when last asked
         self._errors: dict[str, str] = {}   # why there was no value, whatever the reason
-        # reentrant: a request that waits for its drive must not keep the next one from being taken
-        group = ReentrantCallbackGroup()
-        for service_type, name, callback in (
-                (GetParameters, 'get_parameters', self._get),
-                (SetParameters, 'set_parameters', self._set),
-                (SetParametersAtomically, 'set_parameters_atomically', self._set_atomically),
-                (ListParameters, 'list_parameters', self._list),
-                (DescribeParameters, 'describe_parameters', self._describe),
-                (GetParameterTypes, 'get_parameter_types', self._types)):
-            node.create_service(service_type, f'~/{name}', callback,
-                                qos_profile=qos_profile_parameters, callback_group=group)
+        self.services = CoroutineServices(node, thread, {
+            'get_parameters': (GetParameters, self._get),
+            'set_parameters': (SetParameters, self._set),
+            'set_parameters_atomically': (SetParametersAtomically, self._set_atomically),
+            'list_parameters': (ListParameters, self._list),
+            'describe_parameters': (DescribeParameters, self._describe),
+            'get_parameter_types': (GetParameterTypes, self._types)})
         self._events = node.create_publisher(ParameterEvent, '/parameter_events',
                                              qos_profile_parameter_events)
 
@@ -150,14 +149,14 @@ class ParameterServices:
             self._errors.pop(next(iter(self._errors)))
         self._errors[name] = reason
 
-    def _list(self, request: Any, response: Any) -> Any:
+    async def _list(self, request: Any, response: Any) -> Any:
         if self._excess(request.prefixes, 'list parameters'):
             return response
         response.result = list_parameters(list(self._directory.listed), list(request.prefixes),
                                           request.depth)
         return response
 
-    def _describe(self, request: Any, response: Any) -> Any:
+    async def _describe(self, request: Any, response: Any) -> Any:
         if self._excess(request.names, 'describe parameters'):
             response.descriptors = [ParameterDescriptor(name=printable(name))
                                     for name in request.names]
@@ -172,7 +171,7 @@ class ParameterServices:
             for name, parameter in found]
         return response
 
-    def _types(self, request: Any, response: Any) -> Any:
+    async def _types(self, request: Any, response: Any) -> Any:
         if self._excess(request.names, 'types of parameters'):
             response.types = [ParameterType.PARAMETER_NOT_SET] * len(request.names)
             return response

@@ -88,8 +88,14 @@ class PolledTopics:
         self._subscriptions: list[Subscription] = []
 
     def subscribe(self, message_type: type, topic: str,
-                  take: Callable[[Any, float], None]) -> None:
-        """Add a topic; ``take`` gets each message (or its number) and ``now``."""
+                  take: Callable[[Any, float], None],
+                  read: Callable[[bytes], Any] | None = None) -> None:
+        """
+        Add a topic.
+
+        :param take: gets each message (or its number) and ``now``.
+        :param read: makes of the bytes what ``take`` gets; None: the message.
+        """
         node = self._node
         name = node.resolve_topic_name(topic)
 
@@ -114,7 +120,7 @@ class PolledTopics:
             self._refuse(f'unreadable {name}',
                          f'command on {name} cannot be read: {printable(reason)}')
         self._topics.append(CommandTopic(subscription, use=take, late=late,
-                                         unreadable=unreadable))
+                                         unreadable=unreadable, read=read))
 
     def take(self, now: float) -> None:
         """Hand over all that waits, oldest first."""

@@ -6,9 +6,8 @@ rclpy converts a message attribute by attribute and serialises it, every time it
 a ``ParameterEvent`` of four values that takes twenty times as long as handing its bytes over
 (docs/performance.md), and nothing but the stamp and four numbers differs from the last one.
 
-Where in the bytes a number stands is not assumed but found: the message is serialised by the
-middleware in use, with a distinctive number in each place. A message in which that cannot be
-found (a bool is one byte, and no byte is distinctive) is published the ordinary way.
+A message in whose bytes the numbers cannot be found (:mod:`.layout`; a bool is one byte, and no
+byte is distinctive) is published the ordinary way.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,25 +15,12 @@ import struct
 from typing import Any
 
 from rclpy.publisher import Publisher
-from rclpy.serialization import serialize_message
 
 from drive_can_bridge.core.parameters import ValueKind
+from drive_can_bridge.ros.layout import find_layout, Layout, Number
 
-#: by struct code: a number whose bytes all differ, and from all others that are likely
-_MARKERS = {
-    'd': struct.unpack('<d', bytes.fromhex('d17ae93b854f2240'))[0],
-    'q': 0x2B86D3195EC7A4F1,
-    'i': 0x3D94E5A7,
-    'I': 0x2C6BD8F3,
-}
-
-#: distance between the markers of two rows
-ROW = 1000
 #: how a number of each kind stands in a message; a bool is no number
 NUMBER_CODES = {ValueKind.DOUBLE: 'd', ValueKind.INTEGER: 'q'}
-#: struct code of a number, and what puts it into the message; ``15d`` is that many in a row, which
-#: are put as a list and published as so many numbers
-Number = tuple[str, Callable[[Any], object]]
 
 
 class PreparedMessage:
@@ -43,19 +29,21 @@ class PreparedMessage:
 
     One ``struct`` makes all of them: what is constant goes into it as byte strings, in turn with
     the numbers.
-
-    :param layout: of the whole message.
-    :param parts: what it packs, in turn a byte string and a number, a byte string at the end.
     """
 
     __slots__ = ('_pack', '_parts', '_publish')
 
-    def __init__(self, publisher: Publisher, layout: struct.Struct, parts: list[Any]) -> None:
+    def __init__(self, publisher: Publisher, layout: Layout) -> None:
         # the way to the handle through ``Publisher.publish`` costs more than the handing over; a
         # destroyed publisher raises RCLError
         self._publish: Callable[[bytes], None] = publisher.handle.publish_raw
-        self._pack = layout.pack
-        self._parts = parts
+        codes, parts = layout.order, []
+        for constant, code in zip(layout.constants, layout.codes):
+            for before in (constant, *[b''] * (int(code[:-1] or 1) - 1)):
+                codes += f'{len(before)}s{code[-1]}'
+                parts += [before, 0]
+        self._parts: list[Any] = [*parts, layout.constants[-1]]
+        self._pack = struct.Struct(f'{codes}{len(self._parts[-1])}s').pack
 
     @classmethod
     def find(cls, publisher: Publisher, message: Any,
@@ -63,18 +51,11 @@ class PreparedMessage:
         """
         Prepare ``message``, whose ``numbers`` change; None when they are not found in its bytes.
 
-        They have to be given in the order in which the message has them. The message is left with
-        arbitrary numbers in it.
+        They have to be given in the order in which the message has them; those in a row are
+        published as so many numbers. The message is left with arbitrary numbers in it.
         """
-        markers = [_marker(code, index) for index, (code, _) in enumerate(numbers)]
-        for (_, put), marker in zip(numbers, markers):
-            put(marker)
-        data = serialize_message(message)
-        for order in '<>':
-            found = _found(data, order, [code for code, _ in numbers], markers)
-            if found is not None:
-                return cls(publisher, *found)
-        return None
+        layout = find_layout(message, numbers)
+        return None if layout is None else cls(publisher, layout)
 
     def publish(self, numbers: Sequence[Any]) -> None:
         """
@@ -85,26 +66,3 @@ class PreparedMessage:
         parts = self._parts
         parts[1::2] = numbers
         self._publish(self._pack(*parts))
-
-
-def _marker(code: str, index: int) -> Any:
-    if len(code) > 1:
-        return [_marker(code[-1], ROW * (1 + index) + place) for place in range(int(code[:-1]))]
-    return _MARKERS[code] + type(_MARKERS[code])(index)
-
-
-def _found(data: bytes, order: str, codes: Sequence[str],
-           markers: Sequence[Any]) -> tuple[struct.Struct, list[Any]] | None:
-    """Return layout and parts of a message with these markers in it; None: they are not there."""
-    layout, parts, end = order, [], 0
-    for code, marker in zip(codes, markers):
-        row = marker if isinstance(marker, list) else [marker]
-        wanted = struct.pack(order + code, *row)
-        place = data.find(wanted)
-        if data.count(wanted) != 1 or place < end:
-            return None
-        for number in row:
-            layout += f'{place - end}s{code[-1]}'
-            parts += [data[end:place], number]
-            end = place = place + struct.calcsize(order + code[-1])
-    return struct.Struct(f'{layout}{len(data) - end}s'), [*parts, data[end:]]

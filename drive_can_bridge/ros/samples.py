@@ -130,6 +130,8 @@ class SamplePublisher:
         built in, which have topics of their own but no part in ``~/response``, and then
         ``cyclic_response``.
     :param stamp: (receive time of the steady clock) -> seconds and nanoseconds.
+    :ivar last: the raw integers of the last sample and its receive time, in one, because other
+        threads look at them; None: the drive is gone.
     """
 
     def __init__(self, node: Node, drive: DriveConfiguration, parameters: tuple[Parameter, ...],
@@ -150,14 +152,13 @@ class SamplePublisher:
         self._wanted_values: list[ValueTopic] = []
         self._wanted_samples: list[EventTopic | JointTopic] = []
         self._count_at = 0.0
-        #: the last sample and when it was received, in one: other threads look at it
-        self._last: tuple[tuple[int, ...], float] | None = None
+        self.last: tuple[tuple[int, ...], float] | None = None
 
     def publish(self, raws: tuple[int, ...], received_at: float) -> None:
         """Publish one sample."""
         if received_at >= self._count_at:
             self._look_who_subscribes(received_at)
-        self._last = raws, received_at
+        self.last = raws, received_at
         if self._wanted_values or self._wanted_samples:
             values = [convert(raw) for convert, raw in zip(self._converters, raws)]
             present = len(values)
@@ -172,19 +173,15 @@ class SamplePublisher:
             if bits.slot < len(raws):
                 bits.update(raws[bits.slot])
 
-    @property
-    def last(self) -> tuple[tuple[int, ...], float] | None:
-        """The raw integers of the last sample, and its receive time; None: the drive is gone."""
-        return self._last
-
     def latest(self) -> dict[str, Value]:
         """Return the values of the last sample, by parameter name (for views)."""
+        last = self.last
         return {parameter.name: parameter.value_from_raw(raw)
-                for parameter, raw in zip(self._parameters, self._last[0] if self._last else ())}
+                for parameter, raw in zip(self._parameters, last[0] if last else ())}
 
     def forget(self) -> None:
         """Take note that the drive is gone: nothing known of it is current."""
-        self._last = None
+        self.last = None
         for bits in self._bits:
             bits.forget()
 

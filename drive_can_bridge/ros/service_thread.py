@@ -3,41 +3,40 @@
 Services that wait for nobody.
 
 An executor serves one callback after the other, and looks at everything else that it has in
-between: whoever asks a drive for a thousand parameters is served before the one who wants it to
-stop. So services that stop machines are taken by a thread that has nothing else to do, straight
-from a wait set of their own. Answers are sent by another one: where a caller has been discovered
-only halfway, sending takes the middleware a tenth of a second.
+between: several times for each call that has to wait for its drive, and whoever asks a drive for a
+thousand parameters is served before the one who wants it to stop. So services of drives are taken
+by threads that have nothing else to do, straight from a wait set of their own; those that stop
+machines by one of theirs. Answers are sent by another one: where a caller has been discovered only
+halfway, sending takes the middleware a tenth of a second.
 """
 
 from collections.abc import Callable
 from contextlib import ExitStack
+from functools import partial
 import queue
 import threading
-from typing import Any, NamedTuple
+from typing import Any
 
 from rclpy.context import Context
 from rclpy.exceptions import InvalidHandle
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.service import Service
 
+from drive_can_bridge.ros.pace import Pace
+
 RCLError = rclpy_implementation.RCLError
 
 #: s between two failures: one that comes at once again must not take the machine
 ERROR_PAUSE = 0.05
+#: share of the processor's time for a thread that anybody can keep busy
+MODEST = 0.3
+#: calls of one service that are taken in a row
+TAKE_MAX = 8
 
 #: takes the response; to be called once, from any thread
 Answer = Callable[[Any], None]
 #: takes a request, and whatever is to be called with the response
 Callback = Callable[[Any, Answer], None]
-
-
-class _Response(NamedTuple):
-    """A response on its way."""
-
-    service: Service
-    header: Any
-    message: Any
-    sent: Callable[[], None]
 
 
 class ServiceThread:
@@ -48,16 +47,20 @@ class ServiceThread:
 
     :param report: takes one line about an exception that a callback let escape.
     :param prepare_thread: called first in the thread that takes requests.
+    :param share: of the processor's time that each of its two threads may use; 1: all of it.
     """
 
     def __init__(self, name: str, context: Context, report: Callable[[str], None],
-                 prepare_thread: Callable[[], object] = lambda: None) -> None:
+                 prepare_thread: Callable[[], object] = lambda: None, *,
+                 share: float = MODEST) -> None:
         self._name = name
+        self._share = share
         self._context = context
         self._report = report
         self._prepare_thread = prepare_thread
         self._served: dict[Service, tuple[Callback, Callable[[], None]]] = {}
-        self._responses: queue.SimpleQueue[_Response | None] = queue.SimpleQueue()
+        self._changed = False   # what is served
+        self._jobs: queue.SimpleQueue[Callable[[], None] | None] = queue.SimpleQueue()
         self._guard = rclpy_implementation.GuardCondition(context.handle)
         self._ending = threading.Event()
         self._threads: list[threading.Thread] = []
@@ -77,23 +80,31 @@ class ServiceThread:
                                  daemon=True)]
             for thread in self._threads:
                 thread.start()
-        self._wake()
+        self._change()
+
+    def later(self, job: Callable[[], None]) -> None:
+        """Have the thread that answers do something. From any thread."""
+        self._jobs.put(job)
 
     def forget(self, services: list[Service]) -> None:
         """Stop to serve them; they may be destroyed then."""
         for service in services:
             self._served.pop(service, None)
-        self._wake()
+        self._change()
 
     def stop(self) -> None:
         """End, when the answers that there are have been sent."""
         self._ending.set()
         self._wake()
-        self._responses.put(None)
+        self._jobs.put(None)
         for thread in self._threads:
             thread.join(timeout=5.0)
         self._threads.clear()
         self._guard.destroy_when_not_in_use()
+
+    def _change(self) -> None:
+        self._changed = True
+        self._wake()
 
     def _wake(self) -> None:
         try:
@@ -106,64 +117,82 @@ class ServiceThread:
 
     def _take_all(self) -> None:
         self._prepare_thread()
+        pace = Pace(self._share)
         while not self._ending.is_set() and self._context.ok():
             try:
-                for service in self._wait():
-                    self._take(service)
+                self._take_while_unchanged(pace)
             except Exception as error:  # noqa: BLE001  outermost loop: no failure is silent
                 if self._ending.is_set():
                     return
                 self._report(f'internal error in a callback: {type(error).__name__}: {error}')
                 self._ending.wait(ERROR_PAUSE)
 
-    def _wait(self) -> list[Service]:
-        """Wait until something is to be served, or has changed."""
+    def _take_while_unchanged(self, pace: Pace) -> None:
+        """Take what comes until something else is to be served."""
+        self._changed = False
         context_handle: Any = self._context.handle
         with ExitStack() as held:
-            present = []
+            present: dict[int, Service] = {}
             for service in list(self._served):
                 try:
                     held.enter_context(service.handle)
                 except InvalidHandle:   # destroyed meanwhile
                     continue
-                present.append(service)
+                present[service.handle.pointer] = service
             held.enter_context(self._guard)
             held.enter_context(context_handle)
             waiting = rclpy_implementation.WaitSet(0, 1, 0, 0, len(present), 0, context_handle)
-            waiting.clear_entities()
-            waiting.add_guard_condition(self._guard)
-            for service in present:
-                waiting.add_service(service.handle)
-            waiting.wait(-1)
-            ready = set(waiting.get_ready_entities('service'))
-            return [service for service in present if service.handle.pointer in ready]
+            handles = [service.handle for service in present.values()]
+            while not self._changed and not self._ending.is_set() and self._context.ok():
+                waiting.clear_entities()
+                waiting.add_guard_condition(self._guard)
+                for handle in handles:
+                    waiting.add_service(handle)
+                waiting.wait(-1)
+                for pointer in waiting.get_ready_entities('service'):
+                    self._take(present[pointer])
+                pace.keep()
 
     def _take(self, service: Service) -> None:
-        served = self._served.get(service)
-        if served is None:
-            return
-        callback, answered = served
         kind: Any = service.srv_type
-        try:
-            with service.handle:
-                request, header = service.handle.service_take_request(kind.Request)
-        except InvalidHandle:
-            return
-        if header is not None:
-            callback(request, lambda message: self._responses.put(
-                _Response(service, header, message, answered)))
+        for _ in range(TAKE_MAX):
+            served = self._served.get(service)
+            if served is None:
+                return
+            request, header = service.handle.service_take_request(kind.Request)
+            if header is None:
+                return
+            callback, answered = served
+            callback(request, partial(self._answer, service, header, answered))
 
     # -- the thread that answers ------------------------------------------------------------------
 
+    def _answer(self, service: Service, header: Any, answered: Callable[[], None],
+                message: Any) -> None:
+        """Have an answer sent. From any thread."""
+        self._jobs.put(partial(self._send, service, header, answered, message))
+
+    @staticmethod
+    def _send(service: Service, header: Any, answered: Callable[[], None], message: Any) -> None:
+        try:
+            service.send_response(message, header)
+        except (InvalidHandle, RCLError):   # service or context are gone
+            pass
+        finally:
+            answered()
+
     def _answer_all(self) -> None:
-        while True:
-            response = self._responses.get()
-            if response is None:
-                return
-            try:
-                response.service.send_response(response.message, response.header)
-            except (InvalidHandle, RCLError):   # service or context are gone
-                pass
-            except Exception as error:  # noqa: BLE001  outermost loop: no failure is silent
-                self._report(f'internal error in an answer: {type(error).__name__}: {error}')
-            response.sent()
+        pace = Pace(self._share)
+        while self._do_one_job():
+            pace.keep()
+
+    def _do_one_job(self) -> bool:
+        """Do what comes next; the job is forgotten then, and with it the drive that it was for."""
+        job = self._jobs.get()
+        if job is None:
+            return False
+        try:
+            job()
+        except Exception as error:  # noqa: BLE001  outermost loop: no failure is silent
+            self._report(f'internal error in an answer: {type(error).__name__}: {error}')
+        return True

@@ -1,0 +1,97 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+Services whose callbacks are coroutines, which wait for answers without an executor.
+
+An executor looks at everything that it has four or five times for each such call: for the request,
+for the answer, for whoever waits for it, and for its own guards. Here the threads of
+:mod:`.service_thread` run them: one begins a coroutine, the one that answers goes on with it.
+"""
+
+from collections.abc import Callable, Coroutine, Generator, Mapping
+from functools import partial
+import threading
+from typing import Any, Generic, TypeVar
+
+from rclpy.node import Node
+from rclpy.qos import qos_profile_parameters
+from rclpy.service import Service
+
+from drive_can_bridge.ros.polled_group import PolledGroup
+from drive_can_bridge.ros.service_thread import Answer, ServiceThread
+
+AnswerT = TypeVar('AnswerT')
+#: takes request and response, and returns the response
+Callback = Callable[[Any, Any], Coroutine[Any, Any, Any]]
+
+
+class Question(Generic[AnswerT]):
+    """
+    What such a coroutine awaits: something that is asked when it is awaited.
+
+    :param ask: takes what is to be called with the answer, once, from any thread, or at once.
+    """
+
+    __slots__ = ('ask',)
+
+    def __init__(self, ask: Callable[[Callable[[AnswerT], None]], None]) -> None:
+        self.ask = ask
+
+    def __await__(self) -> Generator[Any, AnswerT, AnswerT]:
+        return (yield self)
+
+
+class CoroutineServices:
+    """
+    Such services of one node. No two of their coroutines run at the same time.
+
+    :param callbacks: by name, with the type of the service.
+    :ivar calls: how many wait for their answer.
+    """
+
+    def __init__(self, node: Node, thread: ServiceThread,
+                 callbacks: Mapping[str, tuple[Any, Callback]]) -> None:
+        self._thread = thread
+        self._running = threading.Lock()
+        self.calls = 0
+        self._services: dict[Service, Callable[[Any, Answer], None]] = {}
+        for name, (kind, callback) in callbacks.items():
+            service = node.create_service(kind, f'~/{name}', _never, callback_group=PolledGroup(),
+                                          qos_profile=qos_profile_parameters)
+            self._services[service] = partial(self._begin, callback, kind.Response)
+
+    def serve(self) -> None:
+        """Begin to serve."""
+        for service, callback in self._services.items():
+            self._thread.serve(service, callback, self._answered)
+
+    def destroy(self) -> None:
+        """Let go of the services. Before the node is destroyed."""
+        self._thread.forget(list(self._services))
+
+    def _begin(self, callback: Callback, response: Callable[[], Any], request: Any,
+               answer: Answer) -> None:
+        with self._running:
+            self.calls += 1
+        self._go_on(callback(request, response()), answer, None)
+
+    def _go_on(self, coroutine: Coroutine[Any, Any, Any], answer: Answer, found: Any) -> None:
+        """Run a coroutine until it asks something, or to its end."""
+        try:
+            with self._running:
+                question: Question[Any] = coroutine.send(found)
+            question.ask(lambda what: self._thread.later(
+                partial(self._go_on, coroutine, answer, what)))
+        except StopIteration as end:
+            answer(end.value)
+        except BaseException:
+            coroutine.close()
+            self._answered()
+            raise
+
+    def _answered(self) -> None:
+        with self._running:
+            self.calls -= 1
+
+
+def _never(_: Any, response: Any) -> Any:
+    raise RuntimeError('such services are taken by a thread of their own')

@@ -1,0 +1,61 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""What timer threads see to beside their drives."""
+
+import math
+import threading
+
+from drive_can_bridge.exchange.errand import Errand
+
+
+def test_once_a_period_and_a_little_early_where_a_thread_is_awake() -> None:
+    done: list[float] = []
+    errand = Errand(done.append)
+    assert errand.run(5.0) == math.inf
+    errand.begin(1.0, now=10.0)
+    assert errand.run(10.0) == 11.0
+    assert errand.run(10.8) == 11.0
+    assert not done
+    assert errand.run(10.95) == 12.0    # the beat is kept
+    assert errand.run(11.5) == 12.0
+    assert errand.run(12.3) == 13.0
+    assert done == [10.95, 12.3]
+
+
+def test_what_was_missed_is_left_out() -> None:
+    done: list[float] = []
+    errand = Errand(done.append)
+    errand.begin(1.0, now=0.0)
+    assert errand.run(7.5) == 8.5
+    assert errand.run(7.6) == 8.5
+    assert done == [7.5]
+
+
+def test_no_thread_waits_for_another() -> None:
+    begun, go_on = threading.Event(), threading.Event()
+    done: list[float] = []
+
+    def action(now: float) -> None:
+        done.append(now)
+        begun.set()
+        go_on.wait(10.0)
+    errand = Errand(action)
+    errand.begin(1.0, now=0.0)
+    other = threading.Thread(target=errand.run, args=(1.0,))
+    other.start()
+    assert begun.wait(10.0)
+    assert errand.run(2.0) == 3.0
+    assert done == [1.0]
+    ended = threading.Event()
+
+    def end() -> None:
+        errand.end()
+        ended.set()
+    ending = threading.Thread(target=end)
+    ending.start()
+    assert not ended.wait(0.05), 'it waits for the call that is under way'
+    go_on.set()
+    other.join(10.0)
+    ending.join(10.0)
+    assert ended.is_set()
+    assert errand.run(100.0) == math.inf
+    assert done == [1.0]

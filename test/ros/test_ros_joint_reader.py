@@ -1,0 +1,87 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Messages for joints mean the same, whether their bytes are known or not."""
+
+from array import array
+import math
+import struct
+from typing import Any
+
+import pytest
+from rclpy.serialization import serialize_message
+from sensor_msgs.msg import JointState
+
+from drive_can_bridge.ros.joint_reader import ALIKE, JointReader
+
+NAMES = ['wj', 'nj', 'shoulder_pan_joint']
+VALUES = [1.5, math.nan, -math.inf]
+
+
+def exact(columns: Any) -> list[tuple[str, bytes]]:
+    return [(quantity, array('d', values).tobytes()) for quantity, values in columns]
+
+
+def knowing(message: JointState) -> JointReader:
+    """Return a reader that knows messages of that shape."""
+    reader = JointReader()
+    first = [reader(serialize_message(message)) for _ in range(ALIKE)]
+    assert len({id(each.names) for each in first}) == ALIKE
+    assert reader(serialize_message(message)).names is first[-1].names, 'it does not know it'
+    return reader
+
+
+@pytest.mark.parametrize('kinds', [
+    {'velocity': VALUES}, {'position': VALUES, 'effort': [0.0, -0.0, 5e-324]},
+    {'position': VALUES, 'velocity': [0.0] * 3, 'effort': [math.nan] * 3}], ids=str)
+def test_numbers_of_a_known_shape(kinds: dict[str, list[float]]) -> None:
+    reader = knowing(JointState(name=NAMES, **{kind: [7.0] * 3 for kind in kinds}))
+    message = JointState(name=NAMES, **kinds)
+    message.header.stamp.sec, message.header.stamp.nanosec = -1, 2**32 - 1
+    read = reader(serialize_message(message))
+    assert read.names == NAMES
+    assert exact(read.columns) == exact(kinds.items())
+
+
+@pytest.mark.parametrize('message', [
+    JointState(name=['wj', 'nj', 'shoulder_pan_join!'], velocity=VALUES),
+    JointState(name=NAMES, position=VALUES),
+    JointState(name=NAMES, velocity=VALUES[:2]),
+    JointState(name=NAMES, velocity=VALUES, effort=[1.0]),
+    JointState(name=NAMES[:1], velocity=[1.0]), JointState(name=NAMES), JointState(),
+], ids=['name', 'quantity', 'too few', 'and another', 'less', 'nothing', 'empty'])
+def test_another_shape_in_between(message: JointState) -> None:
+    known = JointState(name=NAMES, velocity=VALUES)
+    reader = knowing(known)
+    for _ in range(ALIKE + 2):
+        read = reader(serialize_message(message))
+        assert read.names == list(message.name)
+        assert exact(read.columns) == exact(
+            (kind, getattr(message, kind)) for kind in ('position', 'velocity', 'effort')
+            if len(getattr(message, kind)))
+    read = reader(serialize_message(known))
+    assert (read.names, exact(read.columns)) == (NAMES, exact([('velocity', VALUES)]))
+
+
+def test_a_frame_is_no_part_of_a_joint() -> None:
+    reader = knowing(JointState(name=NAMES, velocity=[0.0] * 3))
+    message = JointState(name=NAMES, velocity=VALUES)
+    message.header.frame_id = 'base'
+    read = reader(serialize_message(message))
+    assert (read.names, exact(read.columns)) == (NAMES, exact([('velocity', VALUES)]))
+
+
+def test_high_byte_first() -> None:
+    """As another machine may write it: OMG DDS-XTypes 1.3, 7.6.3.1.2, CDR_BE."""
+    reader = knowing(JointState(name=['ab'], velocity=[0.0]))
+    body = (struct.pack('>iI', 1, 2) + struct.pack('>I4s', 1, b'')      # stamp, frame_id
+            + struct.pack('>II4s', 1, 3, b'ab')                         # name
+            + struct.pack('>II', 0, 1) + bytes(4) + struct.pack('>d', -2.5)
+            + struct.pack('>I', 0))
+    read = reader(struct.pack('>HH', 0, 0) + body)
+    assert (read.names, exact(read.columns)) == (['ab'], exact([('velocity', [-2.5])]))
+
+
+@pytest.mark.parametrize('data', [b'', b'\x00\x01\x00\x00', b'\xff' * 200])
+def test_rubbish(data: bytes) -> None:
+    reader = knowing(JointState(name=NAMES, velocity=VALUES))
+    with pytest.raises((RuntimeError, ValueError)):
+        reader(data)
