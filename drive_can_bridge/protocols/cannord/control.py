@@ -55,7 +55,8 @@ def make_control(*, parameter_set: int, timeout: float,
     :param unheard: says which of them may run without answering any more; '' if none.
     """
     return ControlMachine(control_table(parameter_set), timeout=timeout, members=members,
-                          unheard=unheard, wording=Wording(lambda status: state_of(status).value, hint))
+                          unheard=unheard,
+                          wording=Wording(lambda status: state_of(status).value, hint))
 
 
 def hint(status: int) -> str:
