@@ -173,13 +173,14 @@ class Client:
         """Subscribe to a topic of which the last message matters."""
         return self.topic(name, message_type, LATCHED)
 
-    def publisher(self, name: str, message_type: Any, quality: QoSProfile = KEEP) -> Any:
-        """Return a publisher that has been found by a subscriber."""
+    def publisher(self, name: str, message_type: Any, quality: QoSProfile = KEEP, *,
+                  host: str = '') -> Any:
+        """Return a publisher that a subscriber knows: that of the node ``host``, if renamed."""
         if name not in self._publishers:
             self._publishers[name] = self.node.create_publisher(message_type, name, quality)
             wait_until(self._publishers[name].get_subscription_count,
                        what=f'a subscriber of {name}')
-            host = re.split('/command/|/joint_command', name)[0]
+            host = host or re.split('/command/|/joint_command', name)[0]
             if host != name:    # nothing is sent again to a subscriber that finds out later
                 self._acquaint(name, host)
         return self._publishers[name]

@@ -70,6 +70,7 @@ def test_topics_and_services_of_a_drive_are_remapped(bridge: StartBridge,
         '-r', 'lift:~/enable:=/lift_on'))
     one.online()
     client.topic('/belt/speed', Float64).wait()
+    client.publisher('/belt/setpoint', Float64, host='/conveyor')
     with one.record() as recorder:
         client.publish('/belt/setpoint', Float64(data=0.0))
         client.publish('/belt/setpoint', Float64(data=2.0))
