@@ -29,6 +29,7 @@ import os
 from pathlib import Path
 import signal
 import tempfile
+import time
 from typing import Any
 
 from hypothesis import HealthCheck, settings
@@ -85,6 +86,8 @@ SPREAD = ('test/system/', 'test/demo/', 'test/monitor/test_monitor_attach',
 FIRST = ('test/system/test_system_parameters', 'test/system/test_system_backup',
          'test/ros/test_ros_contract', 'test/system/test_soak', 'test/panel/', 'test/system/',
          'test/monitor/test_monitor_attach', 'test/demo/', 'test/backup/', 'test/ros/', 'test/')
+#: s for which others are looked at
+LOOK = 0.5
 #: processes for each core that has nothing else to do: most of the time they wait
 WORKERS_PER_CORE = 3
 
@@ -119,7 +122,23 @@ def pytest_xdist_auto_num_workers() -> int:
     if wanted:
         return int(wanted)
     cores = len(os.sched_getaffinity(0))
-    return max(cores + 1, WORKERS_PER_CORE * cores - round(os.getloadavg()[0]))
+    return max(cores + 1, WORKERS_PER_CORE * cores - round(2.0 * _busy_cores()))
+
+
+def _busy_cores() -> float:
+    """Return how many cores others use now; the load average still tells of the set-up."""
+    def look() -> list[int]:
+        try:
+            return [int(word) for word in Path('/proc/stat').read_text().split()[1:9]]
+        except OSError:     # no Linux
+            return []
+    before = look()
+    time.sleep(LOOK)
+    spent = [after - former for after, former in zip(look(), before)]
+    if not sum(spent):
+        return 0.0
+    user, _, system, _, _, *interrupts = spent      # who is nice makes room
+    return float(os.cpu_count() or 1) * (user + system + sum(interrupts)) / sum(spent)
 
 
 @pytest.hookimpl(optionalhook=True)
