@@ -122,7 +122,7 @@ def pytest_xdist_auto_num_workers() -> int:
     if wanted:
         return int(wanted)
     cores = len(os.sched_getaffinity(0))
-    return max(cores + 1, WORKERS_PER_CORE * cores - round(2.0 * _busy_cores()))
+    return max(cores + 1, WORKERS_PER_CORE * cores - round(_busy_cores()))
 
 
 def _busy_cores() -> float:

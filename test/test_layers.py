@@ -8,6 +8,7 @@ and below ``TYPE_CHECKING``. Whoever needs a new edge adds it here, and thereby 
 
 import ast
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 import sys
 from typing import NamedTuple
@@ -126,11 +127,17 @@ def module_exists(name: str) -> bool:
     return path.with_suffix('.py').is_file() or (path / '__init__.py').is_file()
 
 
+@cache
+def tree_of(path: Path) -> ast.Module:
+    """Return what a file consists of."""
+    return ast.parse(path.read_text(encoding='utf-8'), str(path))
+
+
 def imports_of(path: Path) -> Iterator[Import]:
     """Go through the imports of a file; names of modules are complete."""
     package = ['drive_can_bridge', *path.relative_to(PACKAGE).parent.parts]
     lazy_nodes: set[ast.AST] = set()
-    tree = ast.parse(path.read_text(encoding='utf-8'), str(path))
+    tree = tree_of(path)
     for node in ast.walk(tree):
         if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
             lazy_nodes.update(ast.walk(node))
@@ -238,11 +245,12 @@ class Class(NamedTuple):
     methods: frozenset[str]
 
 
+@cache
 def classes() -> dict[str, Class]:
     """Return all classes of the package by name."""
     found: dict[str, Class] = {}
     for path in SOURCES:
-        for node in ast.walk(ast.parse(path.read_text(encoding='utf-8'), str(path))):
+        for node in ast.walk(tree_of(path)):
             if isinstance(node, ast.ClassDef):
                 bases = [base.value if isinstance(base, ast.Subscript) else base
                          for base in node.bases]
@@ -255,14 +263,11 @@ def classes() -> dict[str, Class]:
     return found
 
 
-CLASSES = classes()
-
-
 def ancestors(name: str) -> Iterator[tuple[int, Class]]:
     """Go through the ancestors of a class in this package, each with its distance."""
-    for base in CLASSES[name].bases:
-        if base in CLASSES and base != name:
-            yield 1, CLASSES[base]
+    for base in classes()[name].bases:
+        if base in classes() and base != name:
+            yield 1, classes()[base]
             yield from ((steps + 1, other) for steps, other in ancestors(base))
 
 
@@ -272,7 +277,7 @@ def test_modules_are_short(source: Path) -> None:
 
 
 def test_no_class_has_many_generations_above_it() -> None:
-    deep = [f'{name}: {other.name}' for name in CLASSES
+    deep = [f'{name}: {other.name}' for name in classes()
             for steps, other in ancestors(name) if steps > STEPS_MAX]
     assert not deep
 
@@ -280,7 +285,7 @@ def test_no_class_has_many_generations_above_it() -> None:
 def test_private_methods_are_overridden_inside_their_package_only() -> None:
     wrong = [
         f'{each.source}: {name}.{method} overrides {other.name}'
-        for name, each in CLASSES.items() for _, other in ancestors(name)
+        for name, each in classes().items() for _, other in ancestors(name)
         for method in each.methods & other.methods
         if method.startswith('_') and not method.startswith('__')
         and each.source.parent != other.source.parent]
@@ -299,10 +304,11 @@ def of_self(node: ast.AST) -> bool:
             and node.value.id in ('self', 'cls'))
 
 
+@cache
 def own_names(path: Path) -> set[str]:
     """Return the private names that the classes of a module give to what is their own."""
     names = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding='utf-8'), str(path))):
+    for node in ast.walk(tree_of(path)):
         if isinstance(node, ast.FunctionDef):
             names.add(node.name)
         elif (isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store)
@@ -311,27 +317,25 @@ def own_names(path: Path) -> set[str]:
     return {name for name in names if name.startswith('_')}
 
 
-OWN_NAMES = {path: own_names(path) for path in SOURCES}
-
-
 def test_what_is_private_is_used_in_its_own_module_only(source: Path) -> None:
     # ``_replace`` and its like belong to every named tuple
-    elsewhere = set().union(*OWN_NAMES.values()) - OWN_NAMES[source] - set(dir(Import))
+    elsewhere = set().union(*map(own_names, SOURCES)) - own_names(source) - set(dir(Import))
     wrong = [
         f'{source}:{node.lineno}: {ast.unparse(node)}'
-        for node in ast.walk(ast.parse(source.read_text(encoding='utf-8'), str(source)))
+        for node in ast.walk(tree_of(source))
         if isinstance(node, ast.Attribute) and private(node) and not of_self(node)
         and node.attr in elsewhere and not ast.unparse(node).startswith('super()')]
     assert not wrong, '\n'.join(wrong)
 
 
-@pytest.mark.parametrize('name', sorted(
-    name for name in CLASSES if any(each.name == 'Session' for _, each in ancestors(name))))
-def test_a_session_uses_nothing_private_of_what_all_share(name: str) -> None:
-    source = CLASSES[name].source
-    shared = OWN_NAMES[CLASSES['Session'].source] - OWN_NAMES[source]
-    wrong = [
-        f'{source}:{node.lineno}: {ast.unparse(node)}'
-        for node in ast.walk(ast.parse(source.read_text(encoding='utf-8'), str(source)))
-        if isinstance(node, ast.Attribute) and private(node) and node.attr in shared]
+def test_no_session_uses_anything_private_of_what_all_share() -> None:
+    base = own_names(classes()['Session'].source)
+    wrong = []
+    for name, found in classes().items():
+        if any(each.name == 'Session' for _, each in ancestors(name)):
+            shared = base - own_names(found.source)
+            wrong += [
+                f'{found.source}:{node.lineno}: {ast.unparse(node)}'
+                for node in ast.walk(tree_of(found.source))
+                if isinstance(node, ast.Attribute) and private(node) and node.attr in shared]
     assert not wrong, '\n'.join(wrong)
