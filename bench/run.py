@@ -99,10 +99,14 @@ def main(arguments: list[str] | None = None) -> int:
         parser.error(f'{", ".join(unknown)}: allowed are {", ".join(planned)}')
     begun = machine()
     results: dict[str, list[Any]] = {}
-    for _ in range(options.repeat):
-        for name in options.scenarios or [each for each in planned if each not in NAMED_ONLY]:
+    names = options.scenarios or [each for each in planned if each not in NAMED_ONLY]
+    try:
+        for name in names * options.repeat:
             print(f'{name} …', file=sys.stderr, flush=True)
-            results.setdefault(name, []).append(planned[name]())
+            found = planned[name]()
+            results.setdefault(name, []).append(found)
+    except KeyboardInterrupt:
+        print('ended early; what was measured so far:', file=sys.stderr)
     lines = report.figures(results)
     print(f'before: {begun}\nafter:  {machine()}\n\n{report.table(lines)}')
     if options.json:

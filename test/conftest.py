@@ -89,7 +89,7 @@ FIRST = ('test/system/test_system_parameters', 'test/system/test_system_backup',
 #: s for which others are looked at
 LOOK = 0.5
 #: processes for each core that has nothing else to do: most of the time they wait
-WORKERS_PER_CORE = 3
+WORKERS_PER_CORE = 4
 
 
 # -- signals and domains --------------------------------------------------------------------------
@@ -122,7 +122,7 @@ def pytest_xdist_auto_num_workers() -> int:
     if wanted:
         return int(wanted)
     cores = len(os.sched_getaffinity(0))
-    return max(cores + 1, WORKERS_PER_CORE * cores - round(_busy_cores()))
+    return max(cores + 1, round(WORKERS_PER_CORE * (cores - _busy_cores())))
 
 
 def _busy_cores() -> float:
