@@ -12,6 +12,7 @@ from collections.abc import Hashable
 MAY_RUN = 'it may still be running'
 #: what a drive that does not answer was told
 _UNHEARD = object()
+_NOTHING_ELSE = frozenset([_UNHEARD])
 
 
 class Told:
@@ -55,7 +56,7 @@ class Told:
 
     def answered(self) -> None:
         """Take note of an answer to what was told last: that has arrived."""
-        if self._running <= {_UNHEARD}:
+        if self._running <= _NOTHING_ELSE:
             self.stopped()
 
     def stopped(self) -> None:

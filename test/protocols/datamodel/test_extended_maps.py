@@ -433,16 +433,21 @@ def test_pause_between_rewrites_is_a_minute_at_most() -> None:
     assert pauses == [1, 2, 4, 8, 16, 32, 60, 60, 60, 60, 60]
 
 
-def test_rewrite_that_somebody_undoes_is_not_repeated_at_once() -> None:
+def undone(first: float, period: float, times: int) -> tuple[
+        Conversation, MapKeeper, list[float]]:
+    """Undo each rewrite at these times; return when the rewrites began, too."""
     keeper = MapKeeper(99, 51, 0, 0, 209, 0, 0, 0)
     talk = configured(keeper)
-    end = 10.2
-    for _ in range(40):
-        keeper.live(talk, end)
+    for number in range(times):
+        keeper.live(talk, first + period * number)
         keeper.registers[122] = 99
-        end += 1.0
+    return talk, keeper, [
+        float(entry.split()[0]) for entry in keeper.trace if entry.endswith('122 := 0')]
+
+
+def test_rewrite_that_somebody_undoes_is_not_repeated_at_once() -> None:
+    talk, keeper, starts = undone(10.2, 1.0, 40)
     # EEPROM cells wear: 1, 2, 4, 8, 16 s instead of one rewrite a second
-    starts = [float(entry.split()[0]) for entry in keeper.trace if entry.endswith('122 := 0')]
     assert len(starts) <= 6
     assert keeper.registers[122] in (50, 99)
     told = talk.events(MappingDiffered)
@@ -452,14 +457,7 @@ def test_rewrite_that_somebody_undoes_is_not_repeated_at_once() -> None:
 
 def test_rewrites_that_somebody_undoes_now_and_then_become_rare() -> None:
     """Maps that are right for some seconds are no reason to wear the EEPROM out."""
-    keeper = MapKeeper(99, 51, 0, 0, 209, 0, 0, 0)
-    talk = configured(keeper)
-    end = 15.0
-    for _ in range(80):
-        keeper.live(talk, end)
-        keeper.registers[122] = 99
-        end += 5.0
-    starts = [float(entry.split()[0]) for entry in keeper.trace if entry.endswith('122 := 0')]
+    _, _, starts = undone(15.0, 5.0, 80)
     pauses = [second - first for first, second in zip(starts, starts[1:])]
     assert len(starts) <= 14
     assert min(pauses[-4:]) >= 60.0
