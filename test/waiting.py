@@ -27,3 +27,16 @@ def wait_for(condition: Callable[[], Any], what: str = 'a condition', timeout: f
             raise AssertionError(f'waited {timeout:g} s for {what}')
         time.sleep(pause)
         pause = min(1.1 * pause, LONGEST)
+
+
+def wait_for_end(lines: Callable[[], list[Any]], end: list[Any]) -> None:
+    """
+    Wait until that is how the lines end.
+
+    What another process prints of the last that it heard comes when that one finds time for it.
+    """
+    deadline = time.monotonic() + DEADLINE
+    while (last := lines()[-len(end):]) != end:
+        if time.monotonic() > deadline:
+            assert last == end
+        time.sleep(LONGEST)

@@ -17,7 +17,7 @@ from parameter_files import bridge_file, CONVEYOR
 from processes import Client, Process, Processes, Simulator
 import pytest
 from test_system_reconnection import status_of
-from waiting import SLOWNESS
+from waiting import SLOWNESS, wait_for_end
 
 LONG = os.environ.get('DRIVE_CAN_TEST_PROFILE') == 'long'
 SECONDS = float(os.environ.get('DRIVE_CAN_SOAK_SECONDS', '120' if LONG else '15'))
@@ -183,7 +183,8 @@ class Soak:
     def judge_the_end(self) -> None:
         """See an orderly end, and that nothing has grown."""
         assert self.bridge.end(self.random.choice((signal.SIGINT, signal.SIGTERM))) == 0
-        assert self.simulator.frames('^003FFFF0.* R$')[-3:] == ['003FFFF0#0000000000000000 R'] * 3
+        wait_for_end(lambda: self.simulator.frames('^003FFFF0.* R$'),
+                     ['003FFFF0#0000000000000000 R'] * 3)
         assert not [line for line in self.bridge.errors
                     if 'internal error' in line or '[FATAL]' in line]
         warm, late = self.megabytes[WARM:], self.megabytes[-WARM:]

@@ -18,7 +18,7 @@ import pytest
 from repeating import again_and_again
 from slcan_peer import ZEROS
 from test_system_reconnection import rearm_and_move, start_moving, status_of
-from waiting import SLOWNESS, wait_for
+from waiting import SLOWNESS, wait_for, wait_for_end
 
 from drive_can_bridge.cli.main import main as drive_can
 
@@ -124,8 +124,7 @@ def test_controller_in_trouble(processes: Processes, client: Client, namespace: 
     neutral_until_armed(client, drive, adapter, since + len(stale))
     assert client.diagnostics(bus, state='^up$')['reconnections'] == '2'
     assert bridge.end() == 0
-    frames = [line for line in adapter.lines if line.startswith('T')]
-    assert frames[-3:] == [NEUTRAL] * 3
+    wait_for_end(lambda: [line for line in adapter.lines if line.startswith('T')], [NEUTRAL] * 3)
 
 
 def test_a_scan_says_what_is_wrong_with_the_bus(adapter: KernelAdapter,

@@ -19,6 +19,7 @@ from test_system_cannord import INVERTER, PROFILE
 from test_system_canopen_pkw import PUMP
 from test_system_datamodel_standard import SHORT
 from test_system_reconnection import status_of
+from waiting import wait_for_end
 
 
 @dataclass(frozen=True)
@@ -134,6 +135,6 @@ def test_run_write_and_stop(processes: Processes, client: Client, namespace: str
     assert not [line for line in simulator.lines if 'violation' in line]
     assert bridge.end() == 0
     head, tail, count = facts.end
-    last = simulator.frames(head)[-count:]
-    assert [bool(re.search(f'{head}{tail}$', frame)) for frame in last] == [True] * count
+    wait_for_end(lambda: [bool(re.search(f'{head}{tail}$', frame))
+                          for frame in simulator.frames(head)], [True] * count)
     assert simulator.end() == 0

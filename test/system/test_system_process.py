@@ -13,7 +13,7 @@ from parameter_files import bridge_file, CONVEYOR
 from processes import Client, Process, Processes
 import pytest
 from test_system_reconnection import rearm_and_move, start_moving
-from waiting import wait_for
+from waiting import wait_for, wait_for_end
 
 DEACTIVATE = 4
 
@@ -80,8 +80,8 @@ def test_signal_while_deactivating(processes: Processes, client: Client, namespa
         pass  # it has gone before it could answer
     timer.join()
     assert bridge.wait() == 0
-    requests = simulator.frames('^003FFFF0.* R$')
-    assert requests[-3:] == ['003FFFF0#0000000000000000 R'] * 3
+    wait_for_end(lambda: simulator.frames('^003FFFF0.* R$'),
+                 ['003FFFF0#0000000000000000 R'] * 3)
     assert not [line for line in bridge.errors if '[ERROR]' in line]
 
 

@@ -8,6 +8,7 @@ from parameter_files import bridge_file, CONVEYOR
 from processes import Client, Processes
 import pytest
 from slcan_peer import Peer, ZEROS
+from waiting import wait_for_end
 
 CYCLIC_REQUEST = 'T003FFFF08'
 MISSED_LIMIT = 40
@@ -70,8 +71,8 @@ def test_adapter_that_takes_nothing(processes: Processes, client: Client, namesp
     client.publish(f'{drive}/command/speed_setpoint', 150.0)
     peer.wait_for(f'{CYCLIC_REQUEST}05DC', count)
     assert bridge.end() == 0
-    frames = [line for line in peer.lines if line.startswith('T')]
-    assert frames[-3:] == [CYCLIC_REQUEST + ZEROS] * 3
+    wait_for_end(lambda: [line for line in peer.lines if line.startswith('T')],
+                 [CYCLIC_REQUEST + ZEROS] * 3)
 
 
 def test_stop_while_the_adapter_takes_nothing(processes: Processes, client: Client,

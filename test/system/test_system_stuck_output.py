@@ -12,7 +12,7 @@ from processes import Client, Processes
 import pytest
 from stuck_output import StuckOutput
 from test_system_reconnection import start_moving
-from waiting import wait_for
+from waiting import wait_for, wait_for_end
 
 NEIGHBOURS_REQUEST, REQUEST = '005FFFF0', '003FFFF0'
 
@@ -45,8 +45,8 @@ def test_a_drive_falls_silent_and_the_bridge_is_stopped(
     assert client.get(f'/{namespace}/conveyor', 'ramp_time') == [1.0]
     assert output.full
     assert bridge.end(signal.SIGTERM, timeout=10.0) == 0
-    requests = [frame for frame in simulator.frames(' R$') if frame.startswith(REQUEST)]
-    assert requests[-3:] == [f'{REQUEST}#0000000000000000 R'] * 3
+    wait_for_end(lambda: simulator.frames(f'^{REQUEST}.* R$'),
+                 [f'{REQUEST}#0000000000000000 R'] * 3)
 
 
 def test_what_was_not_read_is_told_later(processes: Processes, client: Client, namespace: str,
