@@ -5,14 +5,18 @@ from pathlib import Path
 from typing import Any
 
 from bridges import Bridge, CONVEYOR, HASTY, LIFT, parameters, StartBridge
-from clients import wait_until
+from clients import Client, wait_until
+from lifecycle_msgs.srv import ChangeState
 import pytest
+from rcl_interfaces.srv import GetParameterTypes, ListParameters
+from rclpy.qos import qos_profile_parameters
 
 from drive_can_bridge.client import find_source, open_drives
 from drive_can_bridge.client.drive import Drive, Enabled, WhichBridge
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.parameters import Access, Storage
 from drive_can_bridge.core.roles import Role
+from drive_can_bridge.ros.client import graph
 
 PUMP: dict[str, Any] = {
     'bus': 'main', 'protocol': 'canopen_pkw', 'station': 5, 'profile': 'tesys_t_ltmr',
@@ -123,6 +127,44 @@ def test_several_bridges_and_none(bridge: StartBridge, tmp_path: Path) -> None:
     with open_drives(namespace='b') as drives:
         assert list(drives) == ['conveyor']
         assert drives['conveyor'].facts.through == '/b/other'
+
+
+def offer(client: Client, name: str, service: str, kind: Any, answer: Any = None) -> None:
+    """Offer a service of somebody who may be a bridge."""
+    client.node.create_service(kind, f'{name}/{service}', answer or (lambda _, response: response),
+                               qos_profile=qos_profile_parameters)
+
+
+def test_services_that_are_found_one_by_one(client: Client) -> None:
+    def greet(_: Any, response: Any) -> Any:
+        def later() -> None:
+            timer.cancel()
+            offer(client, '/slow/bridge', 'list_parameters', ListParameters, tell)
+        timer = client.node.create_timer(0.5, later)
+        return response
+
+    def tell(_: Any, response: Any) -> Any:
+        response.result.names = ['drives.conveyor.profile_sha256', 'drives.lift.profile_sha256']
+        return response
+    offer(client, '/slow/bridge', 'change_state', ChangeState)
+    offer(client, '/slow/bridge', 'get_parameter_types', GetParameterTypes, greet)
+    source = find_source(namespace='slow')
+    assert list(source.names) == ['conveyor', 'lift']
+    source.close()
+
+
+def test_what_may_be_a_bridge_and_answers_nothing_is_named(
+        client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(graph, '_FIND_TIMEOUT', 1.0)
+    offer(client, '/mute/bridge', 'change_state', ChangeState)
+    offer(client, '/mute/bridge', 'get_parameter_types', GetParameterTypes)
+    offer(client, '/deaf/bridge', 'change_state', ChangeState)
+    with pytest.raises(DriveCanError, match=r'^no bridge answers in namespace /mute \(ROS domain '
+                                            r'\d+\): /mute/bridge does not offer list_param'):
+        find_source(namespace='mute')
+    with pytest.raises(DriveCanError, match=r'^no bridge answers \(.*\): /deaf/bridge does not '
+                                            r'answer; /mute/bridge does not offer list_param'):
+        find_source()
 
 
 def test_a_second_bridge_with_the_same_drive_does_not_configure(bridge: StartBridge) -> None:

@@ -1,7 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Finding a running bridge, and what it says of its drives."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 import json
 import os
 import time
@@ -18,10 +18,10 @@ from drive_can_bridge.ros.client.descriptors import parameter_of, plain, role_of
 from drive_can_bridge.ros.client.drive import BridgedDrive
 from drive_can_bridge.ros.client.graph import Graph, NoAnswer
 
-#: s until a bridge that nobody has found counts as not running
-_SEARCH = 4.0
-#: s without anything new in the graph until there are no others, once one is found
-_SETTLE = 1.0
+#: s without anything new in the graph until nobody else is there; once a bridge is found
+_SEARCH, _SETTLE = 4.0, 1.0
+#: s that looking takes in a graph where there is always something new
+_LONGEST = 12.0
 #: s that one that may be a bridge has to say so
 _ASK_TIMEOUT = 5.0
 #: names in one call
@@ -83,46 +83,53 @@ class BridgeSource:
         """Return the full name of the bridge, and its drives."""
         found: dict[str, tuple[str, ...]] = {}
         looked: set[str] = set()
+        silent: dict[str, NoAnswer] = {}
         graph: list[object] = []
-        last = time.monotonic() + _SEARCH
-        end = last
-        while time.monotonic() < end:
+        changed = time.monotonic()
+        last = changed + _LONGEST
+        while time.monotonic() < min(last, changed + (_SETTLE if found else _SEARCH)):
             before, graph = graph, self._graph.everything()
-            if found and graph != before:   # they are still being discovered
-                end = min(last, time.monotonic() + _SETTLE)
+            if graph != before:     # they are still being discovered
+                changed = time.monotonic()
             new = [node for node in self._graph.nodes_with('change_state', _LIFECYCLE)
                    if node not in looked and self._in_namespace(node)]
             if not new:
                 self._graph.wait(lambda: False, 0.1)
             for node in new:
                 looked.add(node)
-                drives = self._drives_of(node)
+                try:
+                    drives = self._drives_of(node)
+                except NoAnswer as error:
+                    silent[node] = error
+                    continue
                 if drives:
                     found[node] = drives
                     # asking it took its time: whoever else is there gets as much
-                    last = time.monotonic() + _SEARCH
-                    end = time.monotonic() + _SETTLE
+                    changed = time.monotonic()
+                    last = changed + _SEARCH
         if not found:
-            where = '' if self._namespace is None else f' in namespace {self._namespace}'
-            domain = os.environ.get('ROS_DOMAIN_ID') or '0'
-            raise DriveCanError(
-                f'no configured bridge is running{where} (ROS domain {domain}): start one, or '
-                'name its file with --params-file to talk to the drives directly')
+            raise DriveCanError(self._nobody(silent))
         if len(found) > 1:
             raise WhichBridge(f'several bridges are running: {", ".join(sorted(found))}; choose '
                               'one with --namespace')
         return next(iter(found.items()))
+
+    def _nobody(self, silent: Mapping[str, NoAnswer]) -> str:
+        where = '' if self._namespace is None else f' in namespace {self._namespace}'
+        domain = os.environ.get('ROS_DOMAIN_ID') or '0'
+        if silent:
+            return (f'no bridge answers{where} (ROS domain {domain}): '
+                    + '; '.join(map(str, silent.values())))
+        return (f'no configured bridge is running{where} (ROS domain {domain}): start one, or '
+                'name its file with --params-file to talk to the drives directly')
 
     def _in_namespace(self, node: str) -> bool:
         return self._namespace is None or (node.rpartition('/')[0] or '/') == self._namespace
 
     def _drives_of(self, node: str) -> tuple[str, ...]:
         """Return the drives of a node; none of one that is no bridge."""
-        try:
-            names = self._graph.call(node, 'list_parameters', ListParameters.Request(
-                prefixes=['drives']), _ASK_TIMEOUT).result.names
-        except NoAnswer:
-            return ()
+        names = self._graph.call(node, 'list_parameters', ListParameters.Request(
+            prefixes=['drives']), _ASK_TIMEOUT).result.names
         return tuple(name.split('.')[1] for name in names
                      if name.endswith(_MARK) and name.count('.') == 2)
 

@@ -9,7 +9,8 @@ cut into slices; Ctrl-C comes through between two of them.
 client. A server that has not gives its answer up, though it has done what it was asked. So before
 the first call another one is made that changes nothing, through a client that was made later,
 until it is answered: endpoints are announced in order, so that a server which knows the later one
-knows the earlier ones of this node, too.
+knows the earlier ones of this node, too. Nor has this side found all services of a node when it
+has found one: what is sent to one that it does not know yet is lost.
 """
 
 from collections.abc import Callable
@@ -97,6 +98,8 @@ class Graph:
         """
         client = self._client(node, service)
         self._acquaint(node)
+        if not self.wait(client.service_is_ready, _FIND_TIMEOUT):
+            raise NoAnswer(f'{node} does not offer {service}')
         future = client.call_async(request)
         deadline = time.monotonic() + timeout
         seen = time.monotonic()
