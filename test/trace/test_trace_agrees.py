@@ -141,8 +141,10 @@ def test_exchanges_and_misses_agree(conversation: tuple[Bus, list[Record]]) -> N
     for name, observed in tracer.observed().items():
         exchanges, missed, rejected = bus.looked[name]
         # answers that came when the bridge waited for them no more, it has rejected
-        assert exchanges - 1 <= observed.exchanges <= exchanges + rejected + 1, name
-        assert abs(observed.missed - missed) <= 1, name
+        assert exchanges - 1 <= observed.exchanges, name
+        # what was on the bus in time, and was read too late because all stood still, it has missed
+        assert 0 < observed.missed <= missed + 1, name
+        assert -1 <= observed.exchanges + observed.missed - exchanges - missed <= 1 + rejected, name
         assert observed.malformed == 0, name
         # the median: what stands still for a moment is late for one of them only
         ours = median(bus.sessions[name].statistics.latency.samples())
