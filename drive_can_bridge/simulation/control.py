@@ -77,9 +77,10 @@ class Operation:
         self._cause_ends = min(self._cause_ends, now)
 
     def repair(self) -> None:
-        """Clear a fault by hand, at the drive."""
-        self.faulted = False
-        self.enabled = self._table is None
+        """Clear a fault by hand, at the drive; without one nothing happens."""
+        if self.faulted:
+            self.faulted = False
+            self.enabled = self._table is None
 
     def standstill(self) -> None:
         """Take note that the motor has stopped: the end of a quick stop."""
