@@ -50,7 +50,6 @@ class SimulatedCannordInverter(SimulatedDrive):
         if not isinstance(self.plant, InverterPlant):
             raise ConfigurationError([f'{self.name}: an inverter needs an InverterPlant'])
         self._options = options = configuration.options
-        self.table = CannordTable(configuration.profile.parameters, self.registers)
         self._timeout_parameter = self.table.numbered(TELEGRAM_TIMEOUT)
         # parameters of known meaning, as they leave the factory, if the profile lists them
         for number, raw in ((TELEGRAM_TIMEOUT, 0), (CAN_ADDRESS, configuration.station)):
@@ -61,6 +60,9 @@ class SimulatedCannordInverter(SimulatedDrive):
         self._main, self._main_response, self._task, self._response, *self._broadcasts = (
             route.identifier for route in self.routes(configuration))
         self._start()
+
+    def make_table(self) -> CannordTable:
+        return CannordTable(self.configuration.profile.parameters, self.registers)
 
     def _start(self) -> None:
         self.table.select_set(1)
@@ -125,7 +127,7 @@ class SimulatedCannordInverter(SimulatedDrive):
             self.table.select_set(self.plant.state.parameter_set)
         self.plant.advance(now)
         if answered:
-            self._answer(answer, now)
+            self.answer(answer, now)
 
     def _take(self, parameters: Sequence[Parameter], words: Sequence[int]) -> None:
         for parameter, word in zip(parameters, words, strict=False):
@@ -161,7 +163,7 @@ class SimulatedCannordInverter(SimulatedDrive):
             response, value = self.table.answer(task)
         except Refused as refusal:
             response, value = Response.REFUSED, refusal.args[0]
-        self._answer(self._parameter_response(response, task.number, task.index, value), now)
+        self.answer(self._parameter_response(response, task.number, task.index, value), now)
 
     def _parameter_response(self, response: Response, number: int, index: int, value: int,
                             ) -> Frame:
@@ -198,9 +200,9 @@ class SimulatedCannordInverter(SimulatedDrive):
         """Fail by itself, and tell at once, unasked."""
         self.plant.fault_code = code
         super().trip(now, duration)
-        self._answer(self._status(self._length), now)
+        self.answer(self._status(self._length), now)
 
-    def power_lost(self, back_at: float, *, forget: bool) -> None:
+    def power_lost(self, *, forget: bool) -> None:
         self._start()
 
     def foreign_frames(self, answer: Frame) -> Sequence[Iterable[Frame]]:

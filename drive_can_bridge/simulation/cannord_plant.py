@@ -2,6 +2,9 @@
 """
 The inside of a simulated NORD inverter: the common registers and motor, with the inverter's rules.
 
+Control words: BU 0050 page 30 (bits) and page 38 (states); where the two differ, on what bit 3 = 0
+leads to, page 38 counts. A word with bit 10 = 0 is ignored as a whole.
+
 In process data 4000h is 100 % of the maximum frequency, whatever the profile calls it: so every
 frequency or speed among the actual values tells the same share of 100 % as the motor has, in hertz
 as in percent.
@@ -11,10 +14,13 @@ from collections.abc import Callable
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.protocols.cannord.states import STATUS_BITS
+from drive_can_bridge.protocols.cannord import states
+from drive_can_bridge.protocols.cannord.states import (
+    ENABLE_OPERATION, FAULT_RESET, NO_DISABLE_VOLTAGE, NO_QUICK_STOP, STATUS_BITS, SWITCH_ON,
+)
 from drive_can_bridge.simulation import names
-from drive_can_bridge.simulation.cannord_operation import InverterOperation
 from drive_can_bridge.simulation.cannord_table import groups_of
+from drive_can_bridge.simulation.control import FAULTS, Machine, Operation, Rule, State
 from drive_can_bridge.simulation.motor_plant import FAULT_CODE, MotorPlant, WARNING_TEMPERATURE
 from drive_can_bridge.simulation.names import Quantity
 from drive_can_bridge.simulation.plant import Mechanics
@@ -26,6 +32,95 @@ WARNING, SETPOINT_REACHED, BUS_CONTROL, ROTATING_RIGHT, ROTATING_LEFT = (
         'warning', 'setpoint_reached', 'bus_control', 'rotating_right', 'rotating_left'))
 #: what an SK 5xxE says of itself, by parameter number: version of the data base
 IDENTITY = {742: 1}
+
+#: status bits of a state: of the two that stand for OFF2 and OFF3 see :attr:`~.status`
+_STATUS = {
+    State.SWITCH_ON_DISABLED: 0x40,
+    State.READY_TO_SWITCH_ON: 0x31,
+    State.SWITCHED_ON: 0x33,
+    State.OPERATION_ENABLED: 0x37,
+    State.QUICK_STOP: 0x17,
+    State.FAULT: 0x08,
+}
+#: OFF2 and OFF3 in the control word, and how far on they stand in the status word
+_OFF = NO_DISABLE_VOLTAGE | NO_QUICK_STOP
+_OFF_SHIFT = 3
+#: the parameter set, in both
+_SET = states.PARAMETER_SETS - 1 << states.PARAMETER_SET_SHIFT
+
+_MACHINE = Machine((
+    Rule(FAULTS, 0, 0, None),
+    Rule(None, NO_DISABLE_VOLTAGE, 0, State.SWITCH_ON_DISABLED),
+    Rule((State.QUICK_STOP,), 0, 0, None),              # ends at standstill only
+    Rule((State.OPERATION_ENABLED,), NO_QUICK_STOP, 0, State.QUICK_STOP),
+    Rule(None, NO_QUICK_STOP, 0, State.SWITCH_ON_DISABLED),
+    Rule((State.OPERATION_ENABLED,), SWITCH_ON, 0, State.OPERATION_ENABLED),    # ramps down first
+    Rule(None, SWITCH_ON, 0, State.READY_TO_SWITCH_ON),
+    Rule((State.SWITCH_ON_DISABLED,), 0, 0, None),      # left with bit 0 = 0 only
+    Rule(None, ENABLE_OPERATION, ENABLE_OPERATION, State.OPERATION_ENABLED),
+    Rule(None, 0, 0, State.SWITCHED_ON),
+), reset=(FAULT_RESET, FAULT_RESET), power_on=(State.SWITCH_ON_DISABLED, _OFF))
+
+
+class InverterOperation(Operation):
+    """
+    The operating state of one simulated inverter.
+
+    :ivar state: never "not ready" or "fault reaction": both would be over at once.
+    :ivar word: the last control word with valid data.
+    """
+
+    def __init__(self) -> None:
+        super().__init__(_MACHINE)
+
+    def word_written(self, word: int, now: float) -> None:
+        if word & states.DATA_VALID:
+            super().word_written(word, now)
+
+    def standstill(self) -> None:
+        """Take note that the motor has stopped: the end of a quick stop, or of a shutdown."""
+        super().standstill()
+        if self.shutting_down:
+            self._enter(State.READY_TO_SWITCH_ON)
+
+    @property
+    def shutting_down(self) -> bool:
+        """On the ramp to zero, because bit 0 was taken away from an enabled inverter."""
+        return self.state is State.OPERATION_ENABLED and not self.word & SWITCH_ON
+
+    @property
+    def setpoint_counts(self) -> bool:
+        """The ramp goes to the setpoint, not to zero."""
+        return bool(self.word & states.ENABLE_SETPOINT) and not self.shutting_down
+
+    @property
+    def frozen(self) -> bool:
+        """The ramp stands where it is."""
+        return (self.state is State.OPERATION_ENABLED and not self.shutting_down
+                and not self.word & states.RELEASE_RAMP)
+
+    @property
+    def reversed(self) -> bool:
+        """The setpoint changes its sign; rotation right has priority."""
+        return bool(self.word & states.ROTATE_LEFT) and not self.word & states.ROTATE_RIGHT
+
+    @property
+    def parameter_set(self) -> int:
+        return states.parameter_set_of(self.word)
+
+    @property
+    def status(self) -> int:
+        """Bits 0 to 6 of the status word, and the parameter set."""
+        bits = _STATUS[self.state] | self.word & _SET
+        if self.state in (State.SWITCH_ON_DISABLED, State.FAULT):
+            bits |= (self.word & _OFF) << _OFF_SHIFT
+        return bits
+
+    def _enter(self, state: State) -> None:
+        super()._enter(state)
+        # b4 = 0 uses the quick stop ramp, too, but leaves the inverter enabled
+        if state is State.OPERATION_ENABLED:
+            self.stopping = not self.word & states.ENABLE_RAMP
 
 
 class InverterPlant(MotorPlant):

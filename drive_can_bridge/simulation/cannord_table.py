@@ -26,14 +26,9 @@ from drive_can_bridge.protocols.cannord.parameter_frame import (
 )
 from drive_can_bridge.simulation.registers import Refusal, Registers
 
-INVALID_NUMBER = 0
-CANNOT_BE_CHANGED = 1
-LIMIT_EXCEEDED = 2
-WRONG_SUBINDEX = 3
-NOT_AN_ARRAY = 4
-INVALID_TYPE = 5
-INVALID_TASK = 201
-CANNOT_BE_REPRESENTED = 202
+(INVALID_NUMBER, CANNOT_BE_CHANGED, LIMIT_EXCEEDED, WRONG_SUBINDEX, NOT_AN_ARRAY, INVALID_TYPE,
+ ) = range(6)
+INVALID_TASK, CANNOT_BE_REPRESENTED = 201, 202
 
 _WRITES = {int(task): how for how, task in WRITE_TASKS.items()}
 _RESPONSES = {(False, 16): Response.WORD, (False, 32): Response.DOUBLE,

@@ -14,16 +14,8 @@ from drive_can_bridge.core.parameters import Parameter, Storage
 from drive_can_bridge.protocols.canopen import abort_codes
 from drive_can_bridge.protocols.canopen_pkw.object_map import BLOCKS, object_of, register_of
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, WORD_MAX
-from drive_can_bridge.simulation.canopen.sdo import checked_length, Refused
-from drive_can_bridge.simulation.registers import Refusal, Registers
-
-_CODES = {
-    Refusal.READ_ONLY: abort_codes.WRITE_OF_READ_ONLY,
-    Refusal.OUT_OF_RANGE: abort_codes.VALUE_OUT_OF_RANGE,
-    Refusal.CROSSED: 0x06090036,
-    Refusal.FORBIDDEN: abort_codes.DEVICE_STATE,
-    Refusal.TOO_EARLY: abort_codes.DEVICE_STATE,
-}
+from drive_can_bridge.simulation.canopen.sdo import checked_length, CODES, Refused
+from drive_can_bridge.simulation.registers import Registers
 
 
 class Cell(NamedTuple):
@@ -91,7 +83,7 @@ class RegisterTable:
                 for name, value in values.items()}
         refusal = self._registers.refusal(raws)
         if refusal is not None:
-            raise Refused(_CODES[refusal])
+            raise Refused(CODES[refusal])
         for name, raw in raws.items():
             self._registers.write(name, raw, wear=wear[name])
 

@@ -1,15 +1,8 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Lines typed by a person, or sent by a script, while drives are simulated.
+Lines typed by a person, or sent by a script, while drives are simulated (docs/simulation.md).
 
-.. code-block:: text
-
-    conveyor silent          a fault begins; several may follow each other on one line
-    conveyor ok              all faults of the drive end
-    conveyor                 what the drive is doing, and which EEPROM cells it has written
-    status                   the same for all drives
-    list                     one line for each drive
-    help                     the faults
+``conveyor late=0.15 drop=2`` plays faults, ``conveyor`` tells what the drive is doing.
 """
 
 import os

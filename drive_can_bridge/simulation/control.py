@@ -1,21 +1,23 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-What the control word makes a simulated drive do, and what its status word tells of it.
+What control words make a simulated drive do, and what its status word tells of it.
+
+One state machine, with the rules of a family or a profile as data. Of a status word, bits are
+found by their names; then the profile's patterns are met.
 
 .. code-block:: text
 
-    power on ──► disabled ◄──── disable, or any word not listed ──── enabled
-                    │  ▲                                              ▲  │
-                    │  └──── standstill ◄── stopping ◄── quick_stop ──┼──┘
-                    └───────────────────────── enable ────────────────┘
-    any state ── trip ──► faulted ── reset_fault (on change, cause gone) ──► disabled
+    power on, reset ──► switch-on disabled   ready to switch on   switched on   operation enabled
+                                ▲                                                       │
+       any ── trip ──► fault    └──────────────── standstill ◄── quick stop ◄───────────┘
 
-After a fault or a quick stop the word must have been something other than ``enable`` before
-``enable`` counts again. A drive without a control section is enabled as long as it has no fault.
-Of a status word, bits are found by their names; then the profile's patterns are met.
+The ways between the upper four are those of the rules. In "switch-on disabled" a word that enables
+does not count before another one came.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from enum import auto, Enum
 import math
 from typing import NamedTuple
 
@@ -23,50 +25,92 @@ from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.profile import ControlTable
 
 
+class State(Enum):
+    """
+    The states of all machines; none uses all of them.
+
+    A fault is released by a word that would end "switch-on disabled": a reset then leads past it.
+    """
+
+    SWITCH_ON_DISABLED = auto()
+    READY_TO_SWITCH_ON = auto()
+    SWITCHED_ON = auto()
+    OPERATION_ENABLED = auto()
+    QUICK_STOP = auto()
+    FAULT = auto()
+    FAULT_RELEASED = auto()
+
+
+FAULTS = (State.FAULT, State.FAULT_RELEASED)
+
+
+class Rule(NamedTuple):
+    """
+    Where control words with ``word & mask == value`` lead.
+
+    :param states: from which states; None: all.
+    :param to: None: nowhere.
+    """
+
+    states: Collection[State] | None
+    mask: int
+    value: int
+    to: State | None
+
+
+@dataclass(frozen=True, slots=True)
+class Machine:
+    """
+    What a family or a profile says.
+
+    :param rules: the first that applies counts.
+    :param reset: mask and value of a word that ends a fault, where the word before was none.
+    :param power_on: where it begins, and with which word as the one before.
+    :param after_fault: where a reset leads.
+    """
+
+    rules: tuple[Rule, ...] = ()
+    reset: tuple[int, int] | None = None
+    power_on: tuple[State, int] = (State.SWITCH_ON_DISABLED, 0)
+    after_fault: State = State.SWITCH_ON_DISABLED
+
+
 class Operation:
     """
     The operating state of one simulated drive.
 
-    :param table: None: there is no control word of the profile's.
+    :ivar state: what the machine is in.
+    :ivar word: the last control word.
     :ivar enabled: torque is on.
     :ivar stopping: on the quick stop ramp; still enabled.
     :ivar faulted: torque is off until the fault is reset.
     """
 
-    def __init__(self, table: ControlTable | None) -> None:
-        self._table = table
+    def __init__(self, machine: Machine) -> None:
+        self._machine = machine
         self.power_on()
 
     def power_on(self) -> None:
-        """Begin anew: no fault, disabled."""
-        self.enabled = self._table is None
-        self.stopping = self.faulted = self._blocked = False
-        self._word: int | None = None
+        """Begin anew, without a fault."""
+        state, self.word = self._machine.power_on
         self._cause_ends = -math.inf
+        self._enter(state)
 
     def word_written(self, word: int, now: float) -> None:
-        table = self._table
-        if table is None:
-            return
-        changed, self._word = word != self._word, word
-        if word not in (table.enable, table.quick_stop):
-            self._blocked = False
-        if self.faulted:
-            if word == table.reset_fault and changed and self.reset_allowed(now):
-                self.faulted = False
-        elif word == table.enable:
-            if not self._blocked and not self.stopping:
-                self.enabled = True
-        elif word == table.quick_stop:
-            self.stopping = self.enabled
-        else:
-            self.enabled = self.stopping = False
+        before, self.word = self.word, word
+        for states, mask, value, to in self._machine.rules:
+            if word & mask == value and (states is None or self.state in states):
+                self._enter(to or self.state)
+                break
+        if self.faulted and self._machine.reset is not None:
+            mask, value = self._machine.reset
+            if word & mask == value != before & mask and self.reset_allowed(now):
+                self.repair()
 
     def trip(self, now: float, duration: float = 0.0) -> None:
         """Fail. The cause lasts for some seconds, during which no reset helps."""
-        self.faulted = self._blocked = True
-        self.enabled = self.stopping = False
         self._cause_ends = now + duration
+        self._enter(State.FAULT)
 
     def reset_allowed(self, now: float) -> bool:
         """Tell whether the cause of a trip is gone."""
@@ -77,18 +121,42 @@ class Operation:
         self._cause_ends = min(self._cause_ends, now)
 
     def repair(self) -> None:
-        """Clear a fault by hand, at the drive."""
-        self.faulted = False
-        self.enabled = self._table is None
+        """Clear a fault, as a reset or somebody at the drive does."""
+        if self.faulted:
+            self._enter(State.READY_TO_SWITCH_ON if self.state is State.FAULT_RELEASED
+                        else self._machine.after_fault)
 
     def standstill(self) -> None:
         """Take note that the motor has stopped: the end of a quick stop."""
-        if self.stopping:
-            self.enabled = self.stopping = False
-            self._blocked = True
+        if self.state is State.QUICK_STOP:
+            self._enter(State.SWITCH_ON_DISABLED)
+
+    def _enter(self, state: State) -> None:
+        self.state = state
+        self.faulted = state in FAULTS
+        self.stopping = state is State.QUICK_STOP
+        self.enabled = self.stopping or state is State.OPERATION_ENABLED
 
 
-class State(NamedTuple):
+def machine_of(table: ControlTable | None) -> Machine:
+    """Return what the control section of a profile says; without one a drive just runs."""
+    if table is None:
+        return Machine(power_on=(State.OPERATION_ENABLED, 0), after_fault=State.OPERATION_ENABLED)
+    exact = -1
+    rules = [
+        Rule((State.SWITCH_ON_DISABLED, State.QUICK_STOP, *FAULTS), exact, table.enable, None),
+        Rule(None, exact, table.enable, State.OPERATION_ENABLED)]
+    if table.quick_stop is not None:
+        rules += [Rule((State.OPERATION_ENABLED,), exact, table.quick_stop, State.QUICK_STOP),
+                  Rule(None, exact, table.quick_stop, None)]
+    rules += [Rule(FAULTS, 0, 0, State.FAULT_RELEASED),
+              Rule(None, 0, 0, State.READY_TO_SWITCH_ON)]
+    # no word was written yet that any other one might equal
+    return Machine(tuple(rules), None if table.reset_fault is None else (exact, table.reset_fault),
+                   (State.READY_TO_SWITCH_ON, exact))
+
+
+class Report(NamedTuple):
     """What status bits can tell."""
 
     operation: Operation
@@ -97,25 +165,25 @@ class State(NamedTuple):
     setpoint_reached: bool = False
 
 
-Condition = Callable[[State], bool]
+Condition = Callable[[Report], bool]
 
 _RULES: tuple[tuple[tuple[str, ...], Condition], ...] = (
     (('ready', 'ready_to_switch_on', 'ready_to_run', 'no_fault', 'ok'),
-     lambda s: not s.operation.faulted),
+     lambda r: not r.operation.faulted),
     (('enabled', 'running', 'operation_enabled', 'on', 'active', 'operating'),
-     lambda s: s.operation.enabled),
-    (('disabled', 'switch_on_disabled'), lambda s: not s.operation.enabled),
-    (('fault', 'error', 'alarm', 'tripped', 'failure'), lambda s: s.operation.faulted),
-    (('warning',), lambda s: s.warning),
-    (('moving', 'rotating', 'motor_running'), lambda s: s.speed != 0.0),
-    (('standstill', 'stopped', 'zero_speed', 'at_standstill'), lambda s: s.speed == 0.0),
-    (('rotating_right', 'forward', 'direction_forward'), lambda s: s.speed > 0.0),
-    (('rotating_left', 'reverse', 'direction_reverse'), lambda s: s.speed < 0.0),
+     lambda r: r.operation.enabled),
+    (('disabled', 'switch_on_disabled'), lambda r: not r.operation.enabled),
+    (('fault', 'error', 'alarm', 'tripped', 'failure'), lambda r: r.operation.faulted),
+    (('warning',), lambda r: r.warning),
+    (('moving', 'rotating', 'motor_running'), lambda r: r.speed != 0.0),
+    (('standstill', 'stopped', 'zero_speed', 'at_standstill'), lambda r: r.speed == 0.0),
+    (('rotating_right', 'forward', 'direction_forward'), lambda r: r.speed > 0.0),
+    (('rotating_left', 'reverse', 'direction_reverse'), lambda r: r.speed < 0.0),
     (('setpoint_reached', 'at_setpoint', 'at_speed', 'speed_reached', 'target_reached',
-      'in_position'), lambda s: s.setpoint_reached),
-    (('quick_stop', 'quick_stop_active'), lambda s: s.operation.stopping),
-    (('no_quick_stop',), lambda s: not s.operation.stopping),
-    (('voltage_enabled', 'power_on', 'mains_ok', 'bus_control', 'remote'), lambda s: True),
+      'in_position'), lambda r: r.setpoint_reached),
+    (('quick_stop', 'quick_stop_active'), lambda r: r.operation.stopping),
+    (('no_quick_stop',), lambda r: not r.operation.stopping),
+    (('voltage_enabled', 'power_on', 'mains_ok', 'bus_control', 'remote'), lambda r: True),
 )
 BIT_RULES: dict[str, Condition] = {name: rule for names, rule in _RULES for name in names}
 
@@ -139,18 +207,18 @@ class StatusWord:
         """Tell whether anything of the word is known; if not, it is a plain register."""
         return bool(self._bits or self._patterns)
 
-    def compose(self, state: State, word: int) -> int:
+    def compose(self, report: Report, word: int) -> int:
         """
         Return the status word.
 
         :param word: supplies the bits that no rule knows.
         """
         for mask, rule in self._bits:
-            word = word | mask if rule(state) else word & ~mask
+            word = word | mask if rule(report) else word & ~mask
         for pattern, rule in self._patterns:
-            if not rule(state) and pattern.matches(word):
+            if not rule(report) and pattern.matches(word):
                 word ^= pattern.mask & -pattern.mask
         for pattern, rule in self._patterns:
-            if rule(state):
+            if rule(report):
                 word = word & ~pattern.mask | pattern.value
         return word

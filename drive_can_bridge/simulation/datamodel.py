@@ -114,9 +114,11 @@ class SimulatedDataModelDrive(SimulatedDrive):
     def __init__(self, configuration: DriveConfiguration,
                  surroundings: Surroundings = ALONE) -> None:
         super().__init__(configuration, surroundings)
-        self.table = DataModelTable(configuration, self.registers, violation=self._violation,
-                                    eeprom_time=surroundings.eeprom_time)
         self._wire = wire_of(configuration)
+
+    def make_table(self) -> DataModelTable:
+        return DataModelTable(self.configuration, self.registers, violation=self._violation,
+                              eeprom_time=self.surroundings.eeprom_time)
 
     @classmethod
     def routes(cls, configuration: DriveConfiguration) -> list[Route]:
@@ -144,10 +146,10 @@ class SimulatedDataModelDrive(SimulatedDrive):
         else:
             words = self.table.read(request.number, request.count, now)
         if words is not None:
-            self._answer(self._wire.answer(frame, words), now)
+            self.answer(self._wire.answer(frame, words), now)
         return True
 
-    def power_lost(self, back_at: float, *, forget: bool) -> None:
+    def power_lost(self, *, forget: bool) -> None:
         """Keep the maps, unless they are to be forgotten."""
         if forget:
             self.table.clear_maps()

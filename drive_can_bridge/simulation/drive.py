@@ -74,10 +74,31 @@ class Ignored(DriveCanError):
     """A frame that a drive leaves alone; the argument says which rule it breaks."""
 
 
+class Companion:
+    """What stands on the bus beside the telegrams of a family: nothing, or a CANopen node."""
+
+    def receive(self, frame: Frame, now: float) -> bool:
+        """Take a frame, as :meth:`SimulatedDrive.receive` does, which gets the others."""
+        return False
+
+    def next_timer(self) -> float:
+        return math.inf
+
+    def handle_timer(self, now: float) -> None:
+        """Do what is due."""
+
+    def look(self, now: float) -> None:
+        """See what has become of the drive."""
+
+    def power_lost(self, back_at: float) -> None:
+        """Begin anew at some time."""
+
+
 class SimulatedDrive(ABC):
     """
     One simulated drive.
 
+    :ivar companion: what it composes beside its own telegrams.
     :ivar requests: requests understood.
     :ivar answers: answers given, before scripted faults took theirs.
     :ivar violations: how often the other side broke a rule of the protocol, by rule.
@@ -97,9 +118,11 @@ class SimulatedDrive(ABC):
         make_plant = surroundings.plant or self.choose_plant()
         self.plant = make_plant(self.registers, configuration, surroundings.mechanics)
         self.registers.connect(self.plant)
+        self.companion = Companion()
         self.requests = self.answers = 0
         self.violations: Counter[str] = Counter()
         self._notices: list[str] = []
+        self.table = self.make_table()
         self._outbox = Outbox(self._foreign_frames)
         self._powered = True
         self._deaf_until = -math.inf
@@ -115,23 +138,25 @@ class SimulatedDrive(ABC):
             return
         self._advance(now)
         try:
-            if not self.receive(frame, now) and any(
+            if not (self.companion.receive(frame, now) or self.receive(frame, now)) and any(
                     route.matches(frame) for route in self.routes(self.configuration)):
                 self._violation('frame that only this drive may send')
         except Ignored as broken:
             self._violation(f'{broken} (ignored)')
+        self.companion.look(now)
         if self.registers.settings_written >= self._cut_at:
             self._cut_at = math.inf
-            self._lose_power(now, math.inf)
+            self.lose_power(now, math.inf)
 
     def next_timer(self) -> float:
         """Return when :meth:`handle_timer` wants to be called; infinity: never."""
-        return self._outbox.next_timer()
+        return min(self._outbox.next_timer(), self.companion.next_timer())
 
     def handle_timer(self, now: float) -> None:
-        """Do what is due: answers that were held back."""
+        """Do what is due: answers that were held back, and what the companion does."""
         self._advance(now)
         self._outbox.handle_timer(now)
+        self.companion.handle_timer(now)
 
     def take_frames(self) -> list[Frame]:
         """Return the frames that the drive sends now."""
@@ -152,8 +177,7 @@ class SimulatedDrive(ABC):
         :param now: let the motor move up to this time first.
         :raises ValueRefused: there is no such register.
         """
-        if now is not None:
-            self._advance(now)
+        self._advance(now)
         return self.registers.value(self._known(name))
 
     def set_value(self, name: str, value: Value, now: float | None = None) -> None:
@@ -162,9 +186,10 @@ class SimulatedDrive(ABC):
 
         :raises ValueRefused: there is no such register, or the value does not fit.
         """
-        if now is not None:
-            self._advance(now)
+        self._advance(now)
         self.registers.set_value(self._known(name), value)
+        if now is not None:
+            self.companion.look(now)
 
     def release(self, name: str) -> None:
         """Let an actual value that was set by hand follow the motor again."""
@@ -195,20 +220,23 @@ class SimulatedDrive(ABC):
             self._cut_at = self.registers.settings_written + (fault.number or 1)
         elif kind in _POWER_CUTS:
             seconds = _POWER_CUTS[kind] if fault.number is None else fault.number
-            self._lose_power(now, now + seconds, forget=kind is FaultKind.FORGET)
+            self.lose_power(now, now + seconds, forget=kind is FaultKind.FORGET)
         elif kind is FaultKind.OK:
             self._repair(now)
         elif self._powered:
             self.trip(now, fault.number or 0.0)
         self._notices.append(f'{self.name}: fault {fault}' if kind is not FaultKind.OK
                              else f'{self.name}: no fault any more')
+        self.companion.look(now)
 
     @property
     def wear(self) -> Counter[str]:
+        """EEPROM cells written, by parameter."""
         return self.registers.wear
 
     @property
     def eeprom_writes(self) -> int:
+        """EEPROM cells written."""
         return sum(self.registers.wear.values())
 
     @property
@@ -245,6 +273,10 @@ class SimulatedDrive(ABC):
         :return: kinds of them, which take turns; of each the first that is no neighbour's is sent.
         """
 
+    @abstractmethod
+    def make_table(self) -> Table:
+        """Return what makes the registers addressable."""
+
     def own_parameters(self) -> Mapping[str, Parameter]:
         """Return what every drive of the family has, listed or not, by name."""
         return {}
@@ -257,13 +289,12 @@ class SimulatedDrive(ABC):
         """Fail by itself; the cause lasts for some seconds."""
         self.plant.trip(duration)
 
-    def power_lost(  # noqa: B027  optional hook
-            self, back_at: float, *, forget: bool) -> None:
-        """Forget what a family keeps outside the registers; power is back at some time."""
+    def power_lost(self, *, forget: bool) -> None:  # noqa: B027  optional hook
+        """Forget what a family keeps outside the registers."""
 
     # -- what a family uses -----------------------------------------------------------------------
 
-    def _answer(self, frame: Frame, now: float) -> None:
+    def answer(self, frame: Frame, now: float) -> None:
         """Send an answer, as far as scripted faults let it."""
         self.answers += 1
         self._outbox.answer(frame, now)
@@ -274,15 +305,24 @@ class SimulatedDrive(ABC):
             self._notices.append(f'{self.name}: violation: {rule}')
         self.violations[rule] += 1
 
-    def _lose_power(self, now: float, back_at: float, *, forget: bool = False) -> None:
+    def send(self, frame: Frame) -> None:
+        """Send a frame that is no answer; no fault touches it."""
+        self._outbox.frames.append(frame)
+
+    def lose_power(self, now: float, back_at: float, *, forget: bool = False) -> None:
         """Lose power until some time; RAM is lost with it."""
         self._outbox.clear()
         self.plant.power_off()
         self.registers.lose_power()
         self._powered = False
-        self._deaf_until = back_at
-        self.power_lost(back_at, forget=forget)
+        self.restart(back_at, forget=forget)
         self._advance(now)
+
+    def restart(self, back_at: float, *, forget: bool = False) -> None:
+        """Forget how far conversations have come, and be deaf until some time."""
+        self._deaf_until = back_at
+        self.companion.power_lost(back_at)
+        self.power_lost(forget=forget)
 
     # -- inside -----------------------------------------------------------------------------------
 
@@ -307,8 +347,10 @@ class SimulatedDrive(ABC):
         return [frame for frame in kinds[self._foreign_turn % len(kinds)] if not any(
             route.matches(frame) for route in self.surroundings.neighbours)][:1]
 
-    def _advance(self, now: float) -> None:
-        """Let the motor move up to now; power may have come back on the way."""
+    def _advance(self, now: float | None) -> None:
+        """Let the motor move up to now, if that is known; power may have come back on the way."""
+        if now is None:
+            return
         if not self._powered and now >= self._deaf_until:
             self.plant.advance(self._deaf_until)
             self.plant.power_on()
@@ -324,7 +366,7 @@ class SimulatedDrive(ABC):
         self._set_by_fault.clear()
         self.plant.operation.repair()
         if self._deaf_until == math.inf:
-            self._lose_power(now, now + BOOT_TIME)
+            self.lose_power(now, now + BOOT_TIME)
 
 
 def _value(parameter: Parameter, text: str) -> Value:

@@ -12,7 +12,7 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.simulation import names, scales
 from drive_can_bridge.simulation.axes import Axes
-from drive_can_bridge.simulation.control import Operation, State, StatusWord
+from drive_can_bridge.simulation.control import machine_of, Operation, Report, StatusWord
 from drive_can_bridge.simulation.names import Quantity
 from drive_can_bridge.simulation.plant import Mechanics
 from drive_can_bridge.simulation.registers import neutral_raw, Registers
@@ -22,10 +22,14 @@ WARNING_TEMPERATURE = 80.0
 #: what a fault code shows while there is a fault
 FAULT_CODE = 7
 
-#: share of a voltage by which the mains swing it, and how fast (rad/s): of a drive at rest it is
-#: the one value that moves, so that whoever looks sees that it is alive
-MAINS_SWING = 0.005
-MAINS_RATE = 2.0 * math.pi * 0.3
+
+def mains_swing(now: float) -> float:
+    """
+    Return by which share of a voltage the mains are off.
+
+    Of a drive at rest it is the one value that moves: whoever looks sees that it is alive.
+    """
+    return 0.005 * math.sin(2.0 * math.pi * 0.3 * now)
 
 
 class MotorPlant:
@@ -42,7 +46,7 @@ class MotorPlant:
                  movable: Mapping[str, Parameter] | None = None) -> None:
         self.registers = registers
         self.control = control = configuration.profile.control
-        self.operation = operation or Operation(control)
+        self.operation = operation or Operation(machine_of(control))
         self.now: float | None = None
         self._powered = True
         self._control_name = control.parameter if control else ''
@@ -76,7 +80,7 @@ class MotorPlant:
         word = StatusWord(parameter, self.control)
         if actual is None and word:
             plain = self.registers.plain
-            return lambda: word.compose(self._state(), plain(parameter.name))
+            return lambda: word.compose(self._report(), plain(parameter.name))
         measure = actual or (quantity and self.measure(parameter, quantity))
         return (lambda: span.nearest(measure())) if measure else None
 
@@ -98,8 +102,7 @@ class MotorPlant:
             Quantity.POWER: lambda: motor.torque * motor.share_of_rated_speed,
             Quantity.LOAD: lambda: abs(motor.torque),
             Quantity.CURRENT: lambda: motor.current,
-            Quantity.VOLTAGE: lambda: 1.0 - 0.02 * motor.current + MAINS_SWING * math.sin(
-                MAINS_RATE * (self.now or 0.0)),
+            Quantity.VOLTAGE: lambda: 1.0 - 0.02 * motor.current + mains_swing(self.now or 0.0),
         }
         share = shares[quantity]
         if quantity is Quantity.VOLTAGE and names.words_of(parameter) & {'motor', 'output'}:
@@ -139,7 +142,8 @@ class MotorPlant:
         self._powered = True
         self.axes.power_on()
 
-    def _state(self) -> State:
+    def _report(self) -> Report:
         motor, operation = self.axes.motor, self.operation
-        return State(operation, warning=motor.temperature > WARNING_TEMPERATURE, speed=motor.speed,
-                     setpoint_reached=operation.enabled and motor.speed == self.axes.target)
+        return Report(operation, warning=motor.temperature > WARNING_TEMPERATURE,
+                      speed=motor.speed,
+                      setpoint_reached=operation.enabled and motor.speed == self.axes.target)

@@ -44,14 +44,7 @@ class PlayedDrive:
     """
     A simulated drive on a running bus, for use from any thread.
 
-    What it does is what :class:`.SimulatedDrive` does, now.
-
-    :ivar requests: requests understood.
-    :ivar answers: answers given, before faults took theirs.
-    :ivar violations: how often the other side broke a rule of the protocol, by rule.
-    :ivar wear: EEPROM cells written, by parameter.
-    :ivar eeprom_writes: EEPROM cells written.
-    :ivar faults_text: the faults in force, in words; 'ok' without any.
+    What it does and tells is what :class:`.SimulatedDrive` does and tells, now.
     """
 
     requests: int = _read('requests')

@@ -21,9 +21,9 @@ A frame that was taken for sending is *not* answered. Adapters differ there, cli
 for it, and python-can's reader returns from ``recv(timeout=0)`` empty-handed once per such answer.
 """
 
-from drive_can_bridge.core.frame import (
-    EXTENDED_IDENTIFIER_MAX, Frame, STANDARD_IDENTIFIER_MAX,
-)
+import re
+
+from drive_can_bridge.core.frame import Frame
 
 DONE = b'\r'
 REFUSED = b'\a'
@@ -32,6 +32,10 @@ REFUSED = b'\a'
 ANSWERS = {'V': b'V1013\r', 'N': b'NSIM1\r', 'F': b'F00\r', **dict.fromkeys('MmWXU', DONE)}
 BIT_RATES = {'S0': 10_000, 'S1': 20_000, 'S2': 50_000, 'S3': 100_000, 'S4': 125_000,
              'S5': 250_000, 'S6': 500_000, 'S7': 750_000, 'S8': 1_000_000, 'S9': 83_300}
+_TIMING = re.compile('s[0-9A-Fa-f]{4}')
+#: identifier of 11 or 29 bits, length, data
+_FRAME = re.compile(r'(?:[tr]([0-7]\h\h)|[TR]([01]\h{7}))([0-8])((?:\h\h)*)'.replace(
+    r'\h', '[0-9A-Fa-f]'))
 # Z1 stamps wrap once a minute
 _STAMP_WRAP = 60_000
 # the longest command is a 29-bit frame with eight bytes: 26 characters
@@ -110,8 +114,7 @@ class SlcanAdapter:
         elif kind == 'C':
             self.is_open = False
         elif kind in 'Ss':
-            known = command in BIT_RATES or kind == 's' and _hexadecimal(command[1:], 4)
-            if self.is_open or not known:
+            if self.is_open or not (command in BIT_RATES or _TIMING.fullmatch(command)):
                 reply = REFUSED
             elif self._bitrate is not None:
                 self._set = BIT_RATES.get(command, self._bitrate)   # s…: by somebody who knows
@@ -134,19 +137,7 @@ class SlcanAdapter:
 
 def _frame(command: str) -> Frame | None:
     """Read a transmit command; None if it is none. Remote frames come out without data."""
-    extended = command[0] in 'TR'
-    remote = command[0] in 'rR'
-    width = 8 if extended else 3
-    head, body = command[1:2 + width], command[2 + width:]
-    if not _hexadecimal(head, 1 + width) or head[-1] not in '012345678':
+    match = _FRAME.fullmatch(command)
+    if match is None or len(match[4]) != (0 if command[0] in 'rR' else 2 * int(match[3])):
         return None
-    identifier, length = int(head[:-1], 16), int(head[-1])
-    if identifier > (EXTENDED_IDENTIFIER_MAX if extended else STANDARD_IDENTIFIER_MAX):
-        return None
-    if not _hexadecimal(body, 0 if remote else 2 * length):
-        return None
-    return Frame(identifier, bytes.fromhex(body), extended)
-
-
-def _hexadecimal(text: str, length: int) -> bool:
-    return len(text) == length and all(c in '0123456789abcdefABCDEF' for c in text)
+    return Frame(int(match[1] or match[2], 16), bytes.fromhex(match[4]), match[1] is None)

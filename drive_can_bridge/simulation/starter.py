@@ -8,10 +8,11 @@ current, a load current and a thermal image that trips. Time is an argument.
 
 import math
 
-from drive_can_bridge.simulation.control import Operation
+from drive_can_bridge.simulation.control import FAULTS, Machine, Rule, State
 
 #: bits of control register 1
 RUN_FORWARD, RUN_REVERSE, RESET = 1 << 0, 1 << 1, 1 << 3
+RUN = RUN_FORWARD | RUN_REVERSE
 
 #: A; the largest full load current of the controller, and what the motor takes
 CONTROLLER_CURRENT = 27.0
@@ -33,34 +34,16 @@ STEP = 0.05
 THERMAL_OVERLOAD, TEST_TRIP = 4, 10
 
 
-class StarterOperation(Operation):
-    """
-    Obeys single bits of the control word, unlike drives that know whole words.
-
-    :ivar reverse: the contactor for the other direction is closed.
-    """
-
-    def power_on(self) -> None:
-        super().power_on()
-        self.enabled = self.reverse = False
-
-    def word_written(self, word: int, now: float) -> None:
-        """Obey a control word: run while one run bit is set, reset when its bit appears."""
-        before, self._word = self._word or 0, word
-        run = word & (RUN_FORWARD | RUN_REVERSE)
-        if not run:
-            self._blocked = False
-        if self.faulted:
-            if word & ~before & RESET and self.reset_allowed(now):
-                self.faulted = False
-            return
-        self.enabled = run in (RUN_FORWARD, RUN_REVERSE) and not self._blocked
-        self.reverse = run == RUN_REVERSE
-
-    def repair(self) -> None:
-        """Clear a trip by hand; the motor stays off until it is commanded again."""
-        self.faulted = False
-        self.end_cause(-math.inf)
+#: after a trip the run bits have to go before they count again
+MACHINE = Machine((
+    Rule((State.FAULT,), RUN, 0, State.FAULT_RELEASED),
+    Rule(FAULTS, 0, 0, None),
+    Rule((State.SWITCH_ON_DISABLED,), RUN, 0, State.READY_TO_SWITCH_ON),
+    Rule((State.SWITCH_ON_DISABLED,), 0, 0, None),
+    Rule(None, RUN, RUN_FORWARD, State.OPERATION_ENABLED),
+    Rule(None, RUN, RUN_REVERSE, State.OPERATION_ENABLED),
+    Rule(None, 0, 0, State.READY_TO_SWITCH_ON),
+), reset=(RESET, RESET), power_on=(State.READY_TO_SWITCH_ON, 0))
 
 
 class Starter:

@@ -16,13 +16,13 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.protocols.canopen_pkw.object_map import register_of
-from drive_can_bridge.simulation.control import State, StatusWord
-from drive_can_bridge.simulation.motor_plant import MAINS_RATE, MAINS_SWING
+from drive_can_bridge.simulation.control import Operation, Report, StatusWord
+from drive_can_bridge.simulation.motor_plant import mains_swing
 from drive_can_bridge.simulation.plant import Mechanics
 from drive_can_bridge.simulation.registers import Registers
 from drive_can_bridge.simulation.scales import RawRange
 from drive_can_bridge.simulation.starter import (
-    Starter, StarterOperation, TEST_TRIP, THERMAL_OVERLOAD,
+    MACHINE, RUN_REVERSE, Starter, TEST_TRIP, THERMAL_OVERLOAD,
 )
 
 GENERAL_CONFIGURATION = 601
@@ -76,7 +76,7 @@ class StarterPlant:
                  mechanics: Mechanics) -> None:
         self.registers = registers
         self.control = configuration.profile.control
-        self.operation = StarterOperation(self.control)
+        self.operation = Operation(MACHINE)
         self._now: float | None = None
         self.starter = Starter()
         self._node = configuration.station
@@ -130,12 +130,9 @@ class StarterPlant:
         self._now = max(now, last)
         self.starter.switch(self.operation.enabled)
         if self.starter.advance(self._now - last):
-            self._trip(THERMAL_OVERLOAD, self.starter.time_to_reset)
+            self.trip(self.starter.time_to_reset, THERMAL_OVERLOAD)
 
-    def trip(self, duration: float = 0.0) -> None:
-        self._trip(TEST_TRIP, duration)
-
-    def _trip(self, cause: int, duration: float) -> None:
+    def trip(self, duration: float = 0.0, cause: int = TEST_TRIP) -> None:
         self._cause = cause
         self.operation.trip(self._now or 0.0, duration)
         self.starter.switch(False)
@@ -154,7 +151,7 @@ class StarterPlant:
         if register == STATUS_1:
             # the profile's own conditions are met in addition, whatever its bits are called
             word = StatusWord(replace(parameter, bits=()), self.control)
-            return lambda: word.compose(State(self.operation), self._status())
+            return lambda: word.compose(Report(self.operation), self._status())
         figure = self._figures.get(register)
         if figure is None:
             return None
@@ -182,7 +179,7 @@ class StarterPlant:
             **dict.fromkeys((453, 456, 457, 462, 463, 470, 508), lambda: 0),
             # outputs: one for each direction
             **dict.fromkeys((458, 459), lambda: (
-                1 << self.operation.reverse if self.operation.enabled else 0)),
+                1 << bool(self.operation.word & RUN_REVERSE) if self.operation.enabled else 0)),
         }
         # active and reactive power, in 0.1 kW
         for register, share in ((482, POWER_FACTOR), (483, math.sqrt(1.0 - POWER_FACTOR ** 2))):
@@ -193,22 +190,15 @@ class StarterPlant:
             found[466 + place] = _scaled(100.0 * share, lambda: starter.ratio)
             found[500 + 2 * place] = _scaled(100.0 * share, lambda: starter.current)
         for place, share in enumerate((1.0, 0.998, 1.002, 1.0)):
-            found[476 + place] = _scaled(MAINS_VOLTAGE * share, lambda: 1.0 + (
-                MAINS_SWING * math.sin(MAINS_RATE * (self._now or 0.0))))
+            found[476 + place] = _scaled(MAINS_VOLTAGE * share,
+                                         lambda: 1.0 + mains_swing(self._now or 0.0))
         return found
 
     def _status(self) -> int:
         operation, ratio = self.operation, self.starter.ratio
-        bits = (
-            not operation.faulted,
-            operation.enabled,
-            operation.faulted,
-            self.starter.alarm,
-            operation.faulted,
-            operation.faulted and operation.reset_allowed(self._now or 0.0),
-            True,
-            ratio > 0.1,
-        )
+        faulted = operation.faulted
+        bits = (not faulted, operation.enabled, faulted, self.starter.alarm, faulted,
+                faulted and operation.reset_allowed(self._now or 0.0), True, ratio > 0.1)
         word = sum(1 << number for number, wanted in enumerate(bits) if wanted)
         return word | min(math.floor(32.0 * ratio + 0.5), 63) << 8 | self.starter.starting << 15
 

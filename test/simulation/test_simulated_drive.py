@@ -288,6 +288,15 @@ class TestControl:
         made.fault('ok', 0.6)    # type: ignore[attr-defined]
         assert self.exchange(made, 0x0001, 0.7)[4:] == '0001'
 
+    def test_ok_without_a_fault_leaves_the_motor_alone(self) -> None:
+        made = self.made()
+        self.exchange(made, 0x0000, 0.0)
+        self.exchange(made, 0x0001, 0.0)
+        assert self.exchange(made, 0x0001, 1.0) == '75300003'
+        made.fault('ok', 1.0)   # type: ignore[attr-defined]
+        # nothing coasts, although no telegram says again that it shall run
+        assert self.exchange(made, 0x0001, 1.5) == '75300003'
+
     def test_status_without_named_bits(self) -> None:
         bare = replace(STATUS_WORD, bits=())
         made = drive([SPEED_SETPOINT, ACTUAL_SPEED, bare, CONTROL_WORD], control=CONTROL,

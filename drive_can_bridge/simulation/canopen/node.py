@@ -1,116 +1,154 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-A simulated CANopen node: NMT, heartbeat, emergencies, SDO server, and the objects of every node.
+A simulated CANopen node: NMT, boot-up, heartbeat, emergencies, SDO server, objects of every node.
 
-A drive composes one of these and keeps its PDOs to itself (CiA 301).
+CiA 301. A drive composes one of these; its PDOs and all further objects are the family's.
 """
 
 from collections.abc import Callable
 import math
 
+from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.frame import Frame, Route, STANDARD_IDENTIFIER_MAX
 from drive_can_bridge.protocols.canopen import abort_codes, network
 from drive_can_bridge.protocols.canopen.network import Emergency, NmtCommand, NmtState
 from drive_can_bridge.protocols.canopen.sdo import REQUEST_BASE, RESPONSE_BASE
 from drive_can_bridge.simulation.canopen.sdo import checked_length, Objects, Refused, SdoServer
+from drive_can_bridge.simulation.drive import Companion, Ignored, SimulatedDrive
+
+#: objects by index and sub-index
+Contents = dict[tuple[int, int], bytes]
+
+#: ms between heartbeats where nobody watches them
+HEARTBEAT = 1000
+#: heartbeats within the time after which the bridge misses them
+HEARTBEATS_WATCHED = 3
+#: s that a reset by NMT takes
+RESET_TIME = 0.05
+#: s between two looks at the motor while it runs
+TICK = 0.1
+TRIP_EMERGENCY = 0xFF00
+#: bits of the error register: generic, maker's own
+TRIP_ERROR_REGISTER = 0x81
 
 HEARTBEAT_TIME = (0x1017, 0)
 
 _NO_ERROR = Emergency(network.NO_ERROR)
-_STATES = {NmtCommand.START: NmtState.OPERATIONAL, NmtCommand.STOP: NmtState.STOPPED,
-           NmtCommand.ENTER_PRE_OPERATIONAL: NmtState.PRE_OPERATIONAL}
+_STATES: dict[int, NmtState] = {
+    NmtCommand.START: NmtState.OPERATIONAL, NmtCommand.STOP: NmtState.STOPPED,
+    NmtCommand.ENTER_PRE_OPERATIONAL: NmtState.PRE_OPERATIONAL}
 
 
-class CanopenNode:
+class CanopenNode(Companion):
     """
-    One node.
+    The node of a drive.
 
-    :param heartbeat: ms between heartbeats after power came on; 0: none.
-    :param constants: returns the content of the device's read-only objects, by address.
-    :param objects: all other ones.
-    :param send: takes frames.
+    :param objects: those that are registers.
+    :param constants: returns the content of the family's other, read-only objects, by address.
+    :param trip_code: returns the maker's code for the trip that there is.
     :ivar state: boot-up: without power, or still starting.
     """
 
-    def __init__(self, number: int, *, heartbeat: int,
-                 constants: Callable[[], dict[tuple[int, int], bytes]], objects: Objects,
-                 send: Callable[[Frame], None]) -> None:
-        self.number = number
-        self.state = NmtState.BOOT_UP
-        self.request_identifier = REQUEST_BASE + number
-        self._default_heartbeat = self._heartbeat = heartbeat
-        self._constants = constants
-        self._objects = objects
-        self._send = send
-        self._server = SdoServer(self)
-        self._error = _NO_ERROR
-        #: when the boot-up frame is due; -infinity: as soon as somebody looks
-        self._boots_at = -math.inf
-        self._beats_at = math.inf
+    def __init__(self, drive: SimulatedDrive, objects: Objects, *,
+                 constants: Callable[[], Contents], trip_code: Callable[[], int]) -> None:
+        self._drive = drive
+        self._objects, self._constants, self._trip_code = objects, constants, trip_code
+        self.number = drive.configuration.station
+        watched: float = drive.configuration.options.heartbeat_timeout
+        self._default_heartbeat = round(
+            1000.0 * watched / HEARTBEATS_WATCHED) if watched else HEARTBEAT
+        self._server = SdoServer(self.read_object, self.write_object)
         self._now = -math.inf
+        self._looks_at = math.inf
+        # the boot-up frame leaves as soon as somebody looks
+        self.power_lost(-math.inf)
 
     @staticmethod
-    def routes(number: int) -> list[Route]:
-        """Return the identifiers of a node but for its PDOs, and that of NMT commands."""
+    def routes(number: int, *pdos: int) -> list[Route]:
+        """Return the identifiers of a node, and that of NMT commands."""
         own = REQUEST_BASE, RESPONSE_BASE, network.HEARTBEAT_BASE, network.EMERGENCY_BASE
         return [Route(identifier, STANDARD_IDENTIFIER_MAX, False) for identifier in (
-            network.NMT_IDENTIFIER, *(base + number for base in own))]
+            network.NMT_IDENTIFIER, *(base + number for base in own), *pdos)]
 
-    @property
-    def communicates(self) -> bool:
-        """Takes and sends SDOs and emergencies."""
-        return self.state in (NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL)
-
-    def start(self, ready_at: float) -> None:
-        """Begin anew; the boot-up frame leaves when the node is ready, at infinity: never."""
+    def power_lost(self, back_at: float) -> None:
         self.state = NmtState.BOOT_UP
         self._heartbeat = self._default_heartbeat
-        self._boots_at, self._beats_at = ready_at, math.inf
+        self._boots_at, self._beats_at = back_at, math.inf
         self._server.reset()
         self._error = _NO_ERROR
 
-    def obey(self, data: bytes) -> NmtCommand | None:
-        """
-        Obey an NMT command, if it is for this node.
+    def receive(self, frame: Frame, now: float) -> bool:
+        identifier, data, extended = frame
+        if extended:
+            return False
+        if self.state is NmtState.BOOT_UP:
+            # whoever is ready to receive has sent its boot-up frame
+            self._report_state(now)
+        if identifier == network.NMT_IDENTIFIER:
+            self._obey(data, now)
+        elif identifier == REQUEST_BASE + self.number:
+            self._serve(data, now)
+        else:
+            return False
+        return True
 
-        :return: a reset, which is for the drive to carry out; else None.
-        :raises RemoteProtocolError: not two bytes.
-        """
-        command, number = network.decode_nmt(data)
-        if number in (0, self.number):
-            if command in (NmtCommand.RESET_NODE, NmtCommand.RESET_COMMUNICATION):
-                return NmtCommand(command)
-            if self.state is not NmtState.BOOT_UP and command in list(NmtCommand):
-                self.state = _STATES[NmtCommand(command)]
-        return None
+    def _obey(self, data: bytes, now: float) -> None:
+        try:
+            command, number = network.decode_nmt(data)
+        except RemoteProtocolError:
+            raise Ignored('NMT command without two data bytes') from None
+        if number not in (0, self.number):
+            return
+        if command == NmtCommand.RESET_NODE:
+            self._drive.lose_power(now, now + RESET_TIME)
+        elif command == NmtCommand.RESET_COMMUNICATION:
+            self._drive.restart(now + RESET_TIME)
+        elif self.state is not NmtState.BOOT_UP:
+            self.state = _STATES.get(command, self.state)
 
-    def serve(self, data: bytes, now: float) -> Frame | None:
-        """Return the answer to an SDO request; None: there is none."""
-        self._now = now
-        response = self._server.answer(data)
-        return None if response is None else Frame(RESPONSE_BASE + self.number, response, False)
+    def _serve(self, data: bytes, now: float) -> None:
+        if self._communicates:
+            self._drive.requests += 1
+            self._now = now
+            response = self._server.answer(data)
+            if response is not None:
+                self._drive.answer(Frame(RESPONSE_BASE + self.number, response, False), now)
 
-    def tell(self, error: Emergency) -> None:
-        """Send an emergency message, unless that is what was told last."""
-        if self.communicates and error.code != self._error.code:
+    def look(self, now: float) -> None:
+        """Report a trip that has come or gone, and plan the next look at a running motor."""
+        operation = self._drive.plant.operation
+        self._looks_at = now + TICK if operation.enabled else math.inf
+        error = Emergency(
+            TRIP_EMERGENCY, TRIP_ERROR_REGISTER, self._trip_code().to_bytes(5, 'little'),
+        ) if operation.faulted else _NO_ERROR
+        if self._communicates and error.code != self._error.code:
             self._error = error
-            self._send(network.encode_emergency(self.number, error))
+            self._drive.send(network.encode_emergency(self.number, error))
+
+    @property
+    def _communicates(self) -> bool:
+        """Takes and sends SDOs and emergencies."""
+        return self.state in (NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL)
 
     def next_timer(self) -> float:
-        return min(self._boots_at, self._beats_at)
+        return min(self._boots_at, self._beats_at, self._looks_at)
 
     def handle_timer(self, now: float) -> None:
+        self._report_state(now)
+        self.look(now)
+
+    def _report_state(self, now: float) -> None:
         """Send the boot-up frame or the heartbeat that is due."""
         if self._boots_at <= now:
             self._boots_at = math.inf
             self.state = NmtState.PRE_OPERATIONAL
             self._plan_heartbeat(now)
-            self._send(network.encode_heartbeat(self.number, NmtState.BOOT_UP))
+            self._drive.send(network.encode_heartbeat(self.number, NmtState.BOOT_UP))
         elif self._beats_at <= now:
             # late ones are left out, the beat is kept
             period = self._heartbeat / 1000.0
             self._beats_at += period * (math.floor((now - self._beats_at) / period) + 1)
-            self._send(network.encode_heartbeat(self.number, self.state))
+            self._drive.send(network.encode_heartbeat(self.number, self.state))
 
     def _plan_heartbeat(self, now: float) -> None:
         self._beats_at = now + self._heartbeat / 1000.0 if self._heartbeat else math.inf
@@ -134,7 +172,7 @@ class CanopenNode:
         else:
             self._objects.write_object(index, subindex, data)
 
-    def _fixed(self, index: int) -> dict[tuple[int, int], bytes]:
+    def _fixed(self, index: int) -> Contents:
         """Return the objects of an index that has no registers."""
         code, register, _ = self._error
         objects = {

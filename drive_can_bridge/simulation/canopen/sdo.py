@@ -6,10 +6,13 @@ Block transfer is refused, and so are segmented writes: no object here is longer
 and may be written.
 """
 
+from collections.abc import Callable
 from typing import Protocol
 
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.protocols.canopen import abort_codes
+from drive_can_bridge.simulation.drive import Table
+from drive_can_bridge.simulation.registers import Refusal
 
 LENGTH = 8
 EXPEDITED_MAX = 4
@@ -21,6 +24,14 @@ DOWNLOAD, UPLOAD, UPLOAD_SEGMENT, ABORT = 1, 2, 3, 4
 EXPEDITED, SIZE_GIVEN, TOGGLE = 0x02, 0x01, 0x10
 RESPONSE_UPLOAD, RESPONSE_DOWNLOAD, RESPONSE_ABORT = 0x40, 0x60, 0x80
 TYPE_TOO_LONG, TYPE_TOO_SHORT = 0x06070012, 0x06070013
+#: abort codes of what registers refuse
+CODES = {
+    Refusal.READ_ONLY: abort_codes.WRITE_OF_READ_ONLY,
+    Refusal.OUT_OF_RANGE: abort_codes.VALUE_OUT_OF_RANGE,
+    Refusal.CROSSED: 0x06090036,
+    Refusal.FORBIDDEN: abort_codes.DEVICE_STATE,
+    Refusal.TOO_EARLY: abort_codes.DEVICE_STATE,
+}
 
 
 class Refused(DriveCanError):
@@ -35,8 +46,8 @@ class Refused(DriveCanError):
         self.code = code
 
 
-class Objects(Protocol):
-    """An object dictionary. Both raise :class:`Refused`."""
+class Objects(Table, Protocol):
+    """An object dictionary. Reading and writing raise :class:`Refused`."""
 
     def read_object(self, index: int, subindex: int) -> bytes:
         """Return the content of an object."""
@@ -48,8 +59,9 @@ class Objects(Protocol):
 class SdoServer:
     """Answers the requests of one client."""
 
-    def __init__(self, objects: Objects) -> None:
-        self._objects = objects
+    def __init__(self, read: Callable[[int, int], bytes],
+                 write: Callable[[int, int, bytes], None]) -> None:
+        self._read, self._write = read, write
         self._address = b'\0\0\0'
         self._rest = b''
         self._toggle = 0
@@ -73,10 +85,10 @@ class SdoServer:
                 return self._upload_segment(head)
             place = int.from_bytes(self._address[:2], 'little'), self._address[2]
             if command == UPLOAD:
-                return self._upload(self._objects.read_object(*place))
+                return self._upload(self._read(*place))
             if command == DOWNLOAD and head & EXPEDITED:
                 unused = head >> 2 & 0x03 if head & SIZE_GIVEN else 0
-                self._objects.write_object(*place, request[4:LENGTH - unused])
+                self._write(*place, request[4:LENGTH - unused])
                 return self._response(RESPONSE_DOWNLOAD)
             raise Refused(abort_codes.UNKNOWN_COMMAND)
         except Refused as error:
