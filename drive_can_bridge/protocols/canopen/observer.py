@@ -24,7 +24,12 @@ class NodeWatch:
         self._observer = observer
         self._booted = booted
 
-    def take_heartbeat(self, data: bytes, now: float) -> None:
+    def handlers(self, node: int) -> dict[int, Handler]:
+        """Return who takes the frames of a node, by identifier."""
+        return {network.HEARTBEAT_BASE + node: self._take_heartbeat,
+                network.EMERGENCY_BASE + node: self._take_emergency}
+
+    def _take_heartbeat(self, data: bytes, now: float) -> None:
         """Take a heartbeat or boot-up message."""
         state = self._observer.decoded(
             network.decode_heartbeat, data, now, _RESPONSE, _NETWORK, 'heartbeat')
@@ -37,7 +42,7 @@ class NodeWatch:
         else:
             self._observer.tell(now, _RESPONSE, _NETWORK, 'heartbeat', remark=state.text)
 
-    def take_emergency(self, data: bytes, now: float) -> None:
+    def _take_emergency(self, data: bytes, now: float) -> None:
         """Take an emergency message."""
         emergency = self._observer.decoded(
             network.decode_emergency, data, now, _RESPONSE, _NETWORK, 'emergency')

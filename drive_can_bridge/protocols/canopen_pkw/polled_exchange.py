@@ -39,20 +39,16 @@ class PolledExchange:
     def __init__(self, session: Session, channel: MailboxChannel, node: Node, *,
                  found: Callable[[float], None], silent: Callable[[str, float], None]) -> None:
         drive = session.configuration
-        table = drive.profile.control
-        status = None if table is None else drive.profile.parameters.get(
-            table.status_parameter or '')
         self._session = session
         self._channel = channel
         self._node = node
         self._found = found
         self._silent = silent
-        self._round = Round(drive, status, session.report.warn)
+        self._round = Round(drive, session.report.warn)
         self._book = ExchangeBook(drive, session.statistics)
         self.timer = self._book.timer
         self.received_at = -math.inf
-        self._no_status = status is None
-        self.status_known = self._no_status
+        self.status_known = not self._round.has_status
 
     def forget(self) -> None:
         """Forget what the drive refuses."""
@@ -98,7 +94,7 @@ class PolledExchange:
             self.status_known = True
             control.status_received(raw, now)
         self._session.control_changed(now)
-        self.status_known = self._no_status
+        self.status_known = not self._round.has_status
 
     def _ended(self, words: procedures.RoundResult) -> None:
         now, session = self._channel.now, self._session

@@ -5,8 +5,10 @@ from collections.abc import Callable, Mapping, Sequence
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.protocols.canopen_pkw import addresses
-from drive_can_bridge.protocols.canopen_pkw.addresses import Span
+from drive_can_bridge.core.process_image import status_word
+from drive_can_bridge.protocols.canopen_pkw.addresses import (
+    Placement, round_plan, round_spans, Span,
+)
 from drive_can_bridge.protocols.canopen_pkw.mailbox import Refused
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address
 
@@ -15,23 +17,20 @@ class Round:
     """
     The rounds of one drive.
 
-    :param status: the parameter of the status word, if there is one.
     :param warn: takes what the drive refuses, once.
+    :ivar has_status: a status word is among what is read.
     :ivar plan: what is read.
     :ivar refusals: the names of what the drive refuses, and why, by what was read.
     """
 
-    def __init__(self, drive: DriveConfiguration, status: Parameter | None,
-                 warn: Callable[[str], None]) -> None:
+    def __init__(self, drive: DriveConfiguration, warn: Callable[[str], None]) -> None:
         self._drive = drive
-        self._addressing: str = drive.options.addressing
-        self._word_order: str = drive.options.word_order
-        self._spans = [addresses.span_of(parameter, self._addressing)
-                       for parameter in drive.cyclic_response]
+        self._placement = Placement.of(drive)
+        self._spans = [self._placement.span(parameter) for parameter in drive.cyclic_response]
         self._warn = warn
-        self._status = status
-        self._status_span = None if status is None else addresses.span_of(
-            status, self._addressing)
+        status = status_word(drive)
+        self._status = None if status is None else (status, self._placement.span(status))
+        self.has_status = status is not None
         self.refusals: dict[Span, str] = {}
         self.plan: list[Span] = []
         self.start_over()
@@ -39,7 +38,7 @@ class Round:
     def start_over(self) -> None:
         """Forget what was refused."""
         self.refusals.clear()
-        self.plan = addresses.round_plan(self._drive)
+        self.plan = round_plan(self._drive)
 
     def refused(self, span: Span, refused: Refused) -> Sequence[Span]:
         """
@@ -47,7 +46,7 @@ class Round:
 
         :return: what to read instead.
         """
-        wanted = addresses.round_spans(self._drive)
+        wanted = round_spans(self._drive)
         if span not in wanted:
             parts = sorted({part for part in wanted
                             if set(part.addresses) <= set(span.addresses)})
@@ -68,13 +67,10 @@ class Round:
 
     def status(self, words: Mapping[Address, int]) -> int | None:
         """Return the status word, if it is among the words."""
-        if self._status is None or self._status_span is None:
-            return None
-        return self._raw(self._status, self._status_span, words)
+        return None if self._status is None else self._raw(*self._status, words)
 
     def _raw(self, parameter: Parameter, span: Span,
              words: Mapping[Address, int]) -> int | None:
         if any(address not in words for address in span.addresses):
             return None
-        return addresses.raw_from_words(
-            parameter, [words[address] for address in span.addresses], self._word_order)
+        return self._placement.raw(parameter, [words[address] for address in span.addresses])

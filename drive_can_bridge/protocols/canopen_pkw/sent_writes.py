@@ -3,8 +3,7 @@
 
 from drive_can_bridge.core.last_sent import LastSent
 from drive_can_bridge.core.outbox import Left
-from drive_can_bridge.protocols.canopen_pkw import addresses
-from drive_can_bridge.protocols.canopen_pkw.addresses import Span
+from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
 from drive_can_bridge.protocols.canopen_pkw.pkw import Message
 
 
@@ -15,10 +14,10 @@ class SentWrites:
     :param sent: where that is kept.
     """
 
-    def __init__(self, sent: LastSent, *, addressing: str, word_order: str) -> None:
+    def __init__(self, sent: LastSent, placement: Placement) -> None:
         self._sent = sent
-        self._word_order = word_order
-        self._places = {addresses.span_of(parameter, addressing): place
+        self._placement = placement
+        self._places = {placement.span(parameter): place
                         for place, parameter in enumerate(sent.parameters)}
 
     def noting(self, message: Message, left: Left) -> Left:
@@ -36,6 +35,5 @@ class SentWrites:
             return
         place = self._places.get(Span(message.address, meaning.count))
         if place is not None:
-            self._sent.take((addresses.raw_from_words(
-                self._sent.parameters[place], message.words[:meaning.count],
-                self._word_order),), place)
+            self._sent.take((self._placement.raw(
+                self._sent.parameters[place], message.words),), place)
