@@ -30,7 +30,6 @@ class NodeWatch:
                 network.EMERGENCY_BASE + node: self._take_emergency}
 
     def _take_heartbeat(self, data: bytes, now: float) -> None:
-        """Take a heartbeat or boot-up message."""
         state = self._observer.decoded(
             network.decode_heartbeat, data, now, _RESPONSE, _NETWORK, 'heartbeat')
         if state is None:
@@ -43,7 +42,6 @@ class NodeWatch:
             self._observer.tell(now, _RESPONSE, _NETWORK, 'heartbeat', remark=state.text)
 
     def _take_emergency(self, data: bytes, now: float) -> None:
-        """Take an emergency message."""
         emergency = self._observer.decoded(
             network.decode_emergency, data, now, _RESPONSE, _NETWORK, 'emergency')
         if emergency is not None:

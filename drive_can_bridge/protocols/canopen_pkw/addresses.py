@@ -158,6 +158,13 @@ def round_plan(drive: DriveConfiguration) -> list[Span]:
     return plan(round_spans(drive))
 
 
+def instead_of(span: Span, wanted: Sequence[Span]) -> list[Span]:
+    """Return what is read when a read that they share is refused; nothing if it is one of them."""
+    if span in wanted:
+        return []
+    return sorted({part for part in wanted if set(part.addresses) <= set(span.addresses)})
+
+
 def _linear(address: Address) -> int:
     if address.subindex is None:
         return address.word
@@ -197,6 +204,8 @@ def keys(parameter: Parameter) -> frozenset[Key]:
 
 def half_refusal(parameter: Parameter, profile: Profile) -> str:
     """Say why an unlisted parameter is not written that is one half of a listed one; else ''."""
+    if parameter.listed:
+        return ''
     mine = keys(parameter)
     for other in profile.parameters.values():
         if other.type.bits != parameter.type.bits and mine & keys(other):

@@ -6,7 +6,6 @@ A request that repeats the function byte of the one before starts nothing (:mod:
 shown, and no answer is expected.
 """
 
-from collections.abc import Sequence
 from functools import partial
 
 from drive_can_bridge.core.configuration import DriveConfiguration
@@ -112,7 +111,7 @@ class PkwObserver(DriveObserver):
         parameters, raws = self._content(span, message.words if answered else None)
         if verdict is Verdict.NORMAL and not writes:
             if refused:
-                self._round.refused(span, self._parts(span), now)
+                self._round.refused(span, addresses.instead_of(span, self._wanted), now)
             else:
                 self._round.answered(span, now)
         if refused:
@@ -129,13 +128,6 @@ class PkwObserver(DriveObserver):
 
     def _refusal(self, message: Message) -> str:
         return refusals.describe(refusals.code_from_words(message.words, self._abort_order))
-
-    def _parts(self, span: Span) -> Sequence[Span]:
-        """Return what is read instead of a shared read that was refused."""
-        if span in self._wanted:
-            return ()
-        return sorted({part for part in self._wanted
-                       if set(part.addresses) <= set(span.addresses)})
 
     def _content(self, span: Span, words: pkw.Words | None,
                  ) -> tuple[list[Parameter], list[int]]:

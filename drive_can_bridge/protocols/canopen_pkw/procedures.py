@@ -1,12 +1,12 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-What takes more than one request: parameters of users, the round of reads, the safe stop.
+What takes more than one request: parameters of users, and the safe stop.
 
 Every generator here is for :class:`.mailbox.MailboxChannel`.
 """
 
-from collections.abc import Callable, Generator, Sequence
-from typing import NamedTuple, Union
+from collections.abc import Generator, Sequence
+from typing import NamedTuple
 
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.requests import Failure, NOT_SENT, Outcome, Outcomes, Written
@@ -85,11 +85,9 @@ class RegisterAccess(Access[Span, Step, Reply]):
         return self.retry.unanswered()
 
 
-# -- the exchange ---------------------------------------------------------------------------------
+# -- the stop -------------------------------------------------------------------------------------
 
 
-#: what a round of reads brought: the words of all registers; None: something was not answered
-RoundResult = Union[dict[Address, int], None]
 #: what became of the last writes: why which one may not have been executed
 StopProcedure = Generator[Step, Reply, list[str]]
 
@@ -104,32 +102,6 @@ class LastWrite(NamedTuple):
     name: str
     span: Span
     words: tuple[int, ...]
-
-
-def read_round(spans: Sequence[Span], answered: Callable[[Span, tuple[int, ...]], None],
-               refused: Callable[[Span, Refused], Sequence[Span]],
-               ) -> Generator[Step, Reply, RoundResult]:
-    """
-    Read all registers of a round. A read that nobody answers ends it.
-
-    :param answered: told of every answer when it arrives.
-    :param refused: told of every refusal; returns what to read instead.
-    :return: what was read; without the registers of reads that were refused.
-    """
-    words: dict[Address, int] = {}
-    pending = list(spans)
-    while pending:
-        span = pending.pop(0)
-        reply = yield Read(span.address, span.count, attempts=1)
-        if isinstance(reply, Silence):
-            return None
-        if isinstance(reply, Refused):
-            pending[:0] = refused(span, reply)
-            continue
-        found = reply.words[:span.count]
-        words.update(zip(span.addresses, found))
-        answered(span, found)
-    return words
 
 
 def write_until_answered(writes: Sequence[LastWrite], attempts: int, timeout: float,

@@ -22,18 +22,15 @@ class SentWrites:
 
     def noting(self, message: Message, left: Left) -> Left:
         """Take note of a request when it leaves, before ``left`` is told what became of it."""
+        meaning = message.meaning
+        place = None if meaning is None or not meaning.writes else (
+            self._places.get(Span(message.address, meaning.count)))
+        if place is None:
+            return left     # nothing that the drive is told by us
+        raw = self._placement.raw(self._sent.parameters[place], message.words)
+
         def told(sent: bool, now: float) -> None:
             if sent:
-                self._note(message)
+                self._sent.take((raw,), place)
             left(sent, now)
         return told
-
-    def _note(self, message: Message) -> None:
-        """Take note of a request that left, if it writes what the drive is told by us."""
-        meaning = message.meaning
-        if meaning is None or not meaning.writes:
-            return
-        place = self._places.get(Span(message.address, meaning.count))
-        if place is not None:
-            self._sent.take((self._placement.raw(
-                self._sent.parameters[place], message.words),), place)

@@ -66,8 +66,7 @@ class PkwSession(Session):
             control = ControlMachine(table, timeout=drive.control_timeout, pulse=1)
         super().__init__(drive, control, roles=Roles(
             drive, controlled=control is not None, cells=addresses.keys,
-            refusal=lambda parameter: '' if parameter.listed else addresses.half_refusal(
-                parameter, drive.profile)))
+            refusal=lambda parameter: addresses.half_refusal(parameter, drive.profile)))
         options, placement = drive.options, addresses.Placement.of(drive)
         self._identifiers = Identifiers.of(drive)
         self._layout = Layout(options.layout)
