@@ -20,6 +20,12 @@ def control_word(drive: DriveConfiguration, *, controlled: bool) -> Parameter | 
     return drive.profile.parameters.get(table.parameter)
 
 
+def status_word(drive: DriveConfiguration) -> Parameter | None:
+    """Return the status word as a parameter of the profile; None: there is none to be read."""
+    table = drive.profile.control
+    return None if table is None else drive.profile.parameters.get(table.status_parameter or '')
+
+
 @dataclass(frozen=True, slots=True)
 class ProcessImage:
     """

@@ -19,7 +19,6 @@ from drive_can_bridge.profiles.errors import ImportFailed
 from drive_can_bridge.profiles.family_check import family_complaints
 from drive_can_bridge.profiles.names import name_of, unique
 from drive_can_bridge.profiles.text import comment, entry_lines, one_line, scalar
-from drive_can_bridge.protocols.cannord.states import STATUS_WORD
 from drive_can_bridge.protocols.families import FAMILIES
 
 #: identity object of CiA 301: vendor, product, revision, serial number
@@ -56,7 +55,7 @@ def build_profile(found: Found, source: str, *, description: str = '',
     """
     entries = len(found.drafts) + len(found.left_out)
     drafts = _narrowed(_without_doubles(sorted(found.drafts, key=_address), found), found)
-    taken = frozenset((STATUS_WORD,)) if 'cannord' in protocols else frozenset[str]()
+    taken = frozenset[str]().union(*(FAMILIES[name].builtin_names for name in protocols))
     named = _sound(_named(drafts, taken), found, protocols or tuple(FAMILIES))
     spoken = tuple(protocols) or _carriers(named)
     named = _carried(named, found, spoken)

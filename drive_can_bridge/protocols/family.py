@@ -76,6 +76,8 @@ class Family(ABC):
     cyclic: bool
     #: knows control and status word by itself; profiles have no ``control`` section
     control_built_in: bool = False
+    #: names of what is built in and published like the parameters of a profile
+    builtin_names: frozenset[str] = frozenset()
     #: the keys that only this family has: a frozen dataclass
     options_type: type[Any] = FamilyOptions
     #: keys that all families have, but whose default is another one here
@@ -97,6 +99,16 @@ class Family(ABC):
     @abstractmethod
     def check(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         """Yield everything that this family cannot do with the drive as configured."""
+
+    def check_names(self, drive: DriveConfiguration) -> Iterator[Complaint]:
+        """Yield what the profile calls like something that is built in."""
+        for name, parameter in drive.profile.parameters.items():
+            place = f'profile.parameters.{name}'
+            for key, taken in ((place, name), *(
+                    (f'{place}.bits.{bit}', bit) for bit, _ in parameter.bits)):
+                if taken in self.builtin_names:
+                    yield Complaint(key, f"'{taken}' is built in for {self.name}, allowed is any "
+                                         'other name')
 
     def check_together(self, drives: Sequence[DriveConfiguration],
                        ) -> Iterator[tuple[DriveConfiguration, Complaint]]:

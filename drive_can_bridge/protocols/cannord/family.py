@@ -55,6 +55,7 @@ class Cannord(Family):
     name = 'cannord'
     cyclic = True
     control_built_in = True
+    builtin_names = frozenset((STATUS_WORD,))
     options_type = CannordOptions
 
     def check(self, drive: DriveConfiguration) -> Iterator[Complaint]:
@@ -62,6 +63,7 @@ class Cannord(Family):
             yield Complaint('station', f'{drive.station} is out of range, '
                                        f'allowed is 0 to {ADDRESS_MAX} ({self.name})')
         yield from self._check_lists(drive)
+        yield from self.check_names(drive)
         yield from self._check_profile(drive)
 
     def check_together(self, drives: Sequence[DriveConfiguration],
@@ -187,10 +189,6 @@ class Cannord(Family):
         foreign = any(protocol != self.name for protocol in drive.profile.protocols)
         for name, parameter in drive.profile.parameters.items():
             place = f'profile.parameters.{name}'
-            for taken in (place, *(f'{place}.bits.{bit}' for bit, _ in parameter.bits)):
-                if taken.endswith(f'.{STATUS_WORD}'):
-                    yield Complaint(taken, f"'{STATUS_WORD}' is built in for {self.name}, allowed "
-                                           'is any other name')
             if parameter.number is not None and not 0 <= parameter.number <= NUMBER_MAX:
                 yield Complaint(f'{place}.number', f'{parameter.number} is out of range, '
                                                    f'allowed is 0 to {NUMBER_MAX}')

@@ -24,8 +24,12 @@ class NodeWatch:
         self._observer = observer
         self._booted = booted
 
-    def take_heartbeat(self, data: bytes, now: float) -> None:
-        """Take a heartbeat or boot-up message."""
+    def handlers(self, node: int) -> dict[int, Handler]:
+        """Return who takes the frames of a node, by identifier."""
+        return {network.HEARTBEAT_BASE + node: self._take_heartbeat,
+                network.EMERGENCY_BASE + node: self._take_emergency}
+
+    def _take_heartbeat(self, data: bytes, now: float) -> None:
         state = self._observer.decoded(
             network.decode_heartbeat, data, now, _RESPONSE, _NETWORK, 'heartbeat')
         if state is None:
@@ -37,8 +41,7 @@ class NodeWatch:
         else:
             self._observer.tell(now, _RESPONSE, _NETWORK, 'heartbeat', remark=state.text)
 
-    def take_emergency(self, data: bytes, now: float) -> None:
-        """Take an emergency message."""
+    def _take_emergency(self, data: bytes, now: float) -> None:
         emergency = self._observer.decoded(
             network.decode_emergency, data, now, _RESPONSE, _NETWORK, 'emergency')
         if emergency is not None:

@@ -4,11 +4,13 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 import re
-from typing import Union
+from typing import Literal, Union
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.process_image import status_word
 from drive_can_bridge.core.profile import Profile
+from drive_can_bridge.protocols.canopen.addressing import object_of_name
 from drive_can_bridge.protocols.canopen_pkw import object_map, pkw
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address
 from drive_can_bridge.protocols.polling import Place, plan_reads
@@ -17,11 +19,11 @@ from drive_can_bridge.protocols.polling import Place, plan_reads
 REGISTERS_MAX = 2
 
 _RAW_REGISTER = re.compile(r'p([0-9]{1,5})', re.ASCII)
-_RAW_OBJECT = re.compile(r'x([0-9a-fA-F]{1,4})\.([0-9a-fA-F]{1,2})', re.ASCII)
 #: sub-indices of one index, and a gap: the last one has no next
 _OBJECT_STEP = 2 * (pkw.SUBINDEX_MAX + 1)
 
 Key = Union[int, tuple[int, int]]
+Addressing = Literal['register', 'canopen']
 
 
 @dataclass(frozen=True, order=True)
@@ -48,11 +50,11 @@ def raw_address(name: str) -> Address | None:
     if match is not None:
         number = int(match.group(1))
         return Address(number) if number <= pkw.WORD_MAX else None
-    match = _RAW_OBJECT.fullmatch(name)
-    return None if match is None else Address(int(match.group(1), 16), int(match.group(2), 16))
+    found = object_of_name(name)
+    return None if found is None else Address(*found)
 
 
-def address_of(parameter: Parameter, addressing: str) -> Address | None:
+def address_of(parameter: Parameter, addressing: Addressing) -> Address | None:
     """
     Return the address that requests for a parameter have; None: the profile does not give it.
 
@@ -67,16 +69,61 @@ def address_of(parameter: Parameter, addressing: str) -> Address | None:
     return Address(parameter.index, parameter.subindex)
 
 
-def span_of(parameter: Parameter, addressing: str) -> Span:
+@dataclass(frozen=True, slots=True)
+class Placement:
     """
-    Return what a parameter takes.
+    Where the parameters of one drive stand, and how their values lie in the registers.
 
-    :raises ValueError: the profile does not give its address (a checked configuration does).
+    :param addressing: how listed parameters are reached.
+    :param word_order: of 32-bit values; the parameter's own order wins.
     """
-    address = address_of(parameter, addressing)
-    if address is None:
-        raise ValueError(f'{parameter.name} has no address to be reached by {addressing}')
-    return Span(address, parameter.type.bits // 16)
+
+    addressing: Addressing
+    word_order: str
+
+    @classmethod
+    def of(cls, drive: DriveConfiguration) -> 'Placement':
+        """Return that of a configured drive."""
+        return cls(drive.options.addressing, drive.options.word_order)
+
+    def address(self, parameter: Parameter) -> Address | None:
+        """Return the address that requests for a parameter have; None: the profile gives none."""
+        return address_of(parameter, self.addressing)
+
+    def span(self, parameter: Parameter) -> Span:
+        """
+        Return what a parameter takes.
+
+        :raises ValueError: the profile does not give its address (a checked configuration does).
+        """
+        address = self.address(parameter)
+        if address is None:
+            raise ValueError(f'{parameter.name} has no address to be reached by {self.addressing}')
+        return Span(address, parameter.type.bits // 16)
+
+    def raw(self, parameter: Parameter, words: Sequence[int]) -> int:
+        """
+        Return the raw integer of a parameter.
+
+        :param words: of its registers, that of the lower number first; more do no harm.
+        """
+        if parameter.type.bits == 16:
+            return parameter.raw_from_word(words[0])
+        return parameter.raw_from_word(pkw.value_from_words(
+            (words[0], words[1]), self._high_first(parameter)))
+
+    def words(self, parameter: Parameter, raw: int) -> tuple[int, ...]:
+        """Return the words of a parameter's registers, that of the lower number first."""
+        value = parameter.word_from_raw(raw)
+        if parameter.type.bits == 16:
+            return (value,)
+        return pkw.words_from_value(value, self._high_first(parameter))
+
+    def _high_first(self, parameter: Parameter) -> bool:
+        return (parameter.word_order or self.word_order) == 'high_first'
+
+
+# -- reads ----------------------------------------------------------------------------------------
 
 
 def plan(spans: Iterable[Span]) -> list[Span]:
@@ -98,18 +145,24 @@ def round_spans(drive: DriveConfiguration) -> list[Span]:
     What a damaged configuration does not give an address for is left out.
     """
     wanted = list(drive.cyclic_response)
-    table = drive.profile.control
-    status = drive.profile.parameters.get(table.status_parameter or '') if table else None
+    status = status_word(drive)
     if status is not None and status not in wanted:
         wanted.append(status)
-    addressing = drive.options.addressing
-    return [span_of(parameter, addressing) for parameter in wanted
-            if address_of(parameter, addressing) is not None]
+    placement = Placement.of(drive)
+    return [placement.span(parameter) for parameter in wanted
+            if placement.address(parameter) is not None]
 
 
 def round_plan(drive: DriveConfiguration) -> list[Span]:
     """Return the reads of a round."""
     return plan(round_spans(drive))
+
+
+def instead_of(span: Span, wanted: Sequence[Span]) -> list[Span]:
+    """Return what is read when a read that they share is refused; nothing if it is one of them."""
+    if span in wanted:
+        return []
+    return sorted({part for part in wanted if set(part.addresses) <= set(span.addresses)})
 
 
 def _linear(address: Address) -> int:
@@ -120,30 +173,6 @@ def _linear(address: Address) -> int:
 
 def _address(linear: int, by_object: bool) -> Address:
     return Address(*divmod(linear, _OBJECT_STEP)) if by_object else Address(linear)
-
-
-# -- values ---------------------------------------------------------------------------------------
-
-
-def raw_from_words(parameter: Parameter, words: Sequence[int], word_order: str) -> int:
-    """
-    Return the raw integer of a parameter.
-
-    :param words: of its registers, that of the lower number first.
-    :param word_order: of the drive; the parameter's own order wins.
-    """
-    if len(words) == 1:
-        return parameter.raw_from_word(words[0])
-    high_first = (parameter.word_order or word_order) == 'high_first'
-    return parameter.raw_from_word(pkw.value_from_words((words[0], words[1]), high_first))
-
-
-def words_from_raw(parameter: Parameter, raw: int, word_order: str) -> tuple[int, ...]:
-    """Return the words of a parameter's registers, that of the lower number first."""
-    value = parameter.word_from_raw(raw)
-    if parameter.type.bits == 16:
-        return (value,)
-    return pkw.words_from_value(value, (parameter.word_order or word_order) == 'high_first')
 
 
 # -- the same register under two names ------------------------------------------------------------
@@ -157,7 +186,8 @@ def keys(parameter: Parameter) -> frozenset[Key]:
     the object dictionary's known layout gives the other.
     """
     found: set[Key] = set()
-    addresses = [address for way in ('register', 'canopen')
+    ways: tuple[Addressing, ...] = 'register', 'canopen'
+    addresses = [address for way in ways
                  if (address := address_of(parameter, way)) is not None]
     for address in addresses:
         for entry in Span(address, parameter.type.bits // 16).addresses:
@@ -174,6 +204,8 @@ def keys(parameter: Parameter) -> frozenset[Key]:
 
 def half_refusal(parameter: Parameter, profile: Profile) -> str:
     """Say why an unlisted parameter is not written that is one half of a listed one; else ''."""
+    if parameter.listed:
+        return ''
     mine = keys(parameter)
     for other in profile.parameters.values():
         if other.type.bits != parameter.type.bits and mine & keys(other):

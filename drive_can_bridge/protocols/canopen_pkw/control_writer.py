@@ -12,13 +12,12 @@ refused ``disable`` is tried again and again: a device under local control, say,
 as it is back under remote control.
 """
 
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 import math
 
 from drive_can_bridge.core.control_machine import ControlMachine
-from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.core.told import Told
-from drive_can_bridge.protocols.canopen_pkw import addresses
+from drive_can_bridge.core.session import Session
+from drive_can_bridge.protocols.canopen_pkw.addresses import Placement
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
     Answered, MailboxChannel, Read, Refused, Reply, Silence, Step, Write,
 )
@@ -35,30 +34,22 @@ class ControlWriter:
     """
     Writes the control word of one drive.
 
-    :param word: parameter of the control word.
-    :param changed: called after anything that may have changed the control word.
-    :param refused: takes what the drive says to a word that it refuses, in words.
-    :param told: takes note of what the drive was told.
-    :param disable: the word that may be written any number of times.
-    :param refresh: s after which an unchanged word is written again; 0: never.
     :ivar refusal: what the drive says to a word that it refused; '' if it does not.
     """
 
-    def __init__(self, channel: MailboxChannel, control: ControlMachine, word: Parameter,
-                 changed: Callable[[float], None], refused: Callable[[str], None],
-                 told: Told, *, disable: int, addressing: str, word_order: str,
-                 refresh: float) -> None:
+    def __init__(self, session: Session, control: ControlMachine,
+                 channel: MailboxChannel) -> None:
+        drive = session.configuration
         self.refusal = ''
-        self._channel = channel
+        self._session = session
         self._control = control
-        self._parameter = word
-        self._changed = changed
-        self._refused = refused
-        self._told = told
-        self._disable = disable
-        self._word_order = word_order
-        self._span = addresses.span_of(word, addressing)
-        self._refresh = refresh
+        self._channel = channel
+        self._parameter = drive.profile.parameters[control.table.parameter]
+        self._disable = control.table.disable   # may be written any number of times
+        self._placement = Placement.of(drive)
+        self._span = self._placement.span(self._parameter)
+        self._refresh: float = (
+            drive.options.refresh_interval if self._parameter in drive.cyclic_request else 0.0)
         self._settled: int | None = None    # the drive has it, or has refused it
         self._settled_at = -math.inf
         self._retry_at = math.inf           # a refused disable
@@ -100,7 +91,7 @@ class ControlWriter:
                          self._words(self._disable))
 
     def _words(self, word: int) -> tuple[int, ...]:
-        return addresses.words_from_raw(self._parameter, word, self._word_order)
+        return self._placement.words(self._parameter, word)
 
     def _write(self) -> Generator[Step, Reply, None]:
         """Write the newest word, until it is answered or silence says to wait a while."""
@@ -116,16 +107,17 @@ class ControlWriter:
                         return
                     continue
                 word = self._control.word
-            before = self._told.runs(CONTROL_WORD)
+            told = self._session.told
+            before = told.runs(CONTROL_WORD)
             if word != self._disable:
-                self._told.note(CONTROL_WORD, runs=True)
+                told.note(CONTROL_WORD, runs=True)
             reply = yield Write(self._span.address, self._words(word),
                                 blind=self._control.stopping)
             if isinstance(reply, Silence):
                 if reply.sent:
                     self._settled, self._doubtful = None, word
                 else:
-                    self._told.note(CONTROL_WORD, runs=before)
+                    told.note(CONTROL_WORD, runs=before)
                 if word == self._control.word:
                     return
                 continue
@@ -145,8 +137,7 @@ class ControlWriter:
         reply = yield Read(self._span.address, self._span.count, attempts=1)
         if not isinstance(reply, Answered):
             return None
-        found = addresses.raw_from_words(
-            self._parameter, reply.words[:self._span.count], self._word_order)
+        found = self._placement.raw(self._parameter, reply.words)
         self._doubtful = None
         return self._parameter.word_from_raw(found) == self._parameter.word_from_raw(word)
 
@@ -154,20 +145,20 @@ class ControlWriter:
         now = self._channel.now
         text = f'{self._parameter.name} {word:04X}h {reason}'
         if text != self.refusal:
-            self._refused(f'write of {text}')
+            self._session.report.warn(f'write of {text}')
         self.refusal = text
         self._doubtful = None
         self._settled, self._settled_at = word, now
         if word == self._disable:
             self._retry_at = now + RETRY_AFTER
         self._control.word_refused(word, reason, now)
-        self._changed(now)
+        self._session.control_changed(now)
 
     def _settle(self, word: int) -> None:
         """Take note that the drive has a word."""
         self._doubtful = None
-        self._told.note(CONTROL_WORD, runs=word != self._disable)
+        self._session.told.note(CONTROL_WORD, runs=word != self._disable)
         self._settled, self._settled_at = word, self._channel.now
         if word == self._control.word:
             self._control.word_sent(self._channel.now)
-            self._changed(self._channel.now)
+            self._session.control_changed(self._channel.now)

@@ -5,11 +5,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.frame import Route, STANDARD_IDENTIFIER_MAX
 from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.process_image import control_word
 from drive_can_bridge.protocols.canopen import network
+from drive_can_bridge.protocols.canopen.addressing import (
+    node_claims, predefined_set, reserved_claims, station_complaints,
+)
 from drive_can_bridge.protocols.canopen_pkw import addresses, pkw
-from drive_can_bridge.protocols.canopen_pkw.addresses import Span
+from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
 from drive_can_bridge.protocols.canopen_pkw.identifiers import Identifiers
 from drive_can_bridge.protocols.canopen_pkw.options import PkwOptions
 from drive_can_bridge.protocols.family import Claim, Complaint, Family, Talk
@@ -37,11 +40,7 @@ class CanopenPkw(Family):
         return options
 
     def check(self, drive: DriveConfiguration) -> Iterator[Complaint]:
-        if not 1 <= drive.station <= network.NODE_MAX:
-            yield Complaint('station', f'{drive.station} is out of range, '
-                                       f'allowed is 1 to {network.NODE_MAX} ({self.name})')
-        else:
-            yield from self._check_identifiers(drive)
+        yield from list(station_complaints(drive)) or self._check_identifiers(drive)
         wrong = list(self._check_profile(drive))
         yield from wrong
         if not wrong:
@@ -52,9 +51,7 @@ class CanopenPkw(Family):
         if not drive.options.predefined_set:
             return
         node = drive.station
-        taken = {network.SYNC_IDENTIFIER: 'SYNC',
-                 **{base + node: f'{what} node {node}'
-                    for base, what in network.PREDEFINED_SET.items()}}
+        taken = {network.SYNC_IDENTIFIER: 'SYNC', **predefined_set(node)}
         for key, at_home in (('request_cob_id', network.REQUEST_BASE + node),
                              ('response_cob_id', network.RESPONSE_BASE + node)):
             identifier = getattr(drive.options, key)
@@ -65,26 +62,12 @@ class CanopenPkw(Family):
                                      'says that this one was')
 
     def claims(self, drive: DriveConfiguration) -> list[Claim]:
-        node = drive.station
-        identifiers = Identifiers.of(drive)
-        purposes = {
-            identifiers.request: f'PKW requests to node {node}',
-            identifiers.response: f'PKW responses of node {node}',
-            identifiers.emergency: f'emergency messages of node {node}',
-            identifiers.heartbeat: f'heartbeats of node {node}',
-        }
-        # all CANopen nodes of a bus listen to the one NMT identifier
-        return [*_claims(purposes),
-                *_claims({network.NMT_IDENTIFIER: 'NMT'}, shared='NMT', heard=False)]
+        request, response = Identifiers.of(drive)
+        return node_claims(drive, {request: f'PKW requests to node {drive.station}',
+                                   response: f'PKW responses of node {drive.station}'})
 
     def reserved(self, drive: DriveConfiguration) -> list[Claim]:
-        """Return the rest of what a node listens to and sends on from the factory."""
-        if not drive.options.predefined_set:
-            return []
-        remark = 'predefined_set'
-        return [*_claims({base + drive.station: f'{what} node {drive.station}; {remark}'
-                          for base, what in network.PREDEFINED_SET.items()}),
-                *_claims({network.SYNC_IDENTIFIER: f'SYNC; {remark}'}, shared='SYNC')]
+        return reserved_claims(drive)
 
     def bits_per_second(self, drive: DriveConfiguration) -> float:
         """Return the worst-case load: each period one round, and every setpoint changes."""
@@ -138,29 +121,30 @@ class CanopenPkw(Family):
         return len(addresses.round_plan(drive)) + len(drive.cyclic_request)
 
     def _check_identifiers(self, drive: DriveConfiguration) -> Iterator[Complaint]:
-        identifiers = Identifiers.of(drive)
-        for key, identifier in (('request_cob_id', identifiers.request),
-                                ('response_cob_id', identifiers.response)):
-            for purpose, other in identifiers._asdict().items():
-                if identifier == other and f'{purpose}_cob_id' != key:
-                    yield Complaint(key, f'{identifier:03X}h is the identifier of the {purpose} '
-                                         'of this node, allowed is any other')
-                    break
+        mine = Identifiers.of(drive)._asdict()
+        taken = [*mine.items(), ('emergency', network.EMERGENCY_BASE + drive.station),
+                 ('heartbeat', network.HEARTBEAT_BASE + drive.station)]
+        for own, identifier in mine.items():
+            purpose = next((purpose for purpose, other in taken
+                            if purpose != own and other == identifier), None)
+            if purpose is not None:
+                yield Complaint(f'{own}_cob_id', f'{identifier:03X}h is the identifier of the '
+                                                 f'{purpose} of this node, allowed is any other')
 
     def _check_profile(self, drive: DriveConfiguration) -> Iterator[Complaint]:
-        addressing = drive.options.addressing
+        placement = Placement.of(drive)
         for name, parameter in drive.profile.parameters.items():
             place = f'profile.parameters.{name}'
             if parameter.index is not None and parameter.subindex is None:
                 yield Complaint(f'{place}.subindex', 'missing, allowed with index is 0 to '
                                                      f'{pkw.SUBINDEX_MAX}')
                 continue
-            address = addresses.address_of(parameter, addressing)
+            address = placement.address(parameter)
             if address is None:
-                key, what = ('number', 'a number') if addressing == 'register' \
+                key, what = ('number', 'a number') if placement.addressing == 'register' \
                     else ('index', 'an index with a subindex')
                 yield Complaint(f'{place}.{key}', f'missing, allowed in {self.name} with '
-                                                  f'addressing {addressing} is {what}')
+                                                  f'addressing {placement.addressing} is {what}')
                 continue
             last = Span(address, parameter.type.bits // 16).addresses[-1]
             if last.word > pkw.WORD_MAX or (last.subindex or 0) > pkw.SUBINDEX_MAX:
@@ -170,13 +154,11 @@ class CanopenPkw(Family):
 
     def _check_request(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         """Look for setpoints that would overwrite each other, or the control word."""
-        control = drive.profile.control
         taken: dict[addresses.Key, str] = {}
         listed = list(drive.cyclic_request)
-        if control is not None:
-            word = drive.profile.parameters.get(control.parameter)
-            if word is not None and word not in listed:
-                listed.insert(0, word)
+        word = control_word(drive, controlled=True)
+        if word is not None and word not in listed:
+            listed.insert(0, word)
         for parameter in listed:
             mine = addresses.keys(parameter) if parameter.listed else frozenset()
             other = next((taken[key] for key in mine if key in taken), None)
@@ -184,9 +166,3 @@ class CanopenPkw(Family):
                 yield Complaint('cyclic_request', f"'{parameter.name}' and '{other}' share a "
                                                   'register, allowed is one of them')
             taken.update(dict.fromkeys(mine, parameter.name))
-
-
-def _claims(purposes: dict[int, str], *, shared: str = '', heard: bool = True) -> list[Claim]:
-    return [Claim(Route(identifier, STANDARD_IDENTIFIER_MAX, False),
-                  f'{identifier:03X}h ({purpose})', shared, heard)
-            for identifier, purpose in purposes.items()]

@@ -6,14 +6,14 @@ A request that repeats the function byte of the one before starts nothing (:mod:
 shown, and no answer is expected.
 """
 
-from collections.abc import Sequence
 from functools import partial
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter, ParameterType
+from drive_can_bridge.protocols.canopen.addressing import name_of_object
 from drive_can_bridge.protocols.canopen.observer import NodeWatch
 from drive_can_bridge.protocols.canopen_pkw import addresses, pkw, refusals
-from drive_can_bridge.protocols.canopen_pkw.addresses import Span
+from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
 from drive_can_bridge.protocols.canopen_pkw.identifiers import Identifiers
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Function, Layout, Message
 from drive_can_bridge.protocols.observer import (
@@ -33,23 +33,19 @@ class PkwObserver(DriveObserver):
         super().__init__(drive.name, emit)
         options = drive.options
         self._decode = partial(pkw.decode, layout=Layout(options.layout))
-        self._word_order: str = options.word_order
         self._abort_order: str = options.abort_code_order
         identifiers = Identifiers.of(drive)
-        node = NodeWatch(self, self._booted)
         self._handlers: dict[int, Handler] = {
-            identifiers.heartbeat: node.take_heartbeat,
-            identifiers.emergency: node.take_emergency,
+            **NodeWatch(self, self._booted).handlers(drive.station),
             identifiers.request: self._take_request,
             identifiers.response: self._take_response,
         }
-        addressing: str = options.addressing
-        self._spans = {addresses.span_of(parameter, addressing): parameter
+        placement = self._placement = Placement.of(drive)
+        self._spans = {placement.span(parameter): parameter
                        for parameter in reversed(list(drive.profile.parameters.values()))
-                       if addresses.address_of(parameter, addressing) is not None}
+                       if placement.address(parameter) is not None}
         self._wanted = addresses.round_spans(drive)
-        self._setpoints = {addresses.span_of(parameter, addressing)
-                           for parameter in drive.cyclic_request}
+        self._setpoints = {placement.span(parameter) for parameter in drive.cyclic_request}
         self._round: RoundWatch[Span] = RoundWatch(addresses.round_plan(drive), self.observed)
         self._questions: Questions[Message] = Questions(
             self, drive.parameter_timeout, self._unanswered)
@@ -115,7 +111,7 @@ class PkwObserver(DriveObserver):
         parameters, raws = self._content(span, message.words if answered else None)
         if verdict is Verdict.NORMAL and not writes:
             if refused:
-                self._round.refused(span, self._parts(span), now)
+                self._round.refused(span, addresses.instead_of(span, self._wanted), now)
             else:
                 self._round.answered(span, now)
         if refused:
@@ -133,13 +129,6 @@ class PkwObserver(DriveObserver):
     def _refusal(self, message: Message) -> str:
         return refusals.describe(refusals.code_from_words(message.words, self._abort_order))
 
-    def _parts(self, span: Span) -> Sequence[Span]:
-        """Return what is read instead of a shared read that was refused."""
-        if span in self._wanted:
-            return ()
-        return sorted({part for part in self._wanted
-                       if set(part.addresses) <= set(span.addresses)})
-
     def _content(self, span: Span, words: pkw.Words | None,
                  ) -> tuple[list[Parameter], list[int]]:
         """Return the parameters in a request or answer, and their values where there are any."""
@@ -150,8 +139,7 @@ class PkwObserver(DriveObserver):
         if words is None:
             return parameters, []
         if exact is not None:
-            return parameters, [addresses.raw_from_words(exact, words[:span.count],
-                                                         self._word_order)]
+            return parameters, [self._placement.raw(exact, words)]
         return parameters, raws_of(parameters, words)
 
     def _booted(self) -> None:
@@ -187,4 +175,4 @@ def _key(message: Message) -> Message:
 def _raw_name(address: Address) -> str:
     if address.subindex is None:
         return f'p{address.word}'
-    return f'x{address.word:04x}.{address.subindex:02x}'
+    return name_of_object(address.word, address.subindex)

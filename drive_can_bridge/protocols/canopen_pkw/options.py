@@ -5,12 +5,13 @@ from dataclasses import dataclass
 from typing import Literal
 
 from drive_can_bridge.core.frame import STANDARD_IDENTIFIER_MAX
+from drive_can_bridge.protocols.canopen.addressing import NodeOptions
 from drive_can_bridge.protocols.options import option
 
 
 @dataclass(frozen=True, slots=True)
-class PkwOptions:
-    """Where the mailbox is, how its bytes are laid out, and who looks after the node."""
+class PkwOptions(NodeOptions):
+    """Where the mailbox is, and how its bytes are laid out."""
 
     layout: Literal['word_le', 'dword_swapped', 'word_be'] = option(
         'word_le', 'Place of the bytes in the PDO: word_le (every word low byte first), '
@@ -22,16 +23,6 @@ class PkwOptions:
         'auto', 'Which half of an abort code word 3 holds; auto finds out.')
     addressing: Literal['register', 'canopen'] = option(
         'register', 'register: parameters are reached by number; canopen: by index and subindex.')
-    nmt_start: bool = option(
-        True, 'Send NMT start to the node at start, after its boot-up frame, when its heartbeat '
-        'says stopped or pre-operational, and once a second while it is offline.')
-    heartbeat_timeout: float = option(
-        0.0, 's without heartbeat until the drive counts as offline; 0: not watched. The producer '
-        '(1017h) is not configured by the bridge.', minimum=0, maximum=3600)
-    predefined_set: bool = option(
-        True, 'Keep other drives off all identifiers of the predefined connection set of the '
-        'node, also those that the bridge does not use: what they send there would be commands '
-        'to it.')
     request_cob_id: int = option(
         None, 'Identifier of requests to the device (receive PDO4); by default 500h + node.',
         minimum=1, maximum=STANDARD_IDENTIFIER_MAX)

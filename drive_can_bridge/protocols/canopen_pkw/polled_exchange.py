@@ -12,11 +12,8 @@ import math
 from drive_can_bridge.core.events import ProcessDataReceived
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.canopen.node import Node
-from drive_can_bridge.protocols.canopen_pkw import procedures
-from drive_can_bridge.protocols.canopen_pkw.addresses import Span
 from drive_can_bridge.protocols.canopen_pkw.mailbox import MailboxChannel
-from drive_can_bridge.protocols.canopen_pkw.pkw import Address
-from drive_can_bridge.protocols.canopen_pkw.round import Round
+from drive_can_bridge.protocols.canopen_pkw.round import Round, Words
 from drive_can_bridge.protocols.channel import Lane
 from drive_can_bridge.protocols.exchange_book import ExchangeBook
 
@@ -39,20 +36,16 @@ class PolledExchange:
     def __init__(self, session: Session, channel: MailboxChannel, node: Node, *,
                  found: Callable[[float], None], silent: Callable[[str, float], None]) -> None:
         drive = session.configuration
-        table = drive.profile.control
-        status = None if table is None else drive.profile.parameters.get(
-            table.status_parameter or '')
         self._session = session
         self._channel = channel
         self._node = node
         self._found = found
         self._silent = silent
-        self._round = Round(drive, status, session.report.warn)
+        self._round = Round(drive, session.report.warn)
         self._book = ExchangeBook(drive, session.statistics)
         self.timer = self._book.timer
         self.received_at = -math.inf
-        self._no_status = status is None
-        self.status_known = self._no_status
+        self.status_known = not self._round.has_status
 
     def forget(self) -> None:
         """Forget what the drive refuses."""
@@ -76,31 +69,28 @@ class PolledExchange:
     def begin(self, now: float) -> None:
         """Begin a round."""
         self._book.begin(now)
-        self._channel.run(
-            procedures.read_round(self._round.plan, self._answered, self._round.refused),
-            self._ended, now)
+        self._channel.run(self._round.read(self._answered), self._ended, now)
 
     def warnings(self) -> list[str]:
         """Say what the drive refuses, and what to do."""
         return [f'poll of {text}: correct cyclic_response or the profile'
                 for text in self._round.refusals.values()]
 
-    def _answered(self, span: Span, words: tuple[int, ...]) -> None:
+    def _answered(self, words: Words) -> None:
         """Take an answer; the status counts from the moment it was read."""
-        self._round.refusals.pop(span, None)
         if self._session.online:
-            self._take_status(dict(zip(span.addresses, words)))
+            self._take_status(words)
 
-    def _take_status(self, words: dict[Address, int]) -> None:
+    def _take_status(self, words: Words) -> None:
         now, control = self._channel.now, self._session.control
         raw = self._round.status(words)
         if raw is not None and control is not None:
             self.status_known = True
             control.status_received(raw, now)
         self._session.control_changed(now)
-        self.status_known = self._no_status
+        self.status_known = not self._round.has_status
 
-    def _ended(self, words: procedures.RoundResult) -> None:
+    def _ended(self, words: Words | None) -> None:
         now, session = self._channel.now, self._session
         if words is None:
             self._miss(now)

@@ -22,6 +22,7 @@ from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.abort_codes import TEXTS
 from drive_can_bridge.protocols.canopen_pkw import pkw
+from drive_can_bridge.protocols.canopen_pkw.addresses import Placement
 from drive_can_bridge.protocols.canopen_pkw.identifiers import Identifiers
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Layout, Message
 from drive_can_bridge.protocols.canopen_pkw.refusals import describe
@@ -125,7 +126,8 @@ class PkwProber(Prober):
         votes: dict[str, list[str]] = {}
         certain, again = False, '; try again while the motor runs'
         for parameter in self._wide():
-            answer = yield from self._ask(self._address(parameter), 2, layout)
+            span = Placement.of(self.drive).span(parameter)
+            answer = yield from self._ask(span.address, span.count, layout)
             if answer is None or answer[1].code == pkw.Function.ERROR:
                 continue
             order, by_limits = _order_of(parameter, answer[1].words)
@@ -172,12 +174,6 @@ class PkwProber(Prober):
             if each.type.bits == 32 and each.readable and not each.bits
             and each.word_order is None)
         return list(found)[:_WIDE_MAX]
-
-    def _address(self, parameter: Parameter) -> Address:
-        by_object = self.drive.options.addressing == 'canopen' or parameter.number is None
-        if by_object and parameter.index is not None:
-            return Address(parameter.index, parameter.subindex or 0)
-        return Address(parameter.number or 0)
 
 
 def harmless(data: bytes) -> bool:

@@ -1,19 +1,18 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-What takes more than one request: parameters of users, the round of reads, the safe stop.
+What takes more than one request: parameters of users, and the safe stop.
 
 Every generator here is for :class:`.mailbox.MailboxChannel`.
 """
 
-from collections.abc import Callable, Generator, Sequence
-from typing import NamedTuple, Union
+from collections.abc import Generator, Sequence
+from typing import NamedTuple
 
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.requests import Failure, NOT_SENT, Outcome, Outcomes, Written
 from drive_can_bridge.core.retry import RetryPolicy
 from drive_can_bridge.protocols.access import Access, Found, Item
-from drive_can_bridge.protocols.canopen_pkw import addresses
-from drive_can_bridge.protocols.canopen_pkw.addresses import Span
+from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, plan, Span
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
     Answered, Read, Refused, Reply, Silence, Step, Write,
 )
@@ -27,26 +26,20 @@ NOT_TOGETHER = ('cannot be written in one frame, nothing was written: two 16-bit
 
 
 class RegisterAccess(Access[Span, Step, Reply]):
-    """
-    Parameters by register or object; adjacent registers share a request.
+    """Parameters by register or object; adjacent registers share a request."""
 
-    :param addressing: how listed parameters are reached.
-    :param word_order: of 32-bit values.
-    """
-
-    def __init__(self, retry: RetryPolicy, *, addressing: str, word_order: str) -> None:
+    def __init__(self, retry: RetryPolicy, placement: Placement) -> None:
         super().__init__(retry)
-        self._addressing = addressing
-        self._word_order = word_order
+        self._placement = placement
 
     def span(self, parameter: Parameter) -> Span:
-        return addresses.span_of(parameter, self._addressing)
+        return self._placement.span(parameter)
 
     def addresses(self, span: Span) -> Sequence[Address]:
         return span.addresses
 
     def plan(self, spans: Sequence[Span]) -> list[Span]:
-        return addresses.plan(spans)
+        return plan(spans)
 
     def read(self, span: Span) -> Generator[Step, Reply, Found]:
         reply = yield Read(span.address, span.count)
@@ -55,25 +48,22 @@ class RegisterAccess(Access[Span, Step, Reply]):
         return self.retry.unanswered() if isinstance(reply, Silence) else Failure(reply.text)
 
     def raw(self, parameter: Parameter, words: tuple[int, ...]) -> int:
-        return addresses.raw_from_words(parameter, words, self._word_order)
+        return self._placement.raw(parameter, words)
 
     def write(self, parameter: Parameter, raw: int) -> Generator[Step, Reply, Outcome]:
-        return self._put(self.span(parameter).address, self._words(parameter, raw))
+        return self._put(self.span(parameter).address, self._placement.words(parameter, raw))
 
     def write_together(self, items: Sequence[Item]) -> Generator[Step, Reply, Outcomes]:
         words: dict[Address, int] = {}
         spans = [self.span(parameter) for parameter, _ in items]
         for span, item in zip(spans, items):
-            words.update(zip(span.addresses, self._words(*item)))
-        shared = addresses.plan(spans)
+            words.update(zip(span.addresses, self._placement.words(*item)))
+        shared = plan(spans)
         if len(shared) != 1 or sum(span.count for span in spans) != shared[0].count:
             return (Failure(NOT_TOGETHER),) * len(items)
         outcome = yield from self._put(
             shared[0].address, tuple(words[address] for address in shared[0].addresses))
         return (outcome,) * len(items)
-
-    def _words(self, parameter: Parameter, raw: int) -> tuple[int, ...]:
-        return addresses.words_from_raw(parameter, raw, self._word_order)
 
     def _put(self, address: Address, words: tuple[int, ...]) -> Generator[Step, Reply, Outcome]:
         """
@@ -95,11 +85,9 @@ class RegisterAccess(Access[Span, Step, Reply]):
         return self.retry.unanswered()
 
 
-# -- the exchange ---------------------------------------------------------------------------------
+# -- the stop -------------------------------------------------------------------------------------
 
 
-#: what a round of reads brought: the words of all registers; None: something was not answered
-RoundResult = Union[dict[Address, int], None]
 #: what became of the last writes: why which one may not have been executed
 StopProcedure = Generator[Step, Reply, list[str]]
 
@@ -114,32 +102,6 @@ class LastWrite(NamedTuple):
     name: str
     span: Span
     words: tuple[int, ...]
-
-
-def read_round(spans: Sequence[Span], answered: Callable[[Span, tuple[int, ...]], None],
-               refused: Callable[[Span, Refused], Sequence[Span]],
-               ) -> Generator[Step, Reply, RoundResult]:
-    """
-    Read all registers of a round. A read that nobody answers ends it.
-
-    :param answered: told of every answer when it arrives.
-    :param refused: told of every refusal; returns what to read instead.
-    :return: what was read; without the registers of reads that were refused.
-    """
-    words: dict[Address, int] = {}
-    pending = list(spans)
-    while pending:
-        span = pending.pop(0)
-        reply = yield Read(span.address, span.count, attempts=1)
-        if isinstance(reply, Silence):
-            return None
-        if isinstance(reply, Refused):
-            pending[:0] = refused(span, reply)
-            continue
-        found = reply.words[:span.count]
-        words.update(zip(span.addresses, found))
-        answered(span, found)
-    return words
 
 
 def write_until_answered(writes: Sequence[LastWrite], attempts: int, timeout: float,

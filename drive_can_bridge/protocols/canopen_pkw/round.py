@@ -1,65 +1,85 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""What a round of reads asks for, and what its answers say."""
+"""A round of reads: what it asks for, and what its answers say."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.protocols.canopen_pkw import addresses
-from drive_can_bridge.protocols.canopen_pkw.addresses import Span
-from drive_can_bridge.protocols.canopen_pkw.mailbox import Refused
+from drive_can_bridge.core.process_image import status_word
+from drive_can_bridge.protocols.canopen_pkw.addresses import (
+    instead_of, Placement, round_plan, round_spans, Span,
+)
+from drive_can_bridge.protocols.canopen_pkw.mailbox import (
+    Read, Refused, Reply, Silence, Step,
+)
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address
+
+#: the words of all registers that were read; those that were refused are missing
+Words = dict[Address, int]
 
 
 class Round:
     """
     The rounds of one drive.
 
-    :param status: the parameter of the status word, if there is one.
     :param warn: takes what the drive refuses, once.
-    :ivar plan: what is read.
+    :ivar has_status: a status word is among what is read.
     :ivar refusals: the names of what the drive refuses, and why, by what was read.
     """
 
-    def __init__(self, drive: DriveConfiguration, status: Parameter | None,
-                 warn: Callable[[str], None]) -> None:
+    def __init__(self, drive: DriveConfiguration, warn: Callable[[str], None]) -> None:
         self._drive = drive
-        self._addressing: str = drive.options.addressing
-        self._word_order: str = drive.options.word_order
-        self._spans = [addresses.span_of(parameter, self._addressing)
-                       for parameter in drive.cyclic_response]
+        self._placement = Placement.of(drive)
+        self._spans = [self._placement.span(parameter) for parameter in drive.cyclic_response]
         self._warn = warn
-        self._status = status
-        self._status_span = None if status is None else addresses.span_of(
-            status, self._addressing)
+        status = status_word(drive)
+        self._status = None if status is None else (status, self._placement.span(status))
+        self.has_status = status is not None
         self.refusals: dict[Span, str] = {}
-        self.plan: list[Span] = []
+        self._plan: list[Span] = []
         self.start_over()
 
     def start_over(self) -> None:
         """Forget what was refused."""
         self.refusals.clear()
-        self.plan = addresses.round_plan(self._drive)
+        self._plan = round_plan(self._drive)
 
-    def refused(self, span: Span, refused: Refused) -> Sequence[Span]:
+    def read(self, answered: Callable[[Words], None]) -> Generator[Step, Reply, Words | None]:
         """
-        Take a refusal; two parameters that share a read are read alone from now on.
+        Read everything once, each in one attempt.
 
-        :return: what to read instead.
+        :param answered: told of every answer when it arrives.
+        :return: what was read; None: something was not answered.
         """
-        wanted = addresses.round_spans(self._drive)
-        if span not in wanted:
-            parts = sorted({part for part in wanted
-                            if set(part.addresses) <= set(span.addresses)})
-            place = self.plan.index(span)
-            self.plan[place:place + 1] = parts
+        words: Words = {}
+        pending = list(self._plan)
+        while pending:
+            span = pending.pop(0)
+            reply = yield Read(span.address, span.count, attempts=1)
+            if isinstance(reply, Silence):
+                return None
+            if isinstance(reply, Refused):
+                pending[:0] = self._instead(span, reply)
+                continue
+            self.refusals.pop(span, None)
+            found = dict(zip(span.addresses, reply.words))
+            words.update(found)
+            answered(found)
+        return words
+
+    def _instead(self, span: Span, refused: Refused) -> Sequence[Span]:
+        """Take a refusal: two parameters that share a read are read alone from now on."""
+        parts = instead_of(span, round_spans(self._drive))
+        if parts:
+            place = self._plan.index(span)
+            self._plan[place:place + 1] = parts
             return parts
         names = ', '.join(parameter.name for parameter, own in zip(
             self._drive.cyclic_response, self._spans) if own == span)
         if span not in self.refusals:
             self._warn(f'read {names or span.address}: {refused.text}')
         self.refusals[span] = f'{names or span.address} {refused.text}'
-        return ()
+        return parts
 
     def raws(self, words: Mapping[Address, int]) -> list[int | None]:
         """Return the values that a round has brought; None for what was refused."""
@@ -68,13 +88,10 @@ class Round:
 
     def status(self, words: Mapping[Address, int]) -> int | None:
         """Return the status word, if it is among the words."""
-        if self._status is None or self._status_span is None:
-            return None
-        return self._raw(self._status, self._status_span, words)
+        return None if self._status is None else self._raw(*self._status, words)
 
     def _raw(self, parameter: Parameter, span: Span,
              words: Mapping[Address, int]) -> int | None:
         if any(address not in words for address in span.addresses):
             return None
-        return addresses.raw_from_words(
-            parameter, [words[address] for address in span.addresses], self._word_order)
+        return self._placement.raw(parameter, [words[address] for address in span.addresses])

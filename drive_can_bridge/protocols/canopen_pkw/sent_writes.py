@@ -3,8 +3,7 @@
 
 from drive_can_bridge.core.last_sent import LastSent
 from drive_can_bridge.core.outbox import Left
-from drive_can_bridge.protocols.canopen_pkw import addresses
-from drive_can_bridge.protocols.canopen_pkw.addresses import Span
+from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
 from drive_can_bridge.protocols.canopen_pkw.pkw import Message
 
 
@@ -15,27 +14,23 @@ class SentWrites:
     :param sent: where that is kept.
     """
 
-    def __init__(self, sent: LastSent, *, addressing: str, word_order: str) -> None:
+    def __init__(self, sent: LastSent, placement: Placement) -> None:
         self._sent = sent
-        self._word_order = word_order
-        self._places = {addresses.span_of(parameter, addressing): place
+        self._placement = placement
+        self._places = {placement.span(parameter): place
                         for place, parameter in enumerate(sent.parameters)}
 
     def noting(self, message: Message, left: Left) -> Left:
         """Take note of a request when it leaves, before ``left`` is told what became of it."""
+        meaning = message.meaning
+        place = None if meaning is None or not meaning.writes else (
+            self._places.get(Span(message.address, meaning.count)))
+        if place is None:
+            return left     # nothing that the drive is told by us
+        raw = self._placement.raw(self._sent.parameters[place], message.words)
+
         def told(sent: bool, now: float) -> None:
             if sent:
-                self._note(message)
+                self._sent.take((raw,), place)
             left(sent, now)
         return told
-
-    def _note(self, message: Message) -> None:
-        """Take note of a request that left, if it writes what the drive is told by us."""
-        meaning = message.meaning
-        if meaning is None or not meaning.writes:
-            return
-        place = self._places.get(Span(message.address, meaning.count))
-        if place is not None:
-            self._sent.take((addresses.raw_from_words(
-                self._sent.parameters[place], message.words[:meaning.count],
-                self._word_order),), place)

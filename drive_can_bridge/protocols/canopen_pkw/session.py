@@ -9,12 +9,12 @@ The conversation with one device over the PKW mailbox.
       └───────────────────────────┘
 
 While running, a round of reads begins every period, as long as the node takes PDOs (see
-:mod:`.node`). A complete round is published as one sample and makes the drive online; three
-rounds (``missed_limit``) with a read that nobody answered make it offline, and so do a boot-up
-frame, a heartbeat that says that the node is not operational, and heartbeats that cease. Whatever
-the reason: the control word goes back to ``disable``, setpoints go neutral and want re-arming. A
-drive that was told to run is told to stand still at once, whatever is known of the node: what is
-only silent may still be listening.
+:mod:`.canopen.node`). A complete round is published as one sample and makes the drive online;
+three rounds (``missed_limit``) with a read that nobody answered make it offline, and so do a
+boot-up frame, a heartbeat that says that the node is not operational, and heartbeats that cease.
+Whatever the reason: the control word goes back to ``disable``, setpoints go neutral and want
+re-arming. A drive that was told to run is told to stand still at once, whatever is known of the
+node: what is only silent may still be listening.
 
 Setpoints and the control word are written while the drive is online: when they change, and
 setpoints again after ``refresh_interval``.
@@ -31,11 +31,9 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.session import LOOKING, Session
-from drive_can_bridge.core.users import Users
+from drive_can_bridge.core.users import DRIVE_OFFLINE, Users
 from drive_can_bridge.protocols.access import ChannelServer
-from drive_can_bridge.protocols.canopen import network
-from drive_can_bridge.protocols.canopen.node import Change, Node
-from drive_can_bridge.protocols.canopen.node_report import NodeReport
+from drive_can_bridge.protocols.canopen.supervision import Supervision
 from drive_can_bridge.protocols.canopen_pkw import addresses, pkw, procedures
 from drive_can_bridge.protocols.canopen_pkw.identifiers import Identifiers
 from drive_can_bridge.protocols.canopen_pkw.mailbox import MailboxChannel, MailboxCourier
@@ -68,25 +66,21 @@ class PkwSession(Session):
             control = ControlMachine(table, timeout=drive.control_timeout, pulse=1)
         super().__init__(drive, control, roles=Roles(
             drive, controlled=control is not None, cells=addresses.keys,
-            refusal=lambda parameter: '' if parameter.listed else addresses.half_refusal(
-                parameter, drive.profile)))
-        options = drive.options
+            refusal=lambda parameter: addresses.half_refusal(parameter, drive.profile)))
+        options, placement = drive.options, addresses.Placement.of(drive)
         self._identifiers = Identifiers.of(drive)
         self._layout = Layout(options.layout)
-        self._node = Node(drive.station, nmt_start=options.nmt_start,
-                          heartbeat_timeout=options.heartbeat_timeout)
-        self._node_report = NodeReport(self._node, self.report)
+        self._supervision = Supervision(self)
+        self._node = self._supervision.node
         self._channel = MailboxChannel(MailboxCourier(
             self._send, order=options.abort_code_order, retry=self.retry))
-        self._sent_writes = SentWrites(
-            self.sent, addressing=options.addressing, word_order=options.word_order)
+        self._sent_writes = SentWrites(self.sent, placement)
         self._writers = Writers(self, self._channel, self._stop_ended)
         self._exchange = PolledExchange(
-            self, self._channel, self._node, found=self._found, silent=self._leave_alone)
+            self, self._channel, self._node, found=self._found, silent=self.node_silent)
         self.users = Users(
-            self, ChannelServer(self._channel, procedures.RegisterAccess(
-                self.retry, addressing=options.addressing, word_order=options.word_order)),
-            blocked=self._blocked, control_refusal=self._writers.control_refusal)
+            self, ChannelServer(self._channel, procedures.RegisterAccess(self.retry, placement)),
+            blocked=self._supervision.refusal, control_refusal=self._writers.control_refusal)
         self._phase = Phase.IDLE
 
     # -- life cycle -------------------------------------------------------------------------------
@@ -96,7 +90,7 @@ class PkwSession(Session):
             self.told.owed or self.ever_online and now >= self._node.free_at)
 
     def begin_stop(self, now: float) -> bool:
-        self._node.stop()
+        self._supervision.stop()
         self._exchange.timer.stop()
         self._channel.drop(now)
         self._phase = Phase.STOPPING
@@ -134,15 +128,14 @@ class PkwSession(Session):
         self._phase = Phase.RUNNING
         self._forget_exchange()
         self._exchange.forget()
-        self._node.begin(now)
-        self._follow_node(now)
+        self._supervision.begin(now)
         self._stop_if_owed(now)
 
     def go_idle(self, advice: str) -> None:
         self._phase = Phase.IDLE
-        self._node.stop()
+        self._supervision.stop()
         self._channel.clear()
-        self._node_report.flush(self._channel.now)
+        self._supervision.report.flush(self._channel.now)
         self._exchange.stop()
         self.be_offline(advice)
 
@@ -174,31 +167,34 @@ class PkwSession(Session):
         self._writers.stop(
             STOP_TIME_SILENT, now, in_the_end=self.configuration.parameter_timeout)
 
-    def _leave_alone(self, reason: str, now: float) -> None:
+    # -- the node ---------------------------------------------------------------------------------
+
+    def node_free(self, free_at: float, now: float, *, anew: bool) -> None:
+        self._channel.hold(free_at)
+        if anew:
+            self._exchange.timer.start(max(now, free_at))
+        self._channel.advance(now)
+
+    def node_silent(self, reason: str, now: float) -> None:
         """Handle a drive that is silent, but may be listening: it has to stand still."""
         was_online = self.online
         self.lose(reason, now)
         self._node.offline(now)
-        self._send_nmt()
         if was_online:
             self._stop_silent(now)
 
-    def _cut_off(self, reason: str, answer: str, now: float) -> None:
-        """
-        Handle a node that takes no PDOs: nothing that was sent is answered any more.
-
-        A stop under way takes its course: however often a node starts anew, stops do not pile up.
-        """
-        self._send_nmt()    # a stop that comes before it is lost
+    def node_closed(self, reason: str, now: float, *, restarted: bool) -> None:
         self.lose(reason, now)
-        self.users.fail_all(answer)
+        self.users.fail_all(f'{"no answer" if restarted else DRIVE_OFFLINE}: {reason}')
+        # a stop takes its course: however often a node starts anew, they do not pile up
         if self._channel.is_idle(Lane.STOP):
             self._channel.clear()
             self._stop_if_owed(now)
 
-    def _send_nmt(self) -> None:
-        for frame in self._node.take_frames():
-            self.outbox.put(frame)
+    def _end_futile_stop(self, now: float) -> None:
+        """End a stop that was for safety only, of a node that takes no PDOs any more."""
+        if self._phase is Phase.STOPPING and now < self._node.free_at and not self.told.owed:
+            self.go_idle('deactivated')
 
     # -- what the device is told ------------------------------------------------------------------
 
@@ -224,66 +220,28 @@ class PkwSession(Session):
 
     def receive_frame(self, frame: Frame, now: float, age: float = 0.0) -> None:
         identifier, data, extended = frame
-        identifiers = self._identifiers
         if extended:
             return
         try:
-            if identifier == identifiers.response:
+            if identifier == self._identifiers.response:
                 self._exchange.received_at = now - age
                 message = pkw.decode(data, self._layout)
                 if not self._channel.receive(message, now):
                     self.report.reject(f'PKW response that nobody asked for: {message}')
-            elif identifier == identifiers.heartbeat:
-                self._heartbeat(network.decode_heartbeat(data), now)
-            elif identifier == identifiers.emergency:
-                self._node_report.emergency(data, now)
-            elif identifier == identifiers.request:
+            elif self._supervision.receive(identifier, data, now):
+                self._end_futile_stop(now)
+            elif identifier == self._identifiers.request:
                 self.report.note(ForeignMasterSeen(
                     f'another master sends PKW requests to node {self.configuration.station}: '
                     f'{frame}'))
         except RemoteProtocolError as error:
             self.report.reject(str(error))
 
-    def _heartbeat(self, state: network.NmtState, now: float) -> None:
-        running = self._phase is Phase.RUNNING
-        change = self._node.receive_heartbeat(state, now, running)
-        if self._phase is Phase.STOPPING and now < self._node.free_at and not self.told.owed:
-            self.go_idle('deactivated')
-        if not running:
-            return
-        if change is Change.RESTARTED:
-            self._node_report.restarted(now)
-            self._cut_off('the device restarted', 'no answer: the device restarted', now)
-            self.report.advice = 'the device restarted: waiting for it to answer'
-        elif change is Change.NOT_OPERATIONAL:
-            text = self._node.refusal(now)
-            self._cut_off(text, f'drive offline: {text}', now)
-        self._follow_node(now, fresh=change is not Change.NONE)
-
-    def _follow_node(self, now: float, *, fresh: bool = True) -> None:
-        """
-        Begin rounds when the node takes PDOs; while offline, see to it that it does.
-
-        :param fresh: something is new; otherwise rounds keep their beat.
-        """
-        if not self.online:
-            self._node.offline(now)
-        self._send_nmt()
-        free_at = self._node.free_at
-        self._channel.hold(free_at)
-        if not self.online and (fresh or now < free_at):
-            self._exchange.timer.start(max(now, free_at))
-        self._channel.advance(now)
-
     # -- timer ------------------------------------------------------------------------------------
 
     def handle_timer(self, now: float) -> None:
-        self._node_report.handle_timer(now)
+        self._supervision.handle_timer(now)
         if self._phase is Phase.RUNNING:
-            if now >= self._node.next_timer():
-                if self._node.handle_timer(now) is Change.HEARTBEAT_LOST:
-                    self._leave_alone(f'no heartbeat for {self._node.heartbeat_timeout:g} s', now)
-                self._send_nmt()
             if self.control is not None and now >= self.control.next_timer():
                 self.control.handle_timer(now)
                 self.control_changed(now)
@@ -300,23 +258,16 @@ class PkwSession(Session):
         soonest = self._channel.next_timer()
         if self._phase is not Phase.RUNNING:
             return soonest
-        soonest = min(soonest, self._exchange.due, self._node.next_timer(),
-                      self._node_report.next_timer())
+        soonest = min(soonest, self._exchange.due, self._supervision.next_timer())
         return soonest if self.control is None else min(soonest, self.control.next_timer())
-
-    # -- users ------------------------------------------------------------------------------------
-
-    def _blocked(self, now: float) -> str:
-        blocked = self._node.refusal(now) if self._phase is Phase.RUNNING else ''
-        return f'drive offline: {blocked}' if blocked else ''
 
     # -- state ------------------------------------------------------------------------------------
 
     @property
     def warning(self) -> str:
+        node = self._supervision.report
         return '; '.join(filter(None, (
-            self._node_report.ailing, *self._exchange.warnings(), *self._writers.warnings(),
-            self._node_report.missing)))
+            node.ailing, *self._exchange.warnings(), *self._writers.warnings(), node.missing)))
 
     def facts(self) -> dict[str, str]:
-        return self._node_report.facts()
+        return self._supervision.report.facts()

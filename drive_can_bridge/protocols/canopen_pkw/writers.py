@@ -32,20 +32,9 @@ class Writers:
                  stop_ended: Callable[[], None]) -> None:
         self._session = session
         self._channel = channel
-        drive, options = session.configuration, session.configuration.options
-        self._setpoints = SetpointWriter(
-            channel, session.setpoints, session.report.warn, session.told,
-            addressing=options.addressing, word_order=options.word_order,
-            refresh=options.refresh_interval)
-        self._control: ControlWriter | None = None
-        table = drive.profile.control
-        if session.control is not None and table is not None:
-            word = drive.profile.parameters[table.parameter]
-            self._control = ControlWriter(
-                channel, session.control, word, session.control_changed, session.report.warn,
-                session.told, disable=table.disable, addressing=options.addressing,
-                word_order=options.word_order,
-                refresh=options.refresh_interval if word in drive.cyclic_request else 0.0)
+        self._setpoints = SetpointWriter(session, channel)
+        self._control = None if session.control is None else ControlWriter(
+            session, session.control, channel)
         self._stop: SafeStop[Step, Reply] = SafeStop(session, channel, stop_ended)
 
     def forget(self) -> None:

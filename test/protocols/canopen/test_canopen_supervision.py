@@ -1,0 +1,128 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""A node beside a session, which is told what it has to do about it; node 5, in hex."""
+
+from builders import drive, frame
+import pytest
+
+from drive_can_bridge.core.errors import RemoteProtocolError
+from drive_can_bridge.core.events import Noted
+from drive_can_bridge.core.outbox import Outbox
+from drive_can_bridge.core.reporter import Reporter
+from drive_can_bridge.core.statistics import DriveStatistics
+from drive_can_bridge.protocols.canopen.addressing import name_of_object, object_of_name
+from drive_can_bridge.protocols.canopen.supervision import Supervision
+
+START = '000#0105'
+
+
+class Exchange:
+    """A session that writes down what it is told, beside the frames that are sent."""
+
+    def __init__(self, **options: float) -> None:
+        self.configuration = drive('canopen_pkw', station=5, **options)
+        self.outbox = Outbox()
+        self.report = Reporter(DriveStatistics(), '')
+        self.online = False
+        self.told: list[object] = []
+        self.supervision = Supervision(self)
+
+    def node_free(self, free_at: float, now: float, *, anew: bool) -> None:
+        self._write_down('free', free_at, anew)
+
+    def node_closed(self, reason: str, now: float, *, restarted: bool) -> None:
+        self._write_down('closed', reason, restarted)
+
+    def node_silent(self, reason: str, now: float) -> None:
+        self._write_down('silent', reason)
+
+    def _write_down(self, *what: object) -> None:
+        self.told += [*map(str, self.outbox.take()), what]
+
+    def hears(self, text: str, now: float) -> list[object]:
+        heard = frame(text)
+        assert self.supervision.receive(heard.identifier, heard.data, now)
+        return self.take()
+
+    def at(self, now: float) -> list[object]:
+        self.supervision.handle_timer(now)
+        return self.take()
+
+    def take(self) -> list[object]:
+        self.told += map(str, self.outbox.take())
+        told, self.told = self.told, []
+        return told
+
+
+def begun(**options: float) -> Exchange:
+    """Return one whose node was started at 10 s."""
+    exchange = Exchange(**options)
+    exchange.supervision.begin(10.0)
+    assert exchange.take() == [START, ('free', 10.05, True)]
+    return exchange
+
+
+def test_the_exchange_begins_anew_only_while_offline_and_for_a_reason() -> None:
+    exchange = begun()
+    assert exchange.hears('705#05', 10.01) == [('free', 10.01, True)], 'at last operational'
+    assert exchange.hears('705#05', 10.2) == [('free', 10.01, False)], 'nothing new'
+    exchange.online = True
+    assert exchange.hears('705#05', 10.3) == [('free', 10.01, False)]
+
+
+def test_a_node_that_stays_closed_moves_what_may_begin() -> None:
+    exchange = begun()
+    closed = ('closed', 'node is pre-operational', False)
+    assert exchange.hears('705#7F', 10.2) == [START, closed, ('free', 11.2, True)]
+    assert exchange.hears('705#7F', 10.25) == [('free', 11.25, True)], 'the same, for longer'
+    assert exchange.supervision.refusal(11.24) == 'drive offline: node is pre-operational'
+    assert exchange.supervision.refusal(11.25) == ''
+
+
+def test_a_restart_is_told_and_the_node_started_first() -> None:
+    exchange = begun()
+    exchange.online = True
+    assert exchange.hears('705#00', 12.0) == [
+        START, ('closed', 'the device restarted', True), ('free', 12.05, False)]
+    assert exchange.report.take() == [Noted('boot-up: the device has started')]
+    assert exchange.report.advice == 'the device restarted: waiting for it to answer'
+
+
+def test_heartbeats_that_cease() -> None:
+    exchange = begun(heartbeat_timeout=0.5)
+    exchange.online = True
+    exchange.supervision.node.online()
+    exchange.hears('705#05', 10.1)
+    assert exchange.supervision.next_timer() == pytest.approx(10.6)
+    assert exchange.at(10.59) == []
+    assert exchange.at(10.61) == [('silent', 'no heartbeat for 0.5 s')]
+    assert exchange.at(10.7) == []
+
+
+def test_a_node_that_is_not_used_is_only_listened_to() -> None:
+    exchange = begun(heartbeat_timeout=0.5)
+    exchange.supervision.stop()
+    for text in ('705#00', '705#7F', '085#1023030000000000'):
+        assert exchange.hears(text, 10.1) == []
+    assert exchange.at(20.0) == []
+    assert exchange.supervision.refusal(10.2) == ''
+    assert exchange.supervision.report.facts()['nmt_state'] == 'pre-operational'
+    assert exchange.supervision.report.ailing
+
+
+def test_frames_of_others_and_malformed_ones() -> None:
+    supervision = begun().supervision
+    assert not supervision.receive(0x706, b'\x05', 10.1)
+    assert not supervision.receive(0x485, bytes(8), 10.1)
+    with pytest.raises(RemoteProtocolError):
+        supervision.receive(0x705, b'', 10.1)
+    with pytest.raises(RemoteProtocolError):
+        supervision.receive(0x085, b'\x05', 10.1)
+
+
+@pytest.mark.parametrize(('name', 'place'), [
+    ('x2004.10', (0x2004, 0x10)), ('xA.0', (0xA, 0)), ('x20040.1', None), ('x2004.100', None),
+    ('X2004.10', None), ('x2004', None), ('p455', None)])
+def test_names_of_objects(name: str, place: tuple[int, int] | None) -> None:
+    assert object_of_name(name) == place
+    if place is not None:
+        assert object_of_name(name_of_object(*place)) == place
