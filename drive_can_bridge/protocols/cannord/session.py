@@ -31,7 +31,7 @@ from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.users import Users
 from drive_can_bridge.protocols.access import ChannelServer
 from drive_can_bridge.protocols.cannord import procedures
-from drive_can_bridge.protocols.cannord.channel import TaskChannel
+from drive_can_bridge.protocols.cannord.channel import TaskChannel, TaskCourier
 from drive_can_bridge.protocols.cannord.control import make_control
 from drive_can_bridge.protocols.cannord.identifiers import identifier, MessageObject
 from drive_can_bridge.protocols.cannord.monitoring import TimeoutWatch
@@ -88,10 +88,10 @@ class CannordSession(Session):
         self._extra = places > MAIN_VALUES
         self._main_response = drive.cyclic_response[:MAIN_VALUES]
         self._extra_response = drive.cyclic_response[MAIN_VALUES:]
-        self._channel = TaskChannel(
+        self._channel = TaskChannel(TaskCourier(
             ParameterLayout(options.value_order, options.index_byte),
             lambda payload, left: self.outbox.put(
-                Frame(self._task_identifier, payload, self._extended), left), self.retry)
+                Frame(self._task_identifier, payload, self._extended), left), self.retry))
         self._access = procedures.TaskAccess(
             self.retry, last_value=self._last_value, persist=options.persist_writes)
         # what only a master sends
