@@ -276,4 +276,5 @@ class AcyclicChannel(Channel[Step, Reply]):
     @property
     def outstanding(self) -> Read | None:
         """The read that waits for its answer, if any."""
-        return self.courier.outstanding
+        step = self.courier.step
+        return step if isinstance(step, Read) else None
