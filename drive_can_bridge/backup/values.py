@@ -7,9 +7,6 @@ from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import Parameter, ValueKind
 from drive_can_bridge.core.words import describe_type, show
 
-_KINDS = {ValueKind.DOUBLE: 'a number', ValueKind.INTEGER: 'an integer',
-          ValueKind.BOOL: 'true or false'}
-
 
 def value_in_file(parameter: Parameter, raw: int) -> str:
     """Write a raw integer as a value that YAML, rcl and :func:`raw_in_file` understand."""
@@ -45,7 +42,7 @@ def raw_in_file(parameter: Parameter, value: object) -> int:
         except ValueRefused:
             return _nearest_raw(parameter, value)
     raise ValueRefused(f'wrong type: {show(value)} is {describe_type(value)}, allowed is '
-                       f'{_KINDS[kind]}')
+                       f'{kind.words}')
 
 
 def _nearest_raw(parameter: Parameter, value: float) -> int:

@@ -17,8 +17,6 @@ from drive_can_bridge.core.parameters import Parameter, Value, ValueKind
 
 _HEADINGS = ('drive', 'name', 'value', 'unit', 'number', 'storage', 'result')
 _BOOLS = {'true': True, '1': True, 'false': False, '0': False}
-_EXPECTED = {ValueKind.DOUBLE: 'a number', ValueKind.INTEGER: 'an integer',
-             ValueKind.BOOL: 'true or false'}
 
 
 def add_parser(subparsers: Any) -> None:
@@ -94,8 +92,7 @@ def _write_one(drive: Drive, name: str, text: str,
     value = None if parameter is None else _value(parameter, text)
     if parameter is not None and value is None:
         outcomes.append((drive, WriteOutcome(
-            name, False, parameter, f'wrong type: {text!r}, expected {_EXPECTED[parameter.kind]}'
-        )))
+            name, False, parameter, f'wrong type: {text!r}, expected {parameter.kind.words}')))
         return
     drive.write({name: 0 if value is None else value},
                 told=lambda outcome: outcomes.append((drive, outcome)))

@@ -63,6 +63,15 @@ class ValueKind(Enum):
     INTEGER = 'integer'
     BOOL = 'bool'
 
+    @property
+    def words(self) -> str:
+        """What is a value of this kind, for whoever gave another: ``a number``."""
+        return _KIND_WORDS[self]
+
+
+_KIND_WORDS = {ValueKind.DOUBLE: 'a number', ValueKind.INTEGER: 'an integer',
+               ValueKind.BOOL: 'true or false'}
+
 
 class Access(Enum):
     """What a user may do with a parameter."""

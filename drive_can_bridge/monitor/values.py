@@ -15,9 +15,7 @@ _WIDTH = 8
 #: what a drive says about its states is read in hexadecimal
 _WORD_SUFFIX = 'word'
 _BOOLS = {'true': True, '1': True, 'on': True, 'false': False, '0': False, 'off': False}
-_KIND_WORDS = {ValueKind.BOOL: 'write true or false',
-               ValueKind.INTEGER: 'write an integer, such as 12 or 0x0C',
-               ValueKind.DOUBLE: 'write a number, such as 12.5'}
+_EXAMPLES = {ValueKind.INTEGER: ', such as 12 or 0x0C', ValueKind.DOUBLE: ', such as 12.5'}
 _PAIR = re.compile(r'(\w+)=(?:"([^"]*)"|(\S+))')
 
 
@@ -126,7 +124,8 @@ class ParameterInfo:
         except (KeyError, ValueError):
             value = math.nan
         if not math.isfinite(value):
-            raise ValueRefused(f'{printable(word)!r} is no value: {_KIND_WORDS[self.kind]}')
+            raise ValueRefused(f'{printable(word)!r} is no value: write {self.kind.words}'
+                               f'{_EXAMPLES.get(self.kind, "")}')
         return value
 
     @property

@@ -190,6 +190,18 @@ class Channel(Generic[StepT, ReplyT]):
 
     # -- input ------------------------------------------------------------------------------------
 
+    def receive(self, answer: Any, now: float) -> bool:
+        """
+        Take an answer, in the form that the courier wants; False: nobody asked for it.
+
+        :raises RemoteProtocolError: malformed, or not the answer to what is under way.
+        """
+        reply = self._courier.receive(answer, now)
+        if isinstance(reply, bool):
+            return reply
+        self.ended(reply, now)
+        return True
+
     def ended(self, reply: ReplyT, now: float) -> None:
         """Take the reply that ended the exchange under way (the courier has matched it)."""
         self.now = now

@@ -9,7 +9,9 @@ are paced. It knows nothing of procedures, lanes, repetitions and quarantine.
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable
 import math
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
+
+from drive_can_bridge.core.retry import RetryPolicy
 
 #: what an answer that does not say what it answers can be mistaken for
 ANYTHING: Hashable = 'anything'
@@ -23,35 +25,71 @@ class Courier(ABC, Generic[StepT, ReplyT]):
     """
     Does one exchange at a time, as a family does it.
 
+    What a family has to add: :meth:`begin` sends the request of a step, once it is noted down by
+    :meth:`expect`; :meth:`receive` makes a reply of an answer. That an exchange has its time, and
+    how it ends without an answer, is the same for all.
+
+    :param retry: how long and how often the drive is asked.
     :ivar anonymous: answers do not say what they answer.
+    :ivar step: what the exchange under way is for.
+    :ivar busy: an exchange is under way.
+    :ivar deadline: when :meth:`handle_timer` wants to be called because of it; infinity: never.
+    :ivar silent: the reply that says that nobody has answered.
     :ivar wake: to be called with the time when an exchange ended in another way than by
         :meth:`receive` and :meth:`handle_timer`, which then tells how.
     """
 
-    anonymous: bool = False
+    anonymous = busy = False
+    deadline = math.inf
+    step: StepT | None = None
+    silent: ReplyT
     wake: Callable[[float], None]
 
-    @property
-    @abstractmethod
-    def busy(self) -> bool:
-        """An exchange is under way."""
-
-    @property
-    @abstractmethod
-    def deadline(self) -> float:
-        """When :meth:`handle_timer` wants to be called because of it; infinity: never."""
+    def __init__(self, retry: RetryPolicy) -> None:
+        self.retry = retry
+        self._reply: ReplyT | bool = False  # that ends the exchange, but is no answer
 
     @abstractmethod
     def begin(self, step: StepT, now: float) -> None:
         """Begin an exchange; none is under way."""
 
-    @abstractmethod
+    def expect(self, step: StepT, until: float) -> None:
+        """Take note that an exchange has begun, and how long its answer is waited for."""
+        self.step, self.busy, self.deadline, self._reply = step, True, until, False
+
+    def receive(self, answer: Any, now: float) -> ReplyT | bool:
+        """
+        Take an answer, in the form that the family gives it.
+
+        :return: the reply that ends the exchange under way; True: it goes on; False: nobody
+            asked for this answer.
+        :raises RemoteProtocolError: it is malformed, or belongs to something else.
+        """
+        return False
+
+    def end(self, step: StepT, reply: ReplyT, now: float) -> None:
+        """End the exchange for a step, if it is still under way, by what is no answer."""
+        if self.step is step:
+            self._reply = reply
+            self.wake(now)
+
     def handle_timer(self, now: float) -> ReplyT | bool:
         """Return the reply that ends the exchange under way; False: none does."""
+        reply = self._reply
+        if reply is False:
+            if now < self.deadline:
+                return False
+            reply = self.silent
+        self.finish()
+        return reply
 
-    @abstractmethod
+    def finish(self) -> None:
+        """Take note that the exchange under way has ended."""
+        self.step, self.busy, self.deadline = None, False, math.inf
+
     def forget(self) -> None:
         """End the exchange under way, if any, without a reply; drop what waits."""
+        self.finish()
 
     @abstractmethod
     def attempts(self, step: StepT) -> int:
@@ -64,7 +102,7 @@ class Courier(ABC, Generic[StepT, ReplyT]):
     @property
     def silence(self) -> float:
         """How many s after its deadline an answer may still come."""
-        return 0.0
+        return self.retry.timeout
 
     def abandon(self, until: float) -> None:
         """Wait for the answer under way until then at most, where others have to wait for it."""

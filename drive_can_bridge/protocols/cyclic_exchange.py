@@ -128,12 +128,19 @@ class CyclicExchange(Generic[TelegramT]):
             if self.cycles_left == 0:
                 self._ended(now)
 
-    def next_turn(self, earliest: float) -> float:
-        """Return the time from ``earliest`` on at which cycles may begin."""
-        phase = self._session.phase
-        if phase is None:
-            return earliest
-        return earliest + (phase - earliest) % self._session.configuration.period
+    def start(self, now: float, *, in_turn: bool = False) -> None:
+        """
+        Let the first cycle follow, a period after the last one at least.
+
+        :param in_turn: it waits for the turn of this drive, if it has one.
+        """
+        self.cycles_left = -1
+        self._book.missed_in_row = 0
+        period, phase = self._session.configuration.period, self._session.phase
+        first = max(now, self._timer.began_at + period)
+        if in_turn and phase is not None:
+            first += (phase - first) % period
+        self._timer.start(first)
 
     # -- the end ----------------------------------------------------------------------------------
 

@@ -38,8 +38,6 @@ BOOT_TIME = 0.5
 #: s without power, where a fault does not say
 _POWER_CUTS = {FaultKind.RESTART: BOOT_TIME, FaultKind.FORGET: BOOT_TIME,
                FaultKind.POWER_CUT: 5.0, FaultKind.OFF: math.inf}
-_KINDS = {ValueKind.BOOL: 'true or false', ValueKind.INTEGER: 'an integer',
-          ValueKind.DOUBLE: 'a number'}
 
 
 @dataclass(frozen=True, slots=True)
@@ -381,4 +379,4 @@ def _value(parameter: Parameter, text: str) -> Value:
         return int(text, 0) if parameter.kind is ValueKind.INTEGER else float(text)
     except (KeyError, ValueError):
         raise ValueRefused(f"'{text}' is no value of {parameter.name}, which is "
-                           f'{_KINDS[parameter.kind]}') from None
+                           f'{parameter.kind.words}') from None

@@ -15,7 +15,6 @@ between, and look like the response to that write.
 
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass
-import math
 from typing import NamedTuple
 
 from drive_can_bridge.core.errors import RemoteProtocolError
@@ -60,6 +59,8 @@ class Reply(NamedTuple):
     sent: bool = True
 
 
+SILENT = Reply(None)
+NOT_SENT = Reply(None, sent=False)
 
 
 class TaskCourier(Courier[Ask, Reply]):
@@ -71,42 +72,24 @@ class TaskCourier(Courier[Ask, Reply]):
     :param retry: how long and how often the inverter is asked.
     """
 
-    busy = False
-    deadline = math.inf
-
     def __init__(self, layout: ParameterLayout, send: Callable[[bytes, Left], None],
                  retry: RetryPolicy) -> None:
-        self._retry = retry
+        super().__init__(retry)
         self._layout = layout
         self._send = send
-        self._task: Ask | None = None
-        self._contrary: ParameterFrame | None = None
-        self._refused = False   # the bus did not take it
-
-    @property
-    def silence(self) -> float:
-        return self._retry.timeout
 
     def begin(self, step: Ask, now: float) -> None:
-        self._task, self._contrary, self._refused = step, None, False
-        self.busy = True
-        self.deadline = now + self._retry.timeout
+        self.silent = SILENT
+        self.expect(step, now + self.retry.timeout)
 
         def left(sent: bool, then: float) -> None:
             # a read that the bus refused is repeated when its time is over
-            if not sent and self._task is step and step.task not in READS:
-                self._refused = True
-                self.wake(then)
+            if not sent and step.task not in READS:
+                self.end(step, NOT_SENT, then)
         self._send(self._layout.encode(step.task, step.number, step.index, step.value), left)
 
-    def receive(self, data: bytes) -> Reply:
-        """
-        Take a parameter frame of the inverter.
-
-        :raises RemoteProtocolError: malformed, or not the response to the task under way.
-        """
-        response = self._layout.decode(data)
-        task = self._task
+    def receive(self, answer: bytes, now: float) -> Reply:
+        response, task = self._layout.decode(answer), self.step
         if task is None:
             raise RemoteProtocolError('parameter response that nobody asked for')
         if not _belongs(response, task):
@@ -115,49 +98,23 @@ class TaskCourier(Courier[Ask, Reply]):
                                       f'task {task.task} for P{task.number}.{task.index}')
         if task.task not in READS and response.identifier != Response.REFUSED and not _echoes(
                 response, task):
-            self._contrary = response
+            self.silent = Reply(None, response)
             raise RemoteProtocolError(f'response to writing P{task.number}.{task.index} with '
                                       'another value')
-        self.forget()
+        self.finish()
         return Reply(response)
 
-    def handle_timer(self, now: float) -> Reply | bool:
-        if not self._refused and now < self.deadline:
-            return False
-        reply = Reply(None, None if self._refused else self._contrary, sent=not self._refused)
-        self.forget()
-        return reply
-
-    def forget(self) -> None:
-        self._task = None
-        self.busy = False
-        self.deadline = math.inf
-
     def attempts(self, step: Ask) -> int:
-        return self._retry.attempts if step.task in READS else 1
+        return self.retry.attempts if step.task in READS else 1
 
     def unanswered(self, step: Ask, reply: Reply) -> bool:
-        return reply.response is None and reply.sent
+        return reply is self.silent
 
     def key(self, step: Ask) -> Hashable:
         return step.number, step.index
 
 
-class TaskChannel(Channel[Ask, Reply]):
-    """Runs procedures, one task at a time. See :class:`TaskCourier` for the parameters."""
-
-    def __init__(self, layout: ParameterLayout, send: Callable[[bytes, Left], None],
-                 retry: RetryPolicy) -> None:
-        self.courier = TaskCourier(layout, send, retry)
-        super().__init__(self.courier)
-
-    def receive(self, data: bytes, now: float) -> None:
-        """
-        Take a parameter frame of the inverter.
-
-        :raises RemoteProtocolError: malformed, or not the response to the task under way.
-        """
-        self.ended(self.courier.receive(data), now)
+TaskChannel = Channel[Ask, Reply]
 
 
 def _belongs(response: ParameterFrame, task: Ask) -> bool:

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.errors import RemoteProtocolError
-from drive_can_bridge.core.events import ForeignMasterSeen, ProcessDataReceived
+from drive_can_bridge.core.events import ForeignMasterSeen
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.process_image import ProcessImage
 from drive_can_bridge.core.roles import publish_it, Roles
@@ -31,15 +31,16 @@ from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.users import Users
 from drive_can_bridge.protocols.access import ChannelServer
 from drive_can_bridge.protocols.cannord import procedures
-from drive_can_bridge.protocols.cannord.channel import TaskChannel
+from drive_can_bridge.protocols.cannord.channel import TaskChannel, TaskCourier
 from drive_can_bridge.protocols.cannord.control import make_control
 from drive_can_bridge.protocols.cannord.identifiers import identifier, MessageObject
 from drive_can_bridge.protocols.cannord.monitoring import TimeoutWatch
 from drive_can_bridge.protocols.cannord.parameter_frame import ParameterLayout
 from drive_can_bridge.protocols.cannord.process_data import (
-    decode_extra, decode_main, encode_extra, encode_main, EXTRA_LENGTH, main_length, MAIN_VALUES,
+    decode_main, encode_extra, encode_main, EXTRA_LENGTH, main_length, MAIN_VALUES,
     values_needed,
 )
+from drive_can_bridge.protocols.cannord.samples import Samples
 from drive_can_bridge.protocols.cannord.states import (
     CONTROL_PARAMETER, is_faulted, STATUS_PARAMETER,
 )
@@ -86,14 +87,13 @@ class CannordSession(Session):
         self._swap: bool = options.swap_setpoints_2_3
         self._length = main_length(min(places, MAIN_VALUES))
         self._extra = places > MAIN_VALUES
-        self._main_response = drive.cyclic_response[:MAIN_VALUES]
-        self._extra_response = drive.cyclic_response[MAIN_VALUES:]
-        self._channel = TaskChannel(
+        self._samples = Samples(self)
+        self._channel = TaskChannel(TaskCourier(
             ParameterLayout(options.value_order, options.index_byte),
             lambda payload, left: self.outbox.put(
-                Frame(self._task_identifier, payload, self._extended), left), self.retry)
+                Frame(self._task_identifier, payload, self._extended), left), self.retry))
         self._access = procedures.TaskAccess(
-            self.retry, last_value=self._last_value, persist=options.persist_writes)
+            self.retry, last_value=self._samples.last, persist=options.persist_writes)
         # what only a master sends
         self._masters = {self.request_identifier, self._task_identifier,
                          group and group.broadcast}
@@ -107,10 +107,7 @@ class CannordSession(Session):
             self, self._book, self._encode, slot=0,
             left=None if group is None else group.cycle_left,
             ended=lambda _: self.stop_left())
-        self._cycling = self._stopping = self._awaiting_extra = False
-        self._held: ProcessDataReceived | None = None   # until values 4 and 5 arrive
-        self._extra_missing = False
-        self._last_sample: tuple[int, ...] = ()
+        self._cycling = self._stopping = False
         self._answer_due = math.inf
 
     # -- life cycle -------------------------------------------------------------------------------
@@ -146,13 +143,8 @@ class CannordSession(Session):
     def begin(self, now: float) -> None:
         self._stopping = False
         self._expect_nothing()
-        self._book.missed_in_row = 0
-        self._exchange.cycles_left = -1
         self._cycling = True
-        if self._led:
-            self._timer.stop()
-            return
-        self._timer.start(max(now, self._timer.began_at + self.configuration.period))
+        self._exchange.start(math.inf if self._led else now)    # those of the leader are for all
         if self.told.owed:
             self._timer.hurry(now)
 
@@ -169,9 +161,7 @@ class CannordSession(Session):
         self._timeout.forget()
 
     def went_offline(self) -> None:
-        self._held = None
-        self._last_sample = ()
-        self._extra_missing = False
+        self._samples.forget()
         self._timeout.warning = ''
         if self._group is not None:
             self._group.member_lost(self)
@@ -223,18 +213,15 @@ class CannordSession(Session):
         self._settle(now)
         self._book.awaiting = True
         self._book.began_at = now
-        self._awaiting_extra = self._extra
+        self._samples.awaiting = self._extra
         self._answer_due = until
 
     def _settle(self, now: float) -> None:
         """End an exchange: what has not arrived by now does not count for it any more."""
         self._answer_due = math.inf
-        self._awaiting_extra = False
-        if self._held is not None:
-            self._extra_missing = True
-            self._publish_held()
-        if (self._book.awaiting and self._book.missed()
-                and not self._stopping):
+        if self._samples.awaiting:
+            self._samples.settle()
+        if self._book.awaiting and self._book.missed() and not self._stopping:
             self._book.missed_in_row = 0
             if self.online:
                 self.lose(f'{NO_ANSWER} for {self.configuration.missed_limit} cycles', now)
@@ -244,38 +231,32 @@ class CannordSession(Session):
     def _expect_nothing(self) -> None:
         """Expect no answer any more; one that is on its way is no surprise, though."""
         self._book.expect_nothing()
-        self._book.stale += self._awaiting_extra
-        self._awaiting_extra = False
+        self._book.stale += self._samples.expect_nothing()
         self._answer_due = math.inf
-        self._held = None
 
     def receive_frame(self, frame: Frame, now: float, age: float = 0.0) -> None:
         received, data, extended = frame
-        if extended != self._extended:
-            self.report.reject(f'{frame}: not of this drive')
-        elif received == self._response_identifier:
-            if len(data) == EXTRA_LENGTH:
-                self._receive_extra(data)
-            else:
-                self._receive_main(data, now, now - age)
-        elif received == self._task_response_identifier:
-            try:
+        try:
+            if extended != self._extended:
+                self.report.reject(f'{frame}: not of this drive')
+            elif received == self._response_identifier:
+                if len(data) == EXTRA_LENGTH:
+                    self._receive_extra(data)
+                else:
+                    self._receive_main(data, now, now - age)
+            elif received == self._task_response_identifier:
                 self._channel.receive(data, now)
-            except RemoteProtocolError as error:
-                self.report.reject(str(error))
-        elif received in self._masters:
-            self.report.note(ForeignMasterSeen(
-                f'another master sends to station {self.configuration.station}: {frame}'))
-        else:
-            self.report.reject(f'{frame}: not of this drive')
+            elif received in self._masters:
+                self.report.note(ForeignMasterSeen(
+                    f'another master sends to station {self.configuration.station}: {frame}'))
+            else:
+                self.report.reject(f'{frame}: not of this drive')
+        except RemoteProtocolError as error:
+            self.report.reject(str(error))
 
     def _receive_main(self, data: bytes, now: float, received_at: float) -> None:
         """Take status word and actual values. The fast path of the reader."""
-        try:
-            word, values = decode_main(data, swap=self._swap)
-        except RemoteProtocolError as error:
-            self.report.reject(str(error))
-            return
+        word, values = decode_main(data, swap=self._swap)
         book = self._book
         asked = book.awaiting
         if asked:
@@ -300,54 +281,16 @@ class CannordSession(Session):
             self._group.member_status(self, word, now)
         if not self.online:         # found again by a stop
             return
-        wanted = self._main_response
-        raws = (word, *(parameter.raw_from_word(value)
-                        for parameter, value in zip(wanted, values)))
-        if len(values) < len(wanted):
-            self.report.reject(f'process data with {len(values)} values, {len(wanted)} needed')
-        elif asked and len(data) < self._length:
+        if self._samples.take(word, values, received_at, asked=asked) and asked and (
+                len(data) < self._length):
             self.statistics.short += 1
-        if self._held is not None:      # its values 4 and 5 would come after these
-            self._publish_held()
-        sample = ProcessDataReceived(raws, received_at)
-        if asked and self._awaiting_extra and self._extra_response and len(
-                raws) > len(wanted):
-            self._held = sample
-        else:
-            self._publish(sample)
 
     def _receive_extra(self, data: bytes) -> None:
         """Take actual values 4 and 5."""
-        if not self._awaiting_extra:
-            if not self._book.take_stale():
-                self.report.reject('additional process data that nobody asked for')
-            return
-        self._awaiting_extra = False
-        held, self._held = self._held, None
-        if held is not None:    # else: nobody wants them, or what they belong to did not come
-            self._extra_missing = False
-            values = (parameter.raw_from_word(value) for parameter, value
-                      in zip(self._extra_response, decode_extra(data)))
-            self._publish(ProcessDataReceived((*held.raws, *values), held.received_at))
-
-    def _publish_held(self) -> None:
-        held, self._held = self._held, None
-        if held is not None:
-            self._publish(held)
-
-    def _publish(self, sample: ProcessDataReceived) -> None:
-        self.gate.measured(sample.raws)
-        self._last_sample = (*sample.raws, *self._last_sample[len(sample.raws):])
-        self.report.note(sample)
-
-    # -- parameters -------------------------------------------------------------------------------
-
-    def _last_value(self, name: str) -> int | None:
-        """Return the raw integer of a parameter that was received last."""
-        for parameter, raw in zip(self.sample_parameters, self._last_sample):
-            if parameter.name == name:
-                return raw
-        return None
+        if self._samples.awaiting:
+            self._samples.take_extra(data)
+        elif not self._book.take_stale():
+            self.report.reject('additional process data that nobody asked for')
 
     # -- timer ------------------------------------------------------------------------------------
 
@@ -370,10 +313,7 @@ class CannordSession(Session):
 
     @property
     def warning(self) -> str:
-        if self._timeout.warning or not self._extra_missing:
-            return self._timeout.warning
-        return ('values 4 and 5 do not arrive: the drive does not answer the additional '
-                'frame; extra_setpoints is for SK 540E and SK 545E')
+        return self._timeout.warning or self._samples.warning
 
     # -- as one of a broadcast group --------------------------------------------------------------
 

@@ -115,87 +115,71 @@ class MailboxCourier(Courier[Step, Reply]):
 
     def __init__(self, send: Callable[[Message, Left], None], *, order: str,
                  retry: RetryPolicy) -> None:
-        self._retry = retry
+        super().__init__(retry)
         self._send = send
         self._order = order
         self._synchronised = False
         self._toggle = False            # of the last request
-        self._step: Step | None = None
         self._request: Message | None = None
-        self._deadline = math.inf
+        self._until = math.inf          # an answer counts; the deadline may be a moment before
         self._abandoned = False
         self._refused_at: float | None = None   # the bus did not take the request
         self._late = False                      # at first
         self._patience = 0.0                    # s that an answer has if it did at once
 
-    @property
-    def busy(self) -> bool:
-        return self._step is not None
-
-    @property
-    def deadline(self) -> float:
-        if self._refused_at is None or not self._waits_for_nobody:
-            return self._deadline
-        return min(self._deadline, self._refused_at + REFUSED_PAUSE)
-
     def attempts(self, step: Step) -> int:
         # What takes more than one write tells what may be executed twice, and what may not.
-        return (step.attempts or self._retry.attempts) if isinstance(step, Read) else 1
+        return (step.attempts or self.retry.attempts) if isinstance(step, Read) else 1
 
     def unanswered(self, step: Step, reply: Reply) -> bool:
         return isinstance(reply, Silence) and isinstance(step, Read)
 
     def begin(self, step: Step, now: float) -> None:
-        if self._step is not None:
+        if self.busy:
             raise RuntimeError('an exchange is under way')
-        self._step = step
+        self.expect(step, math.inf)     # until its request is made
         if self._synchronised or isinstance(step, Write) and step.blind:
             self._send_step(step, now)
             return
         self._request = pkw.idle_request()
-        self._deadline = now + min(self._retry.timeout, SYNCHRONISATION_TIMEOUT)
+        self.deadline = self._until = now + min(self.retry.timeout, SYNCHRONISATION_TIMEOUT)
         self._send(self._request, self._left)
 
     def abandon(self, until: float) -> None:
         """Wait for the answer under way until then at most; the step is not gone on with."""
-        if self._step is not None:
+        if self.busy:
             self._abandoned = True
-            self._deadline = min(self._deadline, until)
+            self._until = min(self._until, until)
+            self.deadline = min(self.deadline, until)
 
-    def receive(self, message: Message, now: float) -> Reply | bool:
-        """
-        Take a response.
-
-        :return: the reply that ends the exchange; True where it goes on; False for a response
-            that nobody asked for.
-        """
-        request, step = self._request, self._step
+    def receive(self, answer: Message, now: float) -> Reply | bool:
+        request, step = self._request, self.step
         if request is None or step is None:
             return False
         if request.code == Function.NONE:
-            if message.code != Function.NONE:
+            if answer.code != Function.NONE:
                 return False
             self._synchronised = True
             if self._abandoned:
-                self._end()
+                self.finish()
                 return Silence(sent=False)
             self._send_step(step, now)
             return True
-        if not pkw.answers(message, request):
+        if not pkw.answers(answer, request):
             return False
         self._synchronised = True
-        self._end()
-        if message.code == Function.ERROR:
-            return Refused(refusals.code_from_words(message.words, self._order))
-        return Answered(message.words)
+        self.finish()
+        if answer.code == Function.ERROR:
+            return Refused(refusals.code_from_words(answer.words, self._order))
+        return Answered(answer.words)
 
     def handle_timer(self, now: float) -> Reply | bool:
-        request, step = self._request, self._step
+        request, step = self._request, self.step
         if request is None or step is None:
             return False
         if self._refused_at is not None:
             return self._try_again(step, self._refused_at, now)
-        if now < self._deadline:
+        if now < self._until:
             return False
         if self._abandoned:
             sent = request.code != Function.NONE
@@ -212,13 +196,12 @@ class MailboxCourier(Courier[Step, Reply]):
 
     def forget(self) -> None:
         """Expect nothing any more; what the device's last function byte is, is unknown."""
-        self._end()
+        self.finish()
         self._synchronised = False
 
-    def _end(self) -> None:
-        self._step = None
+    def finish(self) -> None:
+        super().finish()
         self._request = None
-        self._deadline = math.inf
         self._abandoned = self._late = False
         self._refused_at = None
 
@@ -228,53 +211,42 @@ class MailboxCourier(Courier[Step, Reply]):
             return
         if sent:
             if self._late:
-                self._deadline = max(self._deadline, now + 0.5 * self._patience)
+                self.deadline = self._until = max(self._until, now + 0.5 * self._patience)
             return
         self._refused_at = now
+        if self._waits_for_nobody:
+            self.deadline = min(self._until, now + REFUSED_PAUSE)
         if self._request.code != Function.NONE:
             self._toggle = not self._toggle     # the device has not seen this one
 
     @property
     def _waits_for_nobody(self) -> bool:
-        return isinstance(self._step, Write) and self._step.blind
+        return isinstance(self.step, Write) and self.step.blind
 
     def _try_again(self, step: Step, refused_at: float, now: float) -> Reply | bool:
         """Go on after a refusal: a read ends when its time is over, a write at once."""
         again = self._waits_for_nobody
-        if now >= self._deadline or self._abandoned or isinstance(step, Write) and not again:
-            self._end()     # what the device's last function byte is, is as known as before
+        if now >= self._until or self._abandoned or isinstance(step, Write) and not again:
+            self.finish()   # what the device's last function byte is, is as known as before
             return Silence(sent=False, refused=True)
         if again and now >= refused_at + REFUSED_PAUSE:
-            deadline, self._refused_at, self._late = self._deadline, None, True
+            until, self._refused_at, self._late = self._until, None, True
             self._send_step(step, now)
-            self._deadline = deadline
+            self.deadline = self._until = until
         return False
 
     def _send_step(self, step: Step, now: float) -> None:
         # inverted after function 00h, too: a late answer to the request before never fits
         self._toggle = not self._toggle
-        timeout = self._retry.timeout
+        timeout = self.retry.timeout
         if isinstance(step, Read):
             self._request = pkw.read_request(step.address, step.count, self._toggle)
         else:
             self._request = pkw.write_request(step.address, step.words, self._toggle)
             timeout = timeout if step.timeout is None else step.timeout
         self._patience = timeout
-        self._deadline = now + timeout
+        self.deadline = self._until = now + timeout
         self._send(self._request, self._left)
 
 
-class MailboxChannel(Channel[Step, Reply]):
-    """Runs procedures through a mailbox."""
-
-    def __init__(self, mailbox: MailboxCourier) -> None:
-        super().__init__(mailbox)
-        self.mailbox = mailbox
-
-    def receive(self, message: Message, now: float) -> bool:
-        """Take a response; False: nobody asked for it."""
-        reply = self.mailbox.receive(message, now)
-        if isinstance(reply, bool):
-            return reply
-        self.ended(reply, now)
-        return True
+MailboxChannel = Channel[Step, Reply]

@@ -7,7 +7,10 @@ Requests of users, a control or status word without a slot in cyclic telegrams, 
 
 from collections.abc import Callable
 import math
+from typing import Union
 
+from drive_can_bridge.core.errors import RemoteProtocolError
+from drive_can_bridge.core.events import ForeignMasterSeen
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.roles import Cells
@@ -17,9 +20,9 @@ from drive_can_bridge.protocols.access import ChannelServer
 from drive_can_bridge.protocols.datamodel import procedures
 from drive_can_bridge.protocols.datamodel.acyclic_control import AcyclicControl, CONTROL_WORD
 from drive_can_bridge.protocols.datamodel.channel import (
-    AcyclicChannel, Polling, Reply, Step, Words, Write,
+    AcyclicChannel, Polling, Read, Reply, Step, Words, Write,
 )
-from drive_can_bridge.protocols.datamodel.extended import SLOTS
+from drive_can_bridge.protocols.datamodel.extended import PAYLOAD, SLOTS
 from drive_can_bridge.protocols.datamodel.options import DataModelOptions
 from drive_can_bridge.protocols.datamodel.process_words import slot_of
 from drive_can_bridge.protocols.datamodel.stop_writes import (
@@ -34,6 +37,7 @@ class AcyclicSide:
 
     :param encode_read: (number, count) -> frame.
     :param encode_write: (number, words) -> frame.
+    :param decode: makes words of an answer, given the read that waits for one.
     :param together: parameters that fit one write frame.
     :param stop_ended: called when a stop by acyclic writes has run its course.
     :param polling: given where the exchange itself goes through the channel.
@@ -43,11 +47,13 @@ class AcyclicSide:
     """
 
     def __init__(self, session: Session, *, encode_read: Callable[[int, int], Frame],
-                 encode_write: Callable[[int, Words], Frame], together: int,
+                 encode_write: Callable[[int, Words], Frame],
+                 decode: Callable[[Frame, Union[Read, None]], Words], together: int,
                  stop_ended: Callable[[], None], polling: Polling | None = None) -> None:
         drive, options = session.configuration, session.configuration.options
         self.offset: int = options.parameter_offset
         self._session = session
+        self._decode = decode
         # where each of ``request_parameters`` is written by number
         self._sent_by_number = {
             (parameter.number or 0) + self.offset: place
@@ -85,6 +91,26 @@ class AcyclicSide:
         self.stop.forget()
         if self.control_writer is not None:
             self.control_writer.stop()
+
+    # -- frames from the drive, or its address ----------------------------------------------------
+
+    def receive(self, frame: Frame, now: float) -> None:
+        """Take an answer: to the outstanding read, or to nothing."""
+        session = self._session
+        try:
+            words = self._decode(frame, self.channel.outstanding)
+        except RemoteProtocolError as error:
+            session.report.reject(str(error))
+            return
+        if len(frame.data) != PAYLOAD:
+            session.statistics.short += 1
+        self.channel.receive(words, now)
+
+    def foreign_master(self, frame: Frame) -> None:
+        """Take note of a request that is not ours."""
+        session = self._session
+        session.report.note(ForeignMasterSeen(
+            f'another master sends requests to station {session.configuration.station}: {frame}'))
 
     # -- control and status word without a slot ---------------------------------------------------
 

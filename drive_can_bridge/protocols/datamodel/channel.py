@@ -100,20 +100,17 @@ class ParameterCourier(Courier[Step, Reply]):
 
     See :class:`AcyclicChannel` for the parameters.
 
-    :ivar outstanding: the read that waits for its answer, if any.
     :ivar asked_at: when the last read was sent.
     :ivar free_at: when the next write to RAM may follow.
     """
 
-    busy = False
-    deadline = math.inf
+    silent = None
 
     def __init__(self, encode_read: Callable[[int, int], Frame],
                  encode_write: Callable[[int, Words], Frame], send: Send, *,
                  retry: RetryPolicy, eeprom_gap: float,
                  wrote: Callable[[Write], None], polling: Polling | None) -> None:
-        self.retry = retry
-        self.outstanding: Read | None = None
+        super().__init__(retry)
         self.asked_at = -math.inf
         self.free_at = -math.inf
         self.anonymous = polling is not None
@@ -123,8 +120,6 @@ class ParameterCourier(Courier[Step, Reply]):
         self._wrote = wrote
         self._eeprom_gap = eeprom_gap
         self._polling = polling
-        self._writing: Write | None = None  # handed out; nobody has said whether it left
-        self._left: bool | None = None      # now somebody has
         self._eeprom_free_at = -math.inf
         self._stop_wait_until = -math.inf   # whatever the EEPROM's gap may be
         self._first: tuple[Write, Left] | None = None
@@ -136,53 +131,36 @@ class ParameterCourier(Courier[Step, Reply]):
 
     # -- one exchange -----------------------------------------------------------------------------
 
+    @property
+    def outstanding(self) -> Read | None:
+        """The read that waits for its answer, if any."""
+        return self.step if isinstance(self.step, Read) else None
+
     def begin(self, step: Step, now: float) -> None:
-        self.busy = True
         if isinstance(step, Read):
             self._emit(self._encode_read(step.number, step.count), None)
-            self.outstanding = step
             self.asked_at = now
-            self.deadline = now + (self.retry.timeout if step.timeout is None else step.timeout)
+            self.expect(step, now + (
+                self.retry.timeout if step.timeout is None else step.timeout))
             return
-        self._writing, self._left = step, None
-        self.deadline = math.inf
+        self.expect(step, math.inf)     # it ends when somebody says whether it left
+        self.write(step, lambda sent, then: self.end(step, SENT if sent else None, then), now)
 
-        def left(sent: bool, then: float) -> None:
-            if self._writing is step:  # else it was forgotten meanwhile
-                self._left = sent
-                self.wake(then)
-        self.write(step, left, now)
-
-    def answered(self, now: float) -> None:
-        """End the exchange under way: its answer has come."""
-        self.forget_exchange()
+    def receive(self, answer: Words, now: float) -> Words:
+        """Take the answer of the outstanding read (the caller has matched it)."""
+        self.finish()
         if self.anonymous:  # a second answer, if there is one, must not meet the next read
             self.free_at = max(self.free_at, now + SPACING)
-
-    def handle_timer(self, now: float) -> Reply | bool:
-        if self._writing is None:
-            if now < self.deadline:
-                return False
-        elif self._left is None:
-            return False
-        sent = self._writing is not None and self._left
-        self.forget_exchange()
-        return SENT if sent else None
+        return answer
 
     def time_lost(self, now: float) -> Reply | bool:
         if self.outstanding is None or not self.anonymous:
             return False    # its answer will say what it answers
-        self.forget_exchange()
+        self.finish()
         return None
 
-    def forget_exchange(self) -> None:
-        """End the exchange under way."""
-        self.busy = False
-        self.deadline = math.inf
-        self.outstanding = self._writing = None
-
     def forget(self) -> None:
-        self.forget_exchange()
+        self.finish()
         self._first = None
         self._urgent.clear()
 
@@ -298,9 +276,5 @@ class AcyclicChannel(Channel[Step, Reply]):
     @property
     def outstanding(self) -> Read | None:
         """The read that waits for its answer, if any."""
-        return self.courier.outstanding
-
-    def receive(self, words: Words, now: float) -> None:
-        """Take the answer of the outstanding read (the caller has matched it)."""
-        self.courier.answered(now)
-        self.ended(words, now)
+        step = self.courier.step
+        return step if isinstance(step, Read) else None

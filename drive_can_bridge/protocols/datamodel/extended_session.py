@@ -24,24 +24,21 @@ import math
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.drive_state import DriveState
-from drive_can_bridge.core.errors import RemoteProtocolError
-from drive_can_bridge.core.events import (
-    Event, ForeignMasterSeen, MappingDiffered, Noted, ProcessDataReceived,
-)
+from drive_can_bridge.core.events import Event, MappingDiffered, ProcessDataReceived
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.cyclic_exchange import CYCLE, CyclicExchange
 from drive_can_bridge.protocols.datamodel import extended
 from drive_can_bridge.protocols.datamodel.acyclic_side import AcyclicSide, map_cells
-from drive_can_bridge.protocols.datamodel.map_supervision import MapSupervision, Verdict
-from drive_can_bridge.protocols.datamodel.positions import PAUSE, Positions
+from drive_can_bridge.protocols.datamodel.map_supervision import (
+    MapSupervision, SILENT_LOOKS, Verdict,
+)
+from drive_can_bridge.protocols.datamodel.positions import Positions
 from drive_can_bridge.protocols.datamodel.process_words import CyclicCodec, wire_numbers
 from drive_can_bridge.protocols.datamodel.stop_writes import ANSWER_TIME, ATTEMPTS
 from drive_can_bridge.protocols.exchange_book import ExchangeBook
 
-#: so many looks at the maps in a row may go unanswered until that is told
-SILENT_LOOKS = 3
 #: direction and station of an identifier
 FROM_WHOM = extended.DIR | extended.STATION_MASK
 
@@ -63,6 +60,7 @@ class ExtendedSession(Session):
     def __init__(self, drive: DriveConfiguration) -> None:
         table = drive.profile.control
         station, options = drive.station, drive.options
+        strict: bool = options.length_policy == 'strict'
         control = None if table is None else ControlMachine(table, timeout=drive.control_timeout)
         super().__init__(drive, control, roles=Roles(
             drive, controlled=table is not None, maps=map_cells(options)))
@@ -71,13 +69,14 @@ class ExtendedSession(Session):
             encode_read=lambda number, count: extended.encode_read_request(
                 station, number, count),
             encode_write=lambda number, words: extended.encode_write(station, number, words),
+            decode=lambda frame, step: extended.decode_answer(
+                frame, station, None if step is None else step.key, strict=strict),
             together=extended.SLOTS, stop_ended=self._stop_ended)
         self._channel = self._side.channel
         self._verify: bool = options.mapping != 'assume'
-        self._strict: bool = options.length_policy == 'strict'
         self._codec = CyclicCodec(
             station, drive.cyclic_request, drive.cyclic_response,
-            control_slot=self._side.control_slot, strict=self._strict)
+            control_slot=self._side.control_slot, strict=strict)
         self._request_identifier = self._codec.request_identifier
         self._response_identifier = self._codec.response_identifier
         offset = self._side.offset
@@ -88,14 +87,16 @@ class ExtendedSession(Session):
             response=wire_numbers(drive.cyclic_response, offset),
             rewrite=options.mapping == 'configure',
             emit=self._maps_reported, judged=self._maps_judged)
-        self._positions = Positions(self._channel, self.setpoints, offset, self._positions_read)
+        self._positions = Positions(
+            self, self._channel, offset, known=self._start_cycling,
+            # it may have started anew meanwhile, with other maps
+            silent=self._maps.look_afresh if self._verify else None)
         self._book = ExchangeBook(drive, self.statistics)
         self._timer = self._book.timer
         self._exchange = CyclicExchange(
             self, self._book, self._codec.encode_request, slot=self._side.control_slot,
             ended=self._last_cycle_left)
         self._phase = Phase.IDLE
-        self._silent_looks = 0
         self._stopping = False
         self._differs = False  # what the last look at the maps found
 
@@ -160,7 +161,6 @@ class ExtendedSession(Session):
     # -- maps -------------------------------------------------------------------------------------
 
     def _maps_judged(self, verdict: Verdict, text: str, now: float) -> None:
-        self._silent_looks = self._silent_looks + 1 if verdict is Verdict.SILENT else 0
         if verdict is Verdict.AGREE:
             self._differs = False
             if self._phase is not Phase.CYCLIC:
@@ -190,8 +190,8 @@ class ExtendedSession(Session):
         elif self._phase is Phase.LEAVING:
             self._maps.look_at = math.inf  # that comes after the last neutral cycle
         elif self._phase is Phase.CYCLIC:  # there, the cyclic answers tell who is there
-            if self._silent_looks == SILENT_LOOKS:
-                self.report.note(Noted(self._maps_unknown, warning=True))
+            if self._maps.silent_looks == SILENT_LOOKS:
+                self.report.warn(self._maps.unknown)
         else:
             self._phase = Phase.CHECKING
             self.report.advice = ('no answer to mapping read: drive silent, wrong station, bit '
@@ -218,25 +218,10 @@ class ExtendedSession(Session):
             self._timer.stop()
             self._positions.read(now)
 
-    def _positions_read(self, answered: bool, now: float) -> None:
-        if self.setpoints.known:
-            self._start_cycling(now)
-            return
-        self.report.advice = self.setpoints.untold_text
-        if answered:    # but the setpoint cannot carry it
-            self._positions.due = now + PAUSE
-        elif self._verify:  # it may have started anew meanwhile, with other maps
-            self._maps.look_afresh(now)
-        else:
-            self._positions.read(now)   # paced by the time-out of the read
-
     def _start_cycling(self, now: float) -> None:
         self._phase = Phase.CYCLIC
-        self._exchange.cycles_left = -1
         self._book.stale = 0
-        self._book.missed_in_row = 0
-        self._timer.start(self._exchange.next_turn(
-            max(now, self._timer.began_at + self.configuration.period)))
+        self._exchange.start(now, in_turn=True)
         self.report.advice = 'no cyclic response: drive silent or response identifier taken'
 
     def _cycle(self, now: float) -> None:
@@ -294,20 +279,9 @@ class ExtendedSession(Session):
             self._receive_cyclic(frame[1], now, now - age)
             return
         if frame.extended and frame.identifier & FROM_WHOM == self._request_identifier & FROM_WHOM:
-            self.report.note(ForeignMasterSeen(
-                f'another master sends requests to station {self.configuration.station}: {frame}'))
-            return
-        step = self._channel.outstanding
-        try:
-            words = extended.decode_answer(
-                frame, self.configuration.station,
-                None if step is None else (step.number, step.count), strict=self._strict)
-        except RemoteProtocolError as error:
-            self.report.reject(str(error))
-            return
-        if len(frame.data) != extended.PAYLOAD:
-            self.statistics.short += 1
-        self._channel.receive(words, now)
+            self._side.foreign_master(frame)
+        else:
+            self._side.receive(frame, now)
 
     def _receive_cyclic(self, data: bytes, now: float, received_at: float) -> None:
         """Take a cyclic response. The fast path of the reader."""
@@ -384,14 +358,7 @@ class ExtendedSession(Session):
 
     @property
     def warning(self) -> str:
-        if self._phase is Phase.CYCLIC and self._silent_looks >= SILENT_LOOKS:
-            return self._maps_unknown
-        return ''
-
-    @property
-    def _maps_unknown(self) -> str:
-        return (f'no answer to {self._silent_looks} mapping reads in a row, although cyclic '
-                f'requests are answered: nobody knows whether the maps are still right')
+        return self._maps.unknown if self._phase is Phase.CYCLIC else ''
 
     @property
     def state(self) -> DriveState:

@@ -24,6 +24,8 @@ from drive_can_bridge.protocols.datamodel.mapping import differences, effective
 MAPPING_PERIOD = 1.0
 #: longest pause between map rewrites
 REWRITE_PAUSE_MAX = 60.0
+#: so many looks at the maps in a row may go unanswered until that is told
+SILENT_LOOKS = 3
 
 
 class Verdict(Enum):
@@ -44,6 +46,7 @@ class MapSupervision:
     :ivar look_at: when the next look is due; infinity: none is planned.
     :ivar request_agrees: the last look found the request map to be right, and it stays: cyclic
         requests reach the parameters that they are meant for.
+    :ivar silent_looks: so many in a row went unanswered.
     """
 
     def __init__(self, channel: AcyclicChannel, *, request_base: int, response_base: int,
@@ -52,6 +55,7 @@ class MapSupervision:
                  judged: Callable[[Verdict, str, float], None]) -> None:
         self.look_at = math.inf
         self.request_agrees = False
+        self.silent_looks = 0
         self._channel = channel
         self._bases = request_base, response_base
         self._request = request
@@ -87,6 +91,13 @@ class MapSupervision:
         self.look_at = math.inf
         self._running = self._agreed = False
 
+    @property
+    def unknown(self) -> str:
+        """Say that nobody knows whether the maps are still right; '' as long as somebody may."""
+        return '' if self.silent_looks < SILENT_LOOKS else (
+            f'no answer to {self.silent_looks} mapping reads in a row, although cyclic '
+            f'requests are answered: nobody knows whether the maps are still right')
+
     # -- inside -----------------------------------------------------------------------------------
 
     def _read(self, maps: procedures.Maps | None) -> None:
@@ -102,8 +113,10 @@ class MapSupervision:
         self.request_agrees = (maps is not None and effective(maps.request) == self._request
                                and not self._rewrite)
         if not found and (maps is None or maps.response is None):
+            self.silent_looks += 1
             self._judged(Verdict.SILENT, '', now)
             return
+        self.silent_looks = 0
         self._agreed = not found
         if not found:
             self._told = ''

@@ -4,7 +4,7 @@
 from collections.abc import Callable
 import math
 
-from drive_can_bridge.core.setpoints import Setpoints
+from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.datamodel.channel import AcyclicChannel, Procedure, Read
 
 #: s until a position that a setpoint cannot carry is read again
@@ -16,17 +16,22 @@ class Positions:
     Reads positions.
 
     :param offset: added to parameter numbers on the wire.
-    :param read: called at the end; takes whether the drive has answered, and the time.
+    :param known: called when all are known.
+    :param silent: called when the drive has not answered; None: they are read again at once, paced
+        by the time-out of the read.
     :ivar due: when they are to be read again; infinity: not planned.
     """
 
-    def __init__(self, channel: AcyclicChannel, setpoints: Setpoints, offset: int,
-                 read: Callable[[bool, float], None]) -> None:
+    def __init__(self, session: Session, channel: AcyclicChannel, offset: int, *,
+                 known: Callable[[float], None],
+                 silent: Callable[[float], None] | None) -> None:
         self.due = math.inf
         self._channel = channel
-        self._setpoints = setpoints
+        self._setpoints = session.setpoints
+        self._report = session.report
         self._offset = offset
-        self._read = read
+        self._known = known
+        self._silent = silent or self.read
         self._asked = -1    # ``setpoints.forgotten`` when they were; -1: they are not
 
     def forget(self) -> None:
@@ -52,7 +57,14 @@ class Positions:
     def _take(self, asked: int, raws: list[int] | None) -> None:
         if asked != self._setpoints.forgotten:      # the drive was lost since
             return
-        self._asked = -1
+        self._asked, now = -1, self._channel.now
         for setpoint, raw in zip(self._setpoints.held, raws or ()):
             self._setpoints.changed |= setpoint.measure(raw)
-        self._read(raws is not None, self._channel.now)
+        if self._setpoints.known:
+            self._known(now)
+            return
+        self._report.advice = self._setpoints.untold_text
+        if raws is None:
+            self._silent(now)
+        else:   # but the setpoint cannot carry it
+            self.due = now + PAUSE

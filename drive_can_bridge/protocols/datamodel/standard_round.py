@@ -1,9 +1,12 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """What a round of a DataModel drive with 11-bit identifiers reads, and how long it takes."""
 
+import math
+
 from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.protocols.datamodel.channel import ParameterCourier, Procedure, Read
 from drive_can_bridge.protocols.datamodel.standard import SLOTS
-from drive_can_bridge.protocols.polling import Chunk, Place, plan_reads, round_time
+from drive_can_bridge.protocols.polling import Chunk, Place, plan_reads, Round, round_time
 
 #: worst-case stuffing, eight bytes, 11-bit identifier, with the interframe space
 FRAME_BITS = 135
@@ -37,3 +40,51 @@ def shortest_period(drive: DriveConfiguration, bitrate: int) -> float:
     """Return the time of such a period at worst, in s."""
     requests = len(reads(drive)) + len(drive.cyclic_request)
     return round_time([FRAME_BITS] * frames(drive), requests, bitrate)
+
+
+class StandardRound:
+    """
+    The rounds of one drive.
+
+    :param status_slot: of the status word in ``cyclic_response``, if it is there.
+    :ivar gap: what the last one asked for in vain, though others were answered, in words.
+    :ivar status_asked_at: when the status was asked for last.
+    """
+
+    def __init__(self, drive: DriveConfiguration, courier: ParameterCourier,
+                 status_slot: int | None) -> None:
+        self.gap = ''
+        self.status_asked_at = -math.inf
+        self._courier = courier
+        self._parameters = drive.cyclic_response
+        self._places = places(drive)
+        self._reads = reads(drive)
+        self._status_read = None if status_slot is None else next(
+            chunk for chunk in self._reads
+            if self._places[status_slot].address in _numbers(chunk))
+
+    def read(self) -> Procedure:
+        """Read all; return the raw integers, or None when one read was not answered."""
+        result = Round(self._places)
+        for chunk in self._reads:
+            words = yield Read(chunk.address, chunk.size, attempts=1)
+            if words is None:
+                self.gap = '' if chunk is self._reads[0] else (
+                    f'no answer to the read of {self._names(chunk)}, though others are answered: '
+                    f'does this drive have it')
+                return None
+            if chunk is self._status_read:
+                self.status_asked_at = self._courier.asked_at
+            result.take(chunk, words)
+        return tuple(parameter.raw_from_word(word)
+                     for parameter, (word,) in zip(self._parameters, result.words()))
+
+    def _names(self, chunk: Chunk) -> str:
+        """Name what a read is for."""
+        return ', '.join(f'{parameter.name} ({parameter.address})'
+                         for parameter, place in zip(self._parameters, self._places)
+                         if place.address in _numbers(chunk))
+
+
+def _numbers(chunk: Chunk) -> range:
+    return range(chunk.address, chunk.address + chunk.size)

@@ -1,0 +1,120 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+What a polled DataModel drive is told: setpoints, and a control word among them, as they change.
+
+One parameter a frame, which nobody acknowledges. They do not wait for answers: they go out while a
+read is under way, or in quarantine, with the values that they have then.
+"""
+
+import math
+
+from drive_can_bridge.core.session import Session
+from drive_can_bridge.protocols.cycle_timer import stop_spacing
+from drive_can_bridge.protocols.datamodel.acyclic_side import AcyclicSide
+from drive_can_bridge.protocols.datamodel.channel import Write
+from drive_can_bridge.protocols.polling import WriteSchedule
+
+
+class SetpointWriter:
+    """
+    Writes what is in ``cyclic_request`` of one drive.
+
+    :ivar doubt: a read went unanswered since the status was read: nobody knows whether the drive
+        was off meanwhile.
+    :ivar word_written_at: when the control word left last.
+    """
+
+    def __init__(self, session: Session, side: AcyclicSide) -> None:
+        drive = session.configuration
+        self.doubt = False
+        self.word_written_at = -math.inf
+        self._session = session
+        self._courier = side.channel.courier
+        self._offset = side.offset
+        self._slot = side.control_slot
+        self._parameters = drive.cyclic_request
+        self._schedule = WriteSchedule(len(drive.cyclic_request), drive.options.refresh_interval)
+        self._spacing = stop_spacing(drive.period)
+        self._pulse_at = math.inf  # when the control word is due again, whatever it was
+
+    def forget(self) -> None:
+        """Take note that nothing is known of the drive."""
+        self._schedule.forget()
+
+    def look(self, now: float, *, unanswered: bool = False) -> None:
+        """
+        Find out what is to be written.
+
+        :param unanswered: what was asked a period ago still waits for its answer.
+        """
+        control = self._session.control
+        # it is not started by a repetition
+        doubt = (self.doubt or unanswered) and control is not None and not (
+            control.at_rest or control.stopping)
+        hold = [self._slot] if doubt else []
+        unknown = self._session.setpoints.unknown
+        if unknown:
+            hold += [index for index, parameter in enumerate(self._parameters)
+                     if parameter.name in unknown]
+        self._schedule.look(self._raws(), now, hold=hold)
+
+    def write(self, now: float) -> None:
+        """Write one that is due, if there is one, with the value that it has now."""
+        if not self._schedule.waiting or now < self._courier.free_at:
+            return
+        index = self._schedule.next()
+        parameter, raw = self._parameters[index], self._raws()[index]
+        # now: a neutral value that follows the axis may be another one when the frame leaves
+        runs = raw != self._raws(neutral=True)[index]
+        # What is sent cyclically is volatile: EEPROM parameters are refused by the configuration.
+        self._courier.write(
+            Write((parameter.number or 0) + self._offset, (parameter.word_from_raw(raw),),
+                  eeprom=False),
+            lambda sent, then: self._left(index, raw, sent, then, runs=runs), now)
+        self._schedule.written(index, raw, now)  # at once: a look meanwhile must not find it due
+
+    def write_word(self, now: float) -> None:
+        """Write a control word that is due: it waits neither for a period nor for setpoints."""
+        self.look(now)
+        control, setpoints = self._session.control, self._session.setpoints
+        if self._slot is not None and control is not None and (
+                control.stopping or not setpoints.held):
+            self._schedule.hurry(self._slot)
+        self.write(now)
+
+    def handle_timer(self, now: float) -> None:
+        """Write what is due."""
+        if now >= self._pulse_at and self._slot is not None:
+            self._pulse_at = math.inf
+            self._schedule.failed(self._slot)
+            self._session.see_to_control_word(now)
+        self.write(now)
+
+    def next_timer(self) -> float:
+        """Return when :meth:`handle_timer` wants to be called; infinity: never."""
+        if self._schedule.waiting:
+            return min(self._pulse_at, self._courier.free_at)
+        return self._pulse_at
+
+    def _raws(self, *, neutral: bool = False) -> list[int]:
+        items, control = self._session.setpoints.items, self._session.control
+        raws = [setpoint.neutral if neutral else setpoint.raw for setpoint in items]
+        if control is not None and self._slot is not None:
+            raws.insert(self._slot, control.table.disable if neutral else control.word)
+        return raws
+
+    def _left(self, index: int, raw: int, sent: bool, now: float, *, runs: bool) -> None:
+        """Take note of a setpoint, or control word, that left; the refused ones are due again."""
+        if not sent:
+            self._schedule.failed(index)
+            return
+        self._session.told.note(index, runs=runs)
+        control = self._session.control
+        if index != self._slot or control is None:
+            return
+        self.word_written_at = now
+        if raw == control.word:
+            control.word_sent(now)
+            if control.pulsing:
+                self._pulse_at = now + self._spacing
+            self._session.control_changed(now)
