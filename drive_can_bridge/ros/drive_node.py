@@ -64,6 +64,7 @@ class DriveNode:
     :param identified: takes the drive's identity in words whenever it changes.
     :ivar joint_commands: the commands for all joints of its bus, which whichever of its drives is
         served next takes for all of them; None: there are none.
+    :ivar witness: is told of events, too; None: nobody is.
     """
 
     def __init__(self, bridge: Node, drive: DriveConfiguration, session: Session, family: Family,
@@ -74,6 +75,7 @@ class DriveNode:
         self.session = session
         self.exchange = exchange
         self.joint_commands: PolledTopics | None = None
+        self.witness: Callable[[Event], None] | None = None
         self._mailbox = mailbox
         self._executor = executor
         self._log = log.speaker(drive.name)
@@ -212,6 +214,8 @@ class DriveNode:
 
     def handle_event(self, event: Event) -> None:
         """Publish or log what happened."""
+        if self.witness is not None:
+            self.witness(event)
         try:
             self._handle_event(event)
         except (InvalidHandle, RCLError) as error:
