@@ -15,7 +15,7 @@ from typing import Any
 from drive_can_bridge.cli.namespaces import namespace
 from drive_can_bridge.cli.without_ros import what_is_missing
 from drive_can_bridge.core.errors import DriveCanError
-from drive_can_bridge.monitor.lines import balance, line
+from drive_can_bridge.monitor.lines import balance, Lines
 from drive_can_bridge.monitor.model import Model
 from drive_can_bridge.monitor.source import Source
 from drive_can_bridge.process import environment
@@ -24,8 +24,6 @@ from drive_can_bridge.process.signals import leave, SignalWatcher
 #: s between two lines of a drive, and between two looks at what arrives
 LINE_PERIOD = 1.0
 _POLL_PERIOD = 0.1
-#: s that a drive which came online may take until its first sample is here
-_FIRST_SAMPLE = 2.0
 
 
 def add_parser(subparsers: Any) -> None:
@@ -87,7 +85,7 @@ def _show(source: Source, model: Model, watcher: SignalWatcher, args: argparse.N
 
 def _print_lines(source: Source, model: Model, watcher: SignalWatcher) -> int:
     """Print one line per drive and second, until a signal."""
-    online_since: dict[str, float] = {}
+    lines = Lines()
     due = time.monotonic() + LINE_PERIOD
     while watcher.wait(_POLL_PERIOD) is None:
         now = time.monotonic()
@@ -95,14 +93,7 @@ def _print_lines(source: Source, model: Model, watcher: SignalWatcher) -> int:
         if now < due:
             continue
         due = max(due + LINE_PERIOD, now)
-        lines = []
-        for drive in model.look(now, time.time()).drives:
-            if not drive.online:
-                online_since.pop(drive.name, None)
-            # its values belong to it: they are a moment behind
-            since = online_since.setdefault(drive.name, now) if drive.online else now
-            known = bool(drive.values and drive.parameters) or now - since > _FIRST_SAMPLE
-            lines.append(line(drive) if known or not drive.online else f'{drive.label} offline')
-        if lines:
-            print('\n'.join(lines), flush=True)
+        found = lines.look(model.look(now, time.time()), now)
+        if found:
+            print('\n'.join(found), flush=True)
     return 0

@@ -73,6 +73,7 @@ class DriveRecord:
         self._rate = Rate()
         self._online: bool | None = None
         self._online_at = math.nan
+        self._offline_at = -math.inf
         self._sampled_since: float | None = None
         self._readings: dict[str, tuple[str, float]] = {}
         self._told_again = 0
@@ -85,6 +86,8 @@ class DriveRecord:
     def reported(self, report: Report, stamp: float, now: float) -> bool:
         """Take what the bridge says; return whether it has begun anew."""
         self._report, self._reported_at = report, now
+        if report.state in _SILENT_STATES:
+            self._offline_at = now
         anew = self._rate.went_back(report.count('exchanges'))
         self._rate.update(report.count('exchanges'), stamp)
         return anew
@@ -93,6 +96,8 @@ class DriveRecord:
         """Take ``~/online``."""
         if online != self._online:
             self._online, self._online_at = online, now
+        if not online:
+            self._offline_at = now
 
     def sampled(self, wanted: bool, now: float) -> None:
         """Take note whether samples are asked for, or not."""
@@ -131,17 +136,21 @@ class DriveRecord:
         report = self._report or Report('', True, '', Level.STALE, 'nothing known yet')
         state, level, advice, online = self._judge(report, now, silent)
         responses, requests = self.responses, self.requests
+        # what it said before it was away is no news of how it is
+        sampled = online and responses.at > self._offline_at
         return DriveSnapshot(
             name=self.name, label=label, bridge=report.bridge, state=state, level=level,
             online=online, advice=advice,
             control=report.facts.get(CONTROL_STATE, '') if online else '',
             setpoints=requests.shown(self.parameters, now, current=online),
-            values=responses.shown(self.parameters, now, current=online),
+            values=responses.shown(self.parameters, now, current=sampled),
             bits=self.bits if online else {}, rate=self.rate if online else 0.0,
             exchanges=report.count('exchanges'), missed=report.count('missed_exchanges'),
             period_error=_times(report, 'period_error'), latency=_times(report, 'latency'),
             command_age=report.number('command_age_s'), facts=report.facts,
-            sample_age=now - responses.at, place=self.place,
+            sample_age=now - responses.at, sampled=sampled,
+            asked_for=0.0 if self._sampled_since is None else now - self._sampled_since,
+            place=self.place,
             parameters=tuple(self.parameters.values()),
             readings={name: Reading(text, now - at)
                       for name, (text, at) in self._readings.items()},

@@ -4,11 +4,46 @@
 from drive_can_bridge.monitor.snapshot import DriveSnapshot, Snapshot, Times
 
 
+#: s that a drive which came online may take until it is known what its values mean, and until the
+#: turn of its samples has come
+_PATIENCE = 2.0
+
+
+class Lines:
+    """
+    A line for each drive, again and again.
+
+    That a drive is online is told before its first sample arrives here: on topics of their own, a
+    moment or, on a busy machine, some seconds apart. A line that says ``online`` has the values,
+    so until then it says ``offline``, which is what the model says of samples that stay away, too.
+    Samples that this monitor did not ask for, because there are too many, are not waited for.
+    """
+
+    def __init__(self) -> None:
+        self._online_since: dict[str, float] = {}
+
+    def look(self, snapshot: Snapshot, now: float) -> list[str]:
+        """Return a line for each drive."""
+        return [line(drive) if self._known(drive, now) else f'{drive.label} offline'
+                for drive in snapshot.drives]
+
+    def _known(self, drive: DriveSnapshot, now: float) -> bool:
+        if not drive.online:
+            self._online_since.pop(drive.name, None)
+            return False
+        elapsed = now - self._online_since.setdefault(drive.name, now)
+        if drive.sampled:
+            # without its descriptors a value has no unit, which is better than no value
+            return bool(drive.parameters) or elapsed > _PATIENCE
+        return elapsed > _PATIENCE and drive.asked_for < elapsed
+
+
 def line(drive: DriveSnapshot) -> str:
     """Write ``conveyor online actual_speed=12.3 rpm motor_current=1.25 A``."""
     if not drive.online:
         return f'{drive.label} offline'
-    return ' '.join([drive.label, 'online', *(shown.assignment for shown in drive.values)])
+    known = [shown.assignment for shown in drive.values if shown.assignment]
+    return ' '.join([drive.label, 'online', *known])
 
 
 def balance(snapshot: Snapshot) -> list[str]:

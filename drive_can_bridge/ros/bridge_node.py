@@ -378,14 +378,14 @@ class BridgeNode(LifecycleNode):
 
     def bus_opened(self, bus: str) -> None:
         """Log it."""
-        self.log.info(f'bus {bus}: open')
+        self.log.speaker(f'bus {bus}').info('open')
 
     def bus_lost(self, bus: str, reason: str) -> None:
         """Log it."""
         exchange = self.exchanges.get(bus)
         if exchange is not None:  # else it was given up while it was still being opened
             again = exchange.bus.reconnect_period
-            self.log.error(f'bus {bus}: {reason}; tried again every {again:g} s')
+            self.log.speaker(f'bus {bus}').error(f'{reason}; tried again every {again:g} s')
         if self._flight is not None:
             self._flight.bus_lost(bus)
 

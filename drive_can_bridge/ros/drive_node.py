@@ -30,6 +30,7 @@ from drive_can_bridge.core.requests import (
 )
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.text import printable
+from drive_can_bridge.core.told import MAY_RUN
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.protocols.family import Family
 from drive_can_bridge.ros.commands import CommandIntake
@@ -45,7 +46,6 @@ from drive_can_bridge.ros.quality import latched_quality, overriding, quality_ov
 from drive_can_bridge.ros.samples import SamplePublisher
 from drive_can_bridge.ros.service_thread import ServiceThread
 from drive_can_bridge.ros.stamps import Stamps
-from drive_can_bridge.ros.throttle import Throttle
 
 RCLError = rclpy_implementation.RCLError
 
@@ -64,6 +64,7 @@ class DriveNode:
     :param identified: takes the drive's identity in words whenever it changes.
     :ivar joint_commands: the commands for all joints of its bus, which whichever of its drives is
         served next takes for all of them; None: there are none.
+    :ivar witness: is told of events, too; None: nobody is.
     """
 
     def __init__(self, bridge: Node, drive: DriveConfiguration, session: Session, family: Family,
@@ -74,10 +75,11 @@ class DriveNode:
         self.session = session
         self.exchange = exchange
         self.joint_commands: PolledTopics | None = None
+        self.witness: Callable[[Event], None] | None = None
         self._mailbox = mailbox
         self._executor = executor
-        self._log = log
-        self._throttle = Throttle(self._warn_now)
+        self._log = log.speaker(drive.name)
+        self._log.reset()
         self._requests: dict[int, tuple[Request, Completed]] = {}
         self._control: ControlServices | None = None
         self.requests_refused = 0
@@ -97,7 +99,7 @@ class DriveNode:
                                  NodeParameter('use_sim_time', value=False),
                                  *quality_overrides(bridge)])
         try:
-            self.commands = CommandIntake(self.node, drive, session, self.warn, self._inform)
+            self.commands = CommandIntake(self.node, drive, session, self.warn, self._log.info)
             try:
                 self._populate(bridge.get_clock(), family, control_thread, parameter_thread)
             except BaseException:
@@ -180,13 +182,7 @@ class DriveNode:
 
         :param once: repetitions are not logged at all, until the drive comes online again.
         """
-        self._throttle(topic, text, once=once)
-
-    def _inform(self, text: str) -> None:
-        self._log.info(f'{self.name}: {text}')
-
-    def _warn_now(self, text: str) -> None:
-        self._log.warning(f'{self.name}: {text}')
+        self._log.warn(topic, text, once=once)
 
     # -- from the exchange (DriveListener): the bus lock is held ----------------------------------
 
@@ -218,6 +214,8 @@ class DriveNode:
 
     def handle_event(self, event: Event) -> None:
         """Publish or log what happened."""
+        if self.witness is not None:
+            self.witness(event)
         try:
             self._handle_event(event)
         except (InvalidHandle, RCLError) as error:
@@ -229,26 +227,25 @@ class DriveNode:
             completed(event.outcomes)
         elif isinstance(event, StationFound):
             self._online.publish(Bool(data=True))
-            self._throttle.reset()
-            self._inform('online')
+            self._log.reset()
+            self._log.info('online')
             self._mailbox.post(self._identity.read)
         elif isinstance(event, StationLost):
             self._online.publish(Bool(data=False))
             self.samples.forget()
             if self.session.active:
                 self.times_lost += 1
-                self._log.warning(f'{self.name}: offline: {event.reason}')
+                self._log.warning(f'offline: {event.reason}', urgent=True)
             else:
-                self._inform('stopped')
+                self._log.info('stopped')
         elif isinstance(event, SetpointsExpired):
             self.warn('command timeout',
                       f'no command for {self.session.configuration.command_timeout:g} s: '
                       f'{", ".join(event.names)} neutral until armed again')
         elif isinstance(event, MappingDiffered):
-            self._log.error(f'{self.name}: mapping differs, no cyclic frame is sent: '
-                               f'{event.text}')
+            self._log.error(f'mapping differs, no cyclic frame is sent: {event.text}')
         elif isinstance(event, MappingWritten):
-            self._log.warning(f'{self.name}: maps of the drive rewritten: {event.text}')
+            self._log.warning(f'maps of the drive rewritten: {event.text}')
         elif isinstance(event, ControlCompleted):
             if self._control is not None:
                 self._control.completed(event)
@@ -260,9 +257,9 @@ class DriveNode:
             self.warn('foreign master', event.text)
         elif isinstance(event, Noted):
             if event.warning:
-                self._warn_now(event.text)
+                self._log.warning(event.text, urgent=MAY_RUN in event.text)
             else:
-                self._inform(event.text)
+                self._log.info(event.text)
 
     def _cannot_publish(self, error: Exception) -> None:
         if self.node.context.ok():

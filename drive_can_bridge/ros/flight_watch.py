@@ -2,8 +2,9 @@
 """The flight recorder in the bridge: what makes it write, and ``~/save_trace``."""
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.callback_groups import ReentrantCallbackGroup
@@ -11,25 +12,74 @@ from rclpy.executors import Executor
 from rclpy.logging import get_logging_directory
 from rclpy.node import Node
 from rclpy.task import Future
-from std_srvs.srv import Trigger
+from std_srvs.srv import Trigger as TriggerService
 
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.drive_state import DriveState
+from drive_can_bridge.core.events import Event, MappingDiffered, StationLost
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.ros.diagnostics import Report
 from drive_can_bridge.ros.drive_node import DriveNode
 from drive_can_bridge.ros.log import Log
 from drive_can_bridge.ros.mailbox import Mailbox
-from drive_can_bridge.ros.periodic_thread import PeriodicThread
 from drive_can_bridge.trace.flight import FlightRecorder
 from drive_can_bridge.transport.link import steady_now
 
-#: s between two looks at the drives
-LOOK_PERIOD = 0.1
 NOT_RECORDING = 'nothing is recorded: set trace_seconds of a bus'
 #: of several reasons at once the most telling one names the trace
 _RANKS = {DriveState.OFFLINE: 1, DriveState.FAULT: 2, DriveState.MAPPING_DIFFERS: 2}
 _BUS_LOST_RANK = 3
+
+
+class Trigger(Protocol):
+    """Has a trace of a bus written; of several reasons at once the highest rank names it."""
+
+    def __call__(self, bus: str, reason: str, *, rank: int = 0) -> None:
+        """Begin."""
+
+
+class Occasions:
+    """
+    What is worth a trace: whatever ails, each time that it begins.
+
+    Told of every event when it happens, so that nothing is over too soon to be noticed.
+    """
+
+    def __init__(self, trigger: Trigger) -> None:
+        self._trigger = trigger
+        self._faulted: set[str] = set()
+        self._bad: set[str] = set()
+
+    def drive_told(self, drive: str, bus: str, event: Event, state: DriveState) -> None:
+        """Take an event of a drive, and its state by then."""
+        states = []
+        if isinstance(event, StationLost):
+            states.append(DriveState.OFFLINE)
+        elif isinstance(event, MappingDiffered):
+            states.append(DriveState.MAPPING_DIFFERS)
+        if state is not DriveState.FAULT:
+            self._faulted.discard(drive)
+        elif drive not in self._faulted:
+            self._faulted.add(drive)
+            states.append(state)
+        for each in states:
+            self._trigger(bus, f'{drive}_{each.value}', rank=_RANKS[each])
+
+    def forget(self, drive: str) -> None:
+        """Take note that a drive is inactive: whatever ails it then begins anew."""
+        self._faulted.discard(drive)
+
+    def bus_lost(self, bus: str) -> None:
+        """Take note that a bus is gone."""
+        self._trigger(bus, 'bus_lost', rank=_BUS_LOST_RANK)
+
+    def reported(self, report: Report, bus: str) -> None:
+        """Take a diagnostic status."""
+        if report.level != DiagnosticStatus.ERROR:
+            self._bad.discard(report.name)
+        elif report.name not in self._bad:
+            self._bad.add(report.name)
+            self._trigger(bus, report.name.split(maxsplit=1)[-1] + '_error')
 
 
 class FlightWatch:
@@ -46,16 +96,14 @@ class FlightWatch:
         self._mailbox = mailbox
         self._executor = executor
         self._recorder: FlightRecorder | None = None
+        self._occasions: Occasions | None = None
         if any(bus.trace_seconds > 0.0 for bus in buses):
             self._recorder = FlightRecorder(
                 buses, Path(str(get_logging_directory())) / 'drive_can_bridge',
                 log.warning, log.error)
-        self._service = node.create_service(Trigger, '~/save_trace', self._save,
+            self._occasions = Occasions(self._recorder.trigger)
+        self._service = node.create_service(TriggerService, '~/save_trace', self._save,
                                             callback_group=ReentrantCallbackGroup())
-        self._drives: list[DriveNode] = []
-        self._states: dict[str, tuple[DriveState, int]] = {}
-        self._bad: set[str] = set()
-        self._thread: PeriodicThread | None = None
 
     def note_of(self, bus: str) -> Callable[..., object] | None:
         """Return what takes every frame of a bus; None: nobody does."""
@@ -71,19 +119,15 @@ class FlightWatch:
 
     def watch(self, drives: Sequence[DriveNode]) -> None:
         """Begin to look at the drives."""
-        recorder = self._recorder
-        if recorder is None:
+        occasions, recorder = self._occasions, self._recorder
+        if occasions is None or recorder is None:
             return
-        self._drives = [drive for drive in drives if drive.drive.bus in recorder.buses]
-        self._thread = PeriodicThread(
-            'flight watch', LOOK_PERIOD, self._look,
-            lambda text: self._log.error(f'flight recorder: {text}'))
-        self._thread.start()
+        for drive in drives:
+            if drive.drive.bus in recorder.buses:
+                drive.witness = partial(_tell, occasions, drive)
 
     def close(self) -> None:
         """Write what is still to be written. The exchanges must be closed."""
-        if self._thread is not None:
-            self._thread.stop()
         if self._recorder is not None:
             self._recorder.close()
         self._node.destroy_service(self._service)
@@ -92,37 +136,13 @@ class FlightWatch:
 
     def bus_lost(self, bus: str) -> None:
         """Take note that a bus is gone."""
-        if self._recorder is not None:
-            self._recorder.trigger(bus, 'bus_lost', rank=_BUS_LOST_RANK)
+        if self._occasions is not None:
+            self._occasions.bus_lost(bus)
 
     def reported(self, report: Report, bus: str) -> None:
         """Take note of a diagnostic status."""
-        if self._recorder is None:
-            return
-        if report.level != DiagnosticStatus.ERROR:
-            self._bad.discard(report.name)
-        elif report.name not in self._bad:
-            self._bad.add(report.name)
-            self._recorder.trigger(bus, report.name.split(maxsplit=1)[-1] + '_error')
-
-    def _look(self) -> None:
-        for drive in self._drives:
-            session = drive.session
-            if not session.active:
-                self._states.pop(drive.name, None)
-                continue
-            seen = session.state, drive.times_lost
-            state, lost = self._states.get(drive.name, (DriveState.OFFLINE, seen[1]))
-            self._states[drive.name] = seen
-            if self._recorder is None:
-                return
-            if seen[1] > lost:
-                self._recorder.trigger(drive.drive.bus, f'{drive.name}_offline',
-                                       rank=_RANKS[DriveState.OFFLINE])
-            if seen[0] is not state and seen[0] in (DriveState.FAULT,
-                                                    DriveState.MAPPING_DIFFERS):
-                self._recorder.trigger(drive.drive.bus, f'{drive.name}_{seen[0].value}',
-                                       rank=_RANKS[seen[0]])
+        if self._occasions is not None:
+            self._occasions.reported(report, bus)
 
     # -- ~/save_trace -----------------------------------------------------------------------------
 
@@ -145,3 +165,11 @@ class FlightWatch:
         recorder.save(bus, 'save_trace',
                       lambda path, refusal: self._mailbox.complete(future, (path, refusal)))
         return future
+
+
+def _tell(occasions: Occasions, drive: DriveNode, event: Event) -> None:
+    """Pass on what a drive tells, with the bus lock held."""
+    if drive.session.active:
+        occasions.drive_told(drive.name, drive.drive.bus, event, drive.session.state)
+    else:
+        occasions.forget(drive.name)

@@ -20,8 +20,7 @@ from drive_can_bridge.ros.drive_node import DriveNode
 from drive_can_bridge.ros.joint_reader import Column, JointMessage, JointReader
 from drive_can_bridge.ros.joint_states import JointStates
 from drive_can_bridge.ros.log import Log
-from drive_can_bridge.ros.polled_topics import PolledTopics
-from drive_can_bridge.ros.throttle import Throttle
+from drive_can_bridge.ros.polled_topics import PolledTopics, Warn
 from drive_can_bridge.transport.clock import steady_now
 
 COMMANDS = '~/joint_commands'
@@ -38,7 +37,9 @@ class Joints:
 
     def __init__(self, node: Node, log: Log, configuration: BridgeConfiguration,
                  drives: Mapping[str, DriveNode]) -> None:
-        self._throttle = Throttle(log.warning)
+        speaker = log.speaker('')
+        speaker.reset()
+        warn = speaker.warn
         self._taken: list[PolledTopics] = []
         self._states: JointStates | None = None
         self._errand: Errand | None = None
@@ -52,15 +53,15 @@ class Joints:
                 continue
             first = not self._taken     # the others hear the same, and need not tell it again
             taken = PolledTopics(
-                node, self._throttle, _refusing(joints, self._throttle if first else None))
+                node, warn, _refusing(joints, warn if first else None))
             self._taken.append(taken)
             taken.subscribe(JointState, COMMANDS, _Taker(
-                joints, known, self._throttle if first else None, log.info), JointReader())
+                joints, known, warn if first else None, log.info), JointReader())
             for drive in here:
                 drive.joint_commands = taken
         if configuration.joint_state_rate > 0.0:
             self._period = 1.0 / configuration.joint_state_rate
-            self._states = JointStates(node, ordered, self._throttle)
+            self._states = JointStates(node, ordered, warn)
             self._errand = Errand(self._states.publish)
             for drive in ordered:
                 drive.exchange.errand = self._errand
@@ -81,7 +82,7 @@ class Joints:
             self._states = None
 
 
-def _refusing(joints: Mapping[str, CommandIntake], warn: Throttle | None,
+def _refusing(joints: Mapping[str, CommandIntake], warn: Warn | None,
               ) -> Callable[[str, str], None]:
     """Return what counts a message that is thrown away, for all that it might have moved."""
     def refuse(topic: str, text: str) -> None:
@@ -102,7 +103,7 @@ class _Taker:
     """
 
     def __init__(self, joints: Mapping[str, CommandIntake], known: Collection[str],
-                 warn: Throttle | None, inform: Callable[[str], None]) -> None:
+                 warn: Warn | None, inform: Callable[[str], None]) -> None:
         self._joints = joints
         self._known = known
         self._warn = warn

@@ -4,29 +4,26 @@ The log of the bridge, written by a thread of its own.
 
 A line costs tens of microseconds at best, and whatever the file of the log and its subscribers
 take at worst. Most of what there is to say is found out with a bus lock held. So whoever has a
-line puts it into a bounded queue and goes on; what does not fit is counted and said later.
+line puts it into a bounded queue and goes on; what does not fit is counted and said later. How
+much drives and buses may say is limited before (:mod:`.log_limit`).
 """
 
-from enum import Enum
+from collections.abc import Callable
 import queue
 import threading
+import time
 from typing import Any
 
 from drive_can_bridge.core.text import printable
+from drive_can_bridge.ros.log_limit import Level, LogLimit, Speaker
 
 #: lines that may wait
 LINES_MAX = 1000
 #: s that the end waits for lines that have not been written yet
 CLOSE_TIMEOUT = 0.3
 
-
-class Level(Enum):
-    """How much a line matters."""
-
-    INFO = 'info'
-    WARNING = 'warning'
-    ERROR = 'error'
-    FATAL = 'fatal'
+#: in the queue: the thread has to look what there is to be summed up, or to end
+_LOOK, _END = (Level.INFO, 'look'), (Level.INFO, 'end')
 
 
 class Log:
@@ -34,15 +31,22 @@ class Log:
     Passes lines on to a logger of rclpy. From any thread; never waits.
 
     Whatever a line contains is printable when it arrives there.
+
+    :param clock: steady, in s.
     """
 
-    def __init__(self, logger: Any) -> None:
+    def __init__(self, logger: Any, clock: Callable[[], float] = time.monotonic) -> None:
         self._logger = logger
-        self._lines: queue.Queue[tuple[Level, str] | None] = queue.Queue(LINES_MAX)
+        self._lines: queue.Queue[tuple[Level, str]] = queue.Queue(LINES_MAX)
+        self._limit = LogLimit(self._put, self._wake, clock)
         self._dropped = 0
         self._closed = False
         self._thread = threading.Thread(target=self._run, name='log', daemon=True)
         self._thread.start()
+
+    def speaker(self, name: str) -> Speaker:
+        """Return the log of a drive or a bus: its lines begin with the name (if there is one)."""
+        return self._limit.speaker(name)
 
     def info(self, text: str) -> None:
         """Log what is as it should be."""
@@ -64,9 +68,10 @@ class Log:
         """Write what waits, for a while at most; what comes later is written at once."""
         if self._closed:
             return
+        self._limit.sum_up(all_of_it=True)
         self._closed = True
         try:
-            self._lines.put(None, timeout=CLOSE_TIMEOUT)
+            self._lines.put(_END, timeout=CLOSE_TIMEOUT)
         except queue.Full:
             return
         if self._thread is not threading.current_thread():
@@ -81,16 +86,27 @@ class Log:
         except queue.Full:
             self._dropped += 1
 
+    def _wake(self) -> None:
+        try:
+            self._lines.put_nowait(_LOOK)
+        except queue.Full:
+            pass    # then the thread is awake
+
     def _run(self) -> None:
         while True:
-            line = self._lines.get()
-            if line is None:
-                return
-            self._write(*line)
-            if self._dropped and self._lines.empty():
+            try:
+                line = self._lines.get(timeout=self._limit.wait())
+            except queue.Empty:
+                line = _LOOK
+            if line is not _LOOK and line is not _END:
+                self._write(*line)
+            self._limit.sum_up()
+            if self._dropped and (self._lines.empty() or line is _END):
                 dropped, self._dropped = self._dropped, 0
                 self._write(Level.WARNING, f'{dropped} lines of the log left out: they came '
                                            f'faster than they could be written')
+            if line is _END:
+                return
 
     def _write(self, level: Level, text: str) -> None:
         text = printable(text, None)

@@ -11,7 +11,7 @@ from monitor_builders import (
 )
 import pytest
 
-from drive_can_bridge.monitor.lines import balance, line
+from drive_can_bridge.monitor.lines import balance, line, Lines
 from drive_can_bridge.monitor.model import Model
 from drive_can_bridge.monitor.reports import Level, read_status, Status
 from drive_can_bridge.monitor.snapshot import Place
@@ -58,6 +58,74 @@ def test_lines_are_for_programs() -> None:
         'lift       12345 exchanges, 3 missed, period error 0.01 ms (p99 0.16), latency 0.51 ms '
         '(p99 2.13)',
         'turntable  no exchange']
+
+
+@pytest.mark.parametrize('rate', [50, 0])
+def test_no_line_says_online_without_the_values(rate: int) -> None:
+    lines, model = Lines(), Model()
+    for second in range(20):
+        now = NOW + second
+        model.diagnosed([drive_status(exchanges=str(100 + rate * second))], AT + second, now)
+        model.described('/conveyor', PARAMETERS)
+        model.sampled(['/conveyor'], now)
+        # the model takes samples that stay away for offline only after some seconds, and never
+        # while it does not know how often they should come
+        assert lines.look(model.look(now, AT), now) == ['conveyor offline'], second
+    model.responded('/conveyor', [('actual_speed', 1.25)], now)
+    assert lines.look(model.look(now, AT), now) == ['conveyor online actual_speed=1.2 rpm']
+
+
+def test_a_line_waits_a_moment_for_what_its_values_mean() -> None:
+    lines, model = Lines(), model_of([drive_status()])
+    model.sampled(['/conveyor'], NOW)
+    model.responded('/conveyor', [('actual_speed', 1.25)], NOW)
+    assert lines.look(model.look(NOW, AT), NOW) == ['conveyor offline']
+    later = NOW + 2.1
+    assert lines.look(model.look(later, AT), later) == ['conveyor online actual_speed=1.250']
+    model.described('/conveyor', PARAMETERS)
+    assert lines.look(model.look(NOW, AT), NOW) == ['conveyor online actual_speed=1.2 rpm']
+
+
+def test_a_line_of_a_drive_that_came_back_has_no_values_of_before() -> None:
+    lines, model = Lines(), model_of([drive_status()])
+    model.described('/conveyor', PARAMETERS)
+    model.sampled(['/conveyor'], NOW)
+    model.responded('/conveyor', [('actual_speed', 1.0)], NOW + 0.1)
+    model.went_online('/conveyor', False, NOW + 0.2)
+    model.went_online('/conveyor', True, NOW + 0.3)
+    snapshot = model.look(NOW + 0.4, AT)
+    assert lines.look(snapshot, NOW + 0.4) == ['conveyor offline']
+    assert [shown.text for shown in snapshot.drives[0].values] == ['']
+    model.responded('/conveyor', [('actual_speed', 2.0)], NOW + 0.5)
+    assert lines.look(model.look(NOW + 0.6, AT), NOW + 0.6) == [
+        'conveyor online actual_speed=2.0 rpm']
+
+
+def test_samples_that_nobody_asked_for_are_not_waited_for() -> None:
+    lines, model = Lines(), model_of([drive_status()])
+    model.sampled(['/conveyor'], NOW)
+    assert lines.look(model.look(NOW, AT), NOW) == ['conveyor offline']
+    model.sampled([], NOW + 1.5)  # there are too many drives: the turn of others
+    assert lines.look(model.look(NOW + 2.1, AT), NOW + 2.1) == ['conveyor online']
+    model.sampled(['/conveyor'], NOW + 2.2)
+    assert lines.look(model.look(NOW + 2.3, AT), NOW + 2.3) == ['conveyor online']
+    # nor are those of before it went away written when it is back
+    model.responded('/conveyor', [('actual_speed', 1.0)], NOW + 2.4)
+    model.went_online('/conveyor', False, NOW + 2.5)
+    assert lines.look(model.look(NOW + 2.5, AT), NOW + 2.5) == ['conveyor offline']
+    model.sampled([], NOW + 2.6)
+    model.went_online('/conveyor', True, NOW + 2.6)
+    assert lines.look(model.look(NOW + 2.6, AT), NOW + 2.6) == ['conveyor offline']
+    model.diagnosed([drive_status()], AT + 3.0, NOW + 3.0)
+    assert lines.look(model.look(NOW + 4.7, AT), NOW + 4.7) == ['conveyor online']
+
+
+def test_a_drive_without_process_values_is_online_in_a_word() -> None:
+    lines, model = Lines(), model_of([drive_status()])
+    model.described('/conveyor', PARAMETERS)
+    model.sampled(['/conveyor'], NOW)
+    model.responded('/conveyor', [], NOW + 0.1)
+    assert lines.look(model.look(NOW + 0.1, AT), NOW + 0.1) == ['conveyor online']
 
 
 def test_without_descriptors_values_are_shown_all_the_same() -> None:

@@ -23,7 +23,8 @@ def test_nothing_is_written_and_stops_are_always_there(run: Run, tmp_path: Path)
         assert 'without --allow-writes' in answer.said['text']
     for action in ('quick_stop', 'disable'):
         for drive in ('/lift', '*'):
-            assert site.do(action, 'operator', {'drive': drive}).said['success'] is True
+            said = site.do(action, 'operator', {'drive': drive}).said
+            assert said['success'] is True, (action, drive, said, site.bridge.errors)
 
     # what reaches nobody is said, of one drive and of all; each takes its time-out, so at once
     assert site.bridge.end(signal.SIGKILL) == -signal.SIGKILL

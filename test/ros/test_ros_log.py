@@ -4,8 +4,10 @@
 import threading
 from typing import Any
 
+import pytest
 from waiting import wait_for
 
+from drive_can_bridge.ros import log_limit
 from drive_can_bridge.ros.log import LINES_MAX, Log
 
 
@@ -63,3 +65,27 @@ def test_the_end_does_not_wait_for_ever() -> None:
         log.info(str(number))
     log.close()
     logger.open.set()
+
+
+def test_its_thread_sums_up_what_repeats_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(log_limit, 'SUM_UP', 0.05)
+    logger = Logger()
+    log = Log(logger)
+    for _ in range(500):
+        log.speaker('lift').warning('fault')
+        log.speaker('lift').info('fault gone')
+    wait_for(lambda: sum('more time' in text for _, text in logger.lines) >= 2)
+    assert logger.lines[:10] == [('warning', 'lift: fault'), ('info', 'lift: fault gone')] * 5
+    log.close()
+    assert len(logger.lines) < 50
+    assert logger.lines[-1][1].startswith('lift: fault gone (')
+
+
+def test_the_end_writes_what_is_held_behind_what_waits() -> None:
+    logger = Logger()
+    log = Log(logger)
+    for _ in range(7):
+        log.speaker('lift').info('online')
+    log.close()
+    assert logger.lines == [('info', 'lift: online')] * 5 + [
+        ('info', 'lift: online (2 more times in 1 s)')]

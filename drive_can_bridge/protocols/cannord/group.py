@@ -19,6 +19,7 @@ import math
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.requests import BRIDGE_INACTIVE
 from drive_can_bridge.core.told import MAY_RUN
 from drive_can_bridge.core.users import DRIVE_OFFLINE
 from drive_can_bridge.protocols.cannord.broadcast import broadcast_identifier
@@ -115,7 +116,12 @@ class Group:
     def member_lost(self, member: CannordSession) -> None:
         """Take note that an inverter of the group is offline."""
         self.control.member_lost(member.configuration.name)
-        self._leader.gate.follow()
+        if member.active:       # else the bridge ends, which the leader tells
+            self._leader.gate.follow()
+
+    def end(self, now: float) -> None:
+        """Take note that the bridge ends: that, and no member that goes, takes the enable back."""
+        self.control.withdraw(BRIDGE_INACTIVE, now)
 
     def member_status(self, member: CannordSession, word: int, now: float) -> None:
         """Take the status word of an inverter that is led."""

@@ -115,6 +115,8 @@ class CannordSession(Session):
     def deactivate(self, now: float) -> None:
         if self._group is not None and self._led and not self._group.led:
             self.told.stopped()     # all were lost: the leader's last cycles are for all
+        if self._group is not None:
+            self._group.end(now)
         super().deactivate(now)
 
     def prepare_stop(self, now: float) -> bool:

@@ -22,6 +22,8 @@ RCLError = rclpy_implementation.RCLError
 _BATCH = 200
 #: s after which an answer is not waited for any more
 CALL_TIMEOUT = 5.0
+#: s that a service which nobody offers yet may still be found in: each is found by itself
+OFFER_TIMEOUT = 2.0
 
 
 def newest_quality() -> QoSProfile:
@@ -90,6 +92,7 @@ class Service:
         self._client = node.create_client(service_type, name,
                                           qos_profile=qos_profile_parameters)
         self._waiting: dict[int, tuple[float, Callable[[Any], None]]] = {}
+        self._unsent: list[tuple[float, Any, Callable[[Any], None]]] = []
 
     @property
     def ready(self) -> bool:
@@ -99,30 +102,41 @@ class Service:
     @property
     def busy(self) -> bool:
         """Somebody waits for an answer."""
-        return bool(self._waiting)
+        return bool(self._waiting or self._unsent)
 
     def send(self, request: Any, done: Callable[[Any], None], now: float) -> None:
         """
-        Ask.
+        Ask, as soon as somebody offers it.
 
         :param done: takes the response, or None: nobody answered in time.
         """
+        if not self.ready:
+            self._unsent.append((now + OFFER_TIMEOUT, request, done))
+            return
         handle = self._client.handle
         with handle:
             number = handle.send_request(request)
         self._waiting[number] = (now + self._timeout, done)
 
     def look(self, now: float) -> None:
-        """Hand over the answers that have arrived."""
+        """Ask what could not be asked before, and hand over the answers that have arrived."""
+        unsent, self._unsent = self._unsent, []
+        for deadline, request, done in unsent:
+            if self.ready:
+                self.send(request, done, now)
+            elif now < deadline:
+                self._unsent.append((deadline, request, done))
+            else:
+                done(None)
         handle = self._client.handle
         while self._waiting:
             with handle:
                 header, response = handle.take_response(self._type.Response)
             if response is None:
                 break
-            _, done = self._waiting.pop(header.request_id.sequence_number, (0.0, None))
-            if done is not None:
-                done(response)
+            asked = self._waiting.pop(header.request_id.sequence_number, None)
+            if asked is not None:
+                asked[1](response)
         for number, (deadline, done) in list(self._waiting.items()):
             if now >= deadline:
                 del self._waiting[number]

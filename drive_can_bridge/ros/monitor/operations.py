@@ -63,7 +63,7 @@ class Operations:
             done(_SILENCE if response is None
                  else Outcome(response.success, printable(response.message)))
         service = self._stops.get(drive, {}).get(stop)
-        if service is None or not service.ready:
+        if service is None:
             done(Outcome(False, f'nobody offers {drive}/{_STOPS[stop][0]}: no control word, or '
                                 f'its bridge does not run'))
         else:

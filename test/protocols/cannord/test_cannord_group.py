@@ -540,6 +540,18 @@ def test_end_while_a_member_that_ran_is_lost() -> None:
     assert worries(bus) == [('turn', 'could not be told to stop: it may still be running')]
 
 
+@pytest.mark.parametrize('order', [(0, 1, 2), (2, 1, 0)])
+def test_the_end_of_the_bridge_is_the_reason_whoever_is_told_first(order: tuple[int, ...]) -> None:
+    bus = driven()
+    for place in order:
+        bus.sessions[place].deactivate(bus.now)
+    bus.live(1.0)
+    noted = bus.events(Noted)
+    # as a drive alone says it, and for whoever reads the log: nothing is wrong
+    assert noted == [('lift', Noted('enable withdrawn: bridge inactive; only ~/enable starts the '
+                                    'drive again'))]
+
+
 def test_members_name_their_leader() -> None:
     bus = three()
     texts = [bus.session('hoist').users.control_refusal(action) for action in ControlAction]
