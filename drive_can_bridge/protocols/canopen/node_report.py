@@ -1,10 +1,10 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """What people are told of a node: restarts and emergencies, its state, what ails it."""
 
+from drive_can_bridge.core.events import Noted
 from drive_can_bridge.core.reporter import Reporter
 from drive_can_bridge.protocols.canopen import network
 from drive_can_bridge.protocols.canopen.node import Node
-from drive_can_bridge.protocols.canopen.notes import PacedNotes
 
 
 class NodeReport:
@@ -16,15 +16,15 @@ class NodeReport:
 
     def __init__(self, node: Node, report: Reporter) -> None:
         self._node = node
-        self._notes = PacedNotes(report.note)
+        self._report = report
 
     # -- for the log ------------------------------------------------------------------------------
 
-    def restarted(self, now: float) -> None:
+    def restarted(self) -> None:
         """Tell of a boot-up frame."""
-        self._notes.note('boot-up', 'boot-up: the device has started', now)
+        self._report.note(Noted('boot-up: the device has started'))
 
-    def emergency(self, data: bytes, now: float) -> None:
+    def emergency(self, data: bytes) -> None:
         """
         Take an emergency message; tell what is new about it.
 
@@ -32,20 +32,7 @@ class NodeReport:
         """
         text = self._node.receive_emergency(network.decode_emergency(data))
         if text:
-            ails = self._node.emergency is not None
-            self._notes.note('emergency' if ails else 'emergency over', text, now, warning=ails)
-
-    def handle_timer(self, now: float) -> None:
-        """Tell what was held back for long enough."""
-        self._notes.handle_timer(now)
-
-    def next_timer(self) -> float:
-        """Return when ``handle_timer`` has something to do; infinity: never."""
-        return self._notes.next_timer()
-
-    def flush(self, now: float) -> None:
-        """Tell everything that was held back: nobody will call any more."""
-        self._notes.flush(now)
+            self._report.note(Noted(text, warning=self._node.emergency is not None))
 
     # -- for diagnostics --------------------------------------------------------------------------
 

@@ -85,7 +85,7 @@ class Supervision:
         if base == network.HEARTBEAT_BASE:
             self._take_heartbeat(network.decode_heartbeat(data), now)
         elif base == network.EMERGENCY_BASE:
-            self.report.emergency(data, now)
+            self.report.emergency(data)
         else:
             return False
         return True
@@ -97,7 +97,7 @@ class Supervision:
             return
         self._send()    # before a stop: the node hears that only when it was started
         if change is Change.RESTARTED:
-            self.report.restarted(now)
+            self.report.restarted()
             session.node_closed('the device restarted', now, restarted=True)
             session.report.advice = 'the device restarted: waiting for it to answer'
         elif change is Change.NOT_OPERATIONAL:
@@ -124,7 +124,6 @@ class Supervision:
 
     def handle_timer(self, now: float) -> None:
         """Do what is due."""
-        self.report.handle_timer(now)
         if self._in_use and now >= self.node.next_timer():
             change = self.node.handle_timer(now)
             self._send()
@@ -134,4 +133,4 @@ class Supervision:
 
     def next_timer(self) -> float:
         """Return when ``handle_timer`` has something to do, while the node is in use."""
-        return min(self.node.next_timer(), self.report.next_timer())
+        return self.node.next_timer()

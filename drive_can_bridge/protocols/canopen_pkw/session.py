@@ -135,7 +135,6 @@ class PkwSession(Session):
         self._phase = Phase.IDLE
         self._supervision.stop()
         self._channel.clear()
-        self._supervision.report.flush(self._channel.now)
         self._exchange.stop()
         self.be_offline(advice)
 

@@ -1,8 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """What people are told of a node."""
 
-import math
-
 from drive_can_bridge.core.events import Noted
 from drive_can_bridge.core.reporter import Reporter
 from drive_can_bridge.core.statistics import DriveStatistics
@@ -24,27 +22,16 @@ def made(heartbeat_timeout: float = 0.0) -> tuple[Node, NodeReport, Reporter]:
 def test_emergency_and_its_end() -> None:
     node, report, log = made()
     assert (report.ailing, report.facts()['emergency']) == ('', 'none')
-    report.emergency(OVERCURRENT, 1.0)
+    report.emergency(OVERCURRENT)
     text = report.facts()['emergency']
     assert '2310h' in text
     assert report.ailing == f'emergency {text}: remove its cause'
-    report.emergency(OVERCURRENT, 1.1)      # nothing new
-    report.emergency(NO_ERROR, 1.2)
+    report.emergency(OVERCURRENT)      # nothing new
+    report.emergency(NO_ERROR)
     assert report.ailing == ''
     assert log.take() == [
         Noted(f'emergency {text}', warning=True),
         Noted('emergency over: the node reports no error any more')]
-
-
-def test_restarts_are_told_in_no_flood() -> None:
-    _, report, log = made()
-    for now in (1.0, 1.1, 1.2):
-        report.restarted(now)
-    assert log.take() == [Noted('boot-up: the device has started')]
-    assert report.next_timer() == 2.0
-    report.handle_timer(2.0)
-    assert log.take() == [Noted('boot-up: the device has started (2 more)')]
-    assert report.next_timer() == math.inf
 
 
 def test_state_and_missing_heartbeat() -> None:
