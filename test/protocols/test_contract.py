@@ -407,6 +407,20 @@ def test_end_while_the_bus_is_lost_is_told(partner: Partner) -> None:
     assert warnings(partner) == ['could not be told to stop: it may still be running']
 
 
+def test_a_stop_that_the_drive_did_not_hear_is_told(partner: Partner) -> None:
+    """What was told to stand still when it had fallen silent already may not have heard it."""
+    run(partner)
+    partner.mute = True
+    partner.talk.commands(0, 0.0, partner.now)
+    partner.live(2.0)
+    assert partner.registers[50] == 1000
+    assert not partner.talk.session.online
+    partner.deliver(partner.talk.deactivate(partner.now))
+    partner.live(2.0)
+    assert partner.talk.session.stopped
+    assert any('may still be running' in text for text in warnings(partner))
+
+
 def test_stop_frames_that_the_bus_refuses_are_no_stop(partner: Partner) -> None:
     run(partner)
     partner.talk.refusing = lambda text: True
