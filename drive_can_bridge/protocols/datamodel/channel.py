@@ -100,7 +100,7 @@ class ParameterCourier(Courier[Step, Reply]):
 
     See :class:`AcyclicChannel` for the parameters.
 
-    :ivar asked_at: when the last read was sent.
+    :ivar asked_at: when the last read was sent; ``wrote_at``: when the last write was.
     :ivar free_at: when the next write to RAM may follow.
     """
 
@@ -111,7 +111,7 @@ class ParameterCourier(Courier[Step, Reply]):
                  retry: RetryPolicy, eeprom_gap: float,
                  wrote: Callable[[Write], None], polling: Polling | None) -> None:
         super().__init__(retry)
-        self.asked_at = -math.inf
+        self.asked_at = self.wrote_at = -math.inf
         self.free_at = -math.inf
         self.anonymous = polling is not None
         self._encode_read = encode_read
@@ -188,7 +188,7 @@ class ParameterCourier(Courier[Step, Reply]):
 
     def write(self, write: Write, told: Left, now: float) -> None:
         """Send a write now."""
-        self.free_at = now + SPACING
+        self.wrote_at, self.free_at = now, now + SPACING
         if write.eeprom:
             self._eeprom_free_at = now + self._eeprom_gap
 

@@ -108,7 +108,9 @@ class SetpointWriter:
         if not sent:
             self._schedule.failed(index)
             return
-        self._session.told.note(index, runs=runs)
+        told = self._session.told
+        told.note(index, runs=runs)
+        told.ran = told.ran or runs     # until an answer shows that what followed has arrived
         control = self._session.control
         if index != self._slot or control is None:
             return

@@ -74,6 +74,7 @@ class StandardSession(Session):
 
     def prepare_stop(self, now: float) -> bool:
         self._clear_acyclic()
+        self.told.doubt()   # should the stop be confirmed, that is over
         owes = self._phase is not Phase.IDLE and (self.online or self.told.owed)
         if owes:
             self._phase = Phase.STOPPING
@@ -114,6 +115,7 @@ class StandardSession(Session):
         self._timer.start(now)
 
     def lost(self, now: float, *, was_online: bool) -> None:
+        self.told.doubt()
         self._tell_to_stop(now, was_online)
 
     def _tell_to_stop(self, now: float, was_online: bool = False) -> None:
@@ -192,6 +194,9 @@ class StandardSession(Session):
             return
         self._writer.doubt = False
         self._book.answered(self._received_at)
+        courier = self._channel.courier
+        if self.online and self.told.ran and courier.asked_at > courier.wrote_at:
+            self.told.answered()
         if not self.online:
             self.gate.measured(raws)    # before anything is written
             self._found(now)
