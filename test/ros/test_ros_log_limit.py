@@ -224,6 +224,20 @@ def test_dangers_are_told_whoever_talks() -> None:
                           'axis_7: mapping differs']
 
 
+def test_a_danger_that_comes_again_is_not_only_counted() -> None:
+    log = Log()
+    danger = f'told to stop, but no answer: {MAY_RUN}'
+    for _ in range(FEW):
+        log.lift.warning(danger, urgent=True)
+        log.wait(QUIET / 2)
+    log.take()
+    log.lift.warning(danger, urgent=True)   # and while it is held there is a flood
+    for number in range(BURST + 2 * TOPICS_MAX):
+        log.lift.warning(f'read p{number}: no answer')
+    log.wait(2 * SUM_UP)
+    assert any(danger in line for line in log.lines)
+
+
 def test_a_hundred_drives_at_once_stay_readable() -> None:
     log = Log()
     for _ in range(2000):
