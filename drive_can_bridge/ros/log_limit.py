@@ -207,7 +207,15 @@ class Speaker:
                 self._hold(known, now)
             known.level, known.text, known.seen_at = level, text, now
             if len(self._topics) > TOPICS_MAX:
-                self._left_out += self._topics.pop(next(iter(self._topics))).held
+                self._make_room(now)
+
+    def _make_room(self, now: float) -> None:
+        """Forget the line that has not come for the longest time."""
+        oldest = self._topics.pop(next(iter(self._topics)))
+        if oldest.held and oldest.urgent and self._wait(True, now) <= 0.0:
+            self._sum_up(oldest, now)   # whatever flood drives it out
+        else:
+            self._left_out += oldest.held
 
     def _hold(self, topic: _Topic, now: float) -> None:
         if not topic.held:
