@@ -421,6 +421,22 @@ def test_a_stop_that_the_drive_did_not_hear_is_told(partner: Partner) -> None:
     assert any('may still be running' in text for text in warnings(partner))
 
 
+def test_a_drive_that_is_silent_when_the_bridge_ends_is_told(make: type[Partner]) -> None:
+    """It does not count as lost yet."""
+    partner = make(missed_limit=100)
+    partner.start()
+    partner.enable()
+    run(partner)
+    partner.mute = True
+    partner.live(2.5 * partner.configuration.period)
+    assert partner.talk.session.online
+    partner.deliver(partner.talk.deactivate(partner.now))
+    partner.live(3.0)
+    assert partner.talk.session.stopped
+    assert partner.registers[50] == 1000
+    assert any('may still be running' in text for text in warnings(partner))
+
+
 def test_stop_frames_that_the_bus_refuses_are_no_stop(partner: Partner) -> None:
     run(partner)
     partner.talk.refusing = lambda text: True
