@@ -56,6 +56,7 @@ class CyclicExchange(Generic[TelegramT]):
         self._raws: list[int] | None = None     # in it, until it has left
         self._runs = False                      # it holds anything but neutral and disable
         self._frames_out = 0                    # of which nobody has said what became of them
+        self._silent = 0                        # cycles missed in a row when the stop began
 
     # -- sending ----------------------------------------------------------------------------------
 
@@ -151,6 +152,7 @@ class CyclicExchange(Generic[TelegramT]):
 
     def stop_soon(self, now: float) -> None:
         """Let the last cycles before silence follow soon."""
+        self._silent = self._book.missed_in_row
         soon = max(now, self._timer.began_at + self._timer.stop_spacing)
         if self._timer.due < math.inf:
             self.cycles_left = STOP_CYCLES
@@ -163,6 +165,12 @@ class CyclicExchange(Generic[TelegramT]):
         """Send the last cycles before silence, beginning then."""
         self.cycles_left = STOP_CYCLES
         self._timer.start(first)
+
+    def doubt_the_end(self) -> None:
+        """Take note of a drive that ran, and was silent already when its last cycles began."""
+        # the last one may still be answered
+        if 0 < self._silent <= self._book.missed_in_row - (STOP_CYCLES - 1):
+            self._session.told.doubt()
 
     def stop(self) -> None:
         """Send nothing more."""

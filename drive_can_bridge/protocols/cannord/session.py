@@ -106,7 +106,7 @@ class CannordSession(Session):
         self._exchange = CyclicExchange(
             self, self._book, self._encode, slot=0,
             left=None if group is None else group.cycle_left,
-            ended=lambda _: self.stop_left())
+            ended=lambda _: self._last_cycle_left())
         self._cycling = self._stopping = False
         self._answer_due = math.inf
 
@@ -118,6 +118,11 @@ class CannordSession(Session):
         if self._group is not None:
             self._group.end(now)
         super().deactivate(now)
+
+    def _last_cycle_left(self) -> None:
+        if self._group is None:     # which asks its members in turn, and says who is offline
+            self._exchange.doubt_the_end()
+        self.stop_left()
 
     def prepare_stop(self, now: float) -> bool:
         self._clear_acyclic()

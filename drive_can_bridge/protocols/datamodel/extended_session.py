@@ -246,6 +246,7 @@ class ExtendedSession(Session):
     def _stop_ended(self) -> None:
         if (self._stopping and not self._side.stop.running
                 and (self._exchange.cycles_left == 0 or self._phase is Phase.STOPPING)):
+            self._exchange.doubt_the_end()
             self.stop_left()
 
     def _miss(self, now: float) -> None:
