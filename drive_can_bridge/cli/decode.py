@@ -163,12 +163,13 @@ def _run_through(records: Iterable[Record], tracer: Tracer) -> bool:
 
 def _live(args: Namespace, configuration: BridgeConfiguration, tracer: Tracer) -> int:
     with listening(configuration) as taps:
-        looked_at = time.time()
+        looked_at = None
         try:
             for record in taps.records(args.seconds):
                 if record is not None:
                     tracer.take(record)
-                else:   # a look before: this one may have come late, and found nothing to read yet
+                elif looked_at is not None:
+                    # of the look before: this one may have come late, with nothing read yet
                     tracer.advance(looked_at - _DELIVERY_TIME)
                 looked_at = time.time()
         except KeyboardInterrupt:

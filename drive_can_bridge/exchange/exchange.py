@@ -167,15 +167,20 @@ class BusExchange:
                     self._stop_one(member, lambda session: session.time_lost(now))
                 self._stop_one(member, lambda session: session.deactivate(now))
         self._alarm.ring()
-        end = now + STOP_MARGIN + max(
+        end = self._clock() + STOP_MARGIN + max(
             (session.longest_stop for session in self._sessions), default=0.0)
         while not self._stopped():
-            if self._clock() > end:
+            now = self._clock()
+            if now > end:
                 self._give_up()
                 return False
             if not self._thread.is_alive():  # the neutral frames go out all the same
                 self._pass_to_stop()
+                now = self._clock()
             time.sleep(0.002)
+            asleep = self._clock() - now
+            if asleep > LATENESS_MAX:   # a process that stood still: not the bus blocks
+                end += asleep
         return True
 
     def _give_up(self) -> None:

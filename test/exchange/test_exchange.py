@@ -2,6 +2,7 @@
 """The exchange of one bus, without a bus: routing, time, stops, and who is told what."""
 
 import threading
+import time
 
 from builders import (
     CONTROL, drive, GAIN, INT16, parameter, RAMP, read, SPEED, WORD, write,
@@ -270,6 +271,23 @@ def test_stop_that_comes_with_the_end_of_a_stall() -> None:
     assert bench.link.take().count('00300321#0000000000000000') >= 3
     assert any(isinstance(event, Noted) and 'may still be running' in event.text
                for event in bench.notes[0].events)
+
+
+def test_a_process_that_stands_still_during_a_stop_ends_it_all_the_same(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = Bench(drive(rearm_immediate=True))
+    bench.online()
+    bench.notes[0].commands.append((0, 100.0))
+    assert bench.at(10.02) == ['003FFFF0#03E8000000000000']
+    bench.step = 0.001
+    stalls = [3.0, 0.0, 2.0]
+
+    def sleep(_: float) -> None:
+        bench.now += stalls.pop(0) if stalls else 0.0
+    monkeypatch.setattr(time, 'sleep', sleep)
+    assert bench.exchange.deactivate() is True
+    assert bench.link.take() == [NEUTRAL] * 3
+    assert not stalls
 
 
 def test_silent_member_of_a_broadcast_group_goes_offline() -> None:
