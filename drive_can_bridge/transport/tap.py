@@ -24,8 +24,8 @@ from drive_can_bridge.transport.port import open_port, Port
 QUEUE_MAX = 200_000
 #: s that a receive may block
 _PATIENCE = 0.05
-#: s by which a stamp may differ from now to be believed
-_STAMP_AGE_MAX = 1.0
+#: s by which a stamp may differ from now to be believed: machines stand still for some of them
+_STAMP_AGE_MAX = 10.0
 
 
 class Tap:
