@@ -35,8 +35,7 @@ def wait_for_end(lines: Callable[[], list[Any]], end: list[Any]) -> None:
 
     What another process prints of the last that it heard comes when that one finds time for it.
     """
-    deadline = time.monotonic() + DEADLINE
-    while (last := lines()[-len(end):]) != end:
-        if time.monotonic() > deadline:
-            assert last == end
-        time.sleep(LONGEST)
+    try:
+        wait_for(lambda: lines()[-len(end):] == end, f'{end} at the end')
+    except AssertionError as error:
+        raise AssertionError(f'{error}, where {lines()[-len(end):]} is') from None

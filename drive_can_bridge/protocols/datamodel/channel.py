@@ -276,5 +276,4 @@ class AcyclicChannel(Channel[Step, Reply]):
     @property
     def outstanding(self) -> Read | None:
         """The read that waits for its answer, if any."""
-        step = self.courier.step
-        return step if isinstance(step, Read) else None
+        return self.courier.outstanding
