@@ -51,10 +51,13 @@ def distributions(results: dict[str, list[Any]], path: Path) -> str:
         ordered = sorted(1e3 * max(each, 1e-6) for each in samples)
         shares = [1.0 - place / len(ordered) for place in range(len(ordered))]
         axes.plot(ordered, shares, label=label, drawstyle='steps-post')
+    left.set_xlim(left=0.003)
     for axes, title in ((left, 'period error'), (right, 'latency')):
         axes.set(xscale='log', yscale='log', xlabel='ms', title=title,
                  ylabel='share of samples that are worse')
         axes.grid(which='both', alpha=0.3)
+        axes.xaxis.set(major_formatter='{x:g}', minor_formatter='{x:g}',
+                       minor_locator=pyplot.LogLocator(subs=(2, 5)))
         if axes.lines:
             axes.legend(fontsize='small')
     chart.savefig(path, dpi=110)

@@ -20,6 +20,7 @@ from rcl_interfaces.msg import ParameterEvent
 import rclpy  # isort: skip
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import JointState
 from topics import TYPES
 
@@ -54,7 +55,9 @@ class Counter:
 
     def __init__(self, node: Node) -> None:
         self.number = 0
-        node.create_subscription(JointState, '/drive_can_bridge/joint_states', self._received, 10)
+        # as the hardware interface of ros2_control and robot_state_publisher subscribe to it
+        node.create_subscription(JointState, '/drive_can_bridge/joint_states', self._received,
+                                 qos_profile_sensor_data)
 
     def _received(self, _: JointState) -> None:
         self.number += 1

@@ -84,10 +84,12 @@ class Noted:
     Anything else that belongs into the log.
 
     :param warning: somebody should do something about it.
+    :param danger: at once: a drive may be running that should not.
     """
 
     text: str
     warning: bool = False
+    danger: bool = False
 
 
 Event = Union[ProcessDataReceived, StationFound, StationLost, MappingDiffered, MappingWritten,

@@ -12,6 +12,7 @@ from drive_can_bridge.core.events import (
 )
 from drive_can_bridge.core.holding import Setpoint
 from drive_can_bridge.core.statistics import DriveStatistics
+from drive_can_bridge.core.told import MAY_RUN
 
 
 class Reporter:
@@ -41,9 +42,14 @@ class Reporter:
         """Tell what happened."""
         self.events.append(event)
 
-    def warn(self, text: str) -> None:
-        """Tell people what is not as it should be."""
-        self.events.append(Noted(text, warning=True))
+    def warn(self, text: str, *, may_run: bool = False) -> None:
+        """
+        Tell people what is not as it should be.
+
+        :param may_run: the drive may be running for that reason, which is said.
+        """
+        self.events.append(Noted(
+            f'{text}: {MAY_RUN}' if may_run else text, warning=True, danger=may_run))
 
     def reject(self, text: str) -> None:
         """Count and tell a frame of the drive that is malformed or unasked."""

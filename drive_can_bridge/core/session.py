@@ -43,7 +43,7 @@ from drive_can_bridge.core.retry import RetryPolicy
 from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.setpoints import Setpoints
 from drive_can_bridge.core.statistics import DriveStatistics
-from drive_can_bridge.core.told import MAY_RUN, Told
+from drive_can_bridge.core.told import Told
 from drive_can_bridge.core.users import Users
 
 #: advice until more is known
@@ -224,7 +224,7 @@ class Session(ABC):
     def _leave_owing(self, why: str) -> None:
         """Say that the drive is left as it is, if it was told to run and not to stop."""
         if self.told.owed:
-            self.report.warn(f'{why}: {MAY_RUN}')
+            self.report.warn(why, may_run=True)
 
     # -- what a family fills in -------------------------------------------------------------------
 

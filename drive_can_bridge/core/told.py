@@ -10,6 +10,8 @@ whether it still owes the drive a stop.
 from collections.abc import Hashable
 
 MAY_RUN = 'it may still be running'
+#: what a control word is among the things that travel separately, where it does
+CONTROL_WORD = 'control word'
 #: what a drive that does not answer was told
 _UNHEARD = object()
 _NOTHING_ELSE = frozenset([_UNHEARD])

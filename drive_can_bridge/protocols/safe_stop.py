@@ -9,7 +9,6 @@ from collections.abc import Callable, Generator
 from typing import Any, Generic
 
 from drive_can_bridge.core.session import Session
-from drive_can_bridge.core.told import MAY_RUN
 from drive_can_bridge.protocols.channel import Channel, Lane
 from drive_can_bridge.protocols.courier import ReplyT, StepT
 
@@ -53,8 +52,8 @@ class SafeStop(Generic[StepT, ReplyT]):
         if not failed:
             confirmed()
         elif self._owed or self._insisting:
-            tail = f': {MAY_RUN}' if self._owed else ''
-            self._session.report.warn(f'told to stop, but {"; ".join(failed)}{tail}')
+            self._session.report.warn(
+                f'told to stop, but {"; ".join(failed)}', may_run=self._owed)
             if not self._session.active:    # which ends with it: there is no more to be said
                 self._session.told.stopped()
         self._ended()

@@ -30,7 +30,6 @@ from drive_can_bridge.core.requests import (
 )
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.text import printable
-from drive_can_bridge.core.told import MAY_RUN
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.protocols.family import Family
 from drive_can_bridge.ros.commands import CommandIntake
@@ -257,7 +256,7 @@ class DriveNode:
             self.warn('foreign master', event.text)
         elif isinstance(event, Noted):
             if event.warning:
-                self._log.warning(event.text, urgent=MAY_RUN in event.text)
+                self._log.warning(event.text, urgent=event.danger)
             else:
                 self._log.info(event.text)
 

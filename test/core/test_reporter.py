@@ -25,6 +25,13 @@ def test_events_in_order_and_once() -> None:
     assert report.take() == []
 
 
+def test_of_a_danger() -> None:
+    report = Reporter(DriveStatistics(), '')
+    report.warn('no answer', may_run=True)
+    assert report.take() == [
+        Noted('no answer: it may still be running', warning=True, danger=True)]
+
+
 def test_what_was_taken_stays_as_it_was() -> None:
     report = Reporter(DriveStatistics(), '')
     report.warn('first')

@@ -256,7 +256,7 @@ def test_stop_frames_that_the_bus_refuses_are_no_stop() -> None:
     assert bench.exchange.deactivate() is False
     assert bench.sessions[0].stopped
     assert bench.notes[0].events[-2:] == [
-        Noted('could not be told to stop: it may still be running', warning=True),
+        Noted('could not be told to stop: it may still be running', warning=True, danger=True),
         StationLost('deactivated')]
 
 

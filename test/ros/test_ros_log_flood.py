@@ -27,7 +27,7 @@ def test_what_flips_is_summed_up_and_a_danger_is_told_meanwhile(
             lift.handle_event(StationFound())
             lift.handle_event(Noted('fault gone (status word 0001h)', warning=True))
         lift.handle_event(Noted('told to stop, but no answer: it may still be running',
-                                warning=True))
+                                warning=True, danger=True))
     assert lift.times_lost == FLIPS
     client.wait_logged('lift: told to stop, but no answer: it may still be running', WARN)
     client.wait_logged('lift: fault gone (status word 0001h) (395 more times in ')

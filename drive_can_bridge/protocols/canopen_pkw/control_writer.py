@@ -17,6 +17,7 @@ import math
 
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.session import Session
+from drive_can_bridge.core.told import CONTROL_WORD
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
     Answered, MailboxChannel, Read, Refused, Reply, Silence, Step, Write,
@@ -26,8 +27,6 @@ from drive_can_bridge.protocols.channel import Lane
 
 #: s until a ``disable`` that was refused is written again
 RETRY_AFTER = 0.25
-#: what the drive is told by it, for the books of what it was told
-CONTROL_WORD = 'control word'
 
 
 class ControlWriter:

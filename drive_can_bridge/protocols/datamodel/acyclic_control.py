@@ -16,6 +16,7 @@ import math
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.parameters import Parameter, Storage
 from drive_can_bridge.core.session import Session
+from drive_can_bridge.core.told import CONTROL_WORD
 from drive_can_bridge.protocols.cycle_timer import stop_spacing
 from drive_can_bridge.protocols.datamodel.channel import AcyclicChannel, Procedure, Read, Write
 
@@ -29,8 +30,6 @@ REPEAT_LAST = 2.0
 EEPROM_REPEATS = 3
 #: s until a word that the bus refused is written again
 REFUSED_PAUSE = 0.02
-#: what the drive is told by it, for the books of what it was told
-CONTROL_WORD = 'control word'
 
 
 class AcyclicControl:
@@ -127,7 +126,9 @@ class AcyclicControl:
                 self._written = None
                 self.retry_at = now + REFUSED_PAUSE
             return
-        self._session.told.note(CONTROL_WORD, runs=runs)
+        told = self._session.told
+        told.note(CONTROL_WORD, runs=runs)
+        told.ran = told.ran or runs     # until an answer shows that what followed has arrived
         self._outdated = self._reading
         self._repeat_at = now + min(REPEAT_FIRST * 2 ** min(self._repeats, 10), REPEAT_LAST)
         if word == self._control.word:

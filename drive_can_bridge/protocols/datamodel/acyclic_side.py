@@ -15,10 +15,11 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.roles import Cells
 from drive_can_bridge.core.session import Session
+from drive_can_bridge.core.told import CONTROL_WORD
 from drive_can_bridge.core.users import Users
 from drive_can_bridge.protocols.access import ChannelServer
 from drive_can_bridge.protocols.datamodel import procedures
-from drive_can_bridge.protocols.datamodel.acyclic_control import AcyclicControl, CONTROL_WORD
+from drive_can_bridge.protocols.datamodel.acyclic_control import AcyclicControl
 from drive_can_bridge.protocols.datamodel.channel import (
     AcyclicChannel, Polling, Read, Reply, Step, Words, Write,
 )

@@ -263,7 +263,7 @@ class ExtendedSession(Session):
         if self._verify and not self.online:
             self.start_over(now)
             return
-        owed = self.told.owed
+        owed = self.told.owed or self.told.ran
         self.lose(f'no cyclic response for {self.configuration.missed_limit} cycles', now)
         if owed:  # of the word that has no slot; setpoints go neutral with the next cycles
             self._side.begin_stop(now, setpoints=False)

@@ -207,7 +207,7 @@ def test_stop_is_tried_three_times() -> None:
     assert talk.session.stopped
     assert talk.events(Noted) == [WITHDRAWN, Noted(
         'told to stop, but control_register_1 0000h not acknowledged in 3 attempts; speed not '
-        'acknowledged in 3 attempts: it may still be running', warning=True)]
+        'acknowledged in 3 attempts: it may still be running', warning=True, danger=True)]
 
 
 def test_stop_of_many_setpoints_has_its_limit() -> None:

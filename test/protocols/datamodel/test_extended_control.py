@@ -16,6 +16,7 @@ from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import FrameRejected, Noted, StationLost
 from drive_can_bridge.core.setpoints import CommandOutcome
+from drive_can_bridge.core.told import MAY_RUN
 
 READY, ENABLED, FAULT = (
     ANSWER, '103FFFF0#03E800FA00030000', '103FFFF0#03E800FA00080000')
@@ -371,6 +372,40 @@ def test_loss_writes_disable() -> None:
     assert [text for _, text in found if text != ASK_WORD] == (
         [NEUTRAL] * 3 + [DISABLE, NEUTRAL, DISABLE, NEUTRAL])
     assert talk.events(StationLost) == [StationLost('no cyclic response for 3 cycles')]
+
+
+@pytest.mark.parametrize('mapping', ['assume', 'verify'])
+def test_enabled_drive_that_is_deaf_to_disable(mapping: str) -> None:
+    """It stood at neutral, but enabled, and nothing shows that it has ever been told else."""
+    talk = online(control=CONTROL, mapping=mapping)
+    talk.asks(ControlAction.ENABLE, 10.01)
+    for cycle, answer in ((1, READY), (2, ENABLED), (3, ENABLED)):
+        talk.until(10.0 + 0.02 * cycle + TICK)
+        talk.hears(answer, 10.002 + 0.02 * cycle)
+    assert talk.asks(ControlAction.DISABLE, 10.07) == [DISABLE]
+    sent = [text for _, text in talk.until(10.2)]
+    assert not talk.session.online
+    assert DISABLE in sent
+    talk.deactivate(10.3)
+    talk.until(11.0)
+    assert talk.session.stopped
+    assert [note.text for note in talk.events(Noted) if note.warning][-1].endswith(MAY_RUN)
+
+
+def test_enabled_drive_that_hears_disable() -> None:
+    talk = beside()
+    talk.asks(ControlAction.ENABLE, 10.01)
+    for cycle, answer in ((1, READY), (2, ENABLED), (3, ENABLED)):
+        talk.until(10.0 + 0.02 * cycle + TICK)
+        talk.hears(answer, 10.002 + 0.02 * cycle)
+    assert talk.asks(ControlAction.DISABLE, 10.07) == [DISABLE]
+    talk.until(10.08 + TICK)
+    talk.hears(READY, 10.082)
+    talk.until(10.2)
+    assert not talk.session.online
+    talk.deactivate(10.3)
+    talk.until(11.0)
+    assert not any(note.text.endswith(MAY_RUN) for note in talk.events(Noted))
 
 
 def test_differing_map_writes_disable() -> None:
