@@ -17,7 +17,7 @@ from drive_can_bridge.core.errors import DriveCanError, ValueRefused
 from drive_can_bridge.process import environment
 from drive_can_bridge.process.signals import SignalWatcher
 from drive_can_bridge.resources import config_file
-from drive_can_bridge.simulation.faults import parse_fault, USAGE
+from drive_can_bridge.simulation.faults import parse_fault, usage_lines
 from drive_can_bridge.simulation.simulation import Simulation
 
 WRONG_USAGE = 2
@@ -26,8 +26,7 @@ PARAMETER_FILE = 'demo.yaml'
 
 def add_parser(subparsers: Any) -> None:
     """Add the subcommand to the parser of ``drive_can``."""
-    width = max(len(usage) for usage, _ in USAGE)
-    faults = '\n'.join(f'  {usage:{width}}  {meaning}' for usage, meaning in USAGE)
+    faults = '\n'.join(usage_lines())
     parser = subparsers.add_parser(
         'demo', help='run a bridge, simulated drives and the live view of them',
         description='Run simulated drives, a bridge for them and the view of drive_can monitor, '

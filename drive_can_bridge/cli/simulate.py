@@ -161,9 +161,8 @@ def _wait(simulation: Simulation, wake: int, console: Console) -> int:
     """Obey standard input until a signal comes, or a thread has ended by itself."""
     reader = LineReader()
     while not simulation.failure:
-        wanted = [wake]
-        if reader.fileno is not None and reader.usable:
-            wanted.append(reader.fileno)
+        typed = reader.fileno
+        wanted = [wake] if typed is None else [wake, typed]
         readable, _, _ = select.select(wanted, [], [], _LOOK_PERIOD)
         if wake in readable:
             return 0

@@ -5,11 +5,12 @@ Lines typed by a person, or sent by a script, while drives are simulated (docs/s
 ``conveyor late=0.15 drop=2`` plays faults, ``conveyor`` tells what the drive is doing.
 """
 
+from contextlib import suppress
 import os
 import sys
 
 from drive_can_bridge.core.errors import ValueRefused
-from drive_can_bridge.simulation.faults import parse_fault, USAGE
+from drive_can_bridge.simulation.faults import parse_fault, usage_lines
 from drive_can_bridge.simulation.player import Say
 from drive_can_bridge.simulation.simulation import PlayedDrive, Simulation
 
@@ -61,43 +62,38 @@ class Console:
 
 
 class LineReader:
-    """
-    Standard input, without ever blocking or stopping a process in the background.
-
-    :ivar fileno: to wait for, or None: nothing (more) comes.
-    """
+    """Standard input, without ever blocking or stopping a process in the background."""
 
     def __init__(self) -> None:
-        self.fileno: int | None = None
+        self._descriptor: int | None = None
         self._rest = b''
-        try:
-            # the descriptor may be closed (None), or replaced by something that has none
-            self.fileno = None if sys.stdin is None else sys.stdin.fileno()
-        except (OSError, ValueError):
-            pass
+        # the stream may be closed (None), or replaced by something that has no descriptor
+        with suppress(AttributeError, OSError, ValueError):
+            self._descriptor = sys.stdin.fileno()
 
     @property
-    def usable(self) -> bool:
-        """May be read now: a terminal stops whoever reads from it in the background."""
-        if self.fileno is None:
-            return False
+    def fileno(self) -> int | None:
+        """What may be read now; None: nothing comes, or a terminal would stop who reads it."""
+        found = self._descriptor
         try:
-            return not os.isatty(self.fileno) or os.tcgetpgrp(self.fileno) == os.getpgrp()
+            foreground = found is None or not os.isatty(found) or (
+                os.tcgetpgrp(found) == os.getpgrp())
         except OSError:
-            return False
+            foreground = False
+        return found if foreground else None
 
     def read_lines(self) -> list[str]:
         """Return the lines that have come. Call it when the descriptor is readable."""
-        if self.fileno is None:
+        if self._descriptor is None:
             return []
         try:
-            data = os.read(self.fileno, _CHUNK)
+            data = os.read(self._descriptor, _CHUNK)
         except BlockingIOError:
             return []
         except OSError:
             data = b''
         if not data:
-            self.fileno = None
+            self._descriptor = None
             data = b'\n'
         *lines, self._rest = (self._rest + data).split(b'\n')
         self._rest = self._rest[:_LINE_MAX]
@@ -116,6 +112,4 @@ def describe(drive: PlayedDrive) -> list[str]:
 
 def help_lines() -> list[str]:
     """Return what can be typed."""
-    width = max(len(usage) for usage, _ in USAGE)
-    return ['DRIVE FAULT …  DRIVE  status  list  help; faults:'] + [
-        f'  {usage:{width}}  {meaning}' for usage, meaning in USAGE]
+    return ['DRIVE FAULT …  DRIVE  status  list  help; faults:', *usage_lines()]

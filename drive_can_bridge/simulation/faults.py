@@ -76,7 +76,12 @@ class FaultKind(Enum):
 
 
 _BY_WORD = {kind.word: kind for kind in FaultKind}
-USAGE = tuple((kind.usage, kind.meaning) for kind in FaultKind)
+
+
+def usage_lines() -> list[str]:
+    """Return a line for each fault: how it is written, and what it does."""
+    width = max(len(kind.usage) for kind in FaultKind)
+    return [f'  {kind.usage:{width}}  {kind.meaning}' for kind in FaultKind]
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +118,7 @@ def parse_fault(text: str) -> Fault:
         near = nearest(word, _BY_WORD)
         hint = f' (nearest: {near})' if near else ''
         raise ValueRefused(f"unknown fault '{word}'{hint}; allowed: "
-                           f"{', '.join(usage for usage, _ in USAGE)}")
+                           f"{', '.join(kind.usage for kind in FaultKind)}")
     if not equals and not kind.required:
         return Fault(kind)
     if kind.convert is None or not argument:

@@ -58,8 +58,7 @@ class SlcanAdapter:
         self.opened = 0
         self._listen_only = False
         self._stamps = False
-        self._command = bytearray()
-        self._skipping = False
+        self._begun = b''
         self._replies = bytearray()
 
     @property
@@ -69,7 +68,10 @@ class SlcanAdapter:
 
     def receive_bytes(self, data: bytes) -> list[Frame]:
         """Take what the client wrote; return the frames it sends. Any bytes will do."""
-        frames = [self._obey(command) for command in self._commands(data)]
+        *commands, begun = (self._begun + data).split(DONE)
+        # of what is too long already, enough is kept to be refused when it ends
+        self._begun = begun[:_COMMAND_MAX + 1]
+        frames = [self._obey(command.decode('latin-1')) for command in commands if command]
         return [frame for frame in frames if frame is not None]
 
     def take_replies(self) -> bytes:
@@ -82,31 +84,13 @@ class SlcanAdapter:
         stamp = f'{int(now * 1000.0) % _STAMP_WRAP:04X}' if self._stamps else ''
         return f'{head}{len(frame.data)}{frame.data.hex().upper()}{stamp}\r'.encode()
 
-    def _commands(self, data: bytes) -> list[str]:
-        """Cut the stream into commands; what is too long to be one is skipped."""
-        commands = []
-        parts = data.split(DONE)
-        for index, part in enumerate(parts):
-            if len(self._command) + len(part) > _COMMAND_MAX:
-                self._skipping = True
-                self._command.clear()
-            if not self._skipping:
-                self._command += part
-            if index == len(parts) - 1:
-                break
-            if self._skipping:
-                self._skipping = False
-                self._replies += REFUSED
-            elif self._command:
-                commands.append(self._command.decode('latin-1'))
-            self._command.clear()
-        return commands
-
     def _obey(self, command: str) -> Frame | None:
         kind, reply = command[0], DONE
         if kind in 'tTrR':
             return self._transmit(command)
-        if kind in 'OL':
+        if len(command) > _COMMAND_MAX:
+            reply = REFUSED
+        elif kind in 'OL':
             # real adapters refuse this while open; a client that crashed never closed
             self.is_open = True
             self._listen_only = kind == 'L'

@@ -40,7 +40,6 @@ class SlcanTerminal(EndPoint):
 
     :param bitrate: of the bus, bit/s: a client that sets another hears nothing; None: any.
     :ivar path: the device that a client opens.
-    :ivar dropped: frames lost because nobody read them.
     :raises BusUnavailable: the system has no pseudo-terminal left.
     """
 
@@ -54,11 +53,11 @@ class SlcanTerminal(EndPoint):
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
         self.path = os.ttyname(self._slave)
-        self.dropped = 0
         self._lock = threading.Lock()
         self._adapter = SlcanAdapter(bitrate)
         self._received: deque[Frame] = deque()
-        self._outgoing: deque[tuple[float, bytes]] = deque()    # with the time it has waited since
+        # with the time it has waited since; the oldest makes room
+        self._outgoing: deque[tuple[float, bytes]] = deque(maxlen=BACKLOG)
         self._started = b''         # rest of what the kernel took a part of
         self._links: list[Path] = []
         self._closed = False
@@ -100,9 +99,6 @@ class SlcanTerminal(EndPoint):
         with self._lock:
             if not self._adapter.connected:
                 return
-            if len(self._outgoing) >= BACKLOG:
-                self._outgoing.popleft()
-                self.dropped += 1
             now = time.monotonic()
             self._outgoing.append((now, self._adapter.encode(frame, now)))
             self._flush()
@@ -154,7 +150,6 @@ class SlcanTerminal(EndPoint):
         if before != (self._adapter.is_open, self._adapter.opened):
             # what an earlier client has not read is nothing for the next one (the kernel's share
             # is for the client to discard: doing that here would race with its first read)
-            self.dropped += len(self._outgoing)
             self._outgoing.clear()
         replies = self._adapter.take_replies()
         if replies:
@@ -166,7 +161,6 @@ class SlcanTerminal(EndPoint):
         oldest = time.monotonic() - BACKLOG_AGE
         while self._outgoing and self._outgoing[0][0] < oldest:
             self._outgoing.popleft()
-            self.dropped += 1
         try:
             while self._has_room() and (self._started or self._outgoing):
                 if not self._started:

@@ -318,26 +318,26 @@ class TestConsole:
         with os.fdopen(reading) as stream:
             monkeypatch.setattr('sys.stdin', stream)
             reader = LineReader()
-            assert (reader.fileno, reader.usable) == (reading, True)
+            assert reader.fileno == reading
             os.write(writing, b'list\nhe')
             assert reader.read_lines() == ['list']
             os.write(writing, b'lp \xff')
             assert reader.read_lines() == []
             os.close(writing)
             assert reader.read_lines() == ['help \N{REPLACEMENT CHARACTER}']
-            assert (reader.fileno, reader.usable, reader.read_lines()) == (None, False, [])
+            assert (reader.fileno, reader.read_lines()) == (None, [])
 
     def test_terminal_of_others_is_left_alone(self, monkeypatch: pytest.MonkeyPatch) -> None:
         # reading from it would stop a process in the background
         terminal = SlcanTerminal()
         with open(terminal.path, encoding='ascii') as stream:
             monkeypatch.setattr('sys.stdin', stream)
-            assert not LineReader().usable
+            assert LineReader().fileno is None
         terminal.close()
 
     def test_no_standard_input(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr('sys.stdin', None)
-        assert not LineReader().usable
+        assert LineReader().fileno is None
 
     def test_a_line_counts_as_a_whole(self, lines: Any, scripted: Scripted) -> None:
         assert len(lines('lift silent nonsense')[1]) == 1
