@@ -11,7 +11,6 @@ it sends its process data unasked.
 from collections.abc import Iterable, Sequence
 import math
 
-from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import ConfigurationError, RemoteProtocolError
 from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.core.parameters import Parameter
@@ -25,7 +24,7 @@ from drive_can_bridge.protocols.cannord.process_data import (
 )
 from drive_can_bridge.simulation.cannord_plant import InverterPlant
 from drive_can_bridge.simulation.cannord_table import CannordTable, Refused
-from drive_can_bridge.simulation.drive import ALONE, Ignored, SimulatedDrive, Surroundings
+from drive_can_bridge.simulation.drive import Ignored, SimulatedDrive
 from drive_can_bridge.simulation.motor_plant import FAULT_CODE
 from drive_can_bridge.simulation.plant import PlantFactory
 
@@ -44,36 +43,31 @@ class SimulatedCannordInverter(SimulatedDrive):
     plant: InverterPlant
     table: CannordTable
 
-    def __init__(self, configuration: DriveConfiguration,
-                 surroundings: Surroundings = ALONE) -> None:
-        super().__init__(configuration, surroundings)
+    def set_up(self) -> None:
         if not isinstance(self.plant, InverterPlant):
             raise ConfigurationError([f'{self.name}: an inverter needs an InverterPlant'])
-        self._options = options = configuration.options
+        self._options = options = self.configuration.options
+        self.table = CannordTable(self.registers)
         self._timeout_parameter = self.table.numbered(TELEGRAM_TIMEOUT)
         # parameters of known meaning, as they leave the factory, if the profile lists them
-        for number, raw in ((TELEGRAM_TIMEOUT, 0), (CAN_ADDRESS, configuration.station)):
+        for number, raw in ((TELEGRAM_TIMEOUT, 0), (CAN_ADDRESS, self.configuration.station)):
             parameter = self.table.numbered(number)
             if parameter is not None and parameter.writable:
                 self.registers.set_value(parameter.name, parameter.value_from_raw(raw))
         self._layout = ParameterLayout(options.value_order, options.index_byte)
         self._main, self._main_response, self._task, self._response, *self._broadcasts = (
-            route.identifier for route in self.routes(configuration))
-        self._start()
+            route.identifier for route in self.routes)
+        self.power_lost(forget=False)
 
-    def make_table(self) -> CannordTable:
-        return CannordTable(self.configuration.profile.parameters, self.registers)
-
-    def _start(self) -> None:
+    def power_lost(self, *, forget: bool) -> None:
         self.table.select_set(1)
         self._length = SHORT_LENGTH
         self._silent_since = math.inf       # inf: the next telegram is not waited for
         self._timed_out = False
 
-    @classmethod
-    def routes(cls, configuration: DriveConfiguration) -> list[Route]:
+    def find_routes(self) -> list[Route]:
         """Return the four identifiers of the address, and the broadcasts that are listened to."""
-        options, address = configuration.options, configuration.station
+        options, address = self.configuration.options, self.configuration.station
         extended = options.extended_identifiers
         found = [identifiers.identifier(kind, address, extended=extended)
                  for kind in MessageObject]
@@ -110,7 +104,7 @@ class SimulatedCannordInverter(SimulatedDrive):
         self._silent_since = now
         if self._timed_out:
             self._timed_out = False
-            self.plant.state.end_cause(now)
+            self.plant.operation.end_cause(now)
         # before the values are taken: it tells how the inverter was when they came
         answer = self._status(len(data))
         requested = self.configuration.cyclic_request
@@ -123,8 +117,8 @@ class SimulatedCannordInverter(SimulatedDrive):
                 self._violation('reserved bit 13 of the control word')
             if word & states.DATA_VALID:
                 self._take(requested, values)
-            self.plant.state.word_written(word, now)
-            self.table.select_set(self.plant.state.parameter_set)
+                self.plant.operation.word_written(word, now)
+            self.table.select_set(states.parameter_set_of(self.plant.operation.word))
         self.plant.advance(now)
         if answered:
             self.answer(answer, now)
@@ -201,9 +195,6 @@ class SimulatedCannordInverter(SimulatedDrive):
         self.plant.fault_code = code
         super().trip(now, duration)
         self.answer(self._status(self._length), now)
-
-    def power_lost(self, *, forget: bool) -> None:
-        self._start()
 
     def foreign_frames(self, answer: Frame) -> Sequence[Iterable[Frame]]:
         """Return the answer of an absent address, its twin of the other form, an answer."""

@@ -25,7 +25,7 @@ from drive_can_bridge.simulation.motor_plant import FAULT_CODE, MotorPlant, WARN
 from drive_can_bridge.simulation.names import Quantity
 from drive_can_bridge.simulation.plant import Mechanics
 from drive_can_bridge.simulation.registers import initial_value, Registers
-from drive_can_bridge.simulation.scales import RawRange
+from drive_can_bridge.simulation.scales import clamp, nearest_raw
 
 WARNING, SETPOINT_REACHED, BUS_CONTROL, ROTATING_RIGHT, ROTATING_LEFT = (
     1 << STATUS_BITS[name] for name in (
@@ -73,10 +73,6 @@ class InverterOperation(Operation):
     def __init__(self) -> None:
         super().__init__(_MACHINE)
 
-    def word_written(self, word: int, now: float) -> None:
-        if word & states.DATA_VALID:
-            super().word_written(word, now)
-
     def standstill(self) -> None:
         """Take note that the motor has stopped: the end of a quick stop, or of a shutdown."""
         super().standstill()
@@ -87,26 +83,6 @@ class InverterOperation(Operation):
     def shutting_down(self) -> bool:
         """On the ramp to zero, because bit 0 was taken away from an enabled inverter."""
         return self.state is State.OPERATION_ENABLED and not self.word & SWITCH_ON
-
-    @property
-    def setpoint_counts(self) -> bool:
-        """The ramp goes to the setpoint, not to zero."""
-        return bool(self.word & states.ENABLE_SETPOINT) and not self.shutting_down
-
-    @property
-    def frozen(self) -> bool:
-        """The ramp stands where it is."""
-        return (self.state is State.OPERATION_ENABLED and not self.shutting_down
-                and not self.word & states.RELEASE_RAMP)
-
-    @property
-    def reversed(self) -> bool:
-        """The setpoint changes its sign; rotation right has priority."""
-        return bool(self.word & states.ROTATE_LEFT) and not self.word & states.ROTATE_RIGHT
-
-    @property
-    def parameter_set(self) -> int:
-        return states.parameter_set_of(self.word)
 
     @property
     def status(self) -> int:
@@ -127,35 +103,38 @@ class InverterPlant(MotorPlant):
     """
     The motor of one inverter. See the base class.
 
-    :ivar state: the state machine, which is the base class's ``operation``.
     :ivar fault_code: what the fault number shows while there is a fault.
     """
+
+    operation: InverterOperation
 
     def __init__(self, registers: Registers, configuration: DriveConfiguration,
                  mechanics: Mechanics) -> None:
         self.fault_code: float = FAULT_CODE
-        self.state = InverterOperation()
         # entries of the sets 2 to 4, by name: the motor knows set 1 and what stands in for it
         self._of_sets = {
             member.name: group.members[0] for group in groups_of(registers.parameters).values()
             if group.sets for index, member in group.members.items() if index != 0}
         super().__init__(
-            registers, configuration, mechanics, operation=self.state,
+            registers, configuration, mechanics, operation=InverterOperation(),
             movable={name: parameter for name, parameter in registers.parameters.items()
                      if name not in self._of_sets})
         moved = self.axes.speed_setpoint
         self._mover = moved if moved in configuration.cyclic_request else None
-        self._share = None if moved is None else RawRange(moved, limits=False)
 
     def command(self, value: float) -> float:
         """Return what the last control word makes of the frequency setpoint."""
+        operation, word = self.operation, self.operation.word
         if self._mover is None:
             return value
-        if self.state.frozen:
-            return self.axes.motor.speed
-        if not self.state.setpoint_counts:
+        if operation.shutting_down:
             return 0.0
-        if self.state.reversed:
+        if operation.state is State.OPERATION_ENABLED and not word & states.RELEASE_RAMP:
+            return self.axes.motor.speed
+        if not word & states.ENABLE_SETPOINT:
+            return 0.0
+        # rotation right has priority
+        if word & states.ROTATE_LEFT and not word & states.ROTATE_RIGHT:
             name = self._mover.name
             raw = self.registers.clamped(name, -self.registers.plain(name))
             return float(self._mover.value_from_raw(raw))
@@ -163,15 +142,15 @@ class InverterPlant(MotorPlant):
 
     def move(self, duration: float) -> None:
         super().move(duration)
-        if self.state.shutting_down and self.axes.motor.speed == 0.0:
-            self.state.standstill()
+        if self.operation.shutting_down and self.axes.motor.speed == 0.0:
+            self.operation.standstill()
             super().move(0.0)
 
     @property
     def status_word(self) -> int:
-        motor, state = self.axes.motor, self.state
-        target = self.axes.target if state.enabled and not state.stopping else 0.0
-        word = state.status | BUS_CONTROL
+        motor, operation = self.axes.motor, self.operation
+        target = self.axes.target if operation.enabled and not operation.stopping else 0.0
+        word = operation.status | BUS_CONTROL
         if motor.temperature > WARNING_TEMPERATURE:
             word |= WARNING
         if motor.speed == target:
@@ -185,13 +164,16 @@ class InverterPlant(MotorPlant):
         if first is None:
             return IDENTITY.get(parameter.number or 0) or super().initial(parameter)
         initial = super().initial(first)
-        return initial_value(first, RawRange(first, limits=True)) if initial is None else initial
+        return initial_value(first) if initial is None else initial
 
     def source(self, parameter: Parameter) -> Callable[[], int] | None:
         if parameter.number is not None or names.measured(parameter) is not Quantity.SPEED:
             return super().source(parameter)
-        span, share, motor = RawRange(parameter, limits=False), self._share, self.axes.motor
-        return lambda: 0 if share is None else span.clamp(share.nearest(motor.speed))
+        moved, motor = self.axes.speed_setpoint, self.axes.motor
+        if moved is None:
+            return lambda: 0
+        own, its = parameter.type.raw_range, moved.type.raw_range
+        return lambda: clamp(nearest_raw(moved, motor.speed, its), own)
 
     def measure(self, parameter: Parameter, quantity: Quantity) -> Callable[[], float]:
         if quantity is Quantity.FAULT_CODE:

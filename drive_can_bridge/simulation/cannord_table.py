@@ -74,9 +74,9 @@ class Refused(Exception):
 class CannordTable:
     """Everything that the parameter channel reaches."""
 
-    def __init__(self, parameters: Mapping[str, Parameter], registers: Registers) -> None:
+    def __init__(self, registers: Registers) -> None:
         self._registers = registers
-        self._groups = groups_of(parameters)
+        self._groups = groups_of(registers.parameters)
         self._active = 1
 
     def answer(self, task: ParameterFrame) -> tuple[Response, int]:

@@ -9,7 +9,6 @@ configuration of the drive can change: one file describes both ends.
 
 from collections.abc import Iterable, Sequence
 
-from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.protocols.canopen import abort_codes, network
@@ -19,7 +18,7 @@ from drive_can_bridge.protocols.canopen_pkw.identifiers import Identifiers
 from drive_can_bridge.simulation.canopen.node import CanopenNode, Contents
 from drive_can_bridge.simulation.canopen.sdo import Refused
 from drive_can_bridge.simulation.canopen_pkw_registers import RegisterTable
-from drive_can_bridge.simulation.drive import ALONE, Ignored, SimulatedDrive, Surroundings
+from drive_can_bridge.simulation.drive import Ignored, SimulatedDrive
 from drive_can_bridge.simulation.motor_plant import MotorPlant
 from drive_can_bridge.simulation.plant import PlantFactory
 from drive_can_bridge.simulation.starter import TEST_TRIP
@@ -34,22 +33,18 @@ class SimulatedPkwDrive(SimulatedDrive):
 
     table: RegisterTable
 
-    def __init__(self, configuration: DriveConfiguration,
-                 surroundings: Surroundings = ALONE) -> None:
-        super().__init__(configuration, surroundings)
-        self._layout = pkw.Layout(configuration.options.layout)
-        self._abort_code_order: str = configuration.options.abort_code_order
-        self._identifiers = Identifiers.of(configuration)
+    def set_up(self) -> None:
+        options = self.configuration.options
+        self._layout = pkw.Layout(options.layout)
+        self.table = RegisterTable(self.configuration, self.registers)
+        self._abort_code_order: str = options.abort_code_order
         self.node = self.companion = CanopenNode(
             self, self.table, constants=self._constants, trip_code=self._trip_code)
         self.power_lost(forget=False)
 
-    def make_table(self) -> RegisterTable:
-        return RegisterTable(self.configuration, self.registers)
-
-    @classmethod
-    def routes(cls, configuration: DriveConfiguration) -> list[Route]:
-        return CanopenNode.routes(configuration.station, *Identifiers.of(configuration)[:2])
+    def find_routes(self) -> list[Route]:
+        self._identifiers = Identifiers.of(self.configuration)
+        return CanopenNode.routes(self.configuration.station, *self._identifiers)
 
     def choose_plant(self) -> PlantFactory:
         """Return a starter for the profile of an LTMR, a motor for any other one."""

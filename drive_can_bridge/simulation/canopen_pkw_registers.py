@@ -59,12 +59,10 @@ class RegisterTable:
 
         :raises Refused: there is none, or it cannot be read.
         """
-        words = []
-        for cell in self._find(address, count):
-            if not cell.parameter.readable:
-                raise Refused(abort_codes.READ_OF_WRITE_ONLY)
-            words.append(self._value(cell.parameter) >> cell.shift & WORD_MAX)
-        return tuple(words)
+        cells = self._find(address, count)
+        if not all(cell.parameter.readable for cell in cells):
+            raise Refused(abort_codes.READ_OF_WRITE_ONLY)
+        return tuple(self._value(cell.parameter) >> cell.shift & WORD_MAX for cell in cells)
 
     def write(self, address: Address, words: tuple[int, ...]) -> None:
         """
@@ -112,22 +110,15 @@ class RegisterTable:
         return None if cell is None else cell.parameter.name
 
     def _find(self, address: Address, count: int) -> list[Cell]:
-        cells = []
-        for _ in range(count):
-            cell = self._cells.get(address)
-            if cell is None:
-                raise Refused(self._absence(address))
-            cells.append(cell)
-            address = address.next
-        return cells
-
-    def _absence(self, address: Address) -> int:
-        """Return why there is no register: no such number or index, or no such sub-index."""
-        known = (any(block.index == address.word for block in BLOCKS)
-                 or self.highest_subindex(address.word) is not None)
-        if address.by_object and known:
-            return abort_codes.NO_SUCH_SUBINDEX
-        return abort_codes.NO_SUCH_OBJECT
+        addresses = (address, address.next)[:count]
+        for each in addresses:
+            if each not in self._cells:
+                # no such number or index, or no such sub-index
+                known = (any(block.index == each.word for block in BLOCKS)
+                         or self.highest_subindex(each.word) is not None)
+                raise Refused(abort_codes.NO_SUCH_SUBINDEX if each.by_object and known
+                              else abort_codes.NO_SUCH_OBJECT)
+        return [self._cells[each] for each in addresses]
 
     def _value(self, parameter: Parameter) -> int:
         return parameter.word_from_raw(self._registers.raw(parameter.name))

@@ -11,11 +11,11 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import RemoteProtocolError
-from drive_can_bridge.core.frame import Frame, Route, STANDARD_IDENTIFIER_MAX
+from drive_can_bridge.core.frame import Frame, STANDARD_IDENTIFIER_MAX
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.datamodel import extended, standard
 from drive_can_bridge.simulation.datamodel_table import DataModelTable, map_parameters
-from drive_can_bridge.simulation.drive import ALONE, Ignored, SimulatedDrive, Surroundings
+from drive_can_bridge.simulation.drive import Ignored, SimulatedDrive
 
 #: what unused bytes of a response hold
 JUNK = bytes([0xA5]) * 8
@@ -31,7 +31,6 @@ class ExtendedWire:
     def __init__(self, configuration: DriveConfiguration) -> None:
         self._station = configuration.station
         self._bits = self._station << extended.STATION_SHIFT
-        self.routes = [extended.station_route(self._station)]
 
     def decode(self, frame: Frame) -> tuple[Request, str] | None:
         """
@@ -72,7 +71,6 @@ class StandardWire:
         options, self._station = configuration.options, configuration.station
         self._own = [standard.identifier(base, self._station)
                      for base in (options.request_id_base, options.response_id_base)]
-        self.routes = [Route(each, STANDARD_IDENTIFIER_MAX, False) for each in self._own]
 
     def decode(self, frame: Frame) -> tuple[Request, str] | None:
         if frame.extended or frame.identifier != self._own[0]:
@@ -101,28 +99,18 @@ def _with_junk(answer: Frame, words: Sequence[int]) -> Frame:
     return Frame(answer.identifier, answer.data[:used] + JUNK[used:], answer.extended)
 
 
-def wire_of(configuration: DriveConfiguration) -> ExtendedWire | StandardWire:
-    is_extended = configuration.protocol == 'datamodel_extended'
-    return ExtendedWire(configuration) if is_extended else StandardWire(configuration)
-
-
 class SimulatedDataModelDrive(SimulatedDrive):
     """One DataModel drive. See the base class."""
 
     table: DataModelTable
 
-    def __init__(self, configuration: DriveConfiguration,
-                 surroundings: Surroundings = ALONE) -> None:
-        super().__init__(configuration, surroundings)
-        self._wire = wire_of(configuration)
-
-    def make_table(self) -> DataModelTable:
-        return DataModelTable(self.configuration, self.registers, violation=self._violation,
-                              eeprom_time=self.surroundings.eeprom_time)
-
-    @classmethod
-    def routes(cls, configuration: DriveConfiguration) -> list[Route]:
-        return wire_of(configuration).routes
+    def set_up(self) -> None:
+        configuration = self.configuration
+        self._wire: ExtendedWire | StandardWire = (
+            ExtendedWire(configuration) if configuration.protocol == 'datamodel_extended'
+            else StandardWire(configuration))
+        self.table = DataModelTable(configuration, self.registers, violation=self._violation,
+                                    eeprom_time=self.eeprom_time)
 
     def own_parameters(self) -> Mapping[str, Parameter]:
         return map_parameters(self.configuration)

@@ -17,7 +17,6 @@ A family derives a class that knows its telegrams. The values are in its
 from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 import math
 from typing import Protocol
 
@@ -38,27 +37,6 @@ BOOT_TIME = 0.5
 #: s without power, where a fault does not say
 _POWER_CUTS = {FaultKind.RESTART: BOOT_TIME, FaultKind.FORGET: BOOT_TIME,
                FaultKind.POWER_CUT: 5.0, FaultKind.OFF: math.inf}
-
-
-@dataclass(frozen=True, slots=True)
-class Surroundings:
-    """
-    What a simulated drive depends on beside its configuration.
-
-    :param neighbours: identifiers of the other drives on the bus; scripted faults keep clear of
-        them.
-    :param eeprom_time: s that an EEPROM write takes.
-    :param mechanics: what the motor carries.
-    :param plant: makes what moves; None: what the family chooses.
-    """
-
-    neighbours: tuple[Route, ...] = ()
-    eeprom_time: float = EEPROM_TIME
-    mechanics: Mechanics = Mechanics()
-    plant: PlantFactory | None = None
-
-
-ALONE = Surroundings()
 
 
 class Table(Protocol):
@@ -96,6 +74,11 @@ class SimulatedDrive(ABC):
     """
     One simulated drive.
 
+    :param eeprom_time: s that an EEPROM write takes.
+    :param mechanics: what the motor carries; None: nothing.
+    :param plant: makes what moves; None: what the family chooses.
+    :ivar routes: the identifiers that belong to the drive, in both directions.
+    :ivar neighbours: those of the other drives on the bus; scripted faults keep clear of them.
     :ivar companion: what it composes beside its own telegrams.
     :ivar requests: requests understood.
     :ivar answers: answers given, before scripted faults took theirs.
@@ -105,28 +88,30 @@ class SimulatedDrive(ABC):
 
     table: Table
 
-    def __init__(self, configuration: DriveConfiguration,
-                 surroundings: Surroundings = ALONE) -> None:
+    def __init__(self, configuration: DriveConfiguration, *, eeprom_time: float = EEPROM_TIME,
+                 mechanics: Mechanics | None = None, plant: PlantFactory | None = None) -> None:
         self.configuration = configuration
         self.name = configuration.name
-        self.surroundings = surroundings
+        self.eeprom_time = eeprom_time
+        self.routes = self.find_routes()
+        self.neighbours: list[Route] = []
         self.registers = Registers(
             {**configuration.profile.parameters, **self.own_parameters()},
             {p.name for p in (*configuration.cyclic_request, *configuration.cyclic_response)})
-        make_plant = surroundings.plant or self.choose_plant()
-        self.plant = make_plant(self.registers, configuration, surroundings.mechanics)
+        self.plant = (plant or self.choose_plant())(
+            self.registers, configuration, mechanics or Mechanics())
         self.registers.connect(self.plant)
         self.companion = Companion()
         self.requests = self.answers = 0
         self.violations: Counter[str] = Counter()
         self._notices: list[str] = []
-        self.table = self.make_table()
         self._outbox = Outbox(self._foreign_frames)
         self._powered = True
         self._deaf_until = -math.inf
         self._foreign_turn = -1
         self._cut_at = math.inf
         self._set_by_fault: set[str] = set()
+        self.set_up()
 
     # -- input and output -------------------------------------------------------------------------
 
@@ -137,7 +122,7 @@ class SimulatedDrive(ABC):
         self._advance(now)
         try:
             if not (self.companion.receive(frame, now) or self.receive(frame, now)) and any(
-                    route.matches(frame) for route in self.routes(self.configuration)):
+                    route.matches(frame) for route in self.routes):
                 self._violation('frame that only this drive may send')
         except Ignored as broken:
             self._violation(f'{broken} (ignored)')
@@ -250,10 +235,9 @@ class SimulatedDrive(ABC):
 
     # -- what a family says -----------------------------------------------------------------------
 
-    @classmethod
     @abstractmethod
-    def routes(cls, configuration: DriveConfiguration) -> list[Route]:
-        """Return the identifiers that belong to a drive, in both directions."""
+    def set_up(self) -> None:
+        """Make the table, and what else the family keeps: registers and plant are there."""
 
     @abstractmethod
     def receive(self, frame: Frame, now: float) -> bool:
@@ -271,9 +255,10 @@ class SimulatedDrive(ABC):
         :return: kinds of them, which take turns; of each the first that is no neighbour's is sent.
         """
 
-    @abstractmethod
-    def make_table(self) -> Table:
-        """Return what makes the registers addressable."""
+    def find_routes(self) -> list[Route]:
+        """Return the identifiers that belong to the drive: those that its family claims."""
+        claims = FAMILIES[self.configuration.protocol].claims(self.configuration)
+        return [claim.route for claim in claims]
 
     def own_parameters(self) -> Mapping[str, Parameter]:
         """Return what every drive of the family has, listed or not, by name."""
@@ -343,7 +328,7 @@ class SimulatedDrive(ABC):
         self._foreign_turn += 1
         kinds = self.foreign_frames(answer)
         return [frame for frame in kinds[self._foreign_turn % len(kinds)] if not any(
-            route.matches(frame) for route in self.surroundings.neighbours)][:1]
+            route.matches(frame) for route in self.neighbours)][:1]
 
     def _advance(self, now: float | None) -> None:
         """Let the motor move up to now, if that is known; power may have come back on the way."""

@@ -15,8 +15,7 @@ from drive_can_bridge.simulation.axes import Axes
 from drive_can_bridge.simulation.control import machine_of, Operation, Report, StatusWord
 from drive_can_bridge.simulation.names import Quantity
 from drive_can_bridge.simulation.plant import Mechanics
-from drive_can_bridge.simulation.registers import neutral_raw, Registers
-from drive_can_bridge.simulation.scales import RawRange
+from drive_can_bridge.simulation.registers import Registers
 
 WARNING_TEMPERATURE = 80.0
 #: what a fault code shows while there is a fault
@@ -60,15 +59,17 @@ class MotorPlant:
         return value
 
     def initial(self, parameter: Parameter) -> int | None:
-        span = RawRange(parameter, limits=True)
         if self.control is not None and parameter.name == self._control_name:
             return self.control.disable
         if parameter.name in self.axes.ramps:
-            return span.nearest(self.axes.initial_ramp_value(parameter))
-        return neutral_raw(parameter, span) if parameter.name in self.axes.setpoints else None
+            value = self.axes.initial_ramp_value(parameter)
+            return scales.nearest_raw(parameter, value, parameter.raw_limits)
+        if parameter.name in self.axes.setpoints and parameter.neutral is None:
+            return scales.clamp(0, parameter.raw_limits)
+        return None
 
     def source(self, parameter: Parameter) -> Callable[[], int] | None:
-        span = RawRange(parameter, limits=False)
+        ends, nearest = parameter.type.raw_range, scales.nearest_raw
         actual = self.axes.actuals.get(parameter.name)
         quantity = names.measured(parameter)
         if quantity is None and parameter.name in self._shown:
@@ -76,13 +77,14 @@ class MotorPlant:
         if quantity is Quantity.POSITION:
             where = actual or (
                 lambda: scales.position_value(parameter, self.axes.motor.position))
-            return lambda: span.clamp(span.nearest(where()) + self.axes.jitter)
+            return lambda: scales.clamp(
+                nearest(parameter, where(), ends) + self.axes.jitter, ends)
         word = StatusWord(parameter, self.control)
         if actual is None and word:
             plain = self.registers.plain
             return lambda: word.compose(self._report(), plain(parameter.name))
         measure = actual or (quantity and self.measure(parameter, quantity))
-        return (lambda: span.nearest(measure())) if measure else None
+        return (lambda: nearest(parameter, measure(), ends)) if measure else None
 
     def measure(self, parameter: Parameter, quantity: Quantity) -> Callable[[], float]:
         """Return what a quantity of the motor amounts to in the parameter's unit."""

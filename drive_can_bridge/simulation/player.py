@@ -8,6 +8,7 @@ within :meth:`BusPlayer.touch`.
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import lru_cache
 import math
 import threading
 
@@ -58,10 +59,10 @@ class BusPlayer:
         self._wake_at = 0.0
         self._closing = False
         self._opened = False            # ever
-        self._misconfigured: BusMisconfigured | None = None
+        self._misconfigured = ''
         self._complained = False
         self._answer_lost = False       # ever
-        self._addressees: dict[tuple[int, bool], tuple[SimulatedDrive, ...]] = {}
+        self._addressees = lru_cache(_ROUTES_MAX)(self._find_addressees)
         # no filters: whoever looks on sees all frames
         self._link = Link(bus, (), self, send_timeout=_SEND_TIMEOUT, opener=self._open)
         self._thread = threading.Thread(
@@ -75,8 +76,8 @@ class BusPlayer:
         """
         self._link.start()
         self._link.wait_first_attempt(_OPEN_TIMEOUT)
-        if self._misconfigured is not None:
-            raise self._misconfigured
+        if self._misconfigured:
+            raise BusMisconfigured(self._misconfigured)
         self._thread.start()
 
     def stop(self) -> None:
@@ -127,23 +128,16 @@ class BusPlayer:
             notices += drive.take_notices()
         return notices
 
-    def _addressees_of(self, frame: Frame) -> tuple[SimulatedDrive, ...]:
-        key = frame.identifier, frame.extended
-        found = self._addressees.get(key)
-        if found is None:
-            if len(self._addressees) >= _ROUTES_MAX:
-                self._addressees.clear()
-            found = self._addressees[key] = tuple(
-                drive for drive in self._drives
-                if any(route.matches(frame) for route in drive.routes(drive.configuration)))
-        return found
+    def _find_addressees(self, identifier: int, extended: bool) -> tuple[SimulatedDrive, ...]:
+        frame = Frame(identifier, b'', extended)
+        return tuple(drive for drive in self._drives
+                     if any(route.matches(frame) for route in drive.routes))
 
     def _open(self) -> EndPoint:
         try:
             return self._open_bus(self.bus)
         except BusMisconfigured as error:
             if not self._opened:
-                self._misconfigured = error
                 raise
             # it did work before: an adapter's driver may come back
             raise BusUnavailable(str(error)) from error
@@ -152,7 +146,7 @@ class BusPlayer:
         """Let the drives that a frame is for answer it."""
         self._show_frame(self.bus.name, frame, False)
         with self._lock:
-            drives = self._addressees_of(frame)
+            drives = self._addressees(frame.identifier, frame.extended)
             now = steady_now()
             for drive in drives:
                 drive.receive_frame(frame, now - age)
@@ -178,6 +172,7 @@ class BusPlayer:
 
     def bus_misconfigured(self, reason: str) -> None:
         """Leave it to :meth:`start`, which tells."""
+        self._misconfigured = reason
 
     def link_failed(self, reason: str) -> None:
         self.failure = f'bus {self.bus.name}: {reason}'

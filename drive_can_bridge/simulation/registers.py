@@ -17,7 +17,7 @@ from drive_can_bridge.core.parameters import Access, Parameter, ParameterType, S
 from drive_can_bridge.simulation import names
 from drive_can_bridge.simulation.faults import Fault, FaultKind
 from drive_can_bridge.simulation.plant import Plant
-from drive_can_bridge.simulation.scales import RawRange
+from drive_can_bridge.simulation.scales import clamp, nearest_raw
 
 
 class Refusal(Enum):
@@ -50,8 +50,6 @@ class Registers:
         self.wear: Counter[str] = Counter()
         self.stand_ins: dict[str, str] = {}
         self._volatile = volatile
-        self._limits = {name: RawRange(parameter, limits=True)
-                        for name, parameter in parameters.items()}
         self._crossings = names.crossings(parameters)
         self._raw: dict[str, int] = {}
         self._initial: dict[str, int] = {}
@@ -65,8 +63,8 @@ class Registers:
         self._plant = plant
         for name, parameter in self.parameters.items():
             initial = plant.initial(parameter)
-            self._initial[name] = (initial_value(parameter, self._limits[name])
-                                   if initial is None else self._limits[name].clamp(initial))
+            self._initial[name] = self.clamped(
+                name, initial_value(parameter) if initial is None else initial)
             source = None if parameter.writable else plant.source(parameter)
             if source is not None:
                 self._sources[name] = source
@@ -86,7 +84,7 @@ class Registers:
 
     def clamped(self, name: str, raw: int) -> int:
         """Return the allowed raw integer nearest to another one."""
-        return self._limits[name].clamp(raw)
+        return clamp(raw, self.parameters[name].raw_limits)
 
     def refusal(self, raws: Mapping[str, int]) -> Refusal | None:
         """Say why registers that are written together refuse it; None: they do not."""
@@ -165,7 +163,8 @@ class Registers:
 
     def put(self, name: str, value: float) -> None:
         """Change a register from inside: nobody is told."""
-        self._raw[name] = self._limits[name].nearest(value)
+        parameter = self.parameters[name]
+        self._raw[name] = nearest_raw(parameter, value, parameter.raw_limits)
 
     def reset(self, name: str) -> None:
         """Give a register back what a new drive has in it."""
@@ -179,27 +178,26 @@ class Registers:
         self._plant.written(name, before, raw)
 
 
-def initial_value(parameter: Parameter, limits: RawRange) -> int:
+def initial_value(parameter: Parameter) -> int:
     """Return a value that a new drive might have; the same one each time."""
+    limits = parameter.raw_limits
     if parameter.neutral is not None:
-        return neutral_raw(parameter, limits)
+        try:
+            return clamp(parameter.neutral_raw, limits)
+        except ValueRefused:
+            return clamp(0, limits)
     words = set(parameter.name.split('_'))
     if (parameter.bits or 'status' in words or parameter.type is ParameterType.BOOL
             or parameter.access is Access.WRITE_ONLY):
-        return limits.clamp(0)
+        return clamp(0, limits)
+    low, high = parameter.minimum, parameter.maximum
     if {'limit', 'maximum', 'max'} & words:
-        return limits.nearest(100.0 if parameter.maximum is None else parameter.maximum)
-    if {'minimum', 'min'} & words:
-        return limits.nearest(0.0 if parameter.minimum is None else parameter.minimum)
-    if parameter.minimum is not None and parameter.maximum is not None:
-        return limits.nearest(parameter.minimum + (parameter.maximum - parameter.minimum) / 3.0)
-    # any figure will do, as long as it is not 0 and differs between parameters
-    return limits.clamp(10 + zlib.crc32(parameter.name.encode()) % 90)
-
-
-def neutral_raw(parameter: Parameter, limits: RawRange) -> int:
-    """Return where a setpoint begins."""
-    try:
-        return limits.clamp(parameter.neutral_raw)
-    except ValueRefused:
-        return limits.clamp(0)
+        value = 100.0 if high is None else high
+    elif {'minimum', 'min'} & words:
+        value = 0.0 if low is None else low
+    elif low is not None and high is not None:
+        value = low + (high - low) / 3.0
+    else:
+        # any figure will do, as long as it is not 0 and differs between parameters
+        return clamp(10 + zlib.crc32(parameter.name.encode()) % 90, limits)
+    return nearest_raw(parameter, value, limits)

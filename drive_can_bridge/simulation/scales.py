@@ -8,7 +8,7 @@ module for its unit, made smaller where the parameter cannot carry it.
 
 import math
 
-from drive_can_bridge.core.parameters import Parameter, ParameterType
+from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.simulation.names import Quantity
 
 #: revolutions per second at a speed of 1 in the unit; one pole pair, 10 mm per revolution
@@ -96,22 +96,15 @@ def rating(parameter: Parameter, quantity: Quantity) -> float:
     return min(wanted, highest(parameter) / headroom)
 
 
-class RawRange:
+def clamp(raw: int, ends: tuple[int, int]) -> int:
+    """Return the integer between two ends that is nearest to another one."""
+    return min(max(raw, ends[0]), ends[1])
+
+
+def nearest_raw(parameter: Parameter, value: float, ends: tuple[int, int]) -> int:
     """
-    The raw integers that a parameter may have, and the nearest one to a value.
+    Return the raw integer nearest to a value.
 
-    :param limits: respect the profile's ``minimum`` and ``maximum``, not only the type.
+    :param ends: between which it is: of the parameter's limits, or of its type.
     """
-
-    def __init__(self, parameter: Parameter, *, limits: bool) -> None:
-        self._scale, self._offset = parameter.scale, parameter.offset
-        self.low, self.high = parameter.type.raw_range
-        if limits and parameter.type is not ParameterType.BOOL:
-            low, self.high = parameter.raw_limits
-            self.low = min(low, self.high)
-
-    def clamp(self, raw: int) -> int:
-        return min(max(raw, self.low), self.high)
-
-    def nearest(self, value: float) -> int:
-        return self.clamp(math.floor((value - self._offset) / self._scale + 0.5))
+    return clamp(math.floor((value - parameter.offset) / parameter.scale + 0.5), ends)

@@ -84,22 +84,20 @@ class Simulation:
     :param say: takes lines about the drives (faults, violations); None: they are dropped.
     :param complain: takes lines about the buses; None: standard error.
     :param show_frame: called for each frame.
-    :param eeprom_time: s that an EEPROM write takes.
     :param mechanics: what the motors of drives carry, by name.
     :param plants: what drives move instead of what they would choose, by name.
     :ivar drives: the drives by name.
-    :raises ConfigurationError: a protocol that is not simulated.
+    :raises ConfigurationError: a plant that a drive cannot do with.
     """
 
     def __init__(self, configuration: BridgeConfiguration, *, open_bus: OpenBus | None = None,
                  say: Say | None = None, complain: Say | None = None,
                  show_frame: ShowFrame | None = None,
-                 eeprom_time: float = EEPROM_TIME - ARRIVAL_JITTER,
                  mechanics: Mapping[str, Mechanics] | None = None,
                  plants: Mapping[str, PlantFactory] | None = None) -> None:
         self.configuration = configuration
-        drives = make_drives(configuration, eeprom_time=eeprom_time, mechanics=mechanics,
-                             plants=plants)
+        drives = make_drives(configuration, eeprom_time=EEPROM_TIME - ARRIVAL_JITTER,
+                             mechanics=mechanics, plants=plants)
         self._players = {
             bus.name: BusPlayer(
                 bus, [drive for drive in drives.values() if drive.configuration.bus == bus.name],

@@ -20,7 +20,7 @@ from drive_can_bridge.simulation.control import Operation, Report, StatusWord
 from drive_can_bridge.simulation.motor_plant import mains_swing
 from drive_can_bridge.simulation.plant import Mechanics
 from drive_can_bridge.simulation.registers import Registers
-from drive_can_bridge.simulation.scales import RawRange
+from drive_can_bridge.simulation.scales import clamp
 from drive_can_bridge.simulation.starter import (
     MACHINE, RUN_REVERSE, Starter, TEST_TRIP, THERMAL_OVERLOAD,
 )
@@ -155,8 +155,8 @@ class StarterPlant:
         figure = self._figures.get(register)
         if figure is None:
             return None
-        span, content = RawRange(parameter, limits=False), figure
-        return lambda: span.clamp(math.floor(content() + 0.5))
+        ends, content = parameter.type.raw_range, figure
+        return lambda: clamp(math.floor(content() + 0.5), ends)
 
     def _all_figures(self) -> dict[int | None, Figure]:
         """Return what gives the contents of registers."""

@@ -13,7 +13,6 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Access, Parameter, ParameterType, Storage
 from drive_can_bridge.core.profile import ControlTable, StatusPattern
 from drive_can_bridge.simulation.datamodel import SimulatedDataModelDrive
-from drive_can_bridge.simulation.drive import Surroundings
 from drive_can_bridge.simulation.plant import Mechanics
 
 RO, RW, WO = Access.READ_ONLY, Access.READ_WRITE, Access.WRITE_ONLY
@@ -61,7 +60,7 @@ def motor(parameters: Iterable[Parameter], control: ControlTable | None = None,
     """Make a drive of which only registers and motor matter."""
     return SimulatedDataModelDrive(
         configuration(parameters, control=control, request=request, response=response),
-        Surroundings(mechanics=Mechanics(**mechanics)))
+        mechanics=Mechanics(**mechanics))
 
 
 def drive(*args: Any, **options: Any) -> SimulatedDataModelDrive:

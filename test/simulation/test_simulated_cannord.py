@@ -276,7 +276,7 @@ class TestBroadcast:
 
     def test_routes(self) -> None:
         def identifiers(**options: object) -> list[str]:
-            routes = SimulatedCannordInverter.routes(configuration(**options))  # type: ignore
+            routes = SimulatedCannordInverter(configuration(**options)).routes  # type: ignore
             assert {route.mask for route in routes} == {
                 0x1FFFFFFF if options.get('extended_identifiers') else 0x7FF}
             return [f'{route.identifier:03X}' for route in routes]

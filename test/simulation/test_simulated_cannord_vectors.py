@@ -84,7 +84,7 @@ def test_takes_setpoints(row: dict[str, Any]) -> None:
         assert answer.identifier == answer_identifier(row)
         assert len(answer.data) == len(frame(row).data)
     if 'word' in row:
-        assert made.plant.state.word == int(row['word'], 16)
+        assert made.plant.operation.word == int(row['word'], 16)
     assert not made.violations
 
 

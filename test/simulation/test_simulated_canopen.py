@@ -11,7 +11,6 @@ import builders
 from ltmr_builders import frame
 import pytest
 
-from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.protocols.canopen import abort_codes
@@ -85,21 +84,17 @@ class Cia402Drive(SimulatedDrive):
 
     table: Objects
 
-    def __init__(self, configuration: DriveConfiguration) -> None:
-        super().__init__(configuration)
+    def set_up(self) -> None:
+        self.table = Objects(self.registers)
         self.node = self.companion = CanopenNode(
             self, self.table, constants=self.constants, trip_code=lambda: 0)
-
-    def make_table(self) -> Objects:
-        return Objects(self.registers)
 
     def choose_plant(self) -> PlantFactory:
         return lambda *made: MotorPlant(*made, operation=Operation(MACHINE))
 
-    @classmethod
-    def routes(cls, configuration: DriveConfiguration) -> list[Route]:
-        return CanopenNode.routes(configuration.station, 0x200 + configuration.station,
-                                  0x180 + configuration.station)
+    def find_routes(self) -> list[Route]:
+        station = self.configuration.station
+        return CanopenNode.routes(station, 0x200 + station, 0x180 + station)
 
     def receive(self, frame: Frame, now: float) -> bool:
         identifier, data, extended = frame

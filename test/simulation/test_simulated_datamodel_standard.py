@@ -23,7 +23,6 @@ from drive_can_bridge.core.errors import LocalProtocolError, ValueRefused
 from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.simulation.datamodel import SimulatedDataModelDrive
-from drive_can_bridge.simulation.drive import Surroundings
 from drive_can_bridge.simulation.drives import make_drives
 
 VECTORS = json.loads((Path(__file__).parents[1] / 'vectors' / 'datamodel.json').read_text(
@@ -45,8 +44,9 @@ def standard(parameters: Iterable[Parameter] = EXAMPLE, **options: Any) -> Drive
 def drive(parameters: Iterable[Parameter] = EXAMPLE, *, neighbours: Iterable[Route] = (),
           **options: Any) -> SimulatedDataModelDrive:
     """Make an 11-bit drive."""
-    return SimulatedDataModelDrive(
-        standard(parameters, **options), Surroundings(neighbours=tuple(neighbours)))
+    made = SimulatedDataModelDrive(standard(parameters, **options))
+    made.neighbours += neighbours
+    return made
 
 
 # -- golden vectors -------------------------------------------------------------------------------
@@ -286,7 +286,7 @@ def test_identifiers_are_sums(station: int, options: dict[str, int], request_tex
     made = drive(station=station, **options)
     assert ask(made, f'{request_text}#031E000100000000', 0.0) == [f'{response}#6400A5A5A5A5A5A5']
     assert ask(made, f'00000{request_text}#031E000100000000', 0.0) == []
-    assert made.routes(made.configuration) == [
+    assert made.routes == [
         Route(int(request_text, 16), 0x7FF, False), Route(int(response, 16), 0x7FF, False)]
 
 
@@ -480,9 +480,9 @@ def test_drives_of_a_bus_know_each_other() -> None:
     third = configuration(name='third', station=1)
     drives = make_drives(bridge(first, second, third))
     assert isinstance(drives['first'], SimulatedDataModelDrive)
-    assert Route(0x7F9, 0x7FF, False) in drives['first'].surroundings.neighbours
-    assert Route(0x3F9, 0x7FF, False) in drives['first'].surroundings.neighbours
-    assert any(route.extended for route in drives['first'].surroundings.neighbours)
+    assert Route(0x7F9, 0x7FF, False) in drives['first'].neighbours
+    assert Route(0x3F9, 0x7FF, False) in drives['first'].neighbours
+    assert any(route.extended for route in drives['first'].neighbours)
     # the 29-bit drive of the same station hears nothing of it
     assert ask(drives['third'], READ_RAMP, 0.0) == []       # type: ignore[arg-type]
     assert not drives['third'].violations

@@ -9,8 +9,9 @@ from simulation_builders import (
     ask, bridge, configuration, CONTROL, CONTROL_WORD, drive, EXAMPLE, frame, parameter, RAM,
 )
 
-from drive_can_bridge.core.errors import ConfigurationError, ValueRefused
-from drive_can_bridge.simulation.drives import make_drives
+from drive_can_bridge.core.errors import ValueRefused
+from drive_can_bridge.protocols.families import FAMILIES
+from drive_can_bridge.simulation.drives import make_drives, SIMULATED_DRIVES
 from drive_can_bridge.simulation.faults import Fault, FaultKind, parse_fault
 
 POLL = '003FFFF0#0000000000000000'
@@ -326,9 +327,5 @@ class TestDrive:
         assert made.take_notices() == []
 
 
-def test_protocol_that_is_not_simulated() -> None:
-    other = configuration()
-    object.__setattr__(other, 'protocol', 'profinet')
-    with pytest.raises(ConfigurationError, match="'profinet' is not simulated, simulated are: "
-                                                 '.*datamodel_extended, datamodel_standard'):
-        make_drives(bridge(other))
+def test_every_family_is_simulated() -> None:
+    assert SIMULATED_DRIVES.keys() == FAMILIES.keys()

@@ -16,7 +16,6 @@ from drive_can_bridge.core.frame import EXTENDED_IDENTIFIER_MAX, Frame, Route
 from drive_can_bridge.core.parameters import Access, Parameter, ParameterType
 from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.simulation.canopen_pkw import SimulatedPkwDrive
-from drive_can_bridge.simulation.drive import Surroundings
 
 VECTORS = json.loads((Path(__file__).parents[1] / 'vectors' / 'canopen_pkw.json').read_text(
     encoding='utf-8'))
@@ -194,7 +193,7 @@ class TestNetwork:
         assert made.read(458, 3.8) == 0
 
     def test_routes(self) -> None:
-        found = SimulatedPkwDrive.routes(configuration())
+        found = SimulatedPkwDrive(configuration()).routes
         assert Route(0x505, 0x7FF, False) in found
         for identifier in (0x000, 0x485, 0x505, 0x585, 0x605, 0x705, 0x085):
             assert any(route.matches(Frame(identifier, b'', False)) for route in found)
@@ -491,9 +490,8 @@ class TestFaults:
             ['481#C701002583200000', '485#C701002583200000']]
 
     def test_foreign_frames_keep_clear_of_neighbours(self) -> None:
-        neighbour = SimulatedPkwDrive.routes(configuration(name='fan', station=1))
         made = Ltmr()
-        made.drive.surroundings = Surroundings(neighbours=tuple(neighbour))
+        made.drive.neighbours = SimulatedPkwDrive(configuration(name='fan', station=1)).routes
         made.fault('foreign', 0.0)
         assert made.ask(READ_455, 0.1)[0].startswith('482#')
 

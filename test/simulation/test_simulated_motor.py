@@ -187,12 +187,10 @@ class TestPlant:
 
     def test_limits_in_any_direction(self) -> None:
         upside_down = parameter('x', 1, type=INT16, scale=-0.5, minimum=-10.0, maximum=20.0)
-        span = scales.RawRange(upside_down, limits=True)
-        assert (span.low, span.high) == (-40, 20)
-        one_sided = scales.RawRange(parameter('x', 1, maximum=15.0), limits=True)
-        assert (one_sided.low, one_sided.high) == (0, 15)
-        boolean = scales.RawRange(parameter('x', 1, type=ParameterType.BOOL), limits=True)
-        assert boolean.clamp(5) == 1
+        registers = motor([upside_down, parameter('y', 2, maximum=15.0),
+                           parameter('z', 3, type=ParameterType.BOOL)]).registers
+        assert [(registers.clamped(name, -50), registers.clamped(name, 50))
+                for name in 'xyz'] == [(-40, 20), (0, 15), (0, 1)]
 
     def test_rate_parameters(self) -> None:
         rate = parameter('acceleration', 3, unit='rpm/s', storage=RAM)

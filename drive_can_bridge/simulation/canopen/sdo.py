@@ -74,15 +74,13 @@ class SdoServer:
         if len(request) != LENGTH:
             return None
         head, command = request[0], request[0] >> 5
-        if command != UPLOAD_SEGMENT:
-            self.reset()
-        if command == ABORT:
-            return None
-        if command != UPLOAD_SEGMENT:
-            self._address = request[1:4]
         try:
             if command == UPLOAD_SEGMENT:
                 return self._upload_segment(head)
+            self.reset()
+            if command == ABORT:
+                return None
+            self._address = request[1:4]
             place = int.from_bytes(self._address[:2], 'little'), self._address[2]
             if command == UPLOAD:
                 return self._upload(self._read(*place))
