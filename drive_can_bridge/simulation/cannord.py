@@ -66,16 +66,13 @@ class SimulatedCannordInverter(SimulatedDrive):
         self._timed_out = False
 
     def find_routes(self) -> list[Route]:
-        """Return the four identifiers of the address, and the broadcasts that are listened to."""
-        options, address = self.configuration.options, self.configuration.station
-        extended = options.extended_identifiers
-        found = [identifiers.identifier(kind, address, extended=extended)
-                 for kind in MessageObject]
-        # an inverter obeys both broadcasts, or none
-        if options.broadcast != 'none':
-            found += [identifiers.group_identifier(address, extended=extended),
+        """Return the four identifiers of the address, and both broadcasts where one is claimed."""
+        own, shared = super().find_routes()[:len(MessageObject)], []
+        extended = self.configuration.options.extended_identifiers
+        if self.configuration.options.broadcast != 'none':
+            shared = [identifiers.group_identifier(self.configuration.station, extended=extended),
                       identifiers.all_identifier(extended=extended)]
-        return [identifiers.route(value, extended=extended) for value in found]
+        return [*own, *(identifiers.route(each, extended=extended) for each in shared)]
 
     def choose_plant(self) -> PlantFactory:
         return InverterPlant

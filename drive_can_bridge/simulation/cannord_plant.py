@@ -33,7 +33,7 @@ WARNING, SETPOINT_REACHED, BUS_CONTROL, ROTATING_RIGHT, ROTATING_LEFT = (
 #: what an SK 5xxE says of itself, by parameter number: version of the data base
 IDENTITY = {742: 1}
 
-#: status bits of a state: of the two that stand for OFF2 and OFF3 see :attr:`~.status`
+#: status bits of a state: those of OFF2 and OFF3 come from the control word in two states
 _STATUS = {
     State.SWITCH_ON_DISABLED: 0x40,
     State.READY_TO_SWITCH_ON: 0x31,
@@ -83,14 +83,6 @@ class InverterOperation(Operation):
     def shutting_down(self) -> bool:
         """On the ramp to zero, because bit 0 was taken away from an enabled inverter."""
         return self.state is State.OPERATION_ENABLED and not self.word & SWITCH_ON
-
-    @property
-    def status(self) -> int:
-        """Bits 0 to 6 of the status word, and the parameter set."""
-        bits = _STATUS[self.state] | self.word & _SET
-        if self.state in (State.SWITCH_ON_DISABLED, State.FAULT):
-            bits |= (self.word & _OFF) << _OFF_SHIFT
-        return bits
 
     def _enter(self, state: State) -> None:
         super()._enter(state)
@@ -150,7 +142,9 @@ class InverterPlant(MotorPlant):
     def status_word(self) -> int:
         motor, operation = self.axes.motor, self.operation
         target = self.axes.target if operation.enabled and not operation.stopping else 0.0
-        word = operation.status | BUS_CONTROL
+        word = _STATUS[operation.state] | operation.word & _SET | BUS_CONTROL
+        if operation.state in (State.SWITCH_ON_DISABLED, State.FAULT):
+            word |= (operation.word & _OFF) << _OFF_SHIFT
         if motor.temperature > WARNING_TEMPERATURE:
             word |= WARNING
         if motor.speed == target:

@@ -60,9 +60,10 @@ class RegisterTable:
         :raises Refused: there is none, or it cannot be read.
         """
         cells = self._find(address, count)
-        if not all(cell.parameter.readable for cell in cells):
-            raise Refused(abort_codes.READ_OF_WRITE_ONLY)
-        return tuple(self._value(cell.parameter) >> cell.shift & WORD_MAX for cell in cells)
+        for cell in cells:
+            if not cell.parameter.readable:
+                raise Refused(abort_codes.READ_OF_WRITE_ONLY)
+        return tuple([self._value(cell.parameter) >> cell.shift & WORD_MAX for cell in cells])
 
     def write(self, address: Address, words: tuple[int, ...]) -> None:
         """
@@ -110,7 +111,7 @@ class RegisterTable:
         return None if cell is None else cell.parameter.name
 
     def _find(self, address: Address, count: int) -> list[Cell]:
-        addresses = (address, address.next)[:count]
+        addresses = (address,) if count == 1 else (address, address.next)
         for each in addresses:
             if each not in self._cells:
                 # no such number or index, or no such sub-index

@@ -143,7 +143,8 @@ class SimulatedDrive(ABC):
 
     def take_frames(self) -> list[Frame]:
         """Return the frames that the drive sends now."""
-        return self._outbox.take()
+        frames, self._outbox.frames = self._outbox.frames, []
+        return frames
 
     def take_notices(self) -> list[str]:
         """Return readable lines about what is worth knowing, since the last call."""

@@ -187,8 +187,3 @@ class Outbox:
     def clear(self) -> None:
         self.frames.clear()
         self._late.clear()
-
-    def take(self) -> list[Frame]:
-        """Return the frames to be sent now, once."""
-        frames, self.frames = self.frames, []
-        return frames
