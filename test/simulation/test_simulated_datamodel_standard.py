@@ -7,6 +7,7 @@ compared here are the literal bytes of the vectors and of the manual's tables.
 """
 
 from collections.abc import Iterable
+from dataclasses import replace
 import json
 from pathlib import Path
 from typing import Any
@@ -478,11 +479,13 @@ def test_drives_of_a_bus_know_each_other() -> None:
     first = standard(name='first', station=1)
     second = standard(name='second', station=9)
     third = configuration(name='third', station=1)
-    drives = make_drives(bridge(first, second, third))
+    elsewhere = replace(standard(name='elsewhere', station=5), bus='other')
+    drives = make_drives(bridge(first, second, third, elsewhere))
     assert isinstance(drives['first'], SimulatedDataModelDrive)
     assert Route(0x7F9, 0x7FF, False) in drives['first'].neighbours
     assert Route(0x3F9, 0x7FF, False) in drives['first'].neighbours
     assert any(route.extended for route in drives['first'].neighbours)
+    assert len(drives['first'].neighbours) == 3     # neither its own nor those of another bus
     # the 29-bit drive of the same station hears nothing of it
     assert ask(drives['third'], READ_RAMP, 0.0) == []       # type: ignore[arg-type]
     assert not drives['third'].violations

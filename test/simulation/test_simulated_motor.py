@@ -187,10 +187,11 @@ class TestPlant:
 
     def test_limits_in_any_direction(self) -> None:
         upside_down = parameter('x', 1, type=INT16, scale=-0.5, minimum=-10.0, maximum=20.0)
+        nothing_between = parameter('w', 4, minimum=0.4, maximum=0.6)
         registers = motor([upside_down, parameter('y', 2, maximum=15.0),
-                           parameter('z', 3, type=ParameterType.BOOL)]).registers
+                           parameter('z', 3, type=ParameterType.BOOL), nothing_between]).registers
         assert [(registers.clamped(name, -50), registers.clamped(name, 50))
-                for name in 'xyz'] == [(-40, 20), (0, 15), (0, 1)]
+                for name in 'xyzw'] == [(-40, 20), (0, 15), (0, 1), (0, 0)]
 
     def test_rate_parameters(self) -> None:
         rate = parameter('acceleration', 3, unit='rpm/s', storage=RAM)

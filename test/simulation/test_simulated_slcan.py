@@ -92,6 +92,13 @@ class TestCommands:
         pieces = [b'T003F', b'FFF0', b'200', b'FF\rt12', b'30\r']
         assert [len(adapter.receive_bytes(piece)) for piece in pieces] == [0, 0, 0, 1, 1]
 
+    def test_a_command_that_is_too_long_is_refused_when_it_ends(self) -> None:
+        adapter = SlcanAdapter()
+        # a filter of 64 characters may be, one of 65 is none
+        for piece in (b'C\rM' + 63 * b'0', b'\rM' + 60 * b'0', b'0000', b'', b'\rC\r'):
+            assert adapter.receive_bytes(piece) == []
+        assert adapter.take_replies() == b'\r\r\a\r'
+
     def test_encode(self) -> None:
         adapter = opened()
         assert adapter.encode(frame('103FFFF0#1122'), 0.0) == b'T103FFFF021122\r'
