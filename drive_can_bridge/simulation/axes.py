@@ -84,14 +84,14 @@ class Axes:
             kind = names.quantity_of(setpoint)
             if actual is None or kind is other_kind and setpoint is not speed:
                 continue
-            follower: tuple[object, str] = self.motor, 'speed'
-            if setpoint is not speed and kind is Quantity.POSITION:
-                travel = self._travels.setdefault(setpoint.name, (setpoint, Travel()))[1]
-                follower = travel, 'position'
-            elif setpoint is not speed:
-                ramp = self._ramps.setdefault(setpoint.name, (setpoint, Ramp()))[1]
-                follower = ramp, 'value'
-            self.actuals[actual.name] = partial(getattr, *follower)
+            if setpoint is speed:
+                self.actuals[actual.name] = partial(getattr, self.motor, 'speed')
+            elif kind is Quantity.POSITION:
+                _, travel = self._travels.setdefault(setpoint.name, (setpoint, Travel()))
+                self.actuals[actual.name] = partial(getattr, travel, 'position')
+            else:
+                _, ramp = self._ramps[setpoint.name] = setpoint, Ramp()
+                self.actuals[actual.name] = partial(getattr, ramp, 'value')
 
     @property
     def target(self) -> float:

@@ -37,10 +37,9 @@ class RegisterTable:
         for parameter in parameters:
             self._enter(parameter, parameter.number, _object(parameter))
         for parameter in parameters:
-            register, place = parameter.number, _object(parameter)
-            self._enter(parameter,
-                        register_of(*place) if place and register is None else None,
-                        object_of(register) if register is not None and not place else None)
+            register = register_number(parameter)
+            self._enter(parameter, register, _object(parameter) or (
+                None if register is None else object_of(register)))
 
     def _enter(self, parameter: Parameter, register: int | None,
                place: tuple[int, int] | None) -> None:
@@ -123,6 +122,13 @@ class RegisterTable:
 
     def _value(self, parameter: Parameter) -> int:
         return parameter.word_from_raw(self._registers.raw(parameter.name))
+
+
+def register_number(parameter: Parameter) -> int | None:
+    """Return the register of a parameter, by its number or by its CANopen address."""
+    if parameter.number is not None or parameter.index is None:
+        return parameter.number
+    return register_of(parameter.index, parameter.subindex or 0)
 
 
 def _object(parameter: Parameter) -> tuple[int, int] | None:

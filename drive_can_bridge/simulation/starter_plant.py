@@ -15,7 +15,7 @@ import struct
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.profile import Profile
-from drive_can_bridge.protocols.canopen_pkw.object_map import register_of
+from drive_can_bridge.simulation.canopen_pkw_registers import register_number
 from drive_can_bridge.simulation.control import Operation, Report, StatusWord
 from drive_can_bridge.simulation.motor_plant import mains_swing
 from drive_can_bridge.simulation.plant import Mechanics
@@ -201,13 +201,6 @@ class StarterPlant:
                 faulted and operation.reset_allowed(self._now or 0.0), True, ratio > 0.1)
         word = sum(1 << number for number, wanted in enumerate(bits) if wanted)
         return word | min(math.floor(32.0 * ratio + 0.5), 63) << 8 | self.starter.starting << 15
-
-
-def register_number(parameter: Parameter) -> int | None:
-    """Return the register of a parameter, by its number or by its CANopen address."""
-    if parameter.number is not None or parameter.index is None:
-        return parameter.number
-    return register_of(parameter.index, parameter.subindex or 0)
 
 
 def _scaled(factor: float, figure: Figure) -> Figure:
