@@ -49,3 +49,10 @@ def test_a_stamp_is_that_of_the_moment_not_of_the_look() -> None:
     before = time.time()
     seconds, nanoseconds = Stamps(Clock()).at(steady_now() - 1000.0)
     assert before - 1000.001 <= seconds + 1e-9 * nanoseconds <= time.time() - 999.999
+
+
+def test_the_same_moment_has_the_same_stamp() -> None:
+    # a sample that stands in several messages, of ~/joint_states say, is no younger in the first
+    stamps, moment = Stamps(Clock()), steady_now()
+    assert len({stamps.at(moment) for _ in range(100)}) == 1
+    assert stamps.at(moment + 0.001) > stamps.at(moment)
