@@ -24,6 +24,7 @@ class Stamps:
         self._clock = clock
         self._simulated = False
         self._look_at = -math.inf
+        self._last: tuple[float, int] = (math.nan, 0)   # moment, and the ns that were said of it
 
     def at(self, received_at: float) -> Stamp:
         """Return the stamp of a moment of the steady clock. Simulated time only knows "now"."""
@@ -31,9 +32,12 @@ class Stamps:
             self._look_at = received_at + LOOK_PERIOD
             self._simulated = (isinstance(self._clock, ROSClock)
                                and self._clock.ros_time_is_active)
-        nanoseconds = (self._clock.now().nanoseconds if self._simulated
-                       else self._at(received_at))
-        return divmod(nanoseconds, 1_000_000_000)
+        if self._simulated:
+            return divmod(self._clock.now().nanoseconds, 1_000_000_000)
+        last = self._last
+        if received_at != last[0]:  # else the clocks would say something else each time
+            last = self._last = received_at, self._at(received_at)
+        return divmod(last[1], 1_000_000_000)
 
     @staticmethod
     def _at(received_at: float) -> int:
