@@ -112,6 +112,17 @@ def test_csv(file: Path, trace: Path, tmp_path: Path) -> None:
     assert list(rows[1].values()) == ['0.001000', '', '', '-150', '0.05', '3']
 
 
+@pytest.mark.parametrize('option', ['--csv', '--plot'])
+def test_what_is_read_is_not_written_over(file: Path, trace: Path, option: str, tmp_path: Path,
+                                          capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / 'link').symlink_to(file)
+    for taken in (trace, tmp_path / 'link'):
+        assert drive_can('decode', trace, '--params-file', file, option, taken) == 2
+        assert 'would be written over, choose another name' in capsys.readouterr().err
+    assert trace.read_text() == TRACE
+    assert file.read_text().startswith('\n/**/drive_can_bridge')
+
+
 def test_plot(file: Path, trace: Path, tmp_path: Path,
               capsys: pytest.CaptureFixture[str]) -> None:
     picture = tmp_path / 'values.png'
