@@ -86,6 +86,11 @@ def run(args: Namespace) -> int:
         complain(f'drive_can decode: --drive {unknown[0]}: no such drive; drives: '
                  f'{", ".join(configuration.drives) or "none"}')
         return WRONG_USAGE
+    taken = _written_over(args)
+    if taken is not None:
+        complain(f'drive_can decode: {taken}: is read, and would be written over, choose another '
+                 'name')
+        return WRONG_USAGE
     with ExitStack() as stack:
         sinks, endings = _sinks(args, configuration, stack)
         tracer = Tracer(configuration, _together(sinks))
@@ -96,6 +101,15 @@ def run(args: Namespace) -> int:
         for ending in endings:
             ending()
     return code
+
+
+def _written_over(args: Namespace) -> Path | None:
+    """Return an output that is one of the files to be read; None: there is none."""
+    outputs = [args.csv] if args.csv is not None else []
+    outputs += [Path(picture) for picture in (args.plot or [])[:1]]
+    read = [Path(each) for each in (args.file, args.params_file) if each is not None]
+    return next((output for output in outputs for each in read
+                 if output.exists() and each.exists() and output.samefile(each)), None)
 
 
 def _sinks(args: Namespace, configuration: BridgeConfiguration, stack: ExitStack,
