@@ -61,18 +61,17 @@ def run(args: Namespace) -> int:
         return WRONG_USAGE
     for loss in LOSSES.get(args.output.suffix.lower(), ()):
         complain(f'warning: {args.output.suffix} does not keep {loss}; .log does')
-    output = _Rotating(args.output, [label(bus) for bus in buses], args.rotate)
-    counters = {label(bus): _Counter(bus.name, bus.bitrate) for bus in buses}
     status = _Status(sys.stderr)
-    try:
-        with listening(configuration) as taps:
-            try:
-                _record(taps.records(args.seconds), output, counters, status)
-            except KeyboardInterrupt:
-                pass
-    finally:
-        status.clear()
-        output.close()
+    with listening(configuration) as taps:      # before a file is replaced
+        counters = {label(bus): _Counter(bus.name, bus.bitrate) for bus in buses}
+        output = _Rotating(args.output, [label(bus) for bus in buses], args.rotate)
+        try:
+            _record(taps.records(args.seconds), output, counters, status)
+        except KeyboardInterrupt:
+            pass
+        finally:
+            status.clear()
+            output.close()
     for counter in counters.values():
         print(counter.document(output) if args.json else counter.line(output))
     return 0

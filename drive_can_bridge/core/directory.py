@@ -66,7 +66,7 @@ class ParameterDirectory:
     def unknown(self, name: str, *, hint: bool = True) -> str:
         """Say that a name is unknown, with the nearest known one (which takes milliseconds)."""
         near = nearest(name, self.listed) if hint else None
-        shown = printable(name, NAME_SHOWN)
+        shown = printable(name, NAME_SHOWN) or "''"
         return f'unknown parameter {shown}' + (f', did you mean {near}?' if near else '')
 
     def raw_from_user(self, parameter: Parameter, value: object) -> int:

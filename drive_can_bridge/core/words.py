@@ -1,6 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Values, types and misspelt names in words, as messages to users have them."""
 
+from array import array
 from collections.abc import Iterable
 import difflib
 import math
@@ -42,7 +43,7 @@ def describe_type(value: Any) -> str:
         return 'a number'
     if isinstance(value, dict):
         return 'a mapping'
-    if isinstance(value, (list, tuple)):
+    if isinstance(value, (list, tuple, array)):     # which is how rclpy gives numbers
         return 'a list' if value else 'an empty list'
     if value is None:
         return 'no value'

@@ -61,6 +61,7 @@ def test_unknown_names_get_a_hint() -> None:
     names = directory()
     assert names.unknown('ramp_tme') == 'unknown parameter ramp_tme, did you mean ramp_time?'
     assert names.unknown('zzz') == 'unknown parameter zzz'
+    assert names.unknown('') == "unknown parameter ''"
 
 
 @pytest.mark.parametrize('entry, value, raw', [

@@ -1,6 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The way to drives through a running bridge: the same answers as directly."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -151,6 +152,28 @@ def test_services_that_are_found_one_by_one(client: Client) -> None:
     source = find_source(namespace='slow')
     assert list(source.names) == ['conveyor', 'lift']
     source.close()
+
+
+def test_where_one_was_slow_to_be_found_another_one_may_be_as_slow(client: Client) -> None:
+    """A write must not go to the first of two for nobody has heard of the other one yet."""
+    def later(seconds: float, action: Callable[[], None]) -> None:
+        def once() -> None:
+            timer.cancel()
+            action()
+        timer = client.node.create_timer(seconds, once)
+
+    def tell(_: Any, response: Any) -> Any:
+        response.result.names = ['drives.conveyor.profile_sha256']
+        return response
+
+    def begin(name: str) -> None:
+        offer(client, name, 'change_state', ChangeState)
+        offer(client, name, 'get_parameter_types', GetParameterTypes)
+        offer(client, name, 'list_parameters', ListParameters, tell)
+    later(1.5, lambda: begin('/first/bridge'))
+    later(3.3, lambda: begin('/second/bridge'))
+    with pytest.raises(WhichBridge, match='/first/bridge, /second/bridge; choose one with'):
+        find_source()
 
 
 def test_what_may_be_a_bridge_and_answers_nothing_is_named(

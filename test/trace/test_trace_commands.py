@@ -309,5 +309,8 @@ def test_record_needs_a_bus(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     file = tmp_path / 'bridge.yaml'
     file.write_text(FILE.format(channel='x').replace('virtual', 'slcan').replace(
         'channel: x', 'channel: /dev/absent'))
-    assert drive_can('record', '-o', tmp_path / 'out.log', '--params-file', file) == 1
+    before = tmp_path / 'out.log'
+    before.write_text('of yesterday')
+    assert drive_can('record', '-o', before, '--params-file', file) == 1
     assert 'slcan /dev/absent' in capsys.readouterr().err
+    assert before.read_text() == 'of yesterday'

@@ -18,8 +18,11 @@ from drive_can_bridge.ros.client.descriptors import parameter_of, plain, role_of
 from drive_can_bridge.ros.client.drive import BridgedDrive
 from drive_can_bridge.ros.client.graph import Graph, NoAnswer
 
-#: s without anything new in the graph until nobody else is there; once a bridge is found
-_SEARCH, _SETTLE = 4.0, 1.0
+#: s without anything new in the graph until nobody is there; where one is known to be there
+_SEARCH, _EXPECTED = 4.0, 6.0
+#: s without anything new, once a bridge is found, until nobody else is there; and how many times
+#: as long as it took to find that one: on a busy machine others need as long at least
+_SETTLE, _AS_LONG = 1.0, 2.0
 #: s that looking takes in a graph where there is always something new
 _LONGEST = 12.0
 #: s that one that may be a bridge has to say so
@@ -85,9 +88,10 @@ class BridgeSource:
         looked: set[str] = set()
         silent: dict[str, NoAnswer] = {}
         graph: list[object] = []
-        changed = time.monotonic()
+        began = changed = time.monotonic()
+        patience = _SEARCH if self._namespace is None else _EXPECTED
         last = changed + _LONGEST
-        while time.monotonic() < min(last, changed + (_SETTLE if found else _SEARCH)):
+        while time.monotonic() < min(last, changed + patience):
             before, graph = graph, self._graph.everything()
             if graph != before:     # they are still being discovered
                 changed = time.monotonic()
@@ -106,7 +110,9 @@ class BridgeSource:
                     found[node] = drives
                     # asking it took its time: whoever else is there gets as much
                     changed = time.monotonic()
-                    last = changed + _SEARCH
+                    if len(found) == 1:
+                        patience = min(max(_SETTLE, _AS_LONG * (changed - began)), _EXPECTED)
+                    last = changed + max(_SEARCH, patience)
         if not found:
             raise DriveCanError(self._nobody(silent))
         if len(found) > 1:
