@@ -13,6 +13,9 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Int64
 
+from drive_can_bridge.core.events import StationLost
+from drive_can_bridge.transport.clock import steady_now
+
 PROFILE = """
 protocols: [datamodel_extended]
 parameters:
@@ -52,6 +55,16 @@ def test_types_follow_the_one_rule(bridge: StartBridge, client: Client, tmp_path
     types = dict(client.node.get_topic_names_and_types())
     assert types['/conveyor/command/speed_setpoint'] == ['std_msgs/msg/Float64']
     assert types['/conveyor/command/counts'] == ['std_msgs/msg/Int64']
+
+
+def test_a_lost_drive_leaves_no_sample_behind(bridge: StartBridge) -> None:
+    """Else all joints in one message would show it once more in the instant it is found again."""
+    drive = bridge(parameters(), simulated=False).node.drives['conveyor']
+    with drive.exchange.lock:
+        drive.samples.publish((1, 2, 3), steady_now())
+        assert drive.samples.last is not None
+        drive.handle_event(StationLost('no answer'))
+        assert drive.samples.last is None
 
 
 def test_every_parameter_once_per_exchange(bridge: StartBridge, client: Client) -> None:
