@@ -50,6 +50,11 @@ class Told:
             self._running.discard(what)
             self.owed = bool(self._running)
 
+    def note_unacknowledged(self, what: Hashable, *, runs: bool) -> None:
+        """Take note of one that nobody acknowledges: only an answer shows that a stop arrived."""
+        self.note(what, runs=runs)
+        self.ran = self.ran or runs
+
     def doubt(self) -> bool:
         """Take note that the drive does not answer; tell whether it may run for that reason."""
         if self.ran:

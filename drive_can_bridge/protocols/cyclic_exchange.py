@@ -105,8 +105,7 @@ class CyclicExchange(Generic[TelegramT]):
         if not sent:
             self.whole = False
         elif self._runs:
-            session.told.ran = True
-            session.told.note(CYCLE, runs=True)
+            session.told.note_unacknowledged(CYCLE, runs=True)
         if self._frames_out or not self.whole:
             return
         if not self._runs:

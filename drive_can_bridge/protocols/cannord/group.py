@@ -103,8 +103,7 @@ class Group:
         runs = leader.told.runs(CYCLE)
         for member in self.members[1:]:
             member.sent.raws = leader.sent.raws
-            member.told.note(CYCLE, runs=runs)
-            member.told.ran = member.told.ran or runs
+            member.told.note_unacknowledged(CYCLE, runs=runs)
 
     # -- what becomes of its members --------------------------------------------------------------
 

@@ -126,9 +126,7 @@ class AcyclicControl:
                 self._written = None
                 self.retry_at = now + REFUSED_PAUSE
             return
-        told = self._session.told
-        told.note(CONTROL_WORD, runs=runs)
-        told.ran = told.ran or runs     # until an answer shows that what followed has arrived
+        self._session.told.note_unacknowledged(CONTROL_WORD, runs=runs)
         self._outdated = self._reading
         self._repeat_at = now + min(REPEAT_FIRST * 2 ** min(self._repeats, 10), REPEAT_LAST)
         if word == self._control.word:

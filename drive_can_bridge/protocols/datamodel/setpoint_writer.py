@@ -108,9 +108,7 @@ class SetpointWriter:
         if not sent:
             self._schedule.failed(index)
             return
-        told = self._session.told
-        told.note(index, runs=runs)
-        told.ran = told.ran or runs     # until an answer shows that what followed has arrived
+        self._session.told.note_unacknowledged(index, runs=runs)
         control = self._session.control
         if index != self._slot or control is None:
             return

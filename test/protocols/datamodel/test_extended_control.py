@@ -361,12 +361,17 @@ def test_word_in_an_eeprom_does() -> None:
     assert talk.until(10.122)[0] == (10.121, QUICK_STOP)
 
 
-def test_loss_writes_disable() -> None:
-    talk = beside()
+def enable(talk: Conversation) -> None:
+    """Ask for it at 10.01 s; the last of three cycles is answered at 10.062 s."""
     talk.asks(ControlAction.ENABLE, 10.01)
     for cycle, answer in ((1, READY), (2, ENABLED), (3, ENABLED)):
         talk.until(10.0 + 0.02 * cycle + TICK)
         talk.hears(answer, 10.002 + 0.02 * cycle)
+
+
+def test_loss_writes_disable() -> None:
+    talk = beside()
+    enable(talk)
     found = talk.until(10.16)
     # disable at once when it is lost, and read back
     assert [text for _, text in found if text != ASK_WORD] == (
@@ -378,10 +383,7 @@ def test_loss_writes_disable() -> None:
 def test_enabled_drive_that_is_deaf_to_disable(mapping: str) -> None:
     """It stood at neutral, but enabled, and nothing shows that it has ever been told else."""
     talk = online(control=CONTROL, mapping=mapping)
-    talk.asks(ControlAction.ENABLE, 10.01)
-    for cycle, answer in ((1, READY), (2, ENABLED), (3, ENABLED)):
-        talk.until(10.0 + 0.02 * cycle + TICK)
-        talk.hears(answer, 10.002 + 0.02 * cycle)
+    enable(talk)
     assert talk.asks(ControlAction.DISABLE, 10.07) == [DISABLE]
     sent = [text for _, text in talk.until(10.2)]
     assert not talk.session.online
@@ -394,10 +396,7 @@ def test_enabled_drive_that_is_deaf_to_disable(mapping: str) -> None:
 
 def test_enabled_drive_that_hears_disable() -> None:
     talk = beside()
-    talk.asks(ControlAction.ENABLE, 10.01)
-    for cycle, answer in ((1, READY), (2, ENABLED), (3, ENABLED)):
-        talk.until(10.0 + 0.02 * cycle + TICK)
-        talk.hears(answer, 10.002 + 0.02 * cycle)
+    enable(talk)
     assert talk.asks(ControlAction.DISABLE, 10.07) == [DISABLE]
     talk.until(10.08 + TICK)
     talk.hears(READY, 10.082)
