@@ -164,6 +164,8 @@ class Session(ABC):
     def bus_down(self, now: float, reason: str) -> None:
         """Handle the loss of the bus: requests fail, the drive is offline."""
         self.bus_available = False
+        if not (self.active or self.stopped):
+            self.told.doubt()   # no answer to the stop will come
         self.users.fail_all(BUS_DOWN)
         self.lose(f'bus down: {reason}', now)
         self.go_idle(f'bus down: {reason}')

@@ -4,7 +4,8 @@ The exchange of protocols with a cyclic service: all setpoints and the control w
 
 A session says when cycles begin and how its telegrams are encoded; here stands what every such
 session has to see to. What the bus did not take counts for nothing: a cycle has been sent when all
-its frames have left. The last cycles before silence are counted.
+its frames have left. The last cycles before silence are counted; where a drive that ran has
+answered none of those that stop it, the answer to the last one is waited for a moment.
 """
 
 from collections.abc import Callable
@@ -17,6 +18,8 @@ from drive_can_bridge.protocols.exchange_book import ExchangeBook
 
 #: cyclic frames with neutral setpoints that are sent before a drive is left alone
 STOP_CYCLES = 3
+#: s that an answer to the cycles of a stop is waited for, where none has come
+LAST_ANSWER = 0.1
 #: what the drive is told by cycles, for the books of what it was told
 CYCLE = 'cycle'
 
@@ -32,7 +35,10 @@ class CyclicExchange(Generic[TelegramT]):
         among them if it has its slot.
     :param slot: of the control word; None: it is not sent cyclically.
     :param left: called when a cycle has left.
-    :param ended: called when the last cycle before silence has left.
+    :param ended: called when the last cycle before silence has left, and that of a stop was
+        answered or waited for.
+    :param unheard: tells whether somebody who ran may not have heard the stop; None: the drive
+        has answered none of its cycles.
     :ivar word: the control word of the last cycle.
     :ivar cycles_left: still to be sent before silence; -1: no end is planned.
     :ivar whole: the bus has taken all frames of the last cycle so far.
@@ -41,7 +47,8 @@ class CyclicExchange(Generic[TelegramT]):
     def __init__(self, session: Session, book: ExchangeBook,
                  encode: Callable[[list[int]], TelegramT], *, slot: int | None,
                  ended: Callable[[float], None],
-                 left: Callable[[], None] | None = None) -> None:
+                 left: Callable[[], None] | None = None,
+                 unheard: Callable[[], bool] | None = None) -> None:
         self.word: int | None = None
         self.cycles_left = -1
         self.whole = True
@@ -52,11 +59,13 @@ class CyclicExchange(Generic[TelegramT]):
         self._slot = slot
         self._ended = ended
         self._told = left
+        self._unheard = self._unanswered if unheard is None else unheard
         self._telegram: TelegramT | None = None
         self._raws: list[int] | None = None     # in it, until it has left
         self._runs = False                      # it holds anything but neutral and disable
         self._frames_out = 0                    # of which nobody has said what became of them
-        self._silent = 0                        # cycles missed in a row when the stop began
+        self._stopping = False                  # the last cycles are those of a stop
+        self._waiting = False                   # they have left, and an answer is waited for
 
     # -- sending ----------------------------------------------------------------------------------
 
@@ -126,7 +135,7 @@ class CyclicExchange(Generic[TelegramT]):
         if self.cycles_left > 0:
             self.cycles_left -= 1
             if self.cycles_left == 0:
-                self._ended(now)
+                self._end(now)
 
     def start(self, now: float, *, in_turn: bool = False) -> None:
         """
@@ -134,7 +143,7 @@ class CyclicExchange(Generic[TelegramT]):
 
         :param in_turn: it waits for the turn of this drive, if it has one.
         """
-        self.cycles_left = -1
+        self._plan(-1)
         self._book.missed_in_row = 0
         period, phase = self._session.configuration.period, self._session.phase
         first = max(now, self._timer.began_at + period)
@@ -147,32 +156,60 @@ class CyclicExchange(Generic[TelegramT]):
     @property
     def longest_stop(self) -> float:
         """How many s the last cycles before silence take at most."""
-        return STOP_CYCLES * self._timer.stop_spacing
+        return STOP_CYCLES * self._timer.stop_spacing + LAST_ANSWER
 
     def stop_soon(self, now: float) -> None:
         """Let the last cycles before silence follow soon."""
-        self._silent = self._book.missed_in_row
         soon = max(now, self._timer.began_at + self._timer.stop_spacing)
         if self._timer.due < math.inf:
-            self.cycles_left = STOP_CYCLES
+            self._plan(STOP_CYCLES)
             self._timer.no_later(soon)
         else:   # those of a stop before this one have left, what goes by writes is under way
             self.run_out(soon)
+        self._stopping = True
         self._timer.hurry(now)
 
     def run_out(self, first: float) -> None:
         """Send the last cycles before silence, beginning then."""
-        self.cycles_left = STOP_CYCLES
+        self._plan(STOP_CYCLES)
         self._timer.start(first)
 
+    def _plan(self, cycles_left: int) -> None:
+        self.cycles_left = cycles_left
+        self._stopping = self._waiting = False
+
+    def _end(self, now: float) -> None:
+        """Come to an end, at once or when somebody has answered."""
+        self._waiting = self._stopping and self._unheard()
+        if self._waiting:
+            self._timer.start(now + LAST_ANSWER)
+        else:
+            self._ended(now)
+
+    def wait_out(self, now: float, *, due: bool = False) -> bool:
+        """
+        Come to an end after all, if an answer came, or its time is over.
+
+        :param due: it is.
+        :return: the last cycle has left: nothing more is sent.
+        """
+        if self._waiting and (due or not self._unheard()):
+            self._waiting = False
+            self._ended(now)
+            return True
+        return self._waiting
+
+    def _unanswered(self) -> bool:
+        """Tell whether a drive that ran has answered none of the last cycles but one."""
+        return self._session.told.ran and self._book.missed_in_row >= STOP_CYCLES - 1
+
     def doubt_the_end(self) -> None:
-        """Take note of a drive that ran, and was silent already when its last cycles began."""
-        # the last one may still be answered
-        if 0 < self._silent <= self._book.missed_in_row - (STOP_CYCLES - 1):
+        """Take note of a drive that ran, and has answered none of its last cycles."""
+        if self._unanswered():
             self._session.told.doubt()
 
     def stop(self) -> None:
         """Send nothing more."""
-        self.cycles_left = -1
+        self._plan(-1)
         self._timer.stop()
         self._book.expect_nothing()

@@ -69,11 +69,6 @@ class Group:
         return drive is self._lead
 
     @property
-    def led(self) -> bool:
-        """The leader is online."""
-        return self._leader.online
-
-    @property
     def _leader(self) -> CannordSession:
         return self.members[0]
 
@@ -104,6 +99,23 @@ class Group:
         for member in self.members[1:]:
             member.sent.raws = leader.sent.raws
             member.told.note_unacknowledged(CYCLE, runs=runs)
+
+    # -- the end of a stop ------------------------------------------------------------------------
+
+    def unheard(self) -> bool:
+        """Tell whether an inverter that ran has not answered since all were told to stop."""
+        return any(member.told.ran for member in self.members)
+
+    def wait_out(self, now: float) -> None:
+        """Take note of an answer of an inverter that is led, while the last cycles leave."""
+        self._leader.wait_out(now)
+
+    def stop_left(self) -> None:
+        """End the stop of all: who ran and did not answer may still be running."""
+        for member in self.members:
+            member.told.doubt()
+            if not member.stopped:
+                member.stop_left()
 
     # -- what becomes of its members --------------------------------------------------------------
 

@@ -106,6 +106,7 @@ class CannordSession(Session):
         self._exchange = CyclicExchange(
             self, self._book, self._encode, slot=0,
             left=None if group is None else group.cycle_left,
+            unheard=None if group is None else group.unheard,
             ended=lambda _: self._last_cycle_left())
         self._cycling = self._stopping = False
         self._answer_due = math.inf
@@ -113,24 +114,32 @@ class CannordSession(Session):
     # -- life cycle -------------------------------------------------------------------------------
 
     def deactivate(self, now: float) -> None:
-        if self._group is not None and self._led and not self._group.led:
-            self.told.stopped()     # all were lost: the leader's last cycles are for all
         if self._group is not None:
             self._group.end(now)
         super().deactivate(now)
 
     def _last_cycle_left(self) -> None:
-        if self._group is None:     # which asks its members in turn, and says who is offline
+        if self._group is None:
             self._exchange.doubt_the_end()
-        self.stop_left()
+            self.stop_left()
+        else:
+            self._group.stop_left()
+
+    def wait_out(self, now: float) -> None:
+        """Come to the end of a stop that only waits for an answer, if that came."""
+        if self._led and self._group is not None:
+            self._group.wait_out(now)
+        else:
+            self._exchange.wait_out(now)
 
     def prepare_stop(self, now: float) -> bool:
         self._clear_acyclic()
-        return self._cycling and not self._led  # the last frames are the leader's business
+        return self._cycling
 
     def begin_stop(self, now: float) -> bool:
         self._stopping = True
-        self._exchange.stop_soon(now)
+        if not self._led:   # else it ends with the last frames of its leader
+            self._exchange.stop_soon(now)
         return True
 
     @property
@@ -177,6 +186,8 @@ class CannordSession(Session):
 
     def _cycle(self, now: float) -> None:
         """Send what is due once a period. The fast path of the timer."""
+        if self._stopping and self._exchange.wait_out(now, due=True):
+            return
         self._settle(now)
         again = self._stopping and not self._exchange.whole
         payloads = self._exchange.begin(now)
@@ -251,6 +262,8 @@ class CannordSession(Session):
                     self._receive_extra(data)
                 else:
                     self._receive_main(data, now, now - age)
+                    if self._stopping:
+                        self.wait_out(now)
             elif received == self._task_response_identifier:
                 self._channel.receive(data, now)
             elif received in self._masters:

@@ -183,7 +183,10 @@ class AcyclicSide:
         self._session.told.stopped()
 
     def _word_stopped(self) -> None:
-        self._session.told.note(CONTROL_WORD, runs=False)
+        session = self._session
+        session.told.note(CONTROL_WORD, runs=False)
+        if not session.active:  # in its end, to be disabled is enough
+            session.told.answered()
 
     def _stop_write(self, parameter: Parameter, raw: int) -> StopWrite:
         return StopWrite(parameter, (parameter.number or 0) + self.offset, raw)

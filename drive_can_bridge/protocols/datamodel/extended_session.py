@@ -226,6 +226,8 @@ class ExtendedSession(Session):
 
     def _cycle(self, now: float) -> None:
         """Send one cyclic request. The fast path of the timer."""
+        if self._stopping and self._exchange.wait_out(now, due=True):
+            return
         if self._book.awaiting:
             self._miss(now)
             if self._timer.due == math.inf:
@@ -315,6 +317,8 @@ class ExtendedSession(Session):
         self.gate.measured(raws)
         self.report.note(ProcessDataReceived(raws, received_at))
         self._channel.release(now)
+        if self._stopping:
+            self._exchange.wait_out(now)
 
     # -- timer ------------------------------------------------------------------------------------
 

@@ -40,6 +40,7 @@ class SetpointWriter:
     def forget(self) -> None:
         """Take note that nothing is known of the drive."""
         self._schedule.forget()
+        self._pulse_at = math.inf
 
     def look(self, now: float, *, unanswered: bool = False) -> None:
         """

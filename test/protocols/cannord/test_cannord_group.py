@@ -537,7 +537,44 @@ def test_end_while_a_member_that_ran_is_lost() -> None:
     for session in bus.sessions:
         session.deactivate(bus.now)
     bus.live(1.0)
-    assert worries(bus) == [('turn', 'could not be told to stop: it may still be running')]
+    assert worries(bus) == [
+        ('turn', 'told to stop, but it does not answer: it may still be running')]
+
+
+def test_end_while_a_member_that_ran_is_lost_but_hears_again() -> None:
+    bus = driven()
+    del bus.answers[3]
+    bus.live(0.3)
+    bus.answers = {1: READY, 2: READY, 3: READY}
+    for session in bus.sessions:
+        session.deactivate(bus.now)
+    bus.live(1.0)
+    assert worries(bus) == []
+
+
+@pytest.mark.parametrize('station, name', [(1, 'lift'), (2, 'hoist'), (3, 'turn')])
+@pytest.mark.parametrize('order', [(0, 1, 2), (2, 1, 0)])
+def test_member_that_falls_silent_together_with_the_stop(
+        station: int, name: str, order: tuple[int, ...]) -> None:
+    bus = driven()
+    del bus.answers[station]
+    for place in order:
+        bus.sessions[place].deactivate(bus.now)
+    sent = bus.live(0.1)
+    assert [text for _, text in sent if text.startswith('400')] == ['400#7E040000'] * 3
+    bus.live(1.0)
+    assert all(session.stopped for session in bus.sessions)
+    assert worries(bus) == [
+        (name, 'told to stop, but it does not answer: it may still be running')]
+
+
+def test_a_stop_that_all_have_heard_waits_for_nobody() -> None:
+    bus = driven()
+    for session in bus.sessions:
+        session.deactivate(bus.now)
+    bus.live(0.07)
+    assert all(session.stopped for session in bus.sessions)
+    assert worries(bus) == []
 
 
 @pytest.mark.parametrize('order', [(0, 1, 2), (2, 1, 0)])
@@ -639,10 +676,13 @@ def test_stop_frames_of_a_group_that_the_bus_refuses() -> None:
     for session in bus.sessions:
         session.deactivate(bus.now)
     assert {text.split('#')[1] for _, text in bus.live(0.3)} == {'7E040000'}
-    assert [session.stopped for session in bus.sessions] == [False, True, True]
-    bus.session('lift').give_up(bus.now)
+    assert [session.stopped for session in bus.sessions] == [False, False, False]
+    for session in bus.sessions:
+        session.give_up(bus.now)
     bus.pump()
-    assert worries(bus) == [('lift', 'could not be told to stop: it may still be running')]
+    assert all(session.stopped for session in bus.sessions)
+    assert worries(bus) == [(name, 'could not be told to stop: it may still be running')
+                            for name in NAMES]
 
 
 def test_member_whose_frame_is_refused_gets_one_before_the_stop_ends() -> None:
@@ -762,7 +802,7 @@ def test_stop_reaches_everybody() -> None:
     bus.live(0.15)
     for session in bus.sessions:
         session.deactivate(bus.now)
-    assert [session.stopped for session in bus.sessions] == [False] + [True] * 6
+    assert not any(session.stopped for session in bus.sessions)
     sent = [text for _, text in bus.live(1.0)]
     assert [text for text in sent if text.startswith('400')] == ['400#7E040000'] * 3
     assert {text[:3] for text in sent} == {'400', '002', '004', '006', '008', '00A', '00C', '00E'}

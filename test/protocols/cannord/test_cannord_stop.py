@@ -146,9 +146,49 @@ def test_three_refused_stop_frames_are_no_stop() -> None:
     assert talk.until(10.101) == [], '10.06, 10.08, 10.1'
     assert not talk.session.stopped
     talk.refusing = lambda text: False
-    assert talk.until(11.0) == [(10.12, READY_FRAME), (10.14, READY_FRAME), (10.16, READY_FRAME)]
+    assert exchange(talk, 10.12) == READY_FRAME
+    assert talk.until(11.0) == [(10.14, READY_FRAME), (10.16, READY_FRAME)]
     assert talk.session.stopped
     assert warnings(talk) == []
+
+
+def test_drive_that_falls_silent_together_with_the_stop() -> None:
+    """It may have been disconnected in the meantime, and run on by itself."""
+    talk = running()
+    talk.deactivate(10.05)
+    assert talk.until(10.25) == [(10.06, READY_FRAME), (10.08, READY_FRAME), (10.1, READY_FRAME)]
+    assert talk.session.stopped
+    assert warnings(talk) == ['told to stop, but it does not answer: it may still be running']
+
+
+def test_drive_that_answers_the_last_cycle_of_a_stop() -> None:
+    talk = running()
+    talk.deactivate(10.05)
+    talk.until(10.1)
+    assert not talk.session.stopped, 'its answer is waited for'
+    assert talk.hears(READY, 10.15) == []
+    assert talk.session.stopped
+    assert talk.until(11.0) == []
+    assert warnings(talk) == []
+
+
+def test_nobody_waits_for_a_drive_that_never_ran() -> None:
+    talk = online()
+    talk.deactivate(10.05)
+    talk.until(10.1)
+    assert talk.session.stopped
+    assert warnings(talk) == []
+
+
+def test_bus_that_is_lost_while_the_last_answer_is_waited_for() -> None:
+    talk = running()
+    talk.deactivate(10.05)
+    talk.until(10.1)
+    talk.bus_down(10.12)
+    assert talk.session.stopped
+    assert talk.until(11.0) == []
+    assert warnings(talk) == [
+        'the bus was lost before it could be told to stop: it may still be running']
 
 
 def test_bus_that_takes_no_stop_frame_at_all() -> None:

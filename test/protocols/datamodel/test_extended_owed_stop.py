@@ -354,9 +354,52 @@ def test_stop_goes_on_until_three_frames_were_taken() -> None:
     talk.deactivate(10.03)
     talk.until(10.09)
     talk.refusing = lambda text: False
-    assert [text for _, text in talk.until(10.5)] == [NEUTRAL] * 3
+    assert exchange(talk, 10.1) == NEUTRAL
+    assert [text for _, text in talk.until(10.5)] == [NEUTRAL] * 2
     assert talk.session.stopped
     assert warnings(talk) == []
+
+
+@pytest.mark.parametrize('mapping', ['verify', 'assume'])
+def test_drive_that_falls_silent_together_with_the_stop(mapping: str) -> None:
+    talk = running(mapping=mapping)
+    talk.deactivate(10.03)
+    sent = talk.until(10.3)
+    assert [text for _, text in sent] == [NEUTRAL] * 3
+    assert talk.session.stopped
+    assert warnings(talk) == ['told to stop, but it does not answer: it may still be running']
+
+
+@pytest.mark.parametrize('mapping', ['verify', 'assume'])
+def test_drive_that_answers_the_last_cycle_of_a_stop(mapping: str) -> None:
+    talk = running(mapping=mapping)
+    talk.deactivate(10.03)
+    sent = talk.until(10.12)
+    assert [text for _, text in sent] == [NEUTRAL] * 3
+    assert not talk.session.stopped, 'its answer is waited for'
+    assert talk.hears(ANSWER, 10.13) == []
+    assert talk.session.stopped
+    assert not talk.session.online
+    assert talk.until(11.0) == []
+    assert warnings(talk) == []
+
+
+def test_nothing_is_doubted_of_a_drive_that_stands_still_when_the_bus_goes() -> None:
+    talk = running()
+    talk.commands(0, 0.0, 10.03)
+    assert exchange(talk, 10.04) == NEUTRAL
+    talk.bus_down(10.05)
+    assert warnings(talk) == []
+
+
+def test_second_end_while_the_last_answer_is_waited_for() -> None:
+    talk = running()
+    talk.deactivate(10.03)
+    talk.until(10.12)
+    talk.deactivate(10.13)
+    assert [text for _, text in talk.until(11.0)] == [NEUTRAL] * 3
+    assert talk.session.stopped
+    assert warnings(talk) == ['told to stop, but it does not answer: it may still be running']
 
 
 def test_stop_of_a_lost_drive_counts_frames_that_were_taken() -> None:

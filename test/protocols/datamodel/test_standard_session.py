@@ -714,6 +714,18 @@ def test_reset_is_a_pulse_of_three_writes(request_: tuple[Parameter, ...], perio
     assert talk.control_outcomes() == [('reset_fault', True, 'ready')]
 
 
+def test_nothing_is_left_of_a_pulse_that_the_bus_cut_short() -> None:
+    talk = polling(request=(SPEED, WORD), control=CONTROL, refresh_interval=60.0)
+    talk.hears(FAULT, 10.002)
+    talk.until(10.018)
+    talk.asks(ControlAction.RESET_FAULT, 10.019)
+    round_of(talk, 10.02, FAULT)
+    assert talk.until(10.026) == [(10.025, RESET_WORD)]
+    talk.bus_down(10.03)
+    assert talk.session.next_timer() == math.inf
+    assert talk.at(10.2) == []
+
+
 def test_the_stop_disables() -> None:
     talk = controlled()
     talk.asks(ControlAction.ENABLE, 10.01)
