@@ -97,7 +97,7 @@ class CommandIntake:
             return
         if outcome is _ACCEPTED:    # nearly all of them
             return
-        if outcome is CommandOutcome.DISABLED:
+        if outcome is CommandOutcome.DISABLED and session.active:
             name = session.setpoints.items[index].parameter.name
             self._warn('disabled', f'command {name} has no effect: disabled, '
                        f'{session.how_to_enable}', once=True)

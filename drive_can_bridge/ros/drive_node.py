@@ -87,6 +87,7 @@ class DriveNode:
             tell=identified, warn=lambda text: self.warn(text, text))
         self.times_lost = 0
         self.rejected_text = ''
+        self._may_run = False   # and nothing has been heard of it since
         self.foreign_text = ''
         # a local remapping wins over a process-wide ``__node:=``, which would rename every drive;
         # time and qualities are the bridge's, whose parameters everybody sees
@@ -225,6 +226,7 @@ class DriveNode:
             _, completed = self._requests.pop(id(event.request))
             completed(event.outcomes)
         elif isinstance(event, StationFound):
+            self._may_run = False
             self._online.publish(Bool(data=True))
             self._log.reset()
             self._log.info('online')
@@ -235,7 +237,7 @@ class DriveNode:
             if self.session.active:
                 self.times_lost += 1
                 self._log.warning(f'offline: {event.reason}', urgent=True)
-            else:
+            elif not self._may_run:
                 self._log.info('stopped')
         elif isinstance(event, SetpointsExpired):
             self.warn('command timeout',
@@ -255,6 +257,7 @@ class DriveNode:
             self.foreign_text = event.text
             self.warn('foreign master', event.text)
         elif isinstance(event, Noted):
+            self._may_run = self._may_run or event.danger
             if event.warning:
                 self._log.warning(event.text, urgent=event.danger)
             else:

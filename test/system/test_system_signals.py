@@ -48,6 +48,22 @@ def test_while_active(processes: Processes, client: Client, namespace: str, tmp_
 
 
 @BOTH
+def test_drive_that_falls_silent_together_with_the_end(
+        processes: Processes, client: Client, namespace: str, tmp_path: Path, number: int) -> None:
+    file = bridge_file(tmp_path)
+    simulator = processes.simulator(file)
+    bridge = processes.bridge(file, namespace)
+    start_moving(client, f'/{namespace}/conveyor')
+    simulator.send(signal.SIGSTOP)
+    try:
+        assert bridge.end(number) == 0
+    finally:
+        simulator.send(signal.SIGCONT)
+    bridge.error('conveyor: told to stop, but it does not answer: it may still be running')
+    assert not [line for line in bridge.errors if line.endswith('conveyor: stopped')]
+
+
+@BOTH
 def test_while_the_bus_is_absent(processes: Processes, namespace: str, tmp_path: Path,
                                  number: int) -> None:
     bridge = processes.bridge(bridge_file(tmp_path, channel='/dev/no_such_adapter'), namespace)
