@@ -8,6 +8,7 @@ holds ``buses``. What makes rcl refuse the whole file counts in every section, w
 parameters counts in ours.
 """
 
+from collections.abc import Iterable
 from pathlib import Path as FilePath
 import re
 from typing import NamedTuple
@@ -27,10 +28,15 @@ _TOKEN = re.compile(r'[A-Za-z_][A-Za-z0-9_]*|\*\*?', re.ASCII)
 
 
 class Section(NamedTuple):
-    """The parameters of one node name; the tree has the problems that only they have."""
+    """
+    The parameters of one node name; the tree has the problems that only they have.
+
+    :param refused: what rcl refuses, or what makes it garble what follows.
+    """
 
     name: str
     tree: Tree
+    refused: list[Problem]
 
 
 class _FileReader:
@@ -112,7 +118,7 @@ class _FileReader:
             return
         reader = TreeReader(self._file, Rules.PARAMETERS)
         reader.read(node)
-        self.sections.append(Section(name, reader.tree))
+        self.sections.append(Section(name, reader.tree, reader.refused))
         self.problems.extend(reader.refused)
 
 
@@ -135,23 +141,31 @@ def section_names(path: FilePath) -> list[str]:
     return [section.name for section in read_sections(path)[0]]
 
 
-def duplicate_keys(path: FilePath, node: str) -> list[Problem]:
+def unseen_problems(paths: Iterable[FilePath], node: str,
+                    ) -> tuple[list[Problem], list[Problem]]:
     """
-    Look for keys that a parameter file gives twice to a node.
+    Look for what rcl does to the parameters of a node without a word.
 
-    rcl takes the last of them without a word: a node that only sees what is left cannot tell.
+    Of keys that stand twice it takes the last, and what follows an empty mapping it puts into
+    that: a node that only sees what is left cannot tell.
 
     :param node: full name of the node.
-    :return: nothing where the file has gone since: launch removes those that it wrote.
+    :return: duplicate keys; and what makes all that the node sees doubtful. Nothing of a file that
+        has gone since: launch removes those that it wrote.
     """
-    try:
-        reader = _FileReader(path)
-    except OSError:
-        return []
-    found = [problem for section in reader.sections if _is_for(section.name, node)
-             for problem in section.tree.problems]
-    found += [problem for problem in reader.problems if _is_for(problem.key, node)]
-    return [problem for problem in found if problem.message.startswith(DUPLICATE)]
+    found: list[Problem] = []
+    garbled: list[Problem] = []
+    for path in paths:
+        try:
+            reader = _FileReader(path)
+        except OSError:
+            continue
+        for section in reader.sections:
+            if _is_for(section.name, node):
+                found += section.tree.problems
+                garbled += section.refused
+        found += [problem for problem in reader.problems if _is_for(problem.key, node)]
+    return [problem for problem in found if problem.message.startswith(DUPLICATE)], garbled
 
 
 def _is_for(section: str, node: str) -> bool:

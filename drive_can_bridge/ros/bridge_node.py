@@ -27,7 +27,7 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 
 from drive_can_bridge.configuration.declare import identity_name
 from drive_can_bridge.configuration.load import configuration_from_overrides
-from drive_can_bridge.configuration.parameter_file import duplicate_keys
+from drive_can_bridge.configuration.parameter_file import unseen_problems
 from drive_can_bridge.configuration.problems import report
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.errors import ConfigurationError
@@ -75,8 +75,7 @@ class BridgeNode(LifecycleNode):
         self._spinner = executor
         self._fatal = fatal
         # now: later on, somebody may have edited or removed them
-        self._duplicates = [problem for file in files for problem in duplicate_keys(
-            Path(file), self.get_fully_qualified_name())]
+        self._unseen = unseen_problems(map(Path, files), self.get_fully_qualified_name())
         self._transition_lock = threading.RLock()
         self._mailbox = Mailbox(self)
         self._control_thread = ServiceThread('control', self.context, self.log.error,
@@ -189,7 +188,9 @@ class BridgeNode(LifecycleNode):
 
         :raises ConfigurationError: with all problems.
         """
-        problems = report(self._duplicates)
+        problems, garbled = map(report, self._unseen)
+        if garbled:     # what else there is to be said would mislead
+            raise ConfigurationError(garbled)
         try:
             configuration = configuration_from_overrides(self._node_parameters.current,
                                                          adapters=adapters)

@@ -7,7 +7,7 @@ from configuration_builders import FILE
 import pytest
 
 from drive_can_bridge.configuration.load import configuration_from_file
-from drive_can_bridge.configuration.parameter_file import duplicate_keys, read_parameter_file
+from drive_can_bridge.configuration.parameter_file import read_parameter_file, unseen_problems
 from drive_can_bridge.core.errors import ConfigurationError
 
 HEAD = '/**/drive_can_bridge:\n  ros__parameters:\n'
@@ -265,18 +265,29 @@ def test_duplicate_keys_of_a_node(tmp_path: Path, section: str, node: str, meant
     file = tmp_path / 'f.yaml'
     file.write_text(f'{section}:\n  ros__parameters:\n    a.b: 1\n    period: 1\n    period: 2\n',
                     encoding='utf-8')
-    found = [(problem.line, problem.key) for problem in duplicate_keys(file, node)]
+    found = [(problem.line, problem.key) for problem in unseen_problems([file], node)[0]]
     assert found == ([(5, 'period')] if meant else [])
 
 
+@pytest.mark.parametrize(('node', 'meant'), [('/drive_can_bridge', True), ('/other', False)])
+def test_empty_mapping_of_a_node(tmp_path: Path, node: str, meant: bool) -> None:
+    file = tmp_path / 'f.yaml'
+    file.write_text('drive_can_bridge:\n  ros__parameters:\n    joint: {}\n    period: 1\n',
+                    encoding='utf-8')
+    duplicates, garbled = unseen_problems([file], node)
+    assert duplicates == []
+    found = [(problem.line, problem.key) for problem in garbled]
+    assert found == ([(3, 'joint')] if meant else [])
+
+
 def test_duplicate_keys_of_a_file_that_has_gone(tmp_path: Path) -> None:
-    assert duplicate_keys(tmp_path / 'gone.yaml', '/drive_can_bridge') == []
+    assert unseen_problems([tmp_path / 'gone.yaml'], '/drive_can_bridge') == ([], [])
 
 
 def test_section_that_stands_twice(tmp_path: Path) -> None:
     file = tmp_path / 'f.yaml'
     section = '/**/drive_can_bridge:\n  ros__parameters: {a: 1}\n'
     file.write_text(section + section, encoding='utf-8')
-    found = duplicate_keys(file, '/drive_can_bridge')
+    found, _ = unseen_problems([file], '/drive_can_bridge')
     assert [(problem.line, problem.key) for problem in found] == [(3, '/**/drive_can_bridge')]
-    assert duplicate_keys(file, '/other') == []
+    assert unseen_problems([file], '/other') == ([], [])

@@ -99,6 +99,18 @@ def test_key_that_stands_twice(run: Run, tmp_path: Path) -> None:
         f'in line {place + 1})')
 
 
+def test_empty_mapping(run: Run, tmp_path: Path) -> None:
+    """What follows is put into it by rcl: nothing of that is worth a word."""
+    file = written(tmp_path)
+    lines = file.read_text(encoding='utf-8').splitlines(keepends=True)
+    place, = [number for number, line in enumerate(lines) if line.strip().startswith('period:')]
+    lines.insert(place, lines[place].replace('period: 0.02', 'joint: {}'))
+    file.write_text(''.join(lines), encoding='utf-8')
+    assert problem(run(*with_file(file))) == (
+        f'{file}:{place + 1}: drives.conveyor.joint: an empty mapping (rcl garbles what follows), '
+        'allowed is to leave the key out')
+
+
 def test_file_for_another_node(run: Run, tmp_path: Path) -> None:
     file = written(tmp_path, node='/other/can_bridge')
     text = problem(run(*with_file(file)))
