@@ -54,7 +54,7 @@ class Backup:
     :param file: where it was read from, as the user names it.
     :param node: name of the node whose section it has.
     :param values: by parameter name, in the order of the file.
-    :param lines: of the values.
+    :param lines: of the values, and of names without one.
     """
 
     file: str
@@ -68,6 +68,11 @@ class Backup:
         """Name of the drive that it was made of; '' where the section is for any node."""
         name = self.node.rsplit('/', 1)[-1]
         return '' if '*' in name else name
+
+    @property
+    def without_value(self) -> list[str]:
+        """Names that the drive did not give when the file was made."""
+        return [name for name in self.lines if name not in self.values]
 
     def problem(self, name: str, message: str) -> str:
         """Write what is wrong with a value as a line."""

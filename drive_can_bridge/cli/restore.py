@@ -198,6 +198,9 @@ def _show(args: Namespace, backup: Backup, drive: Drive, plan: RestorePlan) -> N
         why = why_left_alone(drive, name, include_protected=True)
         if why is not None and not is_setting(drive, name):
             complain(printable(f'{drive.name}: {name} is left alone: {why.text}'))
+    if backup.without_value:
+        complain(printable(f'{backup.file}: no value in it, left alone: '
+                           f'{_list(backup.without_value)}'))
     if not plan.changes and not args.json:
         print(printable(f'{drive.name}: nothing to restore, {len(plan.same)} settings are as in '
                         f'{backup.file}'))

@@ -240,6 +240,16 @@ class TestRestore:
         assert said.code == 0
         assert shop.values('pump', 'flc1_ratio') == (33.0,)
 
+    def test_what_has_no_value_in_the_file_is_told(self, shop: Shop, command: Command) -> None:
+        """As ``ros2 param dump`` writes what the drive did not give."""
+        command('backup', 'conveyor', '-o', 'b.yaml')
+        text = Path('b.yaml').read_text()
+        assert 'ramp_time: 1.0' in text
+        Path('b.yaml').write_text(text.replace('ramp_time: 1.0', 'ramp_time: null'))
+        said = command('restore', 'b.yaml', '--yes')
+        assert said.code == 0
+        assert said.errors == ['b.yaml: no value in it, left alone: ramp_time']
+
     def test_of_another_family(self, shop: Shop, command: Command) -> None:
         command('backup', 'mixer', '-o', 'mixer.yaml')
         said = command('restore', 'mixer.yaml', 'conveyor', '--yes')
