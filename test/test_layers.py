@@ -45,8 +45,8 @@ INTERNAL: dict[str, set[str]] = {
     'ros.monitor': {'', 'core', 'monitor', 'ros.guest'},
     'ros.demo': {'', 'core', 'configuration', 'simulation', 'monitor', 'ros', 'ros.monitor'},
     'demo': {'', 'core', 'configuration', 'process'},
-    'client.drive': {'', 'core'},
-    'ros.client': {'', 'core', 'process', 'client.drive', 'ros.guest'},
+    'client.drive': {'', 'core', 'process'},
+    'ros.client': {'', 'core', 'client.drive', 'ros.guest'},
     'client': {
         '', 'core', 'configuration', 'protocols', 'transport', 'exchange', 'process',
         'client.drive', 'ros.client'},

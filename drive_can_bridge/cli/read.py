@@ -16,7 +16,7 @@ from drive_can_bridge.cli.drives import (
 from drive_can_bridge.cli.listening import complain, positive
 from drive_can_bridge.cli.progress import Bar
 from drive_can_bridge.cli.tables import fitting_table, print_json, print_table
-from drive_can_bridge.client.drive import Drive, Drives, readable_names, ReadOutcome
+from drive_can_bridge.client.drive import Drive, Drives, ReadOutcome
 from drive_can_bridge.core.words import value_text
 
 _HEADINGS = ('drive', 'name', 'value', 'unit', 'raw', 'number', 'storage', 'description',
@@ -62,7 +62,7 @@ def run(args: Namespace) -> int:
 def _read(args: Namespace, drives: Drives, wanted: Sequence[str]) -> int:
     outcomes = []
     for drive in drives.values():
-        names = wanted or readable_names(drive)
+        names = wanted or drive.readable_names
         with Bar(f'reading {drive.name}', len(names)) as bar:
             outcomes += [(drive, outcome)
                          for outcome in drive.read(*names, told=bar.step).values()]

@@ -7,15 +7,14 @@ whether it is there (at the beginning, and after a request of which nothing was 
 greeted by single reads before anything else.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 from drive_can_bridge.client.conversation import BusConversation
 from drive_can_bridge.client.drive import (
-    Drive, DriveFacts, Enabled, readable_names, ReadOutcome, sort_out, WriteOutcome,
+    Drive, DriveFacts, Enabled, ReadOutcome, WriteOutcome,
 )
 from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration
 from drive_can_bridge.core.directory import ParameterDirectory
-from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.requests import (
     Failure, is_answer, NO_ANSWER, NO_ANSWER_OFFLINE, OFFLINE, Outcome, ReadRequest, ReadValue,
@@ -23,7 +22,6 @@ from drive_can_bridge.core.requests import (
 )
 from drive_can_bridge.core.roles import Role
 from drive_can_bridge.core.words import value_text
-from drive_can_bridge.process.interruption import finish_first
 from drive_can_bridge.protocols.families import FAMILIES
 
 #: parameters that are handed to a session at once: two frames where four share one; and how many
@@ -44,18 +42,17 @@ class DirectDrive(Drive):
     def __init__(self, drive: DriveConfiguration, bus: BusConfiguration,
                  conversation: BusConversation, nmt_start: bool) -> None:
         self._drive = drive
-        self._family = FAMILIES[drive.protocol]
-        self._conversation = conversation
-        self._session = conversation.sessions[drive.name]
-        self._directory = ParameterDirectory(
-            drive.profile.parameters, lambda name: self._family.raw_parameter(drive, name))
-        self._start_frame = self._family.make_prober(drive).start_frame()
-        self._nmt_start = nmt_start
-        self._facts = DriveFacts(
+        self._family = family = FAMILIES[drive.protocol]
+        super().__init__(DriveFacts(
             drive.name, bus.name, bus.interface, str(bus.channel), bus.bitrate, drive.protocol,
             drive.station, drive.profile_key or drive.profile.name, drive.profile.sha256,
             drive.profile.restore,
-            persist_writes=getattr(drive.options, 'persist_writes', True))
+            persist_writes=getattr(drive.options, 'persist_writes', True)), ParameterDirectory(
+            drive.profile.parameters, lambda name: family.raw_parameter(drive, name)))
+        self._conversation = conversation
+        self._session = conversation.sessions[drive.name]
+        self._start_frame = family.make_prober(drive).start_frame()
+        self._nmt_start = nmt_start
 
     def _start(self) -> None:
         if self._nmt_start and self._start_frame is not None:
@@ -76,56 +73,25 @@ class DirectDrive(Drive):
                 yield (f'{self.name}: {supervision.address} is not 0: the drive supervises '
                        'telegrams once it has got one, and faults when they end')
 
-    @property
-    def name(self) -> str:
-        return self._drive.name
-
-    @property
-    def facts(self) -> DriveFacts:
-        return self._facts
-
-    @property
-    def parameters(self) -> Mapping[str, Parameter]:
-        return self._drive.profile.parameters
-
-    def find(self, name: str) -> Parameter | None:
-        return self._directory.find(name)
-
     def role(self, name: str) -> Role | None:
         parameter = self.find(name)
         return None if parameter is None else self._session.roles.role(parameter)
 
-    def check(self, name: str, value: object) -> str:
-        parameter = self.find(name)
-        if parameter is None:
-            return self._directory.unknown(name)
-        if parameter.writable:
-            owner = self._session.roles.owner(parameter)
-            if owner is not None and owner[0] is Role.CONTROL:
-                return 'control word: only a running bridge sends it'
-            if owner is not None and owner[0] is Role.CYCLIC:
-                return f'setpoint {owner[1].name}: only a running bridge sends it'
-            refusal = self._session.users.write_refusal(parameter)
-            if refusal:
-                return refusal
-        try:
-            self._directory.raw_from_user(parameter, value)
-        except ValueRefused as error:
-            return str(error)
-        return ''
+    def write_refusal(self, name: str, parameter: Parameter) -> str:
+        if not parameter.writable:
+            return ''   # which its value is told
+        owner = self._session.roles.owner(parameter)
+        if owner is not None and owner[0] is Role.CONTROL:
+            return 'control word: only a running bridge sends it'
+        if owner is not None and owner[0] is Role.CYCLIC:
+            return f'setpoint {owner[1].name}: only a running bridge sends it'
+        return self._session.users.write_refusal(parameter)
 
     # -- reading ----------------------------------------------------------------------------------
 
-    def read(self, *names: str,
-             told: Callable[[ReadOutcome], object] | None = None) -> dict[str, ReadOutcome]:
-        wanted = names or readable_names(self)
-        found, asked = sort_out(self, wanted, told)
+    def ask(self, asked: Sequence[tuple[str, Parameter]]) -> Iterator[ReadOutcome]:
         for name, parameter, outcome in self._outcomes(asked):
-            made = self._read_outcome(name, parameter, outcome)
-            found[name] = made
-            if told is not None:
-                told(made)
-        return {name: found[name] for name in wanted}
+            yield self._read_outcome(name, parameter, outcome)
 
     def _outcomes(self, asked: Sequence[tuple[str, Parameter]],
                   ) -> Iterator[tuple[str, Parameter, Outcome]]:
@@ -200,21 +166,7 @@ class DirectDrive(Drive):
 
     # -- writing ----------------------------------------------------------------------------------
 
-    def write(self, values: Mapping[str, Value], *,
-              told: Callable[[WriteOutcome], object] | None = None) -> dict[str, WriteOutcome]:
-        found = {}
-        for name, value in values.items():
-            with finish_first():
-                outcome = found[name] = self._write_one(name, value)
-                if told is not None:
-                    told(outcome)
-        return found
-
-    def _write_one(self, name: str, value: Value) -> WriteOutcome:
-        parameter = self.find(name)
-        refusal = self.check(name, value)
-        if refusal or parameter is None:
-            return WriteOutcome(name, False, parameter, refusal)
+    def put(self, name: str, parameter: Parameter, value: Value) -> WriteOutcome:
         if not self._session.online:    # what does not answer is told nothing
             self._start()
             _, failure = self._greet()

@@ -24,15 +24,18 @@ commands need that have to know which drive is meant:
     open_drives(params_file=None, *, only=('*',), namespace=None, nmt_start=False) -> Drives
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol
 
-from drive_can_bridge.core.errors import DriveCanError
+from drive_can_bridge.core.directory import ParameterDirectory
+from drive_can_bridge.core.errors import DriveCanError, ValueRefused
 from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.profile import RestoreTable
 from drive_can_bridge.core.roles import Role
+from drive_can_bridge.process.interruption import finish_first
 
 
 class WhichBridge(DriveCanError):
@@ -115,20 +118,23 @@ class DriveFacts:
     persist_writes: bool = True
 
 
-class Drive(Protocol):
+class Drive(ABC):
     """
     One drive.
 
     Calls block until everything is done. They belong into one thread.
+
+    :ivar facts: what is known of the drive without asking it.
     """
+
+    def __init__(self, facts: DriveFacts, directory: ParameterDirectory) -> None:
+        self.facts = facts
+        self._directory = directory
 
     @property
     def name(self) -> str:
         """Name of the drive in the configuration."""
-
-    @property
-    def facts(self) -> DriveFacts:
-        """What is known of the drive without asking it."""
+        return self.facts.name
 
     @property
     def parameters(self) -> Mapping[str, Parameter]:
@@ -138,10 +144,25 @@ class Drive(Protocol):
         Limits (``minimum``, ``maximum``) that come through a bridge are those in effect: where the
         profile has none, what the type can carry.
         """
+        return self._directory.listed
+
+    @property
+    def readable_names(self) -> list[str]:
+        """
+        What ``read`` reads when no name is given.
+
+        What exists in process data only can be read only while these are received: through a
+        bridge, where they are mapped.
+        """
+        return [name for name, parameter in self.parameters.items() if parameter.readable and (
+            parameter.number is not None or parameter.index is not None
+            or self.facts.through and not parameter.writable and self.role(name) is Role.CYCLIC)]
 
     def find(self, name: str) -> Parameter | None:
         """Return a parameter by profile name or raw name; None if there is no such thing."""
+        return self._directory.find(name)
 
+    @abstractmethod
     def role(self, name: str) -> Role | None:
         """
         Say what a bridge uses a parameter for itself; None: nothing, or an unknown name.
@@ -156,6 +177,17 @@ class Drive(Protocol):
 
         Unknown name, read-only, wrong type, out of range, a setpoint, a control word.
         """
+        parameter = self.find(name)
+        if parameter is None:
+            return self._directory.unknown(name)
+        refusal = self.write_refusal(name, parameter)
+        if refusal:
+            return refusal
+        try:
+            self._directory.raw_from_user(parameter, value)
+        except ValueRefused as error:
+            return str(error)
+        return ''
 
     def read(self, *names: str,
              told: Callable[[ReadOutcome], object] | None = None) -> dict[str, ReadOutcome]:
@@ -165,6 +197,26 @@ class Drive(Protocol):
         :param told: is told each outcome as soon as it is known, in any order.
         :return: one outcome for each name, in the order asked.
         """
+        wanted = names or self.readable_names
+        found: dict[str, ReadOutcome] = {}
+        for outcome in self._read_all(wanted):
+            found[outcome.name] = outcome
+            if told is not None:
+                told(outcome)
+        return {name: found[name] for name in wanted}
+
+    def _read_all(self, names: Sequence[str]) -> Iterator[ReadOutcome]:
+        """Tell first what cannot be read at all; of the rest, neighbours share frames."""
+        asked: list[tuple[str, Parameter]] = []
+        for name in dict.fromkeys(names):
+            parameter = self.find(name)
+            if parameter is not None and parameter.readable:
+                asked.append((name, parameter))
+            else:
+                yield ReadOutcome(name, parameter, reason='write-only' if parameter else
+                                  self._directory.unknown(name))
+        asked.sort(key=lambda each: (each[1].number or 0, each[1].subindex or 0))
+        yield from self.ask(asked)
 
     def write(self, values: Mapping[str, Value], *,
               told: Callable[[WriteOutcome], object] | None = None) -> dict[str, WriteOutcome]:
@@ -176,10 +228,25 @@ class Drive(Protocol):
         :raises KeyboardInterrupt: on Ctrl-C; not before the write under way has its outcome, and
             ``told`` knows it.
         """
+        found = {}
+        for name, value in values.items():
+            with finish_first():
+                parameter = self.find(name)
+                refusal = self.check(name, value)
+                if refusal or parameter is None:
+                    outcome = WriteOutcome(name, False, parameter, refusal)
+                else:
+                    outcome = self.put(name, parameter, value)
+                found[name] = outcome
+                if told is not None:
+                    told(outcome)
+        return found
 
+    @abstractmethod
     def enabled(self) -> Enabled:
         """Tell whether the drive is enabled, asking for its status where that is possible."""
 
+    @abstractmethod
     def identity(self) -> str:
         """
         Say who the drive is: ``firmware=10205 serial_number=4711``.
@@ -188,42 +255,19 @@ class Drive(Protocol):
         none.
         """
 
+    # -- what the way to the drive decides, for the methods above ---------------------------------
 
-def readable_names(drive: Drive) -> list[str]:
-    """
-    Return what ``read`` reads when no name is given.
+    @abstractmethod
+    def write_refusal(self, name: str, parameter: Parameter) -> str:
+        """Say why a parameter cannot be written whatever the value; '' if it can."""
 
-    What exists in process data only can be read only while these are received: through a bridge,
-    where they are mapped.
-    """
-    return [name for name, parameter in drive.parameters.items() if parameter.readable and (
-        parameter.number is not None or parameter.index is not None
-        or drive.facts.through and not parameter.writable and drive.role(name) is Role.CYCLIC)]
+    @abstractmethod
+    def ask(self, asked: Sequence[tuple[str, Parameter]]) -> Iterator[ReadOutcome]:
+        """Ask for parameters that can be read; their outcomes come in any order."""
 
-
-def sort_out(drive: Drive, names: Sequence[str],
-             told: Callable[[ReadOutcome], object] | None,
-             ) -> tuple[dict[str, ReadOutcome], list[tuple[str, Parameter]]]:
-    """
-    Tell what cannot be read at all from what is to be asked for.
-
-    :param told: is told the outcomes that are known without asking.
-    :return: these outcomes; and name and parameter of the rest, neighbours beside each other,
-        because they share frames.
-    """
-    known: dict[str, ReadOutcome] = {}
-    asked: list[tuple[str, Parameter]] = []
-    for name in dict.fromkeys(names):
-        parameter = drive.find(name)
-        if parameter is None or not parameter.readable:
-            reason = drive.check(name, None) if parameter is None else 'write-only'
-            known[name] = ReadOutcome(name, parameter, reason=reason)
-            if told is not None:
-                told(known[name])
-        else:
-            asked.append((name, parameter))
-    asked.sort(key=lambda each: (each[1].number or 0, each[1].subindex or 0))
-    return known, asked
+    @abstractmethod
+    def put(self, name: str, parameter: Parameter, value: Value) -> WriteOutcome:
+        """Write a value that nothing speaks against."""
 
 
 class Drives(Mapping[str, Drive]):

@@ -1,18 +1,16 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """One drive, asked through its node of a running bridge."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters
 
 from drive_can_bridge.client.drive import (
-    Drive, DriveFacts, Enabled, readable_names, ReadOutcome, sort_out, WriteOutcome,
+    Drive, DriveFacts, Enabled, ReadOutcome, WriteOutcome,
 )
 from drive_can_bridge.core.directory import ParameterDirectory
-from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.roles import Role
-from drive_can_bridge.process.interruption import finish_first
 from drive_can_bridge.ros.client.descriptors import (
     facts_of, message_of, parameter_of, plain, raw_of, role_of,
 )
@@ -40,30 +38,13 @@ class BridgedDrive(Drive):
 
     def __init__(self, graph: Graph, node: str, facts: DriveFacts, table: dict[str, Parameter],
                  roles: dict[str, Role], period: float, identity: Callable[[str], str]) -> None:
+        super().__init__(facts, ParameterDirectory(table, self._raw_parameter))
         self._graph = graph
         self._node = node
-        self._facts = facts
-        self._table = table
         self._roles = roles
         self._period = period
         self._identity = identity
         self._raw: dict[str, Parameter | None] = {}
-        self._directory = ParameterDirectory(table, self._raw_parameter)
-
-    @property
-    def name(self) -> str:
-        return self._facts.name
-
-    @property
-    def facts(self) -> DriveFacts:
-        return self._facts
-
-    @property
-    def parameters(self) -> Mapping[str, Parameter]:
-        return self._table
-
-    def find(self, name: str) -> Parameter | None:
-        return self._directory.find(name)
 
     def _raw_parameter(self, name: str) -> Parameter | None:
         if name not in self._raw:
@@ -77,10 +58,7 @@ class BridgedDrive(Drive):
     def role(self, name: str) -> Role | None:
         return None if self.find(name) is None else self._roles.get(name)
 
-    def check(self, name: str, value: object) -> str:
-        parameter = self.find(name)
-        if parameter is None:
-            return self._directory.unknown(name)
+    def write_refusal(self, name: str, parameter: Parameter) -> str:
         role = self.role(name)
         if parameter.writable and role is Role.CONTROL:
             return 'use ~/enable'
@@ -89,22 +67,11 @@ class BridgedDrive(Drive):
             return f'sent cyclically: publish ~/command/{own}'
         if role is Role.MAP:
             return 'mapping parameter: not written while the bridge is active'
-        try:
-            self._directory.raw_from_user(parameter, value)
-        except ValueRefused as error:
-            return str(error)
         return ''
 
-    def read(self, *names: str,
-             told: Callable[[ReadOutcome], object] | None = None) -> dict[str, ReadOutcome]:
-        wanted = names or readable_names(self)
-        found, asked = sort_out(self, wanted, told)
+    def ask(self, asked: Sequence[tuple[str, Parameter]]) -> Iterator[ReadOutcome]:
         for start in range(0, len(asked), BLOCK):
-            for outcome in self._get(asked[start:start + BLOCK]):
-                found[outcome.name] = outcome
-                if told is not None:
-                    told(outcome)
-        return {name: found[name] for name in wanted}
+            yield from self._get(asked[start:start + BLOCK])
 
     def _get(self, asked: Sequence[tuple[str, Parameter]]) -> list[ReadOutcome]:
         names = [name for name, _ in asked]
@@ -133,28 +100,14 @@ class BridgedDrive(Drive):
                                   DescribeParameters.Request(names=list(names)))
         return list(answer.descriptors)
 
-    def write(self, values: Mapping[str, Value], *,
-              told: Callable[[WriteOutcome], object] | None = None) -> dict[str, WriteOutcome]:
-        found = {}
-        for name, value in values.items():
-            with finish_first():
-                outcome = found[name] = self._write_one(name, value)
-                if told is not None:
-                    told(outcome)
-        return found
-
-    def _write_one(self, name: str, value: Value) -> WriteOutcome:
-        parameter = self.find(name)
-        refusal = self.check(name, value)
-        if refusal or parameter is None:
-            return WriteOutcome(name, False, parameter, refusal)
+    def put(self, name: str, parameter: Parameter, value: Value) -> WriteOutcome:
         answer = self._graph.call(self._node, 'set_parameters', SetParameters.Request(
             parameters=[message_of(name, parameter, value)]))
         result, = answer.results
         return WriteOutcome(name, result.successful, parameter, result.reason)
 
     def enabled(self) -> Enabled:
-        wanted = f'{self._facts.through.lstrip("/")}: drive {self.name}'
+        wanted = f'{self.facts.through.lstrip("/")}: drive {self.name}'
         found: list[dict[str, str]] = []
 
         def look(status: object) -> bool:
