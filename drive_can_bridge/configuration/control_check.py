@@ -29,9 +29,10 @@ def check_control(tree: Tree, parameters: dict[str, Parameter], names: tuple[str
             if word > largest:
                 tree.wrong(('control', 'words', key), f'{word} does not fit {parameter.name}, '
                            f'allowed is 0 to {largest} ({parameter.type.value})')
-    if 'disable' in words and words['disable'] == words.get('enable'):
-        tree.wrong(('control', 'words', 'enable'), f'{show(words["enable"])} is the word for '
-                                                   'disable too, allowed is another one')
+    for key, word in words.items():     # nothing but ~/enable starts a drive
+        if key != 'enable' and word == words.get('enable'):
+            tree.wrong(('control', 'words', 'enable'), f'{show(word)} is the word for {key} too, '
+                                                       'allowed is another one')
     if isinstance(control.get('status'), dict):
         _check_status(tree, control['status'], parameters, names)
 

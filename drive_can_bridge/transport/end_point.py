@@ -8,6 +8,10 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.transport.error_frames import BusError, ERROR_ACTIVE
 
 
+#: what is told of an adapter that does not take what it was handed
+REFUSED_FRAMES = 'the adapter refuses frames'
+
+
 class EndPoint(ABC):
     """
     One open bus. Whatever an end point has no means to count stays 0.
@@ -57,6 +61,11 @@ class EndPoint(ABC):
     def has_room(self) -> bool | None:
         """A frame could be sent now; None: this adapter does not tell."""
         return None
+
+    @property
+    def refused_frames(self) -> int:
+        """Frames that the adapter refused after it had been handed them, where it tells."""
+        return 0
 
     @property
     def overflowed_frames(self) -> int:

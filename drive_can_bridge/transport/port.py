@@ -20,10 +20,11 @@ from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, Trans
 from drive_can_bridge.core.frame import (
     EXTENDED_IDENTIFIER_MAX, Frame, Route, STANDARD_IDENTIFIER_MAX,
 )
+from drive_can_bridge.transport.adapter_answers import AdapterAnswers
 from drive_can_bridge.transport.clock import steady_now
-from drive_can_bridge.transport.end_point import EndPoint
+from drive_can_bridge.transport.end_point import EndPoint, REFUSED_FRAMES
 from drive_can_bridge.transport.error_frames import (
-    ADVICE_DISTURBED, BUS_OFF, BusError, decode_error_frame,
+    ADVICE_ALONE, ADVICE_DISTURBED, BUS_OFF, BusError, decode_error_frame,
 )
 from drive_can_bridge.transport.failures import (
     in_words, is_full_queue, is_malformed, is_misconfiguration, with_cause,
@@ -70,6 +71,7 @@ class Port(EndPoint):
         # the serial port below python-can's text protocols
         self._serial = getattr(bus, 'serialPortOrig', None)
         self._writer: SerialWriter | None = getattr(bus, 'drive_can_writer', None)
+        self._answers: AdapterAnswers | None = getattr(bus, 'drive_can_answers', None)
         self._socket = RawSocket.below(bus)
         self._lost = False
         self._malformed_in_row = 0
@@ -89,6 +91,9 @@ class Port(EndPoint):
         if message is None:
             self._earliest = steady_now()
             self._limit_line()
+            if self._answers is not None and self._answers.takes_nothing(time.monotonic()):
+                self._lost = True
+                raise BusUnavailable(f'{REFUSED_FRAMES}; {ADVICE_ALONE}')
             return None
         if self.witness is not None:
             self.witness(message)
@@ -126,6 +131,8 @@ class Port(EndPoint):
             else:
                 self._writer.timeout = timeout
                 self._bus.send(message)
+            if self._answers is not None:
+                self._answers.sent()
         except TransportError:
             raise
         except can.CanTimeoutError as error:
@@ -145,6 +152,11 @@ class Port(EndPoint):
     def has_room(self) -> bool | None:
         """A frame could be sent now; None: this adapter does not tell."""
         return None if self._socket is None else self._socket.has_room(0.0)
+
+    @property
+    def refused_frames(self) -> int:
+        """Frames that the adapter refused after it had been handed them, where it tells."""
+        return 0 if self._answers is None else self._answers.refused
 
     @property
     def overflowed_frames(self) -> int:
@@ -235,7 +247,8 @@ def open_port(bus: BusConfiguration, routes: Sequence[Route] = (), *, stations: 
         adapter = can.interface._get_class_for_interface(bus.interface)
         if _takes(adapter, 'bitrate'):
             options['bitrate'] = bus.bitrate
-        opened = (watched(adapter)(bus.channel, **options) if bus.interface in _SERIAL else
+        opened = (watched(adapter, slcan=bus.interface == 'slcan')(
+                      bus.channel, **options) if bus.interface in _SERIAL else
                   can.Bus(interface=bus.interface, channel=bus.channel, ignore_config=True,
                           **options))
         port = Port(opened, kernel_errors=bus.interface in _KERNEL_ERRORS)

@@ -13,6 +13,8 @@ import select
 import time
 from typing import Any
 
+from drive_can_bridge.transport.adapter_answers import AdapterAnswers
+
 #: s that each command to a serial adapter may take while it is opened
 OPEN_TIMEOUT = 0.5
 
@@ -88,12 +90,31 @@ class _WatchedPort:
             port.write(getattr(self, 'LINE_TERMINATOR', b''))
 
 
-#: interface -> its class with the mix-in
+class _WatchedSlcan(_WatchedPort):
+    """The same for SLCAN, whose lines python-can throws away where they are no frame."""
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        self.drive_can_answers = AdapterAnswers()
+        super().__init__(*args, **options)
+
+    def _read(self, timeout: float | None) -> str | None:
+        line: str | None = super()._read(timeout)  # type: ignore[misc]
+        if line:
+            self.drive_can_answers.take(line, time.monotonic())
+        return line
+
+
+#: the class of an interface with the mix-in, by that class
 _WATCHED: dict[type, type] = {}
 
 
-def watched(adapter: type[Any]) -> Callable[..., Any]:
-    """Return a serial adapter's class, made so that opening it cannot hang."""
+def watched(adapter: type[Any], *, slcan: bool) -> Callable[..., Any]:
+    """
+    Return a serial adapter's class, made so that opening it cannot hang.
+
+    :param slcan: what it says to frames is listened to.
+    """
     if adapter not in _WATCHED:
-        _WATCHED[adapter] = type(adapter.__name__, (_WatchedPort, adapter), {})
+        mix_in = _WatchedSlcan if slcan else _WatchedPort
+        _WATCHED[adapter] = type(adapter.__name__, (mix_in, adapter), {})
     return _WATCHED[adapter]

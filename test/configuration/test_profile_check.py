@@ -173,6 +173,12 @@ CASES = [
     ('enable: 1', 'enable: 0',
      ['table.yaml:18: control.words.enable: 0 is the word for disable too, allowed is another '
       'one']),
+    ('quick_stop: 2', 'quick_stop: 1',
+     ['table.yaml:18: control.words.enable: 1 is the word for quick_stop too, allowed is another '
+      'one']),
+    ('reset_fault: 128', 'reset_fault: 1',
+     ['table.yaml:18: control.words.enable: 1 is the word for reset_fault too, allowed is another '
+      'one']),
     ('enable: 1', 'enable: 65536',
      ['table.yaml:18: control.words.enable: 65536 does not fit word, allowed is 0 to 65535 '
       '(uint16)']),

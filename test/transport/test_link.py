@@ -42,7 +42,7 @@ class FakePort:
         self.closed = False
         self.age = 0.0
         self.error_frames = self.bus_off_count = self.overflowed_frames = 0
-        self.rejected_frames = 0
+        self.rejected_frames = self.refused_frames = 0
         self.last_error: BusError | None = None
         self.controller = ''
 
@@ -419,6 +419,18 @@ def test_figures_outlive_a_port(make: Callable[..., Bench]) -> None:
         assert (bench.link.error_frames, bench.link.overflowed_frames,
                 bench.link.bus_off_count) == (4 + times, 5 + 2 * times, 3 * times - 2)
         second.coming.append(BusUnavailable('unplugged'))
+
+
+def test_refused_frames_count_as_not_sent(make: Callable[..., Bench]) -> None:
+    """An adapter says so after it was handed them."""
+    bench = make()
+    bench.opened()
+    for _ in range(5):
+        assert bench.link.send(FRAME)
+    bench.port.refused_frames = 3
+    wait_for(lambda: bench.link.send_failures == 3)
+    assert bench.link.frames_sent == 2
+    assert bench.link.last_error == 'the adapter refuses frames'
 
 
 def test_rejected_frames_count_as_rejected(make: Callable[..., Bench]) -> None:

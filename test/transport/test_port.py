@@ -2,6 +2,7 @@
 """An open bus: what becomes of what an adapter delivers, refuses and throws."""
 
 from collections import deque
+from collections.abc import Iterator
 import errno
 import fcntl
 import os
@@ -318,6 +319,74 @@ def test_what_an_earlier_client_left_is_thrown_away() -> None:
         assert lines[-4:] == [b'C', b'S4', b'O', b'O']
     finally:
         terminal.close()
+
+
+class Adapter:
+    """The far end of an SLCAN adapter: answers what it is told to each frame."""
+
+    def __init__(self) -> None:
+        self.terminal = FullTerminal()
+        os.set_blocking(self.terminal.master, False)
+        self.port = open_port(slcan(self.terminal.path))
+        self.answer(b'')
+
+    def lines(self) -> list[bytes]:
+        try:
+            return [line for line in os.read(self.terminal.master, 65536).split(b'\r') if line]
+        except BlockingIOError:
+            return []
+
+    def answer(self, text: bytes) -> None:
+        """Answer every command so far."""
+        for _ in self.lines():
+            os.write(self.terminal.master, text)
+
+    def receive(self) -> None:
+        for _ in range(5):
+            self.port.receive(0.01)
+
+    def close(self) -> None:
+        self.port.close()
+        self.terminal.close()
+
+
+@pytest.fixture(name='adapter')
+def adapter_fixture() -> Iterator[Adapter]:
+    adapter = Adapter()
+    yield adapter
+    adapter.close()
+
+
+STOP = Frame(0x003FFFF0, bytes(8), True)
+
+
+def test_frame_that_an_adapter_refuses_is_counted(adapter: Adapter) -> None:
+    os.write(adapter.terminal.master, b'\a')    # of a command, before there was a frame
+    adapter.receive()
+    assert adapter.port.refused_frames == 0
+    for taken in (b'\a', b'z\r', b'\a', b'\r', b'\a'):
+        adapter.port.send(STOP, 0.1)
+        adapter.answer(taken)
+        adapter.receive()
+    assert adapter.port.refused_frames == 3
+
+
+def test_adapter_that_refuses_everything_is_lost(adapter: Adapter) -> None:
+    with pytest.raises(BusUnavailable, match='the adapter refuses frames; no other node'):
+        for _ in range(20):
+            adapter.port.send(STOP, 0.1)
+            adapter.answer(b'\a')
+            adapter.receive()
+    assert 4 <= adapter.port.refused_frames < 20
+
+
+def test_adapter_that_refuses_some_is_not_lost(adapter: Adapter) -> None:
+    for _ in range(10):
+        for taken in (b'\a', b'\a', b'\a', b'z\r'):
+            adapter.port.send(STOP, 0.1)
+            adapter.answer(taken)
+            adapter.receive()
+    assert adapter.port.refused_frames == 30
 
 
 def test_absent_adapter(tmp_path: Path) -> None:
