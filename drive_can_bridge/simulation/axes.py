@@ -18,7 +18,7 @@ import random
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.simulation import names, scales
-from drive_can_bridge.simulation.control import Operation
+from drive_can_bridge.simulation.control import ENDS, Operation
 from drive_can_bridge.simulation.motor import Motor, Ramp, Rates, Travel
 from drive_can_bridge.simulation.names import Quantity, RampParameter, RampUse
 from drive_can_bridge.simulation.plant import Mechanics
@@ -99,7 +99,8 @@ class Axes:
             return 0.0
         return self._command(self._registers.commanded(self.speed_setpoint.name))
 
-    def advance(self, duration: float, operation: Operation, *, energised: bool) -> None:
+    def advance(self, duration: float, operation: Operation) -> None:
+        energised = operation.powered and operation.enabled
         load, noise = self._mechanics.load, self._mechanics.noise
         if duration > 0.0 and noise:
             self.jitter = self._noise.randint(-noise, noise)
@@ -135,7 +136,7 @@ class Axes:
             motor.advance(duration, self.target if driven else drift * rated,
                           rates if driven else Rates(stop * rated, stop * rated),
                           energised=energised)
-        if operation.stopping and motor.speed == 0.0:
+        if operation.state in ENDS and motor.speed == 0.0:
             operation.standstill()
             motor.moved(0.0, 0.0, energised=operation.enabled)
 

@@ -25,7 +25,6 @@ from drive_can_bridge.protocols.cannord.process_data import (
 from drive_can_bridge.simulation.cannord_plant import InverterPlant
 from drive_can_bridge.simulation.cannord_table import CannordTable, Refused
 from drive_can_bridge.simulation.drive import Ignored, SimulatedDrive
-from drive_can_bridge.simulation.motor_plant import FAULT_CODE
 from drive_can_bridge.simulation.plant import PlantFactory
 
 #: P513, s that may pass between two telegrams; 0 or less: any
@@ -101,7 +100,7 @@ class SimulatedCannordInverter(SimulatedDrive):
         self._silent_since = now
         if self._timed_out:
             self._timed_out = False
-            self.plant.operation.end_cause(now)
+            self.plant.operation.end_cause()
         # before the values are taken: it tells how the inverter was when they came
         answer = self._status(len(data))
         requested = self.configuration.cyclic_request
@@ -114,7 +113,7 @@ class SimulatedCannordInverter(SimulatedDrive):
                 self._violation('reserved bit 13 of the control word')
             if word & states.DATA_VALID:
                 self._take(requested, values)
-                self.plant.operation.word_written(word, now)
+                self.plant.operation.word_written(word)
             self.table.select_set(states.parameter_set_of(self.plant.operation.word))
         self.plant.advance(now)
         if answered:
@@ -187,10 +186,9 @@ class SimulatedCannordInverter(SimulatedDrive):
 
     # -- faults -----------------------------------------------------------------------------------
 
-    def trip(self, now: float, duration: float, code: float = FAULT_CODE) -> None:
+    def trip(self, now: float, duration: float, code: float | None = None) -> None:
         """Fail by itself, and tell at once, unasked."""
-        self.plant.fault_code = code
-        super().trip(now, duration)
+        super().trip(now, duration, code)
         self.answer(self._status(self._length), now)
 
     def foreign_frames(self, answer: Frame) -> Sequence[Iterable[Frame]]:

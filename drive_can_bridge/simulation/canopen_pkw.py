@@ -39,7 +39,7 @@ class SimulatedPkwDrive(SimulatedDrive):
         self.table = RegisterTable(self.configuration, self.registers)
         self._abort_code_order: str = options.abort_code_order
         self.node = self.companion = CanopenNode(
-            self, self.table, constants=self._constants, trip_code=self._trip_code)
+            self, self.table, constants=self._constants, trip_code=TEST_TRIP)
         self.power_lost(forget=False)
 
     def find_routes(self) -> list[Route]:
@@ -49,9 +49,6 @@ class SimulatedPkwDrive(SimulatedDrive):
     def choose_plant(self) -> PlantFactory:
         """Return a starter for the profile of an LTMR, a motor for any other one."""
         return StarterPlant if is_starter(self.configuration.profile) else MotorPlant
-
-    def _trip_code(self) -> int:
-        return self.plant.trip_code if isinstance(self.plant, StarterPlant) else TEST_TRIP
 
     def power_lost(self, *, forget: bool) -> None:
         """Forget the function byte of the last request, and what the mailbox holds."""

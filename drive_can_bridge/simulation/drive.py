@@ -106,7 +106,6 @@ class SimulatedDrive(ABC):
         self.violations: Counter[str] = Counter()
         self._notices: list[str] = []
         self._outbox = Outbox(self._foreign_frames)
-        self._powered = True
         self._deaf_until = -math.inf
         self._foreign_turn = -1
         self._cut_at = math.inf
@@ -207,7 +206,7 @@ class SimulatedDrive(ABC):
             self.lose_power(now, now + seconds, forget=kind is FaultKind.FORGET)
         elif kind is FaultKind.OK:
             self._repair(now)
-        elif self._powered:
+        elif self.plant.operation.powered:
             self.trip(now, fault.number or 0.0)
         self._notices.append(f'{self.name}: fault {fault}' if kind is not FaultKind.OK
                              else f'{self.name}: no fault any more')
@@ -269,9 +268,10 @@ class SimulatedDrive(ABC):
         """Return what makes the plant, where nobody brings another one."""
         return MotorPlant
 
-    def trip(self, now: float, duration: float) -> None:
-        """Fail by itself; the cause lasts for some seconds."""
-        self.plant.trip(duration)
+    def trip(self, now: float, duration: float, code: float | None = None) -> None:
+        """Fail by itself; the cause lasts for some seconds. See :meth:`.Operation.trip`."""
+        self.plant.operation.trip(duration, code)
+        self.plant.advance(now)
 
     def power_lost(self, *, forget: bool) -> None:  # noqa: B027  optional hook
         """Forget what a family keeps outside the registers."""
@@ -296,9 +296,9 @@ class SimulatedDrive(ABC):
     def lose_power(self, now: float, back_at: float, *, forget: bool = False) -> None:
         """Lose power until some time; RAM is lost with it."""
         self._outbox.clear()
+        self.plant.operation.power_off()
         self.plant.power_off()
         self.registers.lose_power()
-        self._powered = False
         self.restart(back_at, forget=forget)
         self._advance(now)
 
@@ -335,10 +335,11 @@ class SimulatedDrive(ABC):
         """Let the motor move up to now, if that is known; power may have come back on the way."""
         if now is None:
             return
-        if not self._powered and now >= self._deaf_until:
+        operation = self.plant.operation
+        if not operation.powered and now >= self._deaf_until:
             self.plant.advance(self._deaf_until)
             self.plant.power_on()
-            self._powered = True
+            operation.powered = True
         self.plant.advance(now)
 
     def _repair(self, now: float) -> None:

@@ -28,7 +28,7 @@ def mains_swing(now: float) -> float:
 
     Of a drive at rest it is the one value that moves: whoever looks sees that it is alive.
     """
-    return 0.005 * math.sin(2.0 * math.pi * 0.3 * now)
+    return 0.005 * math.sin(2.0 * math.pi * 0.3 * max(now, 0.0))
 
 
 class MotorPlant:
@@ -37,7 +37,6 @@ class MotorPlant:
 
     :param operation: the operating state; None: that of the profile's control section.
     :param movable: parameters that may move something; None: all.
-    :ivar now: the time up to which it has moved.
     """
 
     def __init__(self, registers: Registers, configuration: DriveConfiguration,
@@ -46,8 +45,6 @@ class MotorPlant:
         self.registers = registers
         self.control = control = configuration.profile.control
         self.operation = operation or Operation(machine_of(control))
-        self.now: float | None = None
-        self._powered = True
         self._control_name = control.parameter if control else ''
         self._shown = {p.name for p in configuration.cyclic_response}
         self.axes = Axes(registers.parameters if movable is None else movable, registers,
@@ -97,14 +94,14 @@ class MotorPlant:
         if quantity is Quantity.TEMPERATURE:
             return lambda: scales.temperature_value(parameter, motor.temperature)
         if quantity is Quantity.FAULT_CODE:
-            return lambda: FAULT_CODE if self.operation.faulted else 0
+            return lambda: self.operation.fault_code(FAULT_CODE)
         full = scales.rating(parameter, quantity)
         shares: dict[Quantity, Callable[[], float]] = {
             Quantity.TORQUE: lambda: motor.torque,
             Quantity.POWER: lambda: motor.torque * motor.share_of_rated_speed,
             Quantity.LOAD: lambda: abs(motor.torque),
             Quantity.CURRENT: lambda: motor.current,
-            Quantity.VOLTAGE: lambda: 1.0 - 0.02 * motor.current + mains_swing(self.now or 0.0),
+            Quantity.VOLTAGE: lambda: 1.0 - 0.02 * motor.current + mains_swing(self.operation.now),
         }
         share = shares[quantity]
         if quantity is Quantity.VOLTAGE and names.words_of(parameter) & {'motor', 'output'}:
@@ -119,29 +116,15 @@ class MotorPlant:
 
     def written(self, name: str, before: int, raw: int) -> None:
         if name == self._control_name:
-            self.operation.word_written(raw, self.now or 0.0)
+            self.operation.word_written(raw)
 
     def advance(self, now: float) -> None:
-        last = now if self.now is None else self.now
-        self.now = max(now, last)
-        self.move(self.now - last)
-
-    def move(self, duration: float) -> None:
-        """Move for some seconds, up to ``self.now``."""
-        self.axes.advance(duration, self.operation,
-                          energised=self._powered and self.operation.enabled)
-
-    def trip(self, duration: float = 0.0) -> None:
-        self.operation.trip(self.now or 0.0, duration)
-        self.axes.advance(0.0, self.operation, energised=False)
+        self.axes.advance(self.operation.advance(now), self.operation)
 
     def power_off(self) -> None:
-        self.operation.power_on()
-        self._powered = False
         self.axes.power_off()
 
     def power_on(self) -> None:
-        self._powered = True
         self.axes.power_on()
 
     def _report(self) -> Report:

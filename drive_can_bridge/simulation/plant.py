@@ -47,13 +47,10 @@ class Plant(Protocol):
         """React to a register that was written."""
 
     def advance(self, now: float) -> None:
-        """Move up to now."""
-
-    def trip(self, duration: float = 0.0) -> None:
-        """Fail; the cause lasts for some seconds."""
+        """Move up to now, and let the clock of the operating state go with it."""
 
     def power_off(self) -> None:
-        """Go on without power: nothing is driven any more."""
+        """Note that power is lost."""
 
     def power_on(self) -> None:
         """Begin anew; the registers have what EEPROM kept."""

@@ -77,10 +77,8 @@ class StarterPlant:
         self.registers = registers
         self.control = configuration.profile.control
         self.operation = Operation(MACHINE)
-        self._now: float | None = None
         self.starter = Starter()
         self._node = configuration.station
-        self._cause = 0
         # of several names for a register the first counts, as everywhere
         self._by_register = {register_number(p): p.name
                              for p in reversed(list(registers.parameters.values()))}
@@ -103,18 +101,16 @@ class StarterPlant:
 
     def written(self, name: str, before: int, raw: int) -> None:
         if name == self._by_register[CONTROL_REGISTER_1]:
-            self.operation.word_written(raw, self._now or 0.0)
+            self.operation.word_written(raw)
         elif name == self._by_register.get(CONTROL_REGISTER_2):
             appeared = raw & ~before
             if appeared & (CLEAR_ALL | CLEAR_THERMAL_LEVEL):
                 self.starter.thermal = 0.0
-                self.operation.end_cause(-math.inf)
+                self.operation.end_cause()
             if appeared & (CLEAR_ALL | CLEAR_SETTINGS):
                 for register in (TRIP_CLASS, FULL_LOAD_RATIO, 653):
                     if register in self._by_register:
                         self.registers.reset(self._by_register[register])
-        self.power_on()
-        self.starter.switch(self.operation.enabled)
 
     def _content(self, register: int) -> int:
         name = self._by_register.get(register)
@@ -123,28 +119,19 @@ class StarterPlant:
     @property
     def trip_code(self) -> int:
         """Code of the trip; 0 without one."""
-        return self._cause if self.operation.faulted else 0
+        return int(self.operation.fault_code(TEST_TRIP))
 
     def advance(self, now: float) -> None:
-        last = now if self._now is None else self._now
-        self._now = max(now, last)
-        self.starter.switch(self.operation.enabled)
-        if self.starter.advance(self._now - last):
-            self.trip(self.starter.time_to_reset, THERMAL_OVERLOAD)
-
-    def trip(self, duration: float = 0.0, cause: int = TEST_TRIP) -> None:
-        self._cause = cause
-        self.operation.trip(self._now or 0.0, duration)
-        self.starter.switch(False)
+        starter, operation = self.starter, self.operation
+        starter.settings(self._content(FULL_LOAD_RATIO), self._content(TRIP_CLASS))
+        if starter.advance(operation.advance(now), on=operation.enabled):
+            operation.trip(starter.time_to_reset, THERMAL_OVERLOAD)
 
     def power_off(self) -> None:
-        """Open the contactors; the thermal image is kept."""
-        self.operation.power_on()
-        self.starter.switch(False)
+        """Keep the thermal image."""
 
     def power_on(self) -> None:
-        """Take over the settings that there are."""
-        self.starter.settings(self._content(FULL_LOAD_RATIO), self._content(TRIP_CLASS))
+        """Go on with it."""
 
     def source(self, parameter: Parameter) -> Callable[[], int] | None:
         register = register_number(parameter)
@@ -191,14 +178,14 @@ class StarterPlant:
             found[500 + 2 * place] = _scaled(100.0 * share, lambda: starter.current)
         for place, share in enumerate((1.0, 0.998, 1.002, 1.0)):
             found[476 + place] = _scaled(MAINS_VOLTAGE * share,
-                                         lambda: 1.0 + mains_swing(self._now or 0.0))
+                                         lambda: 1.0 + mains_swing(self.operation.now))
         return found
 
     def _status(self) -> int:
         operation, ratio = self.operation, self.starter.ratio
         faulted = operation.faulted
         bits = (not faulted, operation.enabled, faulted, self.starter.alarm, faulted,
-                faulted and operation.reset_allowed(self._now or 0.0), True, ratio > 0.1)
+                faulted and operation.reset_allowed, True, ratio > 0.1)
         word = sum(1 << number for number, wanted in enumerate(bits) if wanted)
         return word | min(math.floor(32.0 * ratio + 0.5), 63) << 8 | self.starter.starting << 15
 

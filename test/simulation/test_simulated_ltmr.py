@@ -637,11 +637,9 @@ class TestMotor:
     @given(st.lists(st.floats(0.0, 3.0), min_size=1, max_size=20))
     def test_it_hardly_matters_how_often_time_passes(self, steps: list[float]) -> None:
         coarse, fine = Ltmr().drive.plant.starter, Ltmr().drive.plant.starter
-        coarse.switch(True)
-        fine.switch(True)
-        coarse.advance(sum(steps))
+        coarse.advance(sum(steps), on=True)
         for step in steps:
-            fine.advance(step)
+            fine.advance(step, on=True)
         assert fine.thermal == pytest.approx(coarse.thermal, abs=0.5)
         assert fine.current == pytest.approx(coarse.current, abs=1e-6)
 

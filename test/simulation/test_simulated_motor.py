@@ -272,7 +272,7 @@ def test_torque_setpoint_is_followed_and_ends_with_a_fault() -> None:
     actual = parameter('actual_torque', 4, unit='%', type=INT16, access=RO)
     plant = running([*EXAMPLE, setpoint, actual], 'torque_setpoint', 50.0)
     assert plant.value('actual_torque') == 50.0
-    plant.plant.trip()
+    plant.plant.operation.trip()
     plant.handle_timer(20.0)
     assert plant.value('actual_torque') == 0.0
 
@@ -304,5 +304,5 @@ def test_overlapping_status_patterns() -> None:
     assert plant.registers.raw('status_word') == 0
     plant.registers.write('control_word', 1)
     assert plant.registers.raw('status_word') == 3
-    plant.plant.trip()
+    plant.plant.operation.trip()
     assert plant.registers.raw('status_word') == 4

@@ -219,7 +219,7 @@ class Clock(MotorPlant):
 
     def source(self, parameter: Parameter) -> Callable[[], int] | None:
         if parameter.name == 'actual_speed':
-            return lambda: round(self.now or 0.0) % 1000
+            return lambda: round(self.operation.now) % 1000
         return super().source(parameter)
 
 

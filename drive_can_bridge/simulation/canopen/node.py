@@ -45,12 +45,12 @@ class CanopenNode(Companion):
 
     :param objects: those that are registers.
     :param constants: returns the content of the family's other, read-only objects, by address.
-    :param trip_code: returns the maker's code for the trip that there is.
+    :param trip_code: the maker's code of a trip that has none of its own.
     :ivar state: boot-up: without power, or still starting.
     """
 
     def __init__(self, drive: SimulatedDrive, objects: Objects, *,
-                 constants: Callable[[], Contents], trip_code: Callable[[], int]) -> None:
+                 constants: Callable[[], Contents], trip_code: int) -> None:
         self._drive = drive
         self._objects, self._constants, self._trip_code = objects, constants, trip_code
         self.number = drive.configuration.station
@@ -118,9 +118,9 @@ class CanopenNode(Companion):
         """Report a trip that has come or gone, and plan the next look at a running motor."""
         operation = self._drive.plant.operation
         self._looks_at = now + TICK if operation.enabled else math.inf
-        error = Emergency(
-            TRIP_EMERGENCY, TRIP_ERROR_REGISTER, self._trip_code().to_bytes(5, 'little'),
-        ) if operation.faulted else _NO_ERROR
+        code = int(operation.fault_code(self._trip_code))
+        error = Emergency(TRIP_EMERGENCY, TRIP_ERROR_REGISTER, code.to_bytes(5, 'little'),
+                          ) if operation.faulted else _NO_ERROR
         if self._communicates and error.code != self._error.code:
             self._error = error
             self._drive.send(network.encode_emergency(self.number, error))
