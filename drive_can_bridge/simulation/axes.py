@@ -19,7 +19,7 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.simulation import names, scales
 from drive_can_bridge.simulation.control import ENDS, Operation
-from drive_can_bridge.simulation.motor import Motor, Ramp, Rates, Travel
+from drive_can_bridge.simulation.motor import Motor, Rates, Travel
 from drive_can_bridge.simulation.names import Quantity, RampParameter, RampUse
 from drive_can_bridge.simulation.plant import Mechanics
 from drive_can_bridge.simulation.registers import Registers
@@ -70,16 +70,16 @@ class Axes:
         other_kind = Quantity.POSITION if by_speed else Quantity.SPEED
         self._mover = mover.name if mover else ''
         self._travels: dict[str, tuple[Parameter, Travel]] = {}     # by setpoint
-        self._ramps: dict[str, tuple[Parameter, Ramp]] = {}
+        self._followers: dict[str, tuple[Parameter, Travel]] = {}
         self.actuals: dict[str, Callable[[], float]] = {}
-        rated, turns = 1.0, 1.0
+        rated, turns, shaft = 1.0, 1.0, Travel()
         if speed is not None:
             rated = scales.rated_speed(speed)
             turns = scales.revolutions_per_unit(speed, rated)
         elif mover is not None:
-            self._travels[mover.name] = mover, Travel()
+            self._travels[mover.name] = mover, shaft
             rated, turns = scales.travel_speed(mover), 1.0 / scales.per_revolution(mover)
-        self.motor = Motor(rated, turns, mechanics.load)
+        self.motor = Motor(rated, turns, mechanics.load, shaft)
         for setpoint, actual in pairs:
             kind = names.quantity_of(setpoint)
             if actual is None or kind is other_kind and setpoint is not speed:
@@ -90,8 +90,8 @@ class Axes:
                 _, travel = self._travels.setdefault(setpoint.name, (setpoint, Travel()))
                 self.actuals[actual.name] = partial(getattr, travel, 'position')
             else:
-                _, ramp = self._ramps[setpoint.name] = setpoint, Ramp()
-                self.actuals[actual.name] = partial(getattr, ramp, 'value')
+                _, follower = self._followers[setpoint.name] = setpoint, Travel()
+                self.actuals[actual.name] = partial(getattr, follower, 'speed')
 
     @property
     def target(self) -> float:
@@ -114,38 +114,34 @@ class Axes:
         stop = 1.0 / COAST_TIME
         if energised:
             stop = self._rate(self._quick_stop, max(rated / QUICK_STOP_TIME, falling)) / rated
-        for name, (setpoint, ramp) in self._ramps.items():
+        for name, (setpoint, follower) in self._followers.items():
             rate = scales.rated_speed(setpoint) / RAMP_TIME
             target = self._registers.commanded(name) if driven else 0.0
-            ramp.advance(duration, target, Rates(rate, rate))
+            follower.run(duration, target, Rates(rate, rate))
         for name, (setpoint, travel) in self._travels.items():
-            before, limit = travel.position, scales.travel_speed(setpoint)
+            limit = scales.travel_speed(setpoint)
             if held:
                 travel.speed = 0.0
             if driven:
                 travel.go(duration, self._registers.commanded(name), limit,
                           limit * rates.rising / rated)
             else:
-                travel.run(duration, drift * limit, stop * limit)
-            if name == self._mover:
-                motor.ramp.value, motor.ramp.slope = travel.speed, travel.slope
-                motor.moved(duration, travel.position - before, energised=energised)
+                travel.run(duration, drift * limit, Rates(stop * limit, stop * limit))
         if self._mover not in self._travels:
             if held:
-                motor.ramp.value = 0.0
-            motor.advance(duration, self.target if driven else drift * rated,
-                          rates if driven else Rates(stop * rated, stop * rated),
-                          energised=energised)
+                motor.shaft.speed = 0.0
+            if duration > 0.0:
+                motor.shaft.run(duration, self.target if driven else drift * rated,
+                                rates if driven else Rates(stop * rated, stop * rated))
+        motor.advance(duration, energised=energised)
         if operation.state in ENDS and motor.speed == 0.0:
             operation.standstill()
-            motor.moved(0.0, 0.0, energised=operation.enabled)
+            motor.advance(0.0, energised=operation.enabled)
 
     def power_off(self) -> None:
         """Stand still; the position is kept, as by an absolute encoder."""
-        self.motor.ramp.value = self.motor.ramp.slope = 0.0
-        for _, ramp in self._ramps.values():
-            ramp.value = 0.0
-        for _, travel in self._travels.values():
+        self.motor.shaft.speed = self.motor.shaft.slope = 0.0
+        for _, travel in (*self._followers.values(), *self._travels.values()):
             travel.speed = 0.0
 
     def power_on(self) -> None:

@@ -191,7 +191,7 @@ class SimulatedDrive(ABC):
         if kind in Outbox.FAULTS:
             self._outbox.add(fault)
         elif kind in (FaultKind.STUCK, FaultKind.REFUSE):
-            self.registers.faults[kind, self._known(str(fault.argument)), ''] = fault
+            self.registers.faults[kind, self._known(fault.argument), ''] = fault
         elif kind is FaultKind.NEEDS:
             name, other = map(self._known, fault.pair)
             self.registers.faults[kind, name, other] = fault
@@ -200,14 +200,14 @@ class SimulatedDrive(ABC):
             self.set_value(name, _value(self.registers.parameters[name], fault.pair[1]), now)
             self._set_by_fault.add(name)
         elif kind is FaultKind.CUT_AT:
-            self._cut_at = self.registers.settings_written + (fault.number or 1)
+            self._cut_at = self.registers.settings_written + fault.argument
         elif kind in _POWER_CUTS:
-            seconds = _POWER_CUTS[kind] if fault.number is None else fault.number
+            seconds = _POWER_CUTS[kind] if fault.argument is None else fault.argument
             self.lose_power(now, now + seconds, forget=kind is FaultKind.FORGET)
         elif kind is FaultKind.OK:
             self._repair(now)
         elif self.plant.operation.powered:
-            self.trip(now, fault.number or 0.0)
+            self.trip(now, fault.argument or 0.0)
         self._notices.append(f'{self.name}: fault {fault}' if kind is not FaultKind.OK
                              else f'{self.name}: no fault any more')
         self.companion.look(now)

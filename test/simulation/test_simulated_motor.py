@@ -16,7 +16,7 @@ from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.core.profile import StatusPattern
 from drive_can_bridge.simulation import names, scales
 from drive_can_bridge.simulation.datamodel import SimulatedDataModelDrive
-from drive_can_bridge.simulation.motor import AMBIENT_TEMPERATURE, Motor, Ramp, Rates
+from drive_can_bridge.simulation.motor import AMBIENT_TEMPERATURE, Motor, Rates, Travel
 from drive_can_bridge.simulation.names import Quantity, RampUse
 
 RATES = Rates(rising=10.0, falling=20.0)
@@ -25,35 +25,46 @@ RATES = Rates(rising=10.0, falling=20.0)
 class TestRamp:
 
     def test_rises_and_falls_at_different_rates(self) -> None:
-        ramp = Ramp()
-        ramp.advance(0.5, 100.0, RATES)
-        assert (ramp.value, ramp.slope) == (5.0, 10.0)
-        ramp.advance(0.1, 0.0, RATES)
-        assert (ramp.value, ramp.slope) == (3.0, -20.0)
+        ramp = Travel()
+        ramp.run(0.5, 100.0, RATES)
+        assert (ramp.speed, ramp.slope) == (5.0, 10.0)
+        ramp.run(0.1, 0.0, RATES)
+        assert (ramp.speed, ramp.slope) == (3.0, -20.0)
 
     def test_reversal_falls_to_zero_and_rises_from_there(self) -> None:
-        ramp = Ramp(10.0)
-        ramp.advance(1.0, -50.0, RATES)
-        assert (ramp.value, ramp.slope) == (-5.0, -10.0)
+        ramp = Travel(speed=10.0)
+        ramp.run(1.0, -50.0, RATES)
+        assert (ramp.speed, ramp.slope) == (-5.0, -10.0)
 
     def test_integral(self) -> None:
         # 1 s up to 10, 1 s at 10
-        assert Ramp().advance(2.0, 10.0, RATES) == 15.0
+        ramp = Travel()
+        ramp.run(2.0, 10.0, RATES)
+        assert ramp.position == 15.0
 
     def test_stays_at_its_target(self) -> None:
-        ramp = Ramp()
-        ramp.advance(100.0, 7.0, RATES)
-        assert (ramp.value, ramp.slope) == (7.0, 0.0)
+        ramp = Travel()
+        ramp.run(100.0, 7.0, RATES)
+        assert (ramp.speed, ramp.slope) == (7.0, 0.0)
 
     @given(st.lists(st.tuples(st.floats(0.0, 5.0), st.floats(-100.0, 100.0)), max_size=20))
     def test_it_does_not_matter_how_often_time_passes(
             self, steps: list[tuple[float, float]]) -> None:
-        coarse, fine = Ramp(), Ramp()
+        coarse, fine = Travel(), Travel()
         for duration, target in steps:
-            whole = coarse.advance(duration, target, RATES)
-            parts = sum(fine.advance(duration / 4.0, target, RATES) for _ in range(4))
-            assert fine.value == pytest.approx(coarse.value, abs=1e-6)
-            assert parts == pytest.approx(whole, abs=1e-6)
+            coarse.position = fine.position = 0.0
+            coarse.run(duration, target, RATES)
+            for _ in range(4):
+                fine.run(duration / 4.0, target, RATES)
+            assert fine.speed == pytest.approx(coarse.speed, abs=1e-6)
+            assert fine.position == pytest.approx(coarse.position, abs=1e-6)
+
+
+def turn(motor: Motor, duration: float, target: float, rates: Rates, *,
+         energised: bool = True) -> None:
+    """Let a motor go towards a speed for some time."""
+    motor.shaft.run(duration, target, rates)
+    motor.advance(duration, energised=energised)
 
 
 class TestMotor:
@@ -61,33 +72,33 @@ class TestMotor:
     def test_current_follows_acceleration_and_load(self) -> None:
         motor = Motor(3000.0, 1.0 / 60.0)
         rates = Rates(3000.0, 3000.0)
-        motor.advance(0.0, 0.0, rates, energised=True)
+        turn(motor, 0.0, 0.0, rates)
         at_rest = motor.current
-        motor.advance(0.5, 3000.0, rates, energised=True)
+        turn(motor, 0.5, 3000.0, rates)
         accelerating = motor.current
-        motor.advance(5.0, 3000.0, rates, energised=True)
+        turn(motor, 5.0, 3000.0, rates)
         running = motor.current
-        motor.advance(0.5, 0.0, rates, energised=True)
+        turn(motor, 0.5, 0.0, rates)
         assert at_rest < running < accelerating
         assert motor.torque < 0.0
 
     def test_position_integrates(self) -> None:
         motor = Motor(3000.0, 1.0 / 60.0)
-        motor.advance(2.0, 600.0, Rates(600.0, 600.0), energised=True)
+        turn(motor, 2.0, 600.0, Rates(600.0, 600.0))
         assert motor.position == pytest.approx(15.0)
 
     def test_temperature_creeps(self) -> None:
         motor = Motor(3000.0, 1.0 / 60.0)
         rates = Rates(3000.0, 3000.0)
-        motor.advance(10.0, 3000.0, rates, energised=True)
-        motor.advance(10.0, 3000.0, rates, energised=True)
+        turn(motor, 10.0, 3000.0, rates)
+        turn(motor, 10.0, 3000.0, rates)
         warm = motor.temperature
-        motor.advance(600.0, 3000.0, rates, energised=True)
+        turn(motor, 600.0, 3000.0, rates)
         assert AMBIENT_TEMPERATURE < warm < motor.temperature < 60.0
 
     def test_without_torque(self) -> None:
         motor = Motor(3000.0, 1.0 / 60.0)
-        motor.advance(1.0, 3000.0, Rates(3000.0, 3000.0), energised=False)
+        turn(motor, 1.0, 3000.0, Rates(3000.0, 3000.0), energised=False)
         assert (motor.torque, motor.current) == (0.0, 0.0)
 
 

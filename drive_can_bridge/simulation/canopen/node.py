@@ -57,7 +57,7 @@ class CanopenNode(Companion):
         watched: float = drive.configuration.options.heartbeat_timeout
         self._default_heartbeat = round(
             1000.0 * watched / HEARTBEATS_WATCHED) if watched else HEARTBEAT
-        self._server = SdoServer(self.read_object, self.write_object)
+        self._server = SdoServer(self)
         self._now = -math.inf
         self._looks_at = math.inf
         # the boot-up frame leaves as soon as somebody looks
@@ -154,26 +154,24 @@ class CanopenNode(Companion):
         self._beats_at = now + self._heartbeat / 1000.0 if self._heartbeat else math.inf
 
     def read_object(self, index: int, subindex: int) -> bytes:
-        fixed = self._fixed(index)
-        if (index, subindex) in fixed:
-            return fixed[index, subindex]
-        if fixed:
-            raise Refused(abort_codes.NO_SUCH_SUBINDEX)
-        return self._objects.read_object(index, subindex)
+        content = self._content(index, subindex)
+        return self._objects.read_object(index, subindex) if content is None else content
 
     def write_object(self, index: int, subindex: int, data: bytes) -> None:
-        fixed = self._fixed(index)
         if (index, subindex) == HEARTBEAT_TIME:
             self._heartbeat = int.from_bytes(checked_length(data, 2), 'little')
             self._plan_heartbeat(self._now)
-        elif fixed:
-            raise Refused(abort_codes.WRITE_OF_READ_ONLY if (index, subindex) in fixed else
-                          abort_codes.NO_SUCH_SUBINDEX)
+        elif self._content(index, subindex) is not None:
+            raise Refused(abort_codes.WRITE_OF_READ_ONLY)
         else:
             self._objects.write_object(index, subindex, data)
 
-    def _fixed(self, index: int) -> Contents:
-        """Return the objects of an index that has no registers."""
+    def _content(self, index: int, subindex: int) -> bytes | None:
+        """
+        Return an object that is no register; None: its index has registers.
+
+        :raises Refused: its index has none, and no such sub-index.
+        """
         code, register, _ = self._error
         objects = {
             # what every node has: device type, errors, identifiers, heartbeat, identity
@@ -187,4 +185,6 @@ class CanopenNode(Companion):
             (0x1018, 1): bytes(4),
             **self._constants(),
         }
-        return {place: content for place, content in objects.items() if place[0] == index}
+        if (index, subindex) not in objects and any(place[0] == index for place in objects):
+            raise Refused(abort_codes.NO_SUCH_SUBINDEX)
+        return objects.get((index, subindex))
