@@ -66,12 +66,13 @@ class SimulatedCannordInverter(SimulatedDrive):
 
     def find_routes(self) -> list[Route]:
         """Return the four identifiers of the address, and both broadcasts where one is claimed."""
-        own, shared = super().find_routes()[:len(MessageObject)], []
-        extended = self.configuration.options.extended_identifiers
-        if self.configuration.options.broadcast != 'none':
-            shared = [identifiers.group_identifier(self.configuration.station, extended=extended),
-                      identifiers.all_identifier(extended=extended)]
-        return [*own, *(identifiers.route(each, extended=extended) for each in shared)]
+        found, options = super().find_routes()[:len(MessageObject)], self.configuration.options
+        extended, station = options.extended_identifiers, self.configuration.station
+        if options.broadcast != 'none':
+            found += [identifiers.route(each, extended=extended) for each in (
+                identifiers.group_identifier(station, extended=extended),
+                identifiers.all_identifier(extended=extended))]
+        return found
 
     def choose_plant(self) -> PlantFactory:
         return InverterPlant

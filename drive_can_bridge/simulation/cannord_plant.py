@@ -24,7 +24,7 @@ from drive_can_bridge.simulation.control import FAULTS, Machine, Operation, Rule
 from drive_can_bridge.simulation.motor_plant import MotorPlant, WARNING_TEMPERATURE
 from drive_can_bridge.simulation.names import Quantity
 from drive_can_bridge.simulation.plant import Mechanics
-from drive_can_bridge.simulation.registers import initial_value, Registers
+from drive_can_bridge.simulation.registers import Registers
 from drive_can_bridge.simulation.scales import clamp, nearest_raw
 
 WARNING, SETPOINT_REACHED, BUS_CONTROL, ROTATING_RIGHT, ROTATING_LEFT = (
@@ -78,7 +78,7 @@ class InverterPlant(MotorPlant):
             registers, configuration, mechanics, operation=Operation(_MACHINE),
             movable={name: parameter for name, parameter in registers.parameters.items()
                      if name not in self._of_sets})
-        moved = self.axes.speed_setpoint
+        moved = self.speed_setpoint
         self._mover = moved if moved in configuration.cyclic_request else None
 
     def command(self, value: float) -> float:
@@ -89,7 +89,7 @@ class InverterPlant(MotorPlant):
         if operation.state is State.SHUTDOWN:
             return 0.0
         if operation.state is State.OPERATION_ENABLED and not word & states.RELEASE_RAMP:
-            return self.axes.motor.speed
+            return self.motor.speed
         if not word & states.ENABLE_SETPOINT:
             return 0.0
         # rotation right has priority
@@ -101,8 +101,8 @@ class InverterPlant(MotorPlant):
 
     @property
     def status_word(self) -> int:
-        motor, operation = self.axes.motor, self.operation
-        target = self.axes.target if operation.enabled and not operation.stopping else 0.0
+        motor, operation = self.motor, self.operation
+        target = self.target if operation.enabled and not operation.stopping else 0.0
         word = _STATUS[operation.state] | operation.word & _SET | BUS_CONTROL
         if operation.state in (State.SWITCH_ON_DISABLED, State.FAULT):
             word |= (operation.word & _OFF) << _OFF_SHIFT
@@ -113,18 +113,15 @@ class InverterPlant(MotorPlant):
         # at standstill the manuals' examples show "right"
         return word | (ROTATING_LEFT if motor.speed < 0.0 else ROTATING_RIGHT)
 
-    def initial(self, parameter: Parameter) -> int | None:
+    def initial(self, parameter: Parameter) -> int:
         """Return what a new inverter has in a register: the same in all parameter sets."""
-        first = self._of_sets.get(parameter.name)
-        if first is None:
-            return IDENTITY.get(parameter.number or 0) or super().initial(parameter)
-        initial = super().initial(first)
-        return initial_value(first) if initial is None else initial
+        first = self._of_sets.get(parameter.name, parameter)
+        return IDENTITY.get(parameter.number or 0) or super().initial(first)
 
     def source(self, parameter: Parameter) -> Callable[[], int] | None:
         if parameter.number is not None or names.measured(parameter) is not Quantity.SPEED:
             return super().source(parameter)
-        moved, motor = self.axes.speed_setpoint, self.axes.motor
+        moved, motor = self.speed_setpoint, self.motor
         if moved is None:
             return lambda: 0
         own, its = parameter.type.raw_range, moved.type.raw_range

@@ -52,8 +52,7 @@ class SimulatedPkwDrive(SimulatedDrive):
 
     def power_lost(self, *, forget: bool) -> None:
         """Forget the function byte of the last request, and what the mailbox holds."""
-        self.request = self.response = bytes(pkw.PAYLOAD)
-        self._function_byte = 0
+        self._request = self._response = pkw.idle_request()
 
     def receive(self, frame: Frame, now: float) -> bool:
         identifier, data, extended = frame
@@ -65,17 +64,18 @@ class SimulatedPkwDrive(SimulatedDrive):
             request = pkw.decode(data, self._layout)
         except RemoteProtocolError:
             raise Ignored('request without eight data bytes') from None
-        if request.function_byte == self._function_byte:
-            if data != self.request:
+        if request.function_byte == self._request.function_byte:
+            if request != self._request:
                 raise Ignored('request with the function byte of the one before')
             return True
-        self.request, self._function_byte = data, request.function_byte
+        self._request = request
         self.requests += 1
-        self.response = pkw.encode(self._response(request), self._layout)
-        self.answer(Frame(self._identifiers.response, self.response, False), now)
+        self._response = self._response_to(request)
+        self.answer(Frame(self._identifiers.response, pkw.encode(self._response, self._layout),
+                          False), now)
         return True
 
-    def _response(self, request: pkw.Message) -> pkw.Message:
+    def _response_to(self, request: pkw.Message) -> pkw.Message:
         meaning = request.meaning
         if request.code == pkw.Function.NONE:
             return pkw.response(request)
@@ -111,7 +111,8 @@ class SimulatedPkwDrive(SimulatedDrive):
 
     def _constants(self) -> Contents:
         """Return the name, the mailbox, PDO4."""
-        mailbox = self.request + self.response
+        mailbox = b''.join(pkw.encode(message, self._layout) for message in (
+            self._request, self._response))
         objects: Contents = {(0x1008, 0): DEVICE_NAME, (0x3000, 0): bytes((4,))}
         for number in range(1, 5):
             objects[0x3000, number] = mailbox[4 * number - 4:4 * number]

@@ -82,6 +82,7 @@ class SimulatedDrive(ABC):
     :ivar companion: what it composes beside its own telegrams.
     :ivar requests: requests understood.
     :ivar answers: answers given, before scripted faults took theirs.
+    :ivar wear: EEPROM cells written, by parameter.
     :ivar violations: how often the other side broke a rule of the protocol, by rule.
     :ivar table: what can be addressed, by the protocol's addresses.
     """
@@ -101,6 +102,7 @@ class SimulatedDrive(ABC):
         self.plant = (plant or self.choose_plant())(
             self.registers, configuration, mechanics or Mechanics())
         self.registers.connect(self.plant)
+        self.wear = self.registers.wear
         self.companion = Companion()
         self.requests = self.answers = 0
         self.violations: Counter[str] = Counter()
@@ -193,11 +195,12 @@ class SimulatedDrive(ABC):
         elif kind in (FaultKind.STUCK, FaultKind.REFUSE):
             self.registers.faults[kind, self._known(fault.argument), ''] = fault
         elif kind is FaultKind.NEEDS:
-            name, other = map(self._known, fault.pair)
+            name, other = map(self._known, fault.argument.split(':', 1))
             self.registers.faults[kind, name, other] = fault
         elif kind is FaultKind.SET:
-            name = self._known(fault.pair[0])
-            self.set_value(name, _value(self.registers.parameters[name], fault.pair[1]), now)
+            word, text = fault.argument.split(':', 1)
+            name = self._known(word)
+            self.set_value(name, _value(self.registers.parameters[name], text), now)
             self._set_by_fault.add(name)
         elif kind is FaultKind.CUT_AT:
             self._cut_at = self.registers.settings_written + fault.argument
@@ -213,14 +216,9 @@ class SimulatedDrive(ABC):
         self.companion.look(now)
 
     @property
-    def wear(self) -> Counter[str]:
-        """EEPROM cells written, by parameter."""
-        return self.registers.wear
-
-    @property
     def eeprom_writes(self) -> int:
         """EEPROM cells written."""
-        return sum(self.registers.wear.values())
+        return sum(self.wear.values())
 
     @property
     def faults_text(self) -> str:

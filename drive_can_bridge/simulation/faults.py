@@ -91,12 +91,6 @@ class Fault:
     def __str__(self) -> str:
         return self.kind.word if self.argument is None else f'{self.kind.word}={self.argument}'
 
-    @property
-    def pair(self) -> tuple[str, str]:
-        """Both halves of an argument with a colon."""
-        first, _, second = self.argument.partition(':')
-        return first, second
-
 
 def parse_fault(text: str) -> Fault:
     """

@@ -17,10 +17,9 @@ from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.simulation.canopen_pkw_registers import register_number
 from drive_can_bridge.simulation.control import Operation, Report, StatusWord
-from drive_can_bridge.simulation.motor_plant import mains_swing
 from drive_can_bridge.simulation.plant import Mechanics
-from drive_can_bridge.simulation.registers import Registers
-from drive_can_bridge.simulation.scales import clamp
+from drive_can_bridge.simulation.registers import Refusal, Registers
+from drive_can_bridge.simulation.scales import clamp, mains_swing, plausible
 from drive_can_bridge.simulation.starter import (
     MACHINE, RUN_REVERSE, Starter, TEST_TRIP, THERMAL_OVERLOAD,
 )
@@ -39,7 +38,7 @@ CONFIGURATION_MODE = 1 << 0
 CLEAR_ALL, CLEAR_THERMAL_LEVEL, CLEAR_SETTINGS = 1 << 0, 1 << 2, 1 << 3
 
 #: registers that are written in configuration mode only
-SETTINGS = range(540, 700)
+SETTINGS = {*range(540, 700)} - {GENERAL_CONFIGURATION}
 #: what settings are in a new controller, by register: in configuration mode, as from the factory
 DEFAULTS = {GENERAL_CONFIGURATION: CONFIGURATION_MODE, TRIP_CLASS: 5, FULL_LOAD_RATIO: 33, 653: 33,
             682: 0, 695: 0, CONTROL_REGISTER_1: 0, CONTROL_REGISTER_2: 0}
@@ -84,20 +83,19 @@ class StarterPlant:
                              for p in reversed(list(registers.parameters.values()))}
         self._figures = self._all_figures()
 
-    def initial(self, parameter: Parameter) -> int | None:
-        register = register_number(parameter) or 0
-        return {**DEFAULTS, **IDENTITY, SERIAL_RANK: self._node}.get(register)
+    def initial(self, parameter: Parameter) -> int:
+        known: dict[int, int] = {**DEFAULTS, **IDENTITY, SERIAL_RANK: self._node}
+        return known.get(register_number(parameter) or 0, plausible(parameter))
 
-    def allows(self, parameter: Parameter, raw: int) -> bool:
-        return raw % STEPS.get(register_number(parameter) or 0, 1) == 0
-
-    def takes(self, parameter: Parameter) -> bool:
+    def refusal(self, parameter: Parameter, raw: int) -> Refusal | None:
         """Take settings with the motor off and in configuration mode only; no word otherwise."""
-        register = register_number(parameter)
-        if register not in SETTINGS or register == GENERAL_CONFIGURATION:
-            return True
+        register = register_number(parameter) or 0
+        if raw % STEPS.get(register, 1):
+            return Refusal.OUT_OF_RANGE
         configuring = self._content(GENERAL_CONFIGURATION) & CONFIGURATION_MODE
-        return bool(configuring) and not self.operation.enabled
+        if register in SETTINGS and (self.operation.enabled or not configuring):
+            return Refusal.UNTOLD
+        return None
 
     def written(self, name: str, before: int, raw: int) -> None:
         if name == self._by_register[CONTROL_REGISTER_1]:
