@@ -23,9 +23,10 @@ from drive_can_bridge.protocols.cannord.process_data import (
     EXTRA_LENGTH, LONG_LENGTH, MAIN_VALUES, SHORT_LENGTH,
 )
 from drive_can_bridge.simulation.cannord_plant import InverterPlant
-from drive_can_bridge.simulation.cannord_table import CannordTable, Refused
+from drive_can_bridge.simulation.cannord_table import CannordTable
 from drive_can_bridge.simulation.drive import Ignored, SimulatedDrive
 from drive_can_bridge.simulation.plant import PlantFactory
+from drive_can_bridge.simulation.registers import Refused
 
 #: P513, s that may pass between two telegrams; 0 or less: any
 TELEGRAM_TIMEOUT = 513
@@ -47,7 +48,6 @@ class SimulatedCannordInverter(SimulatedDrive):
             raise ConfigurationError([f'{self.name}: an inverter needs an InverterPlant'])
         self._options = options = self.configuration.options
         self.table = CannordTable(self.registers)
-        self._timeout_parameter = self.table.numbered(TELEGRAM_TIMEOUT)
         # parameters of known meaning, as they leave the factory, if the profile lists them
         for number, raw in ((TELEGRAM_TIMEOUT, 0), (CAN_ADDRESS, self.configuration.station)):
             parameter = self.table.numbered(number)
@@ -153,7 +153,7 @@ class SimulatedCannordInverter(SimulatedDrive):
         try:
             response, value = self.table.answer(task)
         except Refused as refusal:
-            response, value = Response.REFUSED, refusal.args[0]
+            response, value = Response.REFUSED, refusal.code
         self.answer(self._parameter_response(response, task.number, task.index, value), now)
 
     def _parameter_response(self, response: Response, number: int, index: int, value: int,
@@ -181,7 +181,7 @@ class SimulatedCannordInverter(SimulatedDrive):
     @property
     def _timeout(self) -> float:
         """Seconds between telegrams that are allowed."""
-        parameter = self._timeout_parameter
+        parameter = self.table.numbered(TELEGRAM_TIMEOUT)
         value = 0.0 if parameter is None else float(self.registers.value(parameter.name))
         return value if value > 0.0 else math.inf
 

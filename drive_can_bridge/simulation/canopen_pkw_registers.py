@@ -14,8 +14,8 @@ from drive_can_bridge.core.parameters import Parameter, Storage
 from drive_can_bridge.protocols.canopen import abort_codes
 from drive_can_bridge.protocols.canopen_pkw.object_map import BLOCKS, object_of, register_of
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, WORD_MAX
-from drive_can_bridge.simulation.canopen.sdo import checked_length, CODES, Refused
-from drive_can_bridge.simulation.registers import Registers
+from drive_can_bridge.simulation.canopen.sdo import checked_length, CODES
+from drive_can_bridge.simulation.registers import Refused, Registers
 
 
 class Cell(NamedTuple):

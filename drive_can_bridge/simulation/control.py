@@ -199,9 +199,7 @@ class Report(NamedTuple):
     setpoint_reached: bool = False
 
 
-Condition = Callable[[Report], bool]
-
-_RULES: tuple[tuple[tuple[str, ...], Condition], ...] = (
+_RULES: tuple[tuple[tuple[str, ...], Callable[[Report], bool]], ...] = (
     (('ready', 'ready_to_switch_on', 'ready_to_run', 'no_fault', 'ok'),
      lambda r: not r.operation.faulted),
     (('enabled', 'running', 'operation_enabled', 'on', 'active', 'operating'),
@@ -219,7 +217,7 @@ _RULES: tuple[tuple[tuple[str, ...], Condition], ...] = (
     (('no_quick_stop',), lambda r: not r.operation.stopping),
     (('voltage_enabled', 'power_on', 'mains_ok', 'bus_control', 'remote'), lambda r: True),
 )
-BIT_RULES: dict[str, Condition] = {name: rule for names, rule in _RULES for name in names}
+BIT_RULES = {name: rule for names, rule in _RULES for name in names}
 
 
 class StatusWord:

@@ -124,8 +124,7 @@ class MotorPlant:
             return lambda: scales.clamp(nearest(parameter, where(), ends) + self._jitter, ends)
         word = StatusWord(parameter, self.control)
         if actual is None and word:
-            plain = self.registers.plain
-            return lambda: word.compose(self._report(), plain(parameter.name))
+            return lambda: word.compose(self._report(), self.registers.plain(parameter.name))
         measure = actual or (quantity and self._measure(parameter, quantity))
         return (lambda: nearest(parameter, measure(), ends)) if measure else None
 

@@ -29,7 +29,7 @@ class Plant(Protocol):
     """
 
     operation: Operation
-    volatile: Collection[str]
+    volatile: Collection[str] = ()
 
     def initial(self, parameter: Parameter) -> int:
         """Return what a new drive has in a register, where its limits allow it."""

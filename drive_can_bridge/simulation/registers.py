@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Mapping
 from enum import Enum
 
+from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.parameters import Parameter, Storage, Value
 from drive_can_bridge.simulation import names
 from drive_can_bridge.simulation.faults import Fault, FaultKind
@@ -27,6 +28,18 @@ class Refusal(Enum):
     FORBIDDEN = 'a scripted fault'
     TOO_EARLY = 'another parameter has to be written first'
     UNTOLD = 'nobody is told, the value stays'
+
+
+class Refused(DriveCanError):
+    """
+    An access that a drive does not carry out.
+
+    :param code: the reason, as a number of its protocol.
+    """
+
+    def __init__(self, code: int) -> None:
+        super().__init__(code)
+        self.code = code
 
 
 class Registers:

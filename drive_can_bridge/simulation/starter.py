@@ -88,9 +88,8 @@ class Starter:
         final = self._final_level
         if final <= TRIP_LEVEL:
             return math.inf
-        if self.thermal >= TRIP_LEVEL:
-            return 0.0
-        return self.time_constant * math.log((final - self.thermal) / (final - TRIP_LEVEL))
+        left = (final - self.thermal) / (final - TRIP_LEVEL)
+        return self.time_constant * math.log(max(left, 1.0))
 
     @property
     def time_to_reset(self) -> float:

@@ -7,8 +7,9 @@ Which register means what is partly recollection; docs/protocol_canopen_pkw.md s
 be trusted.
 """
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 import math
 import struct
 
@@ -17,7 +18,7 @@ from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.simulation.canopen_pkw_registers import register_number
 from drive_can_bridge.simulation.control import Operation, Report, StatusWord
-from drive_can_bridge.simulation.plant import Mechanics
+from drive_can_bridge.simulation.plant import Mechanics, Plant
 from drive_can_bridge.simulation.registers import Refusal, Registers
 from drive_can_bridge.simulation.scales import clamp, mains_swing, plausible
 from drive_can_bridge.simulation.starter import (
@@ -66,10 +67,8 @@ def is_starter(profile: Profile) -> bool:
     return word is not None and register_number(word) == CONTROL_REGISTER_1
 
 
-class StarterPlant:
-    """A :class:`.Starter` behind registers."""
-
-    volatile: Collection[str] = ()
+class StarterPlant(Plant):
+    """A :class:`.Starter` behind registers. Its thermal image outlives a loss of power."""
 
     def __init__(self, registers: Registers, configuration: DriveConfiguration,
                  mechanics: Mechanics) -> None:
@@ -114,22 +113,11 @@ class StarterPlant:
         name = self._by_register.get(register)
         return DEFAULTS[register] if name is None else self.registers.plain(name)
 
-    @property
-    def trip_code(self) -> int:
-        """Code of the trip; 0 without one."""
-        return int(self.operation.fault_code(TEST_TRIP))
-
     def advance(self, now: float) -> None:
         starter, operation = self.starter, self.operation
         starter.settings(self._content(FULL_LOAD_RATIO), self._content(TRIP_CLASS))
         if starter.advance(operation.advance(now), on=operation.enabled):
             operation.trip(starter.time_to_reset, THERMAL_OVERLOAD)
-
-    def power_off(self) -> None:
-        """Keep the thermal image."""
-
-    def power_on(self) -> None:
-        """Go on with it."""
 
     def source(self, parameter: Parameter) -> Callable[[], int] | None:
         register = register_number(parameter)
@@ -145,11 +133,11 @@ class StarterPlant:
 
     def _all_figures(self) -> dict[int | None, Figure]:
         """Return what gives the contents of registers."""
-        starter = self.starter
+        starter, code = self.starter, partial(self.operation.fault_code, TEST_TRIP)
         found: dict[int | None, Figure] = {
             450: lambda: math.ceil(starter.time_to_reset) if self.operation.faulted else 0,
-            451: lambda: self.trip_code,
-            452: lambda: _bit_of(self.trip_code),
+            451: code,
+            452: lambda: _bit_of(int(code())),
             460: lambda: THERMAL_OVERLOAD if starter.alarm else 0,
             461: lambda: _bit_of(THERMAL_OVERLOAD) if starter.alarm else 0,
             465: lambda: starter.thermal,

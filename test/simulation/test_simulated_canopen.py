@@ -16,12 +16,12 @@ from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.protocols.canopen import abort_codes
 from drive_can_bridge.protocols.canopen.network import NmtState
 from drive_can_bridge.simulation.canopen.node import CanopenNode, Contents
-from drive_can_bridge.simulation.canopen.sdo import checked_length, CODES, Refused
+from drive_can_bridge.simulation.canopen.sdo import checked_length, CODES
 from drive_can_bridge.simulation.control import FAULTS, Machine, Operation, Rule, State
 from drive_can_bridge.simulation.drive import SimulatedDrive
 from drive_can_bridge.simulation.motor_plant import MotorPlant
 from drive_can_bridge.simulation.plant import PlantFactory
-from drive_can_bridge.simulation.registers import Registers
+from drive_can_bridge.simulation.registers import Refused, Registers
 
 OFF, READY, ON, ENABLED, STOPPING = (
     State.SWITCH_ON_DISABLED, State.READY_TO_SWITCH_ON, State.SWITCHED_ON,

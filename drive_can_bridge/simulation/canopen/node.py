@@ -13,8 +13,9 @@ from drive_can_bridge.core.frame import Frame, Route, STANDARD_IDENTIFIER_MAX
 from drive_can_bridge.protocols.canopen import abort_codes, network
 from drive_can_bridge.protocols.canopen.network import Emergency, NmtCommand, NmtState
 from drive_can_bridge.protocols.canopen.sdo import REQUEST_BASE, RESPONSE_BASE
-from drive_can_bridge.simulation.canopen.sdo import checked_length, Objects, Refused, SdoServer
+from drive_can_bridge.simulation.canopen.sdo import checked_length, Objects, SdoServer
 from drive_can_bridge.simulation.drive import Companion, Ignored, SimulatedDrive
+from drive_can_bridge.simulation.registers import Refused
 
 #: objects by index and sub-index
 Contents = dict[tuple[int, int], bytes]

@@ -8,9 +8,8 @@ and may be written.
 
 from typing import Protocol
 
-from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.protocols.canopen import abort_codes
-from drive_can_bridge.simulation.registers import Refusal
+from drive_can_bridge.simulation.registers import Refusal, Refused
 
 LENGTH = 8
 EXPEDITED_MAX = 4
@@ -32,20 +31,8 @@ CODES = {
 }
 
 
-class Refused(DriveCanError):
-    """
-    An access that the device does not carry out.
-
-    :param code: SDO abort code.
-    """
-
-    def __init__(self, code: int) -> None:
-        super().__init__(abort_codes.describe(code))
-        self.code = code
-
-
 class Objects(Protocol):
-    """An object dictionary. Reading and writing raise :class:`Refused`."""
+    """An object dictionary. Reading and writing raise :class:`Refused`, with SDO abort codes."""
 
     def read_object(self, index: int, subindex: int) -> bytes:
         """Return the content of an object."""
