@@ -305,6 +305,15 @@ def test_ramps_by_use() -> None:
     assert plant.value('actual_speed') == 750.0
 
 
+def test_time_never_runs_backwards() -> None:
+    # a frame may have waited, and be told with the time of its arrival
+    plant = motor(EXAMPLE)
+    plant.set_value('speed_setpoint', 3000.0)
+    for now in (0.0, 0.5, 0.4, 0.5):
+        plant.handle_timer(now)
+    assert plant.value('actual_speed') == 1500.0
+
+
 def test_overlapping_status_patterns() -> None:
     # states as numbers in the low bits: 0 is ready, 3 enabled, 4 a fault
     table = replace(CONTROL, ready=StatusPattern(7, 0), enabled=StatusPattern(7, 3),
