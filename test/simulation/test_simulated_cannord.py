@@ -124,6 +124,15 @@ class TestMotor:
         tells(made, '7F040040', 2.5)
         assert tells(made, '7F040040', 3.0) == '370B0040'
 
+    def test_shutdown_may_become_a_quick_stop(self) -> None:
+        made = inverter()
+        run(made)
+        tells(made, '7F040040', 0.0)
+        tells(made, '7E040040', 2.0)
+        tells(made, '7A040040', 2.5)
+        assert tells(made, '7A040040', 2.55) == '170A0010'      # 0.2 s from 100 %
+        assert tells(made, '7A040040', 2.6) == '500B0000'
+
     def test_quick_stop_brakes_fast_and_disables(self) -> None:
         made = inverter()
         run(made)

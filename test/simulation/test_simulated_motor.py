@@ -305,6 +305,19 @@ def test_ramps_by_use() -> None:
     assert plant.value('actual_speed') == 750.0
 
 
+def test_no_current_once_a_quick_stop_is_over() -> None:
+    plant = motor([*EXAMPLE, CONTROL_WORD], CONTROL)
+    plant.handle_timer(0.0)
+    plant.registers.write('control_word', 1)
+    plant.set_value('speed_setpoint', 3000.0)
+    plant.handle_timer(2.0)
+    plant.registers.write('control_word', 2)
+    plant.handle_timer(2.1)
+    assert plant.value('motor_current') > 0.0
+    plant.handle_timer(3.0)
+    assert (plant.value('actual_speed'), plant.value('motor_current')) == (0.0, 0.0)
+
+
 def test_time_never_runs_backwards() -> None:
     # a frame may have waited, and be told with the time of its arrival
     plant = motor(EXAMPLE)
