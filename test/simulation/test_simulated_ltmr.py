@@ -643,6 +643,20 @@ class TestMotor:
         assert fine.thermal == pytest.approx(coarse.thermal, abs=0.5)
         assert fine.current == pytest.approx(coarse.current, abs=1e-6)
 
+    def test_a_trip_opens_the_contactor(self) -> None:
+        starter = Ltmr().drive.plant.starter
+        starter.settings(5.0, 5.0)
+        assert starter.advance(30.0, on=True)
+        assert starter.current == 0.0
+
+    def test_time_to_a_trip_that_is_due(self) -> None:
+        starter = Ltmr().drive.plant.starter
+        starter.settings(5.0, 5.0)
+        starter.advance(0.0, on=True)
+        assert starter.time_to_trip > 0.0
+        starter.thermal = 120.0
+        assert starter.time_to_trip == 0.0
+
     def test_emergency_waits_for_a_node_that_may_send_it(self) -> None:
         made = Ltmr()
         made.ask('000#0205', 0.1)

@@ -318,6 +318,16 @@ def test_no_current_once_a_quick_stop_is_over() -> None:
     assert (plant.value('actual_speed'), plant.value('motor_current')) == (0.0, 0.0)
 
 
+def test_torque_of_an_acceleration_is_still_there_at_the_same_instant() -> None:
+    plant = motor(EXAMPLE)
+    plant.set_value('speed_setpoint', 3000.0)
+    currents = []
+    for now in (0.0, 0.5, 0.5):
+        plant.handle_timer(now)
+        currents.append(plant.value('motor_current'))
+    assert currents[0] < currents[1] == currents[2]
+
+
 def test_time_never_runs_backwards() -> None:
     # a frame may have waited, and be told with the time of its arrival
     plant = motor(EXAMPLE)
