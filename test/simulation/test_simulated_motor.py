@@ -237,10 +237,11 @@ class TestPlant:
             parameter('gain', 6, scale=0.01, minimum=0.0, maximum=3.0),
             parameter('position_setpoint', 7, neutral=1e9),
             parameter('ramp_ms', 8, unit='ms'), parameter('warm_up', 9, minimum=200.0),
+            parameter('tension', 10, scale=0.5, neutral=5.0),
         ]
         plant = motor(table)
         assert [plant.value(p.name) for p in table] == [
-            False, 0, 100, 100.0, 10.0, 1.0, 0, 1000.0, 200]
+            False, 0, 100, 100.0, 10.0, 1.0, 0, 1000.0, 200, 5.0]
 
 
 POSITION_SETPOINT = parameter('position_setpoint', 53, type=INT16, scale=0.1, unit='deg',
@@ -303,6 +304,16 @@ def test_ramps_by_use() -> None:
     plant.set_value('speed_setpoint', 0.0)
     plant.handle_timer(2.0)
     assert plant.value('actual_speed') == 750.0
+
+
+def test_no_current_as_soon_as_it_trips() -> None:
+    plant = motor(EXAMPLE)
+    plant.set_value('speed_setpoint', 3000.0)
+    plant.handle_timer(0.0)
+    plant.handle_timer(2.0)
+    assert plant.value('motor_current') > 0.0
+    plant.fault('trip', 2.0)
+    assert plant.value('motor_current') == 0.0
 
 
 def test_no_current_once_a_quick_stop_is_over() -> None:
