@@ -315,6 +315,11 @@ class TestFaults:
         made.fault('trip', 0.0)
         assert [len(sent.data) for sent in made.take_frames()] == [length]
 
+    def test_an_answer_that_is_too_long(self) -> None:
+        made = inverter()
+        made.fault('length=6', 0.0)
+        assert tells(made, READY) == f'{DISABLED}00000000'
+
     def test_reset_needs_an_edge(self) -> None:
         made = inverter()
         tells(made, ACKNOWLEDGE)            # held already when the fault comes

@@ -721,6 +721,13 @@ class TestObjects:
     def test_objects(self, request_text: str, response: str) -> None:
         assert Ltmr().ask(f'605#{request_text}', 0.1) == [f'585#{response}']
 
+    def test_an_address_of_the_profile_is_the_only_one(self) -> None:
+        table = {'state': Parameter('state', number=455, index=0x2100, subindex=1)}
+        made = Ltmr(Profile('table', '/table.yaml', '', ('canopen_pkw',), table),
+                    response=('state',))
+        assert made.ask('605#4000210100000000', 0.1)[0].startswith('585#4B002101')
+        assert made.ask('605#4004200600000000', 0.1) == ['585#8004200611000906']
+
     def test_device_name_comes_in_segments(self) -> None:
         made = Ltmr()
         assert made.ask('605#4008100000000000', 0.1) == ['585#410810000E000000']

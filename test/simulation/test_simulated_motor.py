@@ -306,6 +306,19 @@ def test_ramps_by_use() -> None:
     assert plant.value('actual_speed') == 750.0
 
 
+@pytest.mark.parametrize('mover', [SPEED_SETPOINT, POSITION_SETPOINT])
+def test_a_brake_holds_at_once(mover: Parameter) -> None:
+    plant = motor([*BOTH, CONTROL_WORD], CONTROL, [mover], brake=1)
+    plant.handle_timer(0.0)
+    plant.registers.write('control_word', 1)
+    plant.set_value(mover.name, 3000.0)
+    plant.handle_timer(0.5)
+    assert plant.value('actual_speed') > 0.0
+    plant.registers.write('control_word', 0)
+    plant.handle_timer(0.5)
+    assert plant.value('actual_speed') == 0.0
+
+
 def test_no_current_as_soon_as_it_trips() -> None:
     plant = motor(EXAMPLE)
     plant.set_value('speed_setpoint', 3000.0)
