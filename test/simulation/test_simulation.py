@@ -303,6 +303,7 @@ class TestConsole:
         assert lines('status')[0][1:] == ['conveyor: EEPROM writes: ramp_time 1',
                                           lines('lift')[0][0]]
         assert lines('conveyor')[0][1:] == ['conveyor: EEPROM writes: ramp_time 1']
+        assert lines('list')[0][1:] == [lines('lift')[0][0]]
 
     @pytest.mark.parametrize(('line', 'complaint'), [
         ('lft silent', "no drive 'lft'; drives: conveyor, lift; also: status, list, help"),
