@@ -23,10 +23,10 @@ from drive_can_bridge.protocols.cannord.process_data import (
     EXTRA_LENGTH, LONG_LENGTH, MAIN_VALUES, SHORT_LENGTH,
 )
 from drive_can_bridge.simulation.cannord_plant import InverterPlant
-from drive_can_bridge.simulation.cannord_table import CannordTable, Refused
+from drive_can_bridge.simulation.cannord_table import CannordTable
 from drive_can_bridge.simulation.drive import Ignored, SimulatedDrive
-from drive_can_bridge.simulation.motor_plant import FAULT_CODE
 from drive_can_bridge.simulation.plant import PlantFactory
+from drive_can_bridge.simulation.registers import Refused
 
 #: P513, s that may pass between two telegrams; 0 or less: any
 TELEGRAM_TIMEOUT = 513
@@ -48,7 +48,6 @@ class SimulatedCannordInverter(SimulatedDrive):
             raise ConfigurationError([f'{self.name}: an inverter needs an InverterPlant'])
         self._options = options = self.configuration.options
         self.table = CannordTable(self.registers)
-        self._timeout_parameter = self.table.numbered(TELEGRAM_TIMEOUT)
         # parameters of known meaning, as they leave the factory, if the profile lists them
         for number, raw in ((TELEGRAM_TIMEOUT, 0), (CAN_ADDRESS, self.configuration.station)):
             parameter = self.table.numbered(number)
@@ -67,12 +66,13 @@ class SimulatedCannordInverter(SimulatedDrive):
 
     def find_routes(self) -> list[Route]:
         """Return the four identifiers of the address, and both broadcasts where one is claimed."""
-        own, shared = super().find_routes()[:len(MessageObject)], []
-        extended = self.configuration.options.extended_identifiers
-        if self.configuration.options.broadcast != 'none':
-            shared = [identifiers.group_identifier(self.configuration.station, extended=extended),
-                      identifiers.all_identifier(extended=extended)]
-        return [*own, *(identifiers.route(each, extended=extended) for each in shared)]
+        found, options = super().find_routes()[:len(MessageObject)], self.configuration.options
+        extended, station = options.extended_identifiers, self.configuration.station
+        if options.broadcast != 'none':
+            found += [identifiers.route(each, extended=extended) for each in (
+                identifiers.group_identifier(station, extended=extended),
+                identifiers.all_identifier(extended=extended))]
+        return found
 
     def choose_plant(self) -> PlantFactory:
         return InverterPlant
@@ -101,7 +101,7 @@ class SimulatedCannordInverter(SimulatedDrive):
         self._silent_since = now
         if self._timed_out:
             self._timed_out = False
-            self.plant.operation.end_cause(now)
+            self.plant.operation.end_cause()
         # before the values are taken: it tells how the inverter was when they came
         answer = self._status(len(data))
         requested = self.configuration.cyclic_request
@@ -114,7 +114,7 @@ class SimulatedCannordInverter(SimulatedDrive):
                 self._violation('reserved bit 13 of the control word')
             if word & states.DATA_VALID:
                 self._take(requested, values)
-                self.plant.operation.word_written(word, now)
+                self.plant.operation.word_written(word)
             self.table.select_set(states.parameter_set_of(self.plant.operation.word))
         self.plant.advance(now)
         if answered:
@@ -153,7 +153,7 @@ class SimulatedCannordInverter(SimulatedDrive):
         try:
             response, value = self.table.answer(task)
         except Refused as refusal:
-            response, value = Response.REFUSED, refusal.args[0]
+            response, value = Response.REFUSED, refusal.code
         self.answer(self._parameter_response(response, task.number, task.index, value), now)
 
     def _parameter_response(self, response: Response, number: int, index: int, value: int,
@@ -181,16 +181,15 @@ class SimulatedCannordInverter(SimulatedDrive):
     @property
     def _timeout(self) -> float:
         """Seconds between telegrams that are allowed."""
-        parameter = self._timeout_parameter
+        parameter = self.table.numbered(TELEGRAM_TIMEOUT)
         value = 0.0 if parameter is None else float(self.registers.value(parameter.name))
         return value if value > 0.0 else math.inf
 
     # -- faults -----------------------------------------------------------------------------------
 
-    def trip(self, now: float, duration: float, code: float = FAULT_CODE) -> None:
+    def trip(self, now: float, duration: float, code: float | None = None) -> None:
         """Fail by itself, and tell at once, unasked."""
-        self.plant.fault_code = code
-        super().trip(now, duration)
+        super().trip(now, duration, code)
         self.answer(self._status(self._length), now)
 
     def foreign_frames(self, answer: Frame) -> Sequence[Iterable[Frame]]:

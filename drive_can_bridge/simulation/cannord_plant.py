@@ -20,11 +20,11 @@ from drive_can_bridge.protocols.cannord.states import (
 )
 from drive_can_bridge.simulation import names
 from drive_can_bridge.simulation.cannord_table import groups_of
-from drive_can_bridge.simulation.control import FAULTS, Machine, Operation, Rule, State
-from drive_can_bridge.simulation.motor_plant import FAULT_CODE, MotorPlant, WARNING_TEMPERATURE
+from drive_can_bridge.simulation.control import FAULTS, Machine, Operation, Rule, RUNNING, State
+from drive_can_bridge.simulation.motor_plant import MotorPlant, WARNING_TEMPERATURE
 from drive_can_bridge.simulation.names import Quantity
 from drive_can_bridge.simulation.plant import Mechanics
-from drive_can_bridge.simulation.registers import initial_value, Registers
+from drive_can_bridge.simulation.registers import Registers
 from drive_can_bridge.simulation.scales import clamp, nearest_raw
 
 WARNING, SETPOINT_REACHED, BUS_CONTROL, ROTATING_RIGHT, ROTATING_LEFT = (
@@ -39,6 +39,7 @@ _STATUS = {
     State.READY_TO_SWITCH_ON: 0x31,
     State.SWITCHED_ON: 0x33,
     State.OPERATION_ENABLED: 0x37,
+    State.SHUTDOWN: 0x37,
     State.QUICK_STOP: 0x17,
     State.FAULT: 0x08,
 }
@@ -52,66 +53,32 @@ _MACHINE = Machine((
     Rule(FAULTS, 0, 0, None),
     Rule(None, NO_DISABLE_VOLTAGE, 0, State.SWITCH_ON_DISABLED),
     Rule((State.QUICK_STOP,), 0, 0, None),              # ends at standstill only
-    Rule((State.OPERATION_ENABLED,), NO_QUICK_STOP, 0, State.QUICK_STOP),
+    Rule(RUNNING, NO_QUICK_STOP, 0, State.QUICK_STOP),
     Rule(None, NO_QUICK_STOP, 0, State.SWITCH_ON_DISABLED),
-    Rule((State.OPERATION_ENABLED,), SWITCH_ON, 0, State.OPERATION_ENABLED),    # ramps down first
+    Rule(RUNNING, SWITCH_ON, 0, State.SHUTDOWN),
     Rule(None, SWITCH_ON, 0, State.READY_TO_SWITCH_ON),
     Rule((State.SWITCH_ON_DISABLED,), 0, 0, None),      # left with bit 0 = 0 only
     Rule(None, ENABLE_OPERATION, ENABLE_OPERATION, State.OPERATION_ENABLED),
     Rule(None, 0, 0, State.SWITCHED_ON),
-), reset=(FAULT_RESET, FAULT_RESET), power_on=(State.SWITCH_ON_DISABLED, _OFF))
-
-
-class InverterOperation(Operation):
-    """
-    The operating state of one simulated inverter.
-
-    :ivar state: never "not ready" or "fault reaction": both would be over at once.
-    :ivar word: the last control word with valid data.
-    """
-
-    def __init__(self) -> None:
-        super().__init__(_MACHINE)
-
-    def standstill(self) -> None:
-        """Take note that the motor has stopped: the end of a quick stop, or of a shutdown."""
-        super().standstill()
-        if self.shutting_down:
-            self._enter(State.READY_TO_SWITCH_ON)
-
-    @property
-    def shutting_down(self) -> bool:
-        """On the ramp to zero, because bit 0 was taken away from an enabled inverter."""
-        return self.state is State.OPERATION_ENABLED and not self.word & SWITCH_ON
-
-    def _enter(self, state: State) -> None:
-        super()._enter(state)
-        # b4 = 0 uses the quick stop ramp, too, but leaves the inverter enabled
-        if state is State.OPERATION_ENABLED:
-            self.stopping = not self.word & states.ENABLE_RAMP
+), reset=(FAULT_RESET, FAULT_RESET), power_on=(State.SWITCH_ON_DISABLED, _OFF),
+    # b4 = 0 uses the quick stop ramp, too, but leaves the inverter enabled
+    ramp=states.ENABLE_RAMP)
 
 
 class InverterPlant(MotorPlant):
-    """
-    The motor of one inverter. See the base class.
-
-    :ivar fault_code: what the fault number shows while there is a fault.
-    """
-
-    operation: InverterOperation
+    """The motor of one inverter. See the base class."""
 
     def __init__(self, registers: Registers, configuration: DriveConfiguration,
                  mechanics: Mechanics) -> None:
-        self.fault_code: float = FAULT_CODE
         # entries of the sets 2 to 4, by name: the motor knows set 1 and what stands in for it
         self._of_sets = {
             member.name: group.members[0] for group in groups_of(registers.parameters).values()
             if group.sets for index, member in group.members.items() if index != 0}
         super().__init__(
-            registers, configuration, mechanics, operation=InverterOperation(),
+            registers, configuration, mechanics, operation=Operation(_MACHINE),
             movable={name: parameter for name, parameter in registers.parameters.items()
                      if name not in self._of_sets})
-        moved = self.axes.speed_setpoint
+        moved = self.speed_setpoint
         self._mover = moved if moved in configuration.cyclic_request else None
 
     def command(self, value: float) -> float:
@@ -119,10 +86,10 @@ class InverterPlant(MotorPlant):
         operation, word = self.operation, self.operation.word
         if self._mover is None:
             return value
-        if operation.shutting_down:
+        if operation.state is State.SHUTDOWN:
             return 0.0
         if operation.state is State.OPERATION_ENABLED and not word & states.RELEASE_RAMP:
-            return self.axes.motor.speed
+            return self.motor.speed
         if not word & states.ENABLE_SETPOINT:
             return 0.0
         # rotation right has priority
@@ -132,16 +99,10 @@ class InverterPlant(MotorPlant):
             return float(self._mover.value_from_raw(raw))
         return value
 
-    def move(self, duration: float) -> None:
-        super().move(duration)
-        if self.operation.shutting_down and self.axes.motor.speed == 0.0:
-            self.operation.standstill()
-            super().move(0.0)
-
     @property
     def status_word(self) -> int:
-        motor, operation = self.axes.motor, self.operation
-        target = self.axes.target if operation.enabled and not operation.stopping else 0.0
+        motor, operation = self.motor, self.operation
+        target = self.target if operation.enabled and not operation.stopping else 0.0
         word = _STATUS[operation.state] | operation.word & _SET | BUS_CONTROL
         if operation.state in (State.SWITCH_ON_DISABLED, State.FAULT):
             word |= (operation.word & _OFF) << _OFF_SHIFT
@@ -152,24 +113,16 @@ class InverterPlant(MotorPlant):
         # at standstill the manuals' examples show "right"
         return word | (ROTATING_LEFT if motor.speed < 0.0 else ROTATING_RIGHT)
 
-    def initial(self, parameter: Parameter) -> int | None:
+    def initial(self, parameter: Parameter) -> int:
         """Return what a new inverter has in a register: the same in all parameter sets."""
-        first = self._of_sets.get(parameter.name)
-        if first is None:
-            return IDENTITY.get(parameter.number or 0) or super().initial(parameter)
-        initial = super().initial(first)
-        return initial_value(first) if initial is None else initial
+        first = self._of_sets.get(parameter.name, parameter)
+        return IDENTITY.get(parameter.number or 0) or super().initial(first)
 
     def source(self, parameter: Parameter) -> Callable[[], int] | None:
         if parameter.number is not None or names.measured(parameter) is not Quantity.SPEED:
             return super().source(parameter)
-        moved, motor = self.axes.speed_setpoint, self.axes.motor
+        moved, motor = self.speed_setpoint, self.motor
         if moved is None:
             return lambda: 0
         own, its = parameter.type.raw_range, moved.type.raw_range
         return lambda: clamp(nearest_raw(moved, motor.speed, its), own)
-
-    def measure(self, parameter: Parameter, quantity: Quantity) -> Callable[[], float]:
-        if quantity is Quantity.FAULT_CODE:
-            return lambda: self.fault_code if self.operation.faulted else 0.0
-        return super().measure(parameter, quantity)

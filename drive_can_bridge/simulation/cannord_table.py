@@ -22,17 +22,15 @@ from dataclasses import dataclass, field
 
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.cannord.parameter_frame import (
-    NUMBER_MAX, ParameterFrame, Response, Task, WRITE_TASKS,
+    NUMBER_MAX, ParameterFrame, Response, RESPONSES, Task, WRITE_TASKS,
 )
-from drive_can_bridge.simulation.registers import Refusal, Registers
+from drive_can_bridge.simulation.registers import Refusal, Refused, Registers
 
 (INVALID_NUMBER, CANNOT_BE_CHANGED, LIMIT_EXCEEDED, WRONG_SUBINDEX, NOT_AN_ARRAY, INVALID_TYPE,
  ) = range(6)
 INVALID_TASK, CANNOT_BE_REPRESENTED = 201, 202
 
 _WRITES = {int(task): how for how, task in WRITE_TASKS.items()}
-_RESPONSES = {(False, 16): Response.WORD, (False, 32): Response.DOUBLE,
-              (True, 16): Response.ARRAY_WORD, (True, 32): Response.ARRAY_DOUBLE}
 _ARRAY_READS = (Task.READ_ARRAY, Task.READ_ELEMENTS)
 _NEGATIVE = 0xFFFF
 _LIMITS = (Refusal.OUT_OF_RANGE, Refusal.CROSSED)
@@ -65,10 +63,6 @@ def groups_of(parameters: Mapping[str, Parameter]) -> dict[int, Group]:
         group.members[parameter.subindex or 0] = parameter
         group.plain = group.plain or parameter.subindex is None
     return groups
-
-
-class Refused(Exception):
-    """The task cannot be executed; the argument is the error number."""
 
 
 class CannordTable:
@@ -108,8 +102,8 @@ class CannordTable:
             self._write(parameter, task.value, double=double, eeprom=eeprom)
         elif not parameter.readable:
             raise Refused(CANNOT_BE_REPRESENTED)
-        response = _RESPONSES[array, parameter.type.bits]
-        return response, self._registers.raw(parameter.name)
+        narrow, wide = RESPONSES[Task.READ_ARRAY if array else Task.READ]
+        return wide if parameter.type.bits == 32 else narrow, self._registers.raw(parameter.name)
 
     def select_set(self, parameter_set: int) -> None:
         """Make a parameter set, 1 to 4, the active one."""

@@ -16,11 +16,11 @@ from drive_can_bridge.protocols.canopen.network import NmtState
 from drive_can_bridge.protocols.canopen_pkw import pkw, refusals
 from drive_can_bridge.protocols.canopen_pkw.identifiers import Identifiers
 from drive_can_bridge.simulation.canopen.node import CanopenNode, Contents
-from drive_can_bridge.simulation.canopen.sdo import Refused
 from drive_can_bridge.simulation.canopen_pkw_registers import RegisterTable
 from drive_can_bridge.simulation.drive import Ignored, SimulatedDrive
 from drive_can_bridge.simulation.motor_plant import MotorPlant
 from drive_can_bridge.simulation.plant import PlantFactory
+from drive_can_bridge.simulation.registers import Refused
 from drive_can_bridge.simulation.starter import TEST_TRIP
 from drive_can_bridge.simulation.starter_plant import is_starter, StarterPlant
 
@@ -39,7 +39,7 @@ class SimulatedPkwDrive(SimulatedDrive):
         self.table = RegisterTable(self.configuration, self.registers)
         self._abort_code_order: str = options.abort_code_order
         self.node = self.companion = CanopenNode(
-            self, self.table, constants=self._constants, trip_code=self._trip_code)
+            self, self.table, constants=self._constants, trip_code=TEST_TRIP)
         self.power_lost(forget=False)
 
     def find_routes(self) -> list[Route]:
@@ -50,13 +50,9 @@ class SimulatedPkwDrive(SimulatedDrive):
         """Return a starter for the profile of an LTMR, a motor for any other one."""
         return StarterPlant if is_starter(self.configuration.profile) else MotorPlant
 
-    def _trip_code(self) -> int:
-        return self.plant.trip_code if isinstance(self.plant, StarterPlant) else TEST_TRIP
-
     def power_lost(self, *, forget: bool) -> None:
         """Forget the function byte of the last request, and what the mailbox holds."""
-        self.request = self.response = bytes(pkw.PAYLOAD)
-        self._function_byte = 0
+        self._request = self._response = pkw.idle_request()
 
     def receive(self, frame: Frame, now: float) -> bool:
         identifier, data, extended = frame
@@ -68,17 +64,18 @@ class SimulatedPkwDrive(SimulatedDrive):
             request = pkw.decode(data, self._layout)
         except RemoteProtocolError:
             raise Ignored('request without eight data bytes') from None
-        if request.function_byte == self._function_byte:
-            if data != self.request:
+        if request.function_byte == self._request.function_byte:
+            if request != self._request:
                 raise Ignored('request with the function byte of the one before')
             return True
-        self.request, self._function_byte = data, request.function_byte
+        self._request = request
         self.requests += 1
-        self.response = pkw.encode(self._response(request), self._layout)
-        self.answer(Frame(self._identifiers.response, self.response, False), now)
+        self._response = self._response_to(request)
+        self.answer(Frame(self._identifiers.response, pkw.encode(self._response, self._layout),
+                          False), now)
         return True
 
-    def _response(self, request: pkw.Message) -> pkw.Message:
+    def _response_to(self, request: pkw.Message) -> pkw.Message:
         meaning = request.meaning
         if request.code == pkw.Function.NONE:
             return pkw.response(request)
@@ -114,7 +111,8 @@ class SimulatedPkwDrive(SimulatedDrive):
 
     def _constants(self) -> Contents:
         """Return the name, the mailbox, PDO4."""
-        mailbox = self.request + self.response
+        mailbox = b''.join(pkw.encode(message, self._layout) for message in (
+            self._request, self._response))
         objects: Contents = {(0x1008, 0): DEVICE_NAME, (0x3000, 0): bytes((4,))}
         for number in range(1, 5):
             objects[0x3000, number] = mailbox[4 * number - 4:4 * number]

@@ -14,8 +14,8 @@ from drive_can_bridge.core.parameters import Parameter, Storage
 from drive_can_bridge.protocols.canopen import abort_codes
 from drive_can_bridge.protocols.canopen_pkw.object_map import BLOCKS, object_of, register_of
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, WORD_MAX
-from drive_can_bridge.simulation.canopen.sdo import checked_length, CODES, Refused
-from drive_can_bridge.simulation.registers import Registers
+from drive_can_bridge.simulation.canopen.sdo import checked_length, CODES
+from drive_can_bridge.simulation.registers import Refused, Registers
 
 
 class Cell(NamedTuple):
@@ -35,22 +35,25 @@ class RegisterTable:
         parameters = list(registers.parameters.values())
         # what the profile says goes before what follows from the table of the vendor
         for parameter in parameters:
-            self._enter(parameter, parameter.number, _object(parameter))
+            if parameter.number is not None:
+                self._enter(parameter, Address(parameter.number))
+            if parameter.index is not None:
+                self._enter(parameter, Address(parameter.index, parameter.subindex or 0))
         for parameter in parameters:
             register = register_number(parameter)
-            self._enter(parameter, register, _object(parameter) or (
-                None if register is None else object_of(register)))
+            place = None if register is None else object_of(register)
+            if register is not None:
+                self._enter(parameter, Address(register))
+            if place is not None and parameter.index is None:
+                self._enter(parameter, Address(*place))
 
-    def _enter(self, parameter: Parameter, register: int | None,
-               place: tuple[int, int] | None) -> None:
+    def _enter(self, parameter: Parameter, address: Address) -> None:
         shifts = range(0, parameter.type.bits, 16)
         if (parameter.word_order or self._word_order) == 'high_first':
             shifts = shifts[::-1]
-        for step, shift in enumerate(shifts):
-            if register is not None:
-                self._cells.setdefault(Address(register + step), Cell(parameter, shift))
-            if place is not None:
-                self._cells.setdefault(Address(place[0], place[1] + step), Cell(parameter, shift))
+        for shift in shifts:
+            self._cells.setdefault(address, Cell(parameter, shift))
+            address = address.next
 
     def read(self, address: Address, count: int) -> tuple[int, ...]:
         """
@@ -130,7 +133,3 @@ def register_number(parameter: Parameter) -> int | None:
         return parameter.number
     return register_of(parameter.index, parameter.subindex or 0)
 
-
-def _object(parameter: Parameter) -> tuple[int, int] | None:
-    """Return the CANopen address of a parameter, as the profile has it."""
-    return None if parameter.index is None else (parameter.index, parameter.subindex or 0)

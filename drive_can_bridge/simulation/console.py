@@ -36,21 +36,21 @@ class Console:
         words = line.split()
         if not words:
             return
+        told: list[str] = []
         if words == ['help']:
-            for text in help_lines():
-                self._say(text)
+            told = help_lines()
         elif words in (['list'], ['status']):
             for drive in self._drives.values():
-                for text in describe(drive)[:1 if words == ['list'] else 2]:
-                    self._say(text)
+                told += describe(drive)[:1 if words == ['list'] else 2]
         elif words[0] not in self._drives:
             self._complain(f"no drive '{words[0]}'; drives: {', '.join(self._drives)}; "
                            f"also: status, list, help")
         elif len(words) == 1:
-            for text in describe(self._drives[words[0]]):
-                self._say(text)
+            told = describe(self._drives[words[0]])
         else:
             self._play(self._drives[words[0]], words[1:])
+        for text in told:
+            self._say(text)
 
     def _play(self, drive: PlayedDrive, texts: list[str]) -> None:
         try:

@@ -12,7 +12,8 @@ found by their names; then the profile's patterns are met.
        any ── trip ──► fault    └──────────────── standstill ◄── quick stop ◄───────────┘
 
 The ways between the upper four are those of the rules. In "switch-on disabled" a word that enables
-does not count before another one came.
+does not count before another one came. A "shutdown" is a way down that some machines have: at
+standstill it leads to "ready to switch on".
 """
 
 from collections.abc import Callable, Collection
@@ -36,12 +37,16 @@ class State(Enum):
     READY_TO_SWITCH_ON = auto()
     SWITCHED_ON = auto()
     OPERATION_ENABLED = auto()
+    SHUTDOWN = auto()
     QUICK_STOP = auto()
     FAULT = auto()
     FAULT_RELEASED = auto()
 
 
 FAULTS = (State.FAULT, State.FAULT_RELEASED)
+RUNNING = (State.OPERATION_ENABLED, State.SHUTDOWN)
+#: where standstill leads
+ENDS = {State.QUICK_STOP: State.SWITCH_ON_DISABLED, State.SHUTDOWN: State.READY_TO_SWITCH_ON}
 
 
 class Rule(NamedTuple):
@@ -67,18 +72,22 @@ class Machine:
     :param reset: mask and value of a word that ends a fault, where the word before was none.
     :param power_on: where it begins, and with which word as the one before.
     :param after_fault: where a reset leads.
+    :param ramp: bits of a word without which the ramp of the quick stop holds.
     """
 
     rules: tuple[Rule, ...] = ()
     reset: tuple[int, int] | None = None
     power_on: tuple[State, int] = (State.SWITCH_ON_DISABLED, 0)
     after_fault: State = State.SWITCH_ON_DISABLED
+    ramp: int = 0
 
 
 class Operation:
     """
     The operating state of one simulated drive.
 
+    :ivar now: the time up to which it has come; before the first frame minus infinity.
+    :ivar powered: there is power.
     :ivar state: what the machine is in.
     :ivar word: the last control word.
     :ivar enabled: torque is on.
@@ -88,15 +97,27 @@ class Operation:
 
     def __init__(self, machine: Machine) -> None:
         self._machine = machine
-        self.power_on()
+        self.now = -math.inf
+        self.power_off()
+        self.powered = True
 
-    def power_on(self) -> None:
-        """Begin anew, without a fault."""
+    def power_off(self) -> None:
+        """Begin anew, without a fault, once it is powered again."""
+        self.powered = False
         state, self.word = self._machine.power_on
         self._cause_ends = -math.inf
         self._enter(state)
 
-    def word_written(self, word: int, now: float) -> None:
+    def advance(self, now: float) -> float:
+        """
+        Let time pass up to now. It never runs backwards.
+
+        :return: how much passed, in s.
+        """
+        last, self.now = self.now, max(now, self.now)
+        return self.now - last if last > -math.inf else 0.0
+
+    def word_written(self, word: int) -> None:
         before, self.word = self.word, word
         for states, mask, value, to in self._machine.rules:
             if word & mask == value and (states is None or self.state in states):
@@ -104,21 +125,34 @@ class Operation:
                 break
         if self.faulted and self._machine.reset is not None:
             mask, value = self._machine.reset
-            if word & mask == value != before & mask and self.reset_allowed(now):
+            if word & mask == value != before & mask and self.reset_allowed:
                 self.repair()
 
-    def trip(self, now: float, duration: float = 0.0) -> None:
-        """Fail. The cause lasts for some seconds, during which no reset helps."""
-        self._cause_ends = now + duration
+    def trip(self, duration: float = 0.0, code: float | None = None) -> None:
+        """
+        Fail.
+
+        :param duration: s that the cause lasts, during which no reset helps.
+        :param code: of the fault; None: it has none of its own.
+        """
+        self._cause_ends = self.now + duration
+        self._code = code
         self._enter(State.FAULT)
 
-    def reset_allowed(self, now: float) -> bool:
-        """Tell whether the cause of a trip is gone."""
-        return now >= self._cause_ends
+    def fault_code(self, default: float) -> float:
+        """Return the code of the fault, the default where it has none; 0 without a fault."""
+        if not self.faulted:
+            return 0.0
+        return default if self._code is None else self._code
 
-    def end_cause(self, now: float) -> None:
-        """Let a reset help from some time on, at the latest."""
-        self._cause_ends = min(self._cause_ends, now)
+    @property
+    def reset_allowed(self) -> bool:
+        """The cause of a trip is gone."""
+        return self.now >= self._cause_ends
+
+    def end_cause(self) -> None:
+        """Let a reset help from now on."""
+        self._cause_ends = min(self._cause_ends, self.now)
 
     def repair(self) -> None:
         """Clear a fault, as a reset or somebody at the drive does."""
@@ -127,15 +161,15 @@ class Operation:
                         else self._machine.after_fault)
 
     def standstill(self) -> None:
-        """Take note that the motor has stopped: the end of a quick stop."""
-        if self.state is State.QUICK_STOP:
-            self._enter(State.SWITCH_ON_DISABLED)
+        """Take note that the motor stands: the end of a quick stop, or of a shutdown."""
+        self._enter(ENDS.get(self.state, self.state))
 
     def _enter(self, state: State) -> None:
         self.state = state
         self.faulted = state in FAULTS
-        self.stopping = state is State.QUICK_STOP
-        self.enabled = self.stopping or state is State.OPERATION_ENABLED
+        running, ramp = state in RUNNING, self._machine.ramp
+        self.stopping = state is State.QUICK_STOP or running and self.word & ramp != ramp
+        self.enabled = self.stopping or running
 
 
 def machine_of(table: ControlTable | None) -> Machine:
@@ -165,9 +199,7 @@ class Report(NamedTuple):
     setpoint_reached: bool = False
 
 
-Condition = Callable[[Report], bool]
-
-_RULES: tuple[tuple[tuple[str, ...], Condition], ...] = (
+_RULES: tuple[tuple[tuple[str, ...], Callable[[Report], bool]], ...] = (
     (('ready', 'ready_to_switch_on', 'ready_to_run', 'no_fault', 'ok'),
      lambda r: not r.operation.faulted),
     (('enabled', 'running', 'operation_enabled', 'on', 'active', 'operating'),
@@ -185,7 +217,7 @@ _RULES: tuple[tuple[tuple[str, ...], Condition], ...] = (
     (('no_quick_stop',), lambda r: not r.operation.stopping),
     (('voltage_enabled', 'power_on', 'mains_ok', 'bus_control', 'remote'), lambda r: True),
 )
-BIT_RULES: dict[str, Condition] = {name: rule for names, rule in _RULES for name in names}
+BIT_RULES = {name: rule for names, rule in _RULES for name in names}
 
 
 class StatusWord:

@@ -12,9 +12,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.frame import Frame, STANDARD_IDENTIFIER_MAX
-from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.parameters import Parameter, Storage
 from drive_can_bridge.protocols.datamodel import extended, standard
-from drive_can_bridge.simulation.datamodel_table import DataModelTable, map_parameters
+from drive_can_bridge.simulation.datamodel_table import DataModelTable
 from drive_can_bridge.simulation.drive import Ignored, SimulatedDrive
 
 #: what unused bytes of a response hold
@@ -113,7 +113,13 @@ class SimulatedDataModelDrive(SimulatedDrive):
                                     eeprom_time=self.eeprom_time)
 
     def own_parameters(self) -> Mapping[str, Parameter]:
-        return map_parameters(self.configuration)
+        """Return the entries of both maps that the profile does not list, ``p122`` and so on."""
+        options, profile = self.configuration.options, self.configuration.profile
+        listed = {parameter.number for parameter in profile.parameters.values()}
+        numbers = [base + slot for base in (options.request_map_base, options.response_map_base)
+                   for slot in range(extended.SLOTS)]
+        return {f'p{number}': Parameter(f'p{number}', number=number, storage=Storage.EEPROM)
+                for number in numbers if number not in listed}
 
     def receive(self, frame: Frame, now: float) -> bool:
         try:

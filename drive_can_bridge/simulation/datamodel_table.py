@@ -19,16 +19,6 @@ from drive_can_bridge.simulation.registers import Registers
 _CLOCK_TOLERANCE = 1e-6
 
 
-def map_parameters(configuration: DriveConfiguration) -> dict[str, Parameter]:
-    """Return the entries of both maps that the profile does not list, ``p122`` and so on."""
-    options = configuration.options
-    listed = {parameter.number for parameter in configuration.profile.parameters.values()}
-    numbers = [base + slot for base in (options.request_map_base, options.response_map_base)
-               for slot in range(SLOTS)]
-    return {f'p{number}': Parameter(f'p{number}', number=number, storage=Storage.EEPROM)
-            for number in numbers if number not in listed}
-
-
 class DataModelTable:
     """
     Everything that can be addressed by a parameter number.

@@ -82,6 +82,7 @@ class SimulatedDrive(ABC):
     :ivar companion: what it composes beside its own telegrams.
     :ivar requests: requests understood.
     :ivar answers: answers given, before scripted faults took theirs.
+    :ivar wear: EEPROM cells written, by parameter.
     :ivar violations: how often the other side broke a rule of the protocol, by rule.
     :ivar table: what can be addressed, by the protocol's addresses.
     """
@@ -101,12 +102,12 @@ class SimulatedDrive(ABC):
         self.plant = (plant or self.choose_plant())(
             self.registers, configuration, mechanics or Mechanics())
         self.registers.connect(self.plant)
+        self.wear = self.registers.wear
         self.companion = Companion()
         self.requests = self.answers = 0
         self.violations: Counter[str] = Counter()
         self._notices: list[str] = []
         self._outbox = Outbox(self._foreign_frames)
-        self._powered = True
         self._deaf_until = -math.inf
         self._foreign_turn = -1
         self._cut_at = math.inf
@@ -192,36 +193,32 @@ class SimulatedDrive(ABC):
         if kind in Outbox.FAULTS:
             self._outbox.add(fault)
         elif kind in (FaultKind.STUCK, FaultKind.REFUSE):
-            self.registers.faults[kind, self._known(str(fault.argument)), ''] = fault
+            self.registers.faults[kind, self._known(fault.argument), ''] = fault
         elif kind is FaultKind.NEEDS:
-            name, other = map(self._known, fault.pair)
+            name, other = map(self._known, fault.argument.split(':', 1))
             self.registers.faults[kind, name, other] = fault
         elif kind is FaultKind.SET:
-            name = self._known(fault.pair[0])
-            self.set_value(name, _value(self.registers.parameters[name], fault.pair[1]), now)
+            word, text = fault.argument.split(':', 1)
+            name = self._known(word)
+            self.set_value(name, _value(self.registers.parameters[name], text), now)
             self._set_by_fault.add(name)
         elif kind is FaultKind.CUT_AT:
-            self._cut_at = self.registers.settings_written + (fault.number or 1)
+            self._cut_at = self.registers.settings_written + fault.argument
         elif kind in _POWER_CUTS:
-            seconds = _POWER_CUTS[kind] if fault.number is None else fault.number
+            seconds = _POWER_CUTS[kind] if fault.argument is None else fault.argument
             self.lose_power(now, now + seconds, forget=kind is FaultKind.FORGET)
         elif kind is FaultKind.OK:
             self._repair(now)
-        elif self._powered:
-            self.trip(now, fault.number or 0.0)
+        elif self.plant.operation.powered:
+            self.trip(now, fault.argument or 0.0)
         self._notices.append(f'{self.name}: fault {fault}' if kind is not FaultKind.OK
                              else f'{self.name}: no fault any more')
         self.companion.look(now)
 
     @property
-    def wear(self) -> Counter[str]:
-        """EEPROM cells written, by parameter."""
-        return self.registers.wear
-
-    @property
     def eeprom_writes(self) -> int:
         """EEPROM cells written."""
-        return sum(self.registers.wear.values())
+        return sum(self.wear.values())
 
     @property
     def faults_text(self) -> str:
@@ -269,9 +266,10 @@ class SimulatedDrive(ABC):
         """Return what makes the plant, where nobody brings another one."""
         return MotorPlant
 
-    def trip(self, now: float, duration: float) -> None:
-        """Fail by itself; the cause lasts for some seconds."""
-        self.plant.trip(duration)
+    def trip(self, now: float, duration: float, code: float | None = None) -> None:
+        """Fail by itself; the cause lasts for some seconds. See :meth:`.Operation.trip`."""
+        self.plant.operation.trip(duration, code)
+        self.plant.advance(now)
 
     def power_lost(self, *, forget: bool) -> None:  # noqa: B027  optional hook
         """Forget what a family keeps outside the registers."""
@@ -296,9 +294,9 @@ class SimulatedDrive(ABC):
     def lose_power(self, now: float, back_at: float, *, forget: bool = False) -> None:
         """Lose power until some time; RAM is lost with it."""
         self._outbox.clear()
+        self.plant.operation.power_off()
         self.plant.power_off()
         self.registers.lose_power()
-        self._powered = False
         self.restart(back_at, forget=forget)
         self._advance(now)
 
@@ -335,10 +333,11 @@ class SimulatedDrive(ABC):
         """Let the motor move up to now, if that is known; power may have come back on the way."""
         if now is None:
             return
-        if not self._powered and now >= self._deaf_until:
+        operation = self.plant.operation
+        if not operation.powered and now >= self._deaf_until:
             self.plant.advance(self._deaf_until)
             self.plant.power_on()
-            self._powered = True
+            operation.powered = True
         self.plant.advance(now)
 
     def _repair(self, now: float) -> None:

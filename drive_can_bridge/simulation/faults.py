@@ -12,18 +12,15 @@ from enum import Enum
 import heapq
 from itertools import count
 import math
-from typing import TypeVar
+from typing import Any
 
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.words import nearest
 
-Argument = float | int | str
-Number = TypeVar('Number', float, int)
 
-
-def _number(kind: type[Number], low: Number, high: float) -> Callable[[str], Number]:
-    def convert(text: str) -> Number:
+def _number(kind: type[Any], low: float, high: float) -> Callable[[str], Any]:
+    def convert(text: str) -> Any:
         value = kind(text)
         if not low <= value <= high:    # nor is what is no number
             raise ValueError
@@ -69,7 +66,7 @@ class FaultKind(Enum):
     OK = 'ok', 'all faults end'
 
     def __init__(self, usage: str, meaning: str,
-                 convert: Callable[[str], Argument] | None = None) -> None:
+                 convert: Callable[[str], Any] | None = None) -> None:
         self.usage, self.meaning, self.convert = usage, meaning, convert
         self.word = usage.partition('=')[0].rstrip('[')
         self.required = convert is not None and '[' not in usage
@@ -86,24 +83,13 @@ def usage_lines() -> list[str]:
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """A fault to be played, with its argument where it has one."""
+    """A fault to be played, with its argument where it has one: a number or a string."""
 
     kind: FaultKind
-    argument: Argument | None = None
+    argument: Any = None
 
     def __str__(self) -> str:
         return self.kind.word if self.argument is None else f'{self.kind.word}={self.argument}'
-
-    @property
-    def pair(self) -> tuple[str, str]:
-        """Both halves of an argument with a colon; the second is '' where there is none."""
-        first, _, second = str(self.argument).partition(':')
-        return first, second
-
-    @property
-    def number(self) -> float | None:
-        """The argument of a fault that takes seconds or a count."""
-        return None if isinstance(self.argument, str) else self.argument
 
 
 def parse_fault(text: str) -> Fault:
@@ -161,13 +147,13 @@ class Outbox:
             self.frames.append(frame)
             return
         self._answers += 1
-        numbers = {kind: fault.number for kind, fault in faults.items()}
-        drop, length, late = map(numbers.get, (FaultKind.DROP, FaultKind.LENGTH, FaultKind.LATE))
+        drop, length, late = (faults[kind].argument if kind in faults else None for kind in (
+            FaultKind.DROP, FaultKind.LENGTH, FaultKind.LATE))
         if FaultKind.SILENT in faults or drop and self._answers % drop == 0:
             return
         spoilt = frame
         if length is not None:
-            spoilt = frame._replace(data=(frame.data + bytes(8))[:int(length)])
+            spoilt = frame._replace(data=(frame.data + bytes(8))[:length])
         frames = [spoilt, spoilt] if FaultKind.DUPLICATE in faults else [spoilt]
         if FaultKind.FOREIGN in faults:
             frames = self._foreign_frames(frame) + frames

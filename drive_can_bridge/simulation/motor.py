@@ -4,7 +4,7 @@ A motor that moves: speed follows its setpoint with a ramp, and what follows fro
 
 Not a model of any real machine. It is there so that values look alive, have the right signs, and
 react to what is commanded. Time is an argument; all formulas are closed, so that it does not
-matter how often :meth:`Motor.advance` is called.
+matter how often time passes.
 """
 
 from dataclasses import dataclass, field
@@ -33,41 +33,9 @@ class Rates:
 
 
 @dataclass
-class Ramp:
-    """
-    A value that follows its target at a limited rate.
-
-    :ivar slope: rate of change at the end of the last step.
-    """
-
-    value: float = 0.0
-    slope: float = 0.0
-
-    def advance(self, duration: float, target: float, rates: Rates) -> float:
-        """
-        Go towards the target for some time.
-
-        :return: integral of the value over the duration.
-        """
-        integral = self.slope = 0.0
-        while duration > 0.0 and self.value != target:
-            before, goal = self.value, target if self.value * target >= 0.0 else 0.0
-            rate = rates.rising if abs(goal) > abs(before) else rates.falling
-            needed = abs(goal - before) / rate
-            if needed <= duration:
-                self.value = goal
-            else:
-                needed, self.slope = duration, math.copysign(rate, goal - before)
-                self.value += self.slope * duration
-            integral += (before + self.value) / 2.0 * needed
-            duration -= needed
-        return integral + self.value * max(duration, 0.0)
-
-
-@dataclass
 class Travel:
     """
-    A position that goes to its target with limited speed and acceleration.
+    Something that moves: a speed, and the position that comes of it.
 
     :ivar slope: rate of change of the speed at the end of the last step.
     """
@@ -76,8 +44,24 @@ class Travel:
     speed: float = 0.0
     slope: float = 0.0
 
+    def run(self, duration: float, target: float, rates: Rates) -> None:
+        """Go towards a speed for some time."""
+        way = self.slope = 0.0
+        while duration > 0.0 and self.speed != target:
+            before, goal = self.speed, target if self.speed * target >= 0.0 else 0.0
+            rate = rates.rising if abs(goal) > abs(before) else rates.falling
+            needed = abs(goal - before) / rate
+            if needed <= duration:
+                self.speed = goal
+            else:
+                needed, self.slope = duration, math.copysign(rate, goal - before)
+                self.speed += self.slope * duration
+            way += (before + self.speed) / 2.0 * needed
+            duration -= needed
+        self.position += way + self.speed * max(duration, 0.0)
+
     def go(self, duration: float, target: float, speed_max: float, acceleration: float) -> None:
-        """Go towards the target for some time, as fast as possible and without overshoot."""
+        """Go towards a position for some time, as fast as possible and without overshoot."""
         distance = target - self.position
         braking = self.speed * abs(self.speed) / (2.0 * acceleration)
         way = math.copysign(1.0, self.speed if distance == braking else distance - braking)
@@ -105,22 +89,15 @@ class Travel:
         self.position += way * moved
         self.speed, self.slope = way * speed, way * slope
 
-    def run(self, duration: float, speed: float, rate: float) -> None:
-        """Go to a speed instead, and on with it."""
-        ramp = Ramp(self.speed)
-        self.position += ramp.advance(duration, speed, Rates(rate, rate))
-        self.speed, self.slope = ramp.value, ramp.slope
-
 
 @dataclass
 class Motor:
     """
-    Speed, position, torque, current and temperature of a motor.
+    Torque, current and temperature of a motor.
 
-    :param rated_speed: in whatever unit speed setpoints have.
-    :param revolutions: revolutions per second at a speed of one unit.
+    :param rated_speed: in whatever unit its shaft moves.
+    :param revolutions: revolutions per unit of its way.
     :param load: share of the rated torque that a weight takes.
-    :ivar position: revolutions since power was applied first.
     :ivar torque: share of the rated torque, with sign.
     :ivar current: share of the rated current, a magnitude.
     :ivar temperature: °C.
@@ -129,8 +106,7 @@ class Motor:
     rated_speed: float
     revolutions: float
     load: float = 0.0
-    ramp: Ramp = field(default_factory=Ramp)
-    position: float = 0.0
+    shaft: Travel = field(default_factory=Travel)
     torque: float = 0.0
     current: float = 0.0
     temperature: float = AMBIENT_TEMPERATURE
@@ -138,20 +114,20 @@ class Motor:
     @property
     def speed(self) -> float:
         """Speed in the unit of the setpoint."""
-        return self.ramp.value
+        return self.shaft.speed
+
+    @property
+    def position(self) -> float:
+        """Revolutions since power was applied first."""
+        return self.shaft.position * self.revolutions
 
     @property
     def share_of_rated_speed(self) -> float:
         """Speed as a share of the rated one, with sign."""
-        return self.ramp.value / self.rated_speed
+        return self.shaft.speed / self.rated_speed
 
-    def advance(self, duration: float, target: float, rates: Rates, *, energised: bool) -> None:
-        travelled = self.ramp.advance(duration, target, rates) if duration > 0.0 else 0.0
-        self.moved(duration, travelled, energised=energised)
-
-    def moved(self, duration: float, travelled: float, *, energised: bool) -> None:
-        """Take note of a way in units of speed times s: position, temperature, torque."""
-        self.position += travelled * self.revolutions
+    def advance(self, duration: float, *, energised: bool) -> None:
+        """Take note of how the shaft has moved for some time."""
         goal = AMBIENT_TEMPERATURE + TEMPERATURE_RISE * self.current ** 2
         self.temperature += (goal - self.temperature) * -math.expm1(
             -duration / TEMPERATURE_TIME_CONSTANT)
@@ -161,6 +137,6 @@ class Motor:
         speed = self.share_of_rated_speed
         friction = math.copysign(FRICTION_TORQUE, speed) if speed else 0.0
         torque = (LOAD_TORQUE * speed + friction + self.load
-                  + INERTIA_TORQUE * self.ramp.slope / self.rated_speed)
+                  + INERTIA_TORQUE * self.shaft.slope / self.rated_speed)
         self.torque = min(max(torque, -TORQUE_MAX), TORQUE_MAX)
         self.current = math.hypot(MAGNETISING_CURRENT, self.torque)

@@ -17,43 +17,37 @@ from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.simulation.control import Operation
 
 if TYPE_CHECKING:
-    from drive_can_bridge.simulation.registers import Registers
+    from drive_can_bridge.simulation.registers import Refusal, Registers
 
 
 class Plant(Protocol):
-    """A motor, or whatever a drive moves. Time is an argument and never runs backwards."""
+    """
+    A motor, or whatever a drive moves. Time is an argument and never runs backwards.
 
-    @property
-    def operation(self) -> Operation:
-        """The operating state."""
+    :ivar operation: the operating state.
+    :ivar volatile: names of further parameters that a loss of power resets.
+    """
 
-    @property
-    def volatile(self) -> Collection[str]:
-        """Names of further parameters that a loss of power resets."""
+    operation: Operation
+    volatile: Collection[str] = ()
 
-    def initial(self, parameter: Parameter) -> int | None:
-        """Return what a new drive has in a register; None: any plausible value."""
+    def initial(self, parameter: Parameter) -> int:
+        """Return what a new drive has in a register, where its limits allow it."""
 
     def source(self, parameter: Parameter) -> Callable[[], int] | None:
         """Return what computes a read-only register; None: it is plain memory."""
 
-    def allows(self, parameter: Parameter, raw: int) -> bool:
-        """Tell whether a register accepts a value within its limits; False: it is refused."""
-
-    def takes(self, parameter: Parameter) -> bool:
-        """Tell whether writes have an effect now; False: acknowledged, the value stays."""
+    def refusal(self, parameter: Parameter, raw: int) -> 'Refusal | None':
+        """Say why a register does not take a value within its limits now; None: it does."""
 
     def written(self, name: str, before: int, raw: int) -> None:
         """React to a register that was written."""
 
     def advance(self, now: float) -> None:
-        """Move up to now."""
-
-    def trip(self, duration: float = 0.0) -> None:
-        """Fail; the cause lasts for some seconds."""
+        """Move up to now, and let the clock of the operating state go with it."""
 
     def power_off(self) -> None:
-        """Go on without power: nothing is driven any more."""
+        """Note that power is lost."""
 
     def power_on(self) -> None:
         """Begin anew; the registers have what EEPROM kept."""

@@ -10,10 +10,9 @@ without power only what is in EEPROM.
 from collections import Counter
 from collections.abc import Callable, Collection, Mapping
 from enum import Enum
-import zlib
 
-from drive_can_bridge.core.errors import ValueRefused
-from drive_can_bridge.core.parameters import Access, Parameter, ParameterType, Storage, Value
+from drive_can_bridge.core.errors import DriveCanError
+from drive_can_bridge.core.parameters import Parameter, Storage, Value
 from drive_can_bridge.simulation import names
 from drive_can_bridge.simulation.faults import Fault, FaultKind
 from drive_can_bridge.simulation.plant import Plant
@@ -21,13 +20,26 @@ from drive_can_bridge.simulation.scales import clamp, nearest_raw
 
 
 class Refusal(Enum):
-    """Why a write is refused, where a protocol can say so."""
+    """Why a write is refused, where a protocol can say so; one kind is acknowledged instead."""
 
     READ_ONLY = 'read-only'
     OUT_OF_RANGE = 'out of range'
     CROSSED = 'minimum above maximum'
     FORBIDDEN = 'a scripted fault'
     TOO_EARLY = 'another parameter has to be written first'
+    UNTOLD = 'nobody is told, the value stays'
+
+
+class Refused(DriveCanError):
+    """
+    An access that a drive does not carry out.
+
+    :param code: the reason, as a number of its protocol.
+    """
+
+    def __init__(self, code: int) -> None:
+        super().__init__(code)
+        self.code = code
 
 
 class Registers:
@@ -62,9 +74,7 @@ class Registers:
         """Fill the registers with what a new drive has, and let a plant compute the others."""
         self._plant = plant
         for name, parameter in self.parameters.items():
-            initial = plant.initial(parameter)
-            self._initial[name] = self.clamped(
-                name, initial_value(parameter) if initial is None else initial)
+            self._initial[name] = self.clamped(name, plant.initial(parameter))
             source = None if parameter.writable else plant.source(parameter)
             if source is not None:
                 self._sources[name] = source
@@ -97,8 +107,11 @@ class Registers:
                     return Refusal.FORBIDDEN
                 if one == name and kind is FaultKind.NEEDS and other not in self._written:
                     return Refusal.TOO_EARLY
-            if raw != self.clamped(name, raw) or not self._plant.allows(parameter, raw):
+            if raw != self.clamped(name, raw):
                 return Refusal.OUT_OF_RANGE
+            refusal = self._plant.refusal(parameter, raw)
+            if refusal not in (None, Refusal.UNTOLD):
+                return refusal
             for ends in self._crossings.get(name, ()):
                 low, high = (self.parameters[end].value_from_raw(raws.get(end, self._raw[end]))
                              for end in ends)
@@ -116,7 +129,7 @@ class Registers:
         parameter = self.parameters[name]
         blocked = self.faults and any(
             one == name and kind is not FaultKind.NEEDS for kind, one, _ in self.faults)
-        if blocked or not self._plant.takes(parameter):
+        if blocked or self._plant.refusal(parameter, raw) is not None:
             return
         if wear:
             self.wear[name] += wear
@@ -177,27 +190,3 @@ class Registers:
             self._kept[name] = raw
         self._plant.written(name, before, raw)
 
-
-def initial_value(parameter: Parameter) -> int:
-    """Return a value that a new drive might have; the same one each time."""
-    limits = parameter.raw_limits
-    if parameter.neutral is not None:
-        try:
-            return clamp(parameter.neutral_raw, limits)
-        except ValueRefused:
-            return clamp(0, limits)
-    words = set(parameter.name.split('_'))
-    if (parameter.bits or 'status' in words or parameter.type is ParameterType.BOOL
-            or parameter.access is Access.WRITE_ONLY):
-        return clamp(0, limits)
-    low, high = parameter.minimum, parameter.maximum
-    if {'limit', 'maximum', 'max'} & words:
-        value = 100.0 if high is None else high
-    elif {'minimum', 'min'} & words:
-        value = 0.0 if low is None else low
-    elif low is not None and high is not None:
-        value = low + (high - low) / 3.0
-    else:
-        # any figure will do, as long as it is not 0 and differs between parameters
-        return clamp(10 + zlib.crc32(parameter.name.encode()) % 90, limits)
-    return nearest_raw(parameter, value, limits)

@@ -7,9 +7,10 @@ module for its unit, made smaller where the parameter cannot carry it.
 """
 
 import math
+import zlib
 
-from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.simulation.names import Quantity
+from drive_can_bridge.core.parameters import Parameter, ParameterType
+from drive_can_bridge.simulation.names import Quantity, words_of
 
 #: revolutions per second at a speed of 1 in the unit; one pole pair, 10 mm per revolution
 _REVOLUTIONS = {
@@ -88,12 +89,42 @@ def temperature_value(parameter: Parameter, celsius: float) -> float:
     return celsius * 1.8 + 32.0 if parameter.unit in ('°F', 'degF', 'F') else celsius
 
 
+def mains_swing(now: float) -> float:
+    """
+    Return by which share of a voltage the mains are off.
+
+    Of a drive at rest it is the one value that moves: whoever looks sees that it is alive.
+    """
+    return 0.005 * math.sin(2.0 * math.pi * 0.3 * max(now, 0.0))
+
+
 def rating(parameter: Parameter, quantity: Quantity) -> float:
     """Return what a parameter shows at 100 % of a quantity."""
     wanted = _RATINGS.get(quantity, {}).get(parameter.unit, _DEFAULT_RATING)
     # a voltage hardly exceeds its rating, everything else may double
     headroom = 1.2 if quantity is Quantity.VOLTAGE else 2.0
     return min(wanted, highest(parameter) / headroom)
+
+
+def plausible(parameter: Parameter) -> int:
+    """Return the raw integer of a value that a new drive might have; the same one each time."""
+    limits, words = parameter.raw_limits, words_of(parameter)
+    low, high = parameter.minimum, parameter.maximum
+    if parameter.neutral is not None:
+        return clamp(parameter.raw_nearest(parameter.neutral) or 0, limits)
+    if (parameter.bits or 'status' in words or parameter.type is ParameterType.BOOL
+            or not parameter.readable):
+        return clamp(0, limits)
+    if {'limit', 'maximum', 'max'} & words:
+        value = 100.0 if high is None else high
+    elif {'minimum', 'min'} & words:
+        value = 0.0 if low is None else low
+    elif low is not None and high is not None:
+        value = low + (high - low) / 3.0
+    else:
+        # any figure will do, as long as it is not 0 and differs between parameters
+        return clamp(10 + zlib.crc32(parameter.name.encode()) % 90, limits)
+    return nearest_raw(parameter, value, limits)
 
 
 def clamp(raw: int, ends: tuple[int, int]) -> int:

@@ -112,16 +112,11 @@ class SlcanAdapter:
         return None
 
     def _transmit(self, command: str) -> Frame | None:
-        frame = _frame(command)
-        if frame is None or not self.is_open or self._listen_only:
+        remote, match = command[0] in 'rR', _FRAME.fullmatch(command)
+        if (match is None or len(match[4]) != (0 if remote else 2 * int(match[3]))
+                or not self.is_open or self._listen_only):
             self._replies += REFUSED
             return None
-        return frame if command[0] in 'tT' and self.connected else None
-
-
-def _frame(command: str) -> Frame | None:
-    """Read a transmit command; None if it is none. Remote frames come out without data."""
-    match = _FRAME.fullmatch(command)
-    if match is None or len(match[4]) != (0 if command[0] in 'rR' else 2 * int(match[3])):
-        return None
-    return Frame(int(match[1] or match[2], 16), bytes.fromhex(match[4]), match[1] is None)
+        if remote or not self.connected:
+            return None
+        return Frame(int(match[1] or match[2], 16), bytes.fromhex(match[4]), match[1] is None)

@@ -57,8 +57,7 @@ class Starter:
 
     def __init__(self) -> None:
         self.thermal = 0.0
-        self.full_load_current = CONTROLLER_CURRENT / 3.0
-        self.time_constant = CLASS_FACTOR * 5.0
+        self.settings(100.0, 5.0)
         self._on_for: float | None = None
 
     @property
@@ -89,9 +88,8 @@ class Starter:
         final = self._final_level
         if final <= TRIP_LEVEL:
             return math.inf
-        if self.thermal >= TRIP_LEVEL:
-            return 0.0
-        return self.time_constant * math.log((final - self.thermal) / (final - TRIP_LEVEL))
+        left = (final - self.thermal) / (final - TRIP_LEVEL)
+        return self.time_constant * math.log(max(left, 1.0))
 
     @property
     def time_to_reset(self) -> float:
@@ -99,21 +97,18 @@ class Starter:
         return self.time_constant * math.log(max(self.thermal / RESET_LEVEL, 1.0))
 
     def settings(self, full_load_percent: float, trip_class: float) -> None:
+        """Take over the full load current, in % of the largest one, and the trip class."""
         self.full_load_current = max(full_load_percent, 1.0) / 100.0 * CONTROLLER_CURRENT
         self.time_constant = CLASS_FACTOR * max(trip_class, 1.0)
 
-    def switch(self, on: bool) -> None:
-        if not on:
-            self._on_for = None
-        elif self._on_for is None:
-            self._on_for = 0.0
-
-    def advance(self, duration: float) -> bool:
+    def advance(self, duration: float, *, on: bool) -> bool:
         """
         Let time pass.
 
-        :return: the thermal capacity is used up.
+        :param on: the contactor is closed.
+        :return: the thermal capacity is used up, which has opened it.
         """
+        self._on_for = (self._on_for or 0.0) if on else None
         steps = max(math.ceil(duration / STEP), 1)
         for _ in range(min(steps, 10_000)):
             step = duration / steps
@@ -122,6 +117,7 @@ class Starter:
             self.thermal += (self._final_level - self.thermal) * -math.expm1(
                 -step / self.time_constant)
             if self._on_for is not None and self.thermal >= TRIP_LEVEL:
+                self._on_for = None
                 return True
         return False
 

@@ -7,8 +7,9 @@ Which register means what is partly recollection; docs/protocol_canopen_pkw.md s
 be trusted.
 """
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 import math
 import struct
 
@@ -17,10 +18,9 @@ from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.simulation.canopen_pkw_registers import register_number
 from drive_can_bridge.simulation.control import Operation, Report, StatusWord
-from drive_can_bridge.simulation.motor_plant import mains_swing
-from drive_can_bridge.simulation.plant import Mechanics
-from drive_can_bridge.simulation.registers import Registers
-from drive_can_bridge.simulation.scales import clamp
+from drive_can_bridge.simulation.plant import Mechanics, Plant
+from drive_can_bridge.simulation.registers import Refusal, Registers
+from drive_can_bridge.simulation.scales import clamp, mains_swing, plausible
 from drive_can_bridge.simulation.starter import (
     MACHINE, RUN_REVERSE, Starter, TEST_TRIP, THERMAL_OVERLOAD,
 )
@@ -39,7 +39,7 @@ CONFIGURATION_MODE = 1 << 0
 CLEAR_ALL, CLEAR_THERMAL_LEVEL, CLEAR_SETTINGS = 1 << 0, 1 << 2, 1 << 3
 
 #: registers that are written in configuration mode only
-SETTINGS = range(540, 700)
+SETTINGS = {*range(540, 700)} - {GENERAL_CONFIGURATION}
 #: what settings are in a new controller, by register: in configuration mode, as from the factory
 DEFAULTS = {GENERAL_CONFIGURATION: CONFIGURATION_MODE, TRIP_CLASS: 5, FULL_LOAD_RATIO: 33, 653: 33,
             682: 0, 695: 0, CONTROL_REGISTER_1: 0, CONTROL_REGISTER_2: 0}
@@ -67,84 +67,57 @@ def is_starter(profile: Profile) -> bool:
     return word is not None and register_number(word) == CONTROL_REGISTER_1
 
 
-class StarterPlant:
-    """A :class:`.Starter` behind registers."""
-
-    volatile: Collection[str] = ()
+class StarterPlant(Plant):
+    """A :class:`.Starter` behind registers. Its thermal image outlives a loss of power."""
 
     def __init__(self, registers: Registers, configuration: DriveConfiguration,
                  mechanics: Mechanics) -> None:
         self.registers = registers
         self.control = configuration.profile.control
         self.operation = Operation(MACHINE)
-        self._now: float | None = None
         self.starter = Starter()
         self._node = configuration.station
-        self._cause = 0
         # of several names for a register the first counts, as everywhere
         self._by_register = {register_number(p): p.name
                              for p in reversed(list(registers.parameters.values()))}
         self._figures = self._all_figures()
 
-    def initial(self, parameter: Parameter) -> int | None:
-        register = register_number(parameter) or 0
-        return {**DEFAULTS, **IDENTITY, SERIAL_RANK: self._node}.get(register)
+    def initial(self, parameter: Parameter) -> int:
+        known: dict[int, int] = {**DEFAULTS, **IDENTITY, SERIAL_RANK: self._node}
+        return known.get(register_number(parameter) or 0, plausible(parameter))
 
-    def allows(self, parameter: Parameter, raw: int) -> bool:
-        return raw % STEPS.get(register_number(parameter) or 0, 1) == 0
-
-    def takes(self, parameter: Parameter) -> bool:
+    def refusal(self, parameter: Parameter, raw: int) -> Refusal | None:
         """Take settings with the motor off and in configuration mode only; no word otherwise."""
-        register = register_number(parameter)
-        if register not in SETTINGS or register == GENERAL_CONFIGURATION:
-            return True
+        register = register_number(parameter) or 0
+        if raw % STEPS.get(register, 1):
+            return Refusal.OUT_OF_RANGE
         configuring = self._content(GENERAL_CONFIGURATION) & CONFIGURATION_MODE
-        return bool(configuring) and not self.operation.enabled
+        if register in SETTINGS and (self.operation.enabled or not configuring):
+            return Refusal.UNTOLD
+        return None
 
     def written(self, name: str, before: int, raw: int) -> None:
         if name == self._by_register[CONTROL_REGISTER_1]:
-            self.operation.word_written(raw, self._now or 0.0)
+            self.operation.word_written(raw)
         elif name == self._by_register.get(CONTROL_REGISTER_2):
             appeared = raw & ~before
             if appeared & (CLEAR_ALL | CLEAR_THERMAL_LEVEL):
                 self.starter.thermal = 0.0
-                self.operation.end_cause(-math.inf)
+                self.operation.end_cause()
             if appeared & (CLEAR_ALL | CLEAR_SETTINGS):
                 for register in (TRIP_CLASS, FULL_LOAD_RATIO, 653):
                     if register in self._by_register:
                         self.registers.reset(self._by_register[register])
-        self.power_on()
-        self.starter.switch(self.operation.enabled)
 
     def _content(self, register: int) -> int:
         name = self._by_register.get(register)
         return DEFAULTS[register] if name is None else self.registers.plain(name)
 
-    @property
-    def trip_code(self) -> int:
-        """Code of the trip; 0 without one."""
-        return self._cause if self.operation.faulted else 0
-
     def advance(self, now: float) -> None:
-        last = now if self._now is None else self._now
-        self._now = max(now, last)
-        self.starter.switch(self.operation.enabled)
-        if self.starter.advance(self._now - last):
-            self.trip(self.starter.time_to_reset, THERMAL_OVERLOAD)
-
-    def trip(self, duration: float = 0.0, cause: int = TEST_TRIP) -> None:
-        self._cause = cause
-        self.operation.trip(self._now or 0.0, duration)
-        self.starter.switch(False)
-
-    def power_off(self) -> None:
-        """Open the contactors; the thermal image is kept."""
-        self.operation.power_on()
-        self.starter.switch(False)
-
-    def power_on(self) -> None:
-        """Take over the settings that there are."""
-        self.starter.settings(self._content(FULL_LOAD_RATIO), self._content(TRIP_CLASS))
+        starter, operation = self.starter, self.operation
+        starter.settings(self._content(FULL_LOAD_RATIO), self._content(TRIP_CLASS))
+        if starter.advance(operation.advance(now), on=operation.enabled):
+            operation.trip(starter.time_to_reset, THERMAL_OVERLOAD)
 
     def source(self, parameter: Parameter) -> Callable[[], int] | None:
         register = register_number(parameter)
@@ -160,11 +133,11 @@ class StarterPlant:
 
     def _all_figures(self) -> dict[int | None, Figure]:
         """Return what gives the contents of registers."""
-        starter = self.starter
+        starter, code = self.starter, partial(self.operation.fault_code, TEST_TRIP)
         found: dict[int | None, Figure] = {
             450: lambda: math.ceil(starter.time_to_reset) if self.operation.faulted else 0,
-            451: lambda: self.trip_code,
-            452: lambda: _bit_of(self.trip_code),
+            451: code,
+            452: lambda: _bit_of(int(code())),
             460: lambda: THERMAL_OVERLOAD if starter.alarm else 0,
             461: lambda: _bit_of(THERMAL_OVERLOAD) if starter.alarm else 0,
             465: lambda: starter.thermal,
@@ -191,14 +164,14 @@ class StarterPlant:
             found[500 + 2 * place] = _scaled(100.0 * share, lambda: starter.current)
         for place, share in enumerate((1.0, 0.998, 1.002, 1.0)):
             found[476 + place] = _scaled(MAINS_VOLTAGE * share,
-                                         lambda: 1.0 + mains_swing(self._now or 0.0))
+                                         lambda: 1.0 + mains_swing(self.operation.now))
         return found
 
     def _status(self) -> int:
         operation, ratio = self.operation, self.starter.ratio
         faulted = operation.faulted
         bits = (not faulted, operation.enabled, faulted, self.starter.alarm, faulted,
-                faulted and operation.reset_allowed(self._now or 0.0), True, ratio > 0.1)
+                faulted and operation.reset_allowed, True, ratio > 0.1)
         word = sum(1 << number for number, wanted in enumerate(bits) if wanted)
         return word | min(math.floor(32.0 * ratio + 0.5), 63) << 8 | self.starter.starting << 15
 

@@ -9,6 +9,7 @@ open here too, so that bridges may come and go.
 
 from array import array
 from collections import deque
+from contextlib import suppress
 import fcntl
 import os
 from pathlib import Path
@@ -125,12 +126,10 @@ class SlcanTerminal(EndPoint):
             return
         self._closed = True
         for path in self._links:
-            try:
-                # another simulation may have taken the name over
+            # another simulation may have taken the name over
+            with suppress(OSError):
                 if os.readlink(path) == self.path:
                     path.unlink()
-            except OSError:
-                pass
         os.close(self._master)
         os.close(self._slave)
 

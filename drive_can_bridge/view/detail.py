@@ -11,7 +11,8 @@ from drive_can_bridge.monitor.reports import Level
 from drive_can_bridge.monitor.snapshot import DriveSnapshot, Times
 from drive_can_bridge.monitor.values import ParameterInfo
 from drive_can_bridge.view.parts import (
-    DIM, lamps, LEVEL_STYLES, Lines, milliseconds, NUMBER, state, ValueColumns, wrapped,
+    DIM, flow, lamps, LEVEL_STYLES, Lines, milliseconds, NUMBER, plain_table, state, ValueColumns,
+    wrapped,
 )
 
 _TREND_MAX = 60
@@ -35,19 +36,9 @@ def identity_lines(drive: DriveSnapshot, width: int) -> Lines:
     if not math.isnan(place.period):
         words.append(Text(f'every {1e3 * place.period:g} ms', style=DIM))
     words.append(Text(f'by {drive.bridge}', style=DIM))
-    lines = _flow(words, width)
+    lines = flow(words, width, 3)
     if drive.level is not Level.OK:
         lines += wrapped(drive.advice, width, LEVEL_STYLES[drive.level])
-    return lines
-
-
-def _flow(words: Sequence[Text], width: int) -> Lines:
-    lines: Lines = []
-    for word in words:
-        if lines and lines[-1].cell_len + 3 + word.cell_len <= width:
-            lines[-1].append('   ').append_text(word)
-        else:
-            lines.append(word.copy())
     return lines
 
 
@@ -131,8 +122,7 @@ def parameter_table(drive: DriveSnapshot, shown: Sequence[ParameterInfo], width:
             left -= wanted + 2
     if left >= 16:
         columns['description'] = left
-    table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False, header_style=DIM,
-                  show_edge=False)
+    table = plain_table()
     for key, wide in columns.items():
         table.add_column(key, width=wide, no_wrap=True,
                          justify='right' if key == 'value' else 'left')

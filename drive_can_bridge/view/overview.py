@@ -12,17 +12,18 @@ import math
 from rich.table import Table
 from rich.text import Text
 
+from drive_can_bridge.core.words import counted
 from drive_can_bridge.monitor.reports import Level
 from drive_can_bridge.monitor.snapshot import (
     BusSnapshot, DriveSnapshot, Shown, Snapshot, UNKNOWN,
 )
 from drive_can_bridge.view.parts import (
-    DIM, LEVEL_STYLES, Lines, milliseconds, NO_VALUE, spark, state, times, ValueColumns, wrapped,
+    DIM, GAP, LEVEL_STYLES, Lines, milliseconds, NO_VALUE, plain_table, spark, state, times,
+    ValueColumns, wrapped,
 )
 
 #: longest state that a drive has
 _STATE = 2 + len('mapping differs')
-_GAP = 2
 _TREND_MIN, _TREND_MAX = 8, 30
 _EXCHANGE_WIDTH = 28
 #: drives with the same trouble that are named
@@ -41,20 +42,16 @@ def drives_table(drives: Sequence[DriveSnapshot], marked: str | None, *, width: 
 
     :param height: at most.
     """
-    full = _FullTable(drives, width)
+    full, count = _FullTable(drives, width), counted(len(drives), 'drive', 'drives')
     if full.fits(height):
-        return full.table(drives, marked), full.height, _count(drives)
+        return full.table(drives, marked), full.height, count
     shown = max(1, height - 1)
     if len(drives) <= shown:
-        return _line_table(drives, drives, marked, width), len(drives) + 1, _count(drives)
+        return _line_table(drives, drives, marked, width), len(drives) + 1, count
     place = next((number for number, drive in enumerate(drives) if drive.name == marked), 0)
     first = min(max(0, place - shown // 2), len(drives) - shown)
     return (_line_table(drives, drives[first:first + shown], marked, width), shown + 1,
             f'drives {first + 1} to {first + shown} of {len(drives)}')
-
-
-def _count(drives: Sequence[DriveSnapshot]) -> str:
-    return f'{len(drives)} drive{"s" * (len(drives) != 1)}'
 
 
 def _mark(drive: DriveSnapshot, marked: str | None) -> Text:
@@ -69,14 +66,14 @@ class _FullTable:
         self._setpoints = ValueColumns(item for drive in drives for item in drive.setpoints)
         self._values = ValueColumns(item for drive in drives for item in drive.values)
         self._first = max([len(drive.label) for drive in drives] + [_STATE]) + 2
-        need = self._first + _GAP + self._values.width
+        need = self._first + GAP + self._values.width
         if self._setpoints.width:
-            need += self._setpoints.width + _GAP
+            need += self._setpoints.width + GAP
         self._too_wide = need > width
-        left = width - need - _GAP
+        left = width - need - GAP
         # where there is room for one of them only, a trend tells more
-        self._exchange = left >= _TREND_MIN + _GAP + _EXCHANGE_WIDTH
-        left -= (_GAP + _EXCHANGE_WIDTH) * self._exchange
+        self._exchange = left >= _TREND_MIN + GAP + _EXCHANGE_WIDTH
+        left -= (GAP + _EXCHANGE_WIDTH) * self._exchange
         self._trend = min(left, _TREND_MAX) if left >= _TREND_MIN else 0
         self.height = 1 + sum(self._lines(drive) for drive in drives) + max(0, len(drives) - 1)
 
@@ -87,12 +84,11 @@ class _FullTable:
         return max(3 + self._exchange, len(drive.setpoints), len(drive.values))
 
     def table(self, drives: Sequence[DriveSnapshot], marked: str | None) -> Table:
-        table = Table(box=None, padding=(0, _GAP, 0, 0), pad_edge=False, header_style=DIM,
-                      show_edge=False)
+        table = plain_table()
         table.add_column('  drive', width=self._first, no_wrap=True)
         if self._setpoints.width:
             table.add_column('setpoint, as sent', width=self._setpoints.width, no_wrap=True)
-        trend = _GAP + self._trend if self._trend else 0
+        trend = GAP + self._trend if self._trend else 0
         table.add_column('actual value', width=self._values.width + trend, no_wrap=True)
         if self._exchange:
             table.add_column(f'{"exchange":14}{"mean":>5}{"p99":>9}', width=_EXCHANGE_WIDTH,
@@ -137,19 +133,18 @@ def _line_table(all_drives: Sequence[DriveSnapshot], drives: Sequence[DriveSnaps
     first = max(len(drive.label) for drive in all_drives) + 2
     sent = ValueColumns(item for item in setpoints.values() if item)
     actual = ValueColumns(item for item in values.values() if item)
-    left = width - first - _GAP - _STATE
+    left = width - first - GAP - _STATE
     wanted = {'sent': sent.width - sent.name, 'actual': actual.width - actual.name, 'rate': 6,
               'trend': _TREND_MIN, 'missed': 6, 'name': actual.name, 'period': 14, 'latency': 14}
     widths = {}
     for key, columns in wanted.items():
-        if columns and left >= columns + _GAP:
+        if columns and left >= columns + GAP:
             widths[key] = columns
-            left -= columns + _GAP
+            left -= columns + GAP
     if 'trend' in widths:
         more = min(max(0, left), _TREND_MAX - _TREND_MIN)
         widths['trend'] += more
-    table = Table(box=None, padding=(0, _GAP, 0, 0), pad_edge=False, header_style=DIM,
-                  show_edge=False)
+    table = plain_table()
     table.add_column('  drive', width=first, no_wrap=True)
     table.add_column('  state', width=_STATE, no_wrap=True)
     headings = {'sent': 'setpoint', 'name': 'actual', 'actual': 'value', 'trend': 'trend',

@@ -14,6 +14,7 @@ from rich.layout import Layout
 from rich.table import Table
 from rich.text import Text
 
+from drive_can_bridge.core.words import counted
 from drive_can_bridge.monitor.hints import hints
 from drive_can_bridge.monitor.snapshot import DriveSnapshot, Snapshot
 from drive_can_bridge.view import detail
@@ -145,10 +146,10 @@ def _header(snapshot: Snapshot, setting: Setting, width: int) -> Text:
     header = Text(setting.title, style='bold', no_wrap=True)
     bridges, drives = len(snapshot.bridges), len(snapshot.drives)
     right = clock(snapshot.at)
-    counted = (f'{drives} drive{"s" * (drives != 1)}, {bridges} bridge{"s" * (bridges != 1)}'
-               if bridges else 'no bridge yet')
+    who = (f'{counted(drives, "drive", "drives")}, {counted(bridges, "bridge", "bridges")}'
+           if bridges else 'no bridge yet')
     namespace = f'below {setting.namespace}' if setting.namespace else ''
-    for words in (counted, setting.place, namespace):
+    for words in (who, setting.place, namespace):
         if words and header.cell_len + len(words) + 5 + len(right) <= width:
             header.append('   ').append(words, style=f'not bold {DIM}')
     header.append(' ' * max(1, width - header.cell_len - len(right)))

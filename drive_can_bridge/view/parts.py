@@ -14,6 +14,7 @@ import time
 from rich import box
 from rich.console import Group, RenderableType
 from rich.panel import Panel
+from rich.table import Table
 from rich.text import Text
 
 from drive_can_bridge.monitor.history import columns
@@ -30,6 +31,8 @@ _LOG_STYLES = {'WARN': 'bold yellow', 'ERROR': 'bold red', 'FATAL': 'bold white 
 #: bits that are no good news, whatever the drive
 _ALARMS = {'fault': 'bold red', 'alarm': 'bold red', 'trip': 'bold red', 'warning': 'bold yellow'}
 NO_VALUE = '–'
+#: between columns, and between what stands one behind the other
+GAP = 2
 _BARS = '▁▂▃▄▅▆▇█'
 #: a trend that spans less than this part of its values is a level line: noise is no news
 _FLAT = 0.02
@@ -101,16 +104,29 @@ class ValueColumns:
 
 def lamps(bits: Mapping[str, bool], width: int) -> Lines:
     """Put bits one behind the other, a lamp before each."""
-    lines: Lines = []
+    found: Lines = []
     for name, on in bits.items():
         style = _ALARMS.get(name, 'bold green') if on else DIM
-        lamp = Text('● ' if on else '○ ', style=style)
-        lamp.append(name, style=(style if name in _ALARMS else '') if on else DIM)
-        if lines and lines[-1].cell_len + 2 + lamp.cell_len <= width:
-            lines[-1].append('  ').append_text(lamp)
+        found.append(Text('● ' if on else '○ ', style=style).append(
+            name, style=(style if name in _ALARMS else '') if on else DIM))
+    return flow(found, width, GAP)
+
+
+def flow(words: Iterable[Text], width: int, gap: int) -> Lines:
+    """Put texts one behind the other, so far apart, as many on a line as fit."""
+    lines: Lines = []
+    for word in words:
+        if lines and lines[-1].cell_len + gap + word.cell_len <= width:
+            lines[-1].append(' ' * gap).append_text(word)
         else:
-            lines.append(lamp)
+            lines.append(word.copy())
     return lines
+
+
+def plain_table() -> Table:
+    """Make a table without any lines."""
+    return Table(box=None, padding=(0, GAP, 0, 0), pad_edge=False, header_style=DIM,
+                 show_edge=False)
 
 
 def wrapped(text: str, width: int, style: str = '') -> Lines:

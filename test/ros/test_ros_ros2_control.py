@@ -90,7 +90,7 @@ class Arm:
     def steps(self, name: str) -> int:
         """Return where an axis really is, in steps; the encoder's noise is not in it."""
         axes: Any = self.one.played[name].drive.plant
-        (travel,) = (travel for _, travel in axes.axes._travels.values())
+        (travel,) = (travel for _, travel in axes._travels.values())
         return round(100 * travel.position)
 
     def enable(self, name: str, wanted: bool = True) -> None:

@@ -124,6 +124,15 @@ class TestMotor:
         tells(made, '7F040040', 2.5)
         assert tells(made, '7F040040', 3.0) == '370B0040'
 
+    def test_shutdown_may_become_a_quick_stop(self) -> None:
+        made = inverter()
+        run(made)
+        tells(made, '7F040040', 0.0)
+        tells(made, '7E040040', 2.0)
+        tells(made, '7A040040', 2.5)
+        assert tells(made, '7A040040', 2.55) == '170A0010'      # 0.2 s from 100 %
+        assert tells(made, '7A040040', 2.6) == '500B0000'
+
     def test_quick_stop_brakes_fast_and_disables(self) -> None:
         made = inverter()
         run(made)
@@ -305,6 +314,11 @@ class TestFaults:
         tells(made, request_data)
         made.fault('trip', 0.0)
         assert [len(sent.data) for sent in made.take_frames()] == [length]
+
+    def test_an_answer_that_is_too_long(self) -> None:
+        made = inverter()
+        made.fault('length=6', 0.0)
+        assert tells(made, READY) == f'{DISABLED}00000000'
 
     def test_reset_needs_an_edge(self) -> None:
         made = inverter()

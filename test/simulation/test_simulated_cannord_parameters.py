@@ -96,6 +96,12 @@ class TestWriting:
         assert [made.value(name) for name in ('p102', 'p102.1', 'p600', 'p411')] == [
             1.0, 3.0, 5, 7]
 
+    def test_a_new_inverter_has_the_same_in_all_parameter_sets(self) -> None:
+        made = made_with()
+        assert [made.value(name) for name in (
+            'acceleration_time', 'acceleration_time_set_2', 'acceleration_time_set_4')] == [
+            1.0, 1.0, 1.0]
+
     def test_values_of_parameter_sets_are_independent(self) -> None:
         made = made_with(acceleration_time=1.0, acceleration_time_set_2=2.0,
                          acceleration_time_set_4=4.0)

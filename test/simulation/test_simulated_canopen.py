@@ -16,12 +16,12 @@ from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.protocols.canopen import abort_codes
 from drive_can_bridge.protocols.canopen.network import NmtState
 from drive_can_bridge.simulation.canopen.node import CanopenNode, Contents
-from drive_can_bridge.simulation.canopen.sdo import checked_length, CODES, Refused
+from drive_can_bridge.simulation.canopen.sdo import checked_length, CODES
 from drive_can_bridge.simulation.control import FAULTS, Machine, Operation, Rule, State
 from drive_can_bridge.simulation.drive import SimulatedDrive
 from drive_can_bridge.simulation.motor_plant import MotorPlant
 from drive_can_bridge.simulation.plant import PlantFactory
-from drive_can_bridge.simulation.registers import Registers
+from drive_can_bridge.simulation.registers import Refused, Registers
 
 OFF, READY, ON, ENABLED, STOPPING = (
     State.SWITCH_ON_DISABLED, State.READY_TO_SWITCH_ON, State.SWITCHED_ON,
@@ -87,7 +87,7 @@ class Cia402Drive(SimulatedDrive):
     def set_up(self) -> None:
         self.table = Objects(self.registers)
         self.node = self.companion = CanopenNode(
-            self, self.table, constants=self.constants, trip_code=lambda: 0)
+            self, self.table, constants=self.constants, trip_code=0)
 
     def choose_plant(self) -> PlantFactory:
         return lambda *made: MotorPlant(*made, operation=Operation(MACHINE))
@@ -104,7 +104,7 @@ class Cia402Drive(SimulatedDrive):
             self.requests += 1
             speed = SPEED.raw_from_word(int.from_bytes(data[2:4], 'little'))
             self.registers.write('target_speed', self.registers.clamped('target_speed', speed))
-            self.plant.operation.word_written(int.from_bytes(data[:2], 'little'), now)
+            self.plant.operation.word_written(int.from_bytes(data[:2], 'little'))
             self.plant.advance(now)
             self.answer(Frame(0x180 + self.node.number, self.status() + self.table.read_object(
                 0x6044, 0), False), now)

@@ -95,6 +95,10 @@ class TestCyclicExchange:
 
 class TestAcyclicAccess:
 
+    def test_map_entry_that_the_profile_lists(self) -> None:
+        made = drive([*EXAMPLE, parameter('first_slot', 122)])
+        assert made.value('first_slot') == made.value('p122') == 50
+
     def test_read_of_a_window_with_an_unknown_register(self) -> None:
         made = drive()
         # 209 to 211 exist, 212 does not

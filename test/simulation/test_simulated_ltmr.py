@@ -637,13 +637,25 @@ class TestMotor:
     @given(st.lists(st.floats(0.0, 3.0), min_size=1, max_size=20))
     def test_it_hardly_matters_how_often_time_passes(self, steps: list[float]) -> None:
         coarse, fine = Ltmr().drive.plant.starter, Ltmr().drive.plant.starter
-        coarse.switch(True)
-        fine.switch(True)
-        coarse.advance(sum(steps))
+        coarse.advance(sum(steps), on=True)
         for step in steps:
-            fine.advance(step)
+            fine.advance(step, on=True)
         assert fine.thermal == pytest.approx(coarse.thermal, abs=0.5)
         assert fine.current == pytest.approx(coarse.current, abs=1e-6)
+
+    def test_a_trip_opens_the_contactor(self) -> None:
+        starter = Ltmr().drive.plant.starter
+        starter.settings(5.0, 5.0)
+        assert starter.advance(30.0, on=True)
+        assert starter.current == 0.0
+
+    def test_time_to_a_trip_that_is_due(self) -> None:
+        starter = Ltmr().drive.plant.starter
+        starter.settings(5.0, 5.0)
+        starter.advance(0.0, on=True)
+        assert starter.time_to_trip > 0.0
+        starter.thermal = 120.0
+        assert starter.time_to_trip == 0.0
 
     def test_emergency_waits_for_a_node_that_may_send_it(self) -> None:
         made = Ltmr()
@@ -708,6 +720,13 @@ class TestObjects:
     ])
     def test_objects(self, request_text: str, response: str) -> None:
         assert Ltmr().ask(f'605#{request_text}', 0.1) == [f'585#{response}']
+
+    def test_an_address_of_the_profile_is_the_only_one(self) -> None:
+        table = {'state': Parameter('state', number=455, index=0x2100, subindex=1)}
+        made = Ltmr(Profile('table', '/table.yaml', '', ('canopen_pkw',), table),
+                    response=('state',))
+        assert made.ask('605#4000210100000000', 0.1)[0].startswith('585#4B002101')
+        assert made.ask('605#4004200600000000', 0.1) == ['585#8004200611000906']
 
     def test_device_name_comes_in_segments(self) -> None:
         made = Ltmr()

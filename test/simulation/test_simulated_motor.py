@@ -16,7 +16,7 @@ from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.core.profile import StatusPattern
 from drive_can_bridge.simulation import names, scales
 from drive_can_bridge.simulation.datamodel import SimulatedDataModelDrive
-from drive_can_bridge.simulation.motor import AMBIENT_TEMPERATURE, Motor, Ramp, Rates
+from drive_can_bridge.simulation.motor import AMBIENT_TEMPERATURE, Motor, Rates, Travel
 from drive_can_bridge.simulation.names import Quantity, RampUse
 
 RATES = Rates(rising=10.0, falling=20.0)
@@ -25,35 +25,46 @@ RATES = Rates(rising=10.0, falling=20.0)
 class TestRamp:
 
     def test_rises_and_falls_at_different_rates(self) -> None:
-        ramp = Ramp()
-        ramp.advance(0.5, 100.0, RATES)
-        assert (ramp.value, ramp.slope) == (5.0, 10.0)
-        ramp.advance(0.1, 0.0, RATES)
-        assert (ramp.value, ramp.slope) == (3.0, -20.0)
+        ramp = Travel()
+        ramp.run(0.5, 100.0, RATES)
+        assert (ramp.speed, ramp.slope) == (5.0, 10.0)
+        ramp.run(0.1, 0.0, RATES)
+        assert (ramp.speed, ramp.slope) == (3.0, -20.0)
 
     def test_reversal_falls_to_zero_and_rises_from_there(self) -> None:
-        ramp = Ramp(10.0)
-        ramp.advance(1.0, -50.0, RATES)
-        assert (ramp.value, ramp.slope) == (-5.0, -10.0)
+        ramp = Travel(speed=10.0)
+        ramp.run(1.0, -50.0, RATES)
+        assert (ramp.speed, ramp.slope) == (-5.0, -10.0)
 
     def test_integral(self) -> None:
         # 1 s up to 10, 1 s at 10
-        assert Ramp().advance(2.0, 10.0, RATES) == 15.0
+        ramp = Travel()
+        ramp.run(2.0, 10.0, RATES)
+        assert ramp.position == 15.0
 
     def test_stays_at_its_target(self) -> None:
-        ramp = Ramp()
-        ramp.advance(100.0, 7.0, RATES)
-        assert (ramp.value, ramp.slope) == (7.0, 0.0)
+        ramp = Travel()
+        ramp.run(100.0, 7.0, RATES)
+        assert (ramp.speed, ramp.slope) == (7.0, 0.0)
 
     @given(st.lists(st.tuples(st.floats(0.0, 5.0), st.floats(-100.0, 100.0)), max_size=20))
     def test_it_does_not_matter_how_often_time_passes(
             self, steps: list[tuple[float, float]]) -> None:
-        coarse, fine = Ramp(), Ramp()
+        coarse, fine = Travel(), Travel()
         for duration, target in steps:
-            whole = coarse.advance(duration, target, RATES)
-            parts = sum(fine.advance(duration / 4.0, target, RATES) for _ in range(4))
-            assert fine.value == pytest.approx(coarse.value, abs=1e-6)
-            assert parts == pytest.approx(whole, abs=1e-6)
+            coarse.position = fine.position = 0.0
+            coarse.run(duration, target, RATES)
+            for _ in range(4):
+                fine.run(duration / 4.0, target, RATES)
+            assert fine.speed == pytest.approx(coarse.speed, abs=1e-6)
+            assert fine.position == pytest.approx(coarse.position, abs=1e-6)
+
+
+def turn(motor: Motor, duration: float, target: float, rates: Rates, *,
+         energised: bool = True) -> None:
+    """Let a motor go towards a speed for some time."""
+    motor.shaft.run(duration, target, rates)
+    motor.advance(duration, energised=energised)
 
 
 class TestMotor:
@@ -61,33 +72,33 @@ class TestMotor:
     def test_current_follows_acceleration_and_load(self) -> None:
         motor = Motor(3000.0, 1.0 / 60.0)
         rates = Rates(3000.0, 3000.0)
-        motor.advance(0.0, 0.0, rates, energised=True)
+        turn(motor, 0.0, 0.0, rates)
         at_rest = motor.current
-        motor.advance(0.5, 3000.0, rates, energised=True)
+        turn(motor, 0.5, 3000.0, rates)
         accelerating = motor.current
-        motor.advance(5.0, 3000.0, rates, energised=True)
+        turn(motor, 5.0, 3000.0, rates)
         running = motor.current
-        motor.advance(0.5, 0.0, rates, energised=True)
+        turn(motor, 0.5, 0.0, rates)
         assert at_rest < running < accelerating
         assert motor.torque < 0.0
 
     def test_position_integrates(self) -> None:
         motor = Motor(3000.0, 1.0 / 60.0)
-        motor.advance(2.0, 600.0, Rates(600.0, 600.0), energised=True)
+        turn(motor, 2.0, 600.0, Rates(600.0, 600.0))
         assert motor.position == pytest.approx(15.0)
 
     def test_temperature_creeps(self) -> None:
         motor = Motor(3000.0, 1.0 / 60.0)
         rates = Rates(3000.0, 3000.0)
-        motor.advance(10.0, 3000.0, rates, energised=True)
-        motor.advance(10.0, 3000.0, rates, energised=True)
+        turn(motor, 10.0, 3000.0, rates)
+        turn(motor, 10.0, 3000.0, rates)
         warm = motor.temperature
-        motor.advance(600.0, 3000.0, rates, energised=True)
+        turn(motor, 600.0, 3000.0, rates)
         assert AMBIENT_TEMPERATURE < warm < motor.temperature < 60.0
 
     def test_without_torque(self) -> None:
         motor = Motor(3000.0, 1.0 / 60.0)
-        motor.advance(1.0, 3000.0, Rates(3000.0, 3000.0), energised=False)
+        turn(motor, 1.0, 3000.0, Rates(3000.0, 3000.0), energised=False)
         assert (motor.torque, motor.current) == (0.0, 0.0)
 
 
@@ -226,10 +237,11 @@ class TestPlant:
             parameter('gain', 6, scale=0.01, minimum=0.0, maximum=3.0),
             parameter('position_setpoint', 7, neutral=1e9),
             parameter('ramp_ms', 8, unit='ms'), parameter('warm_up', 9, minimum=200.0),
+            parameter('tension', 10, scale=0.5, neutral=5.0),
         ]
         plant = motor(table)
         assert [plant.value(p.name) for p in table] == [
-            False, 0, 100, 100.0, 10.0, 1.0, 0, 1000.0, 200]
+            False, 0, 100, 100.0, 10.0, 1.0, 0, 1000.0, 200, 5.0]
 
 
 POSITION_SETPOINT = parameter('position_setpoint', 53, type=INT16, scale=0.1, unit='deg',
@@ -272,7 +284,7 @@ def test_torque_setpoint_is_followed_and_ends_with_a_fault() -> None:
     actual = parameter('actual_torque', 4, unit='%', type=INT16, access=RO)
     plant = running([*EXAMPLE, setpoint, actual], 'torque_setpoint', 50.0)
     assert plant.value('actual_torque') == 50.0
-    plant.plant.trip()
+    plant.plant.operation.trip()
     plant.handle_timer(20.0)
     assert plant.value('actual_torque') == 0.0
 
@@ -294,6 +306,61 @@ def test_ramps_by_use() -> None:
     assert plant.value('actual_speed') == 750.0
 
 
+@pytest.mark.parametrize('mover', [SPEED_SETPOINT, POSITION_SETPOINT])
+def test_a_brake_holds_at_once(mover: Parameter) -> None:
+    plant = motor([*BOTH, CONTROL_WORD], CONTROL, [mover], brake=1)
+    plant.handle_timer(0.0)
+    plant.registers.write('control_word', 1)
+    plant.set_value(mover.name, 3000.0)
+    plant.handle_timer(0.5)
+    assert plant.value('actual_speed') > 0.0
+    plant.registers.write('control_word', 0)
+    plant.handle_timer(0.5)
+    assert plant.value('actual_speed') == 0.0
+
+
+def test_no_current_as_soon_as_it_trips() -> None:
+    plant = motor(EXAMPLE)
+    plant.set_value('speed_setpoint', 3000.0)
+    plant.handle_timer(0.0)
+    plant.handle_timer(2.0)
+    assert plant.value('motor_current') > 0.0
+    plant.fault('trip', 2.0)
+    assert plant.value('motor_current') == 0.0
+
+
+def test_no_current_once_a_quick_stop_is_over() -> None:
+    plant = motor([*EXAMPLE, CONTROL_WORD], CONTROL)
+    plant.handle_timer(0.0)
+    plant.registers.write('control_word', 1)
+    plant.set_value('speed_setpoint', 3000.0)
+    plant.handle_timer(2.0)
+    plant.registers.write('control_word', 2)
+    plant.handle_timer(2.1)
+    assert plant.value('motor_current') > 0.0
+    plant.handle_timer(3.0)
+    assert (plant.value('actual_speed'), plant.value('motor_current')) == (0.0, 0.0)
+
+
+def test_torque_of_an_acceleration_is_still_there_at_the_same_instant() -> None:
+    plant = motor(EXAMPLE)
+    plant.set_value('speed_setpoint', 3000.0)
+    currents = []
+    for now in (0.0, 0.5, 0.5):
+        plant.handle_timer(now)
+        currents.append(plant.value('motor_current'))
+    assert currents[0] < currents[1] == currents[2]
+
+
+def test_time_never_runs_backwards() -> None:
+    # a frame may have waited, and be told with the time of its arrival
+    plant = motor(EXAMPLE)
+    plant.set_value('speed_setpoint', 3000.0)
+    for now in (0.0, 0.5, 0.4, 0.5):
+        plant.handle_timer(now)
+    assert plant.value('actual_speed') == 1500.0
+
+
 def test_overlapping_status_patterns() -> None:
     # states as numbers in the low bits: 0 is ready, 3 enabled, 4 a fault
     table = replace(CONTROL, ready=StatusPattern(7, 0), enabled=StatusPattern(7, 3),
@@ -304,5 +371,5 @@ def test_overlapping_status_patterns() -> None:
     assert plant.registers.raw('status_word') == 0
     plant.registers.write('control_word', 1)
     assert plant.registers.raw('status_word') == 3
-    plant.plant.trip()
+    plant.plant.operation.trip()
     assert plant.registers.raw('status_word') == 4

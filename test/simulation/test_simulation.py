@@ -219,7 +219,7 @@ class Clock(MotorPlant):
 
     def source(self, parameter: Parameter) -> Callable[[], int] | None:
         if parameter.name == 'actual_speed':
-            return lambda: round(self.now or 0.0) % 1000
+            return lambda: round(self.operation.now) % 1000
         return super().source(parameter)
 
 
@@ -303,6 +303,7 @@ class TestConsole:
         assert lines('status')[0][1:] == ['conveyor: EEPROM writes: ramp_time 1',
                                           lines('lift')[0][0]]
         assert lines('conveyor')[0][1:] == ['conveyor: EEPROM writes: ramp_time 1']
+        assert lines('list')[0][1:] == [lines('lift')[0][0]]
 
     @pytest.mark.parametrize(('line', 'complaint'), [
         ('lft silent', "no drive 'lft'; drives: conveyor, lift; also: status, list, help"),

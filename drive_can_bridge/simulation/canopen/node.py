@@ -13,8 +13,9 @@ from drive_can_bridge.core.frame import Frame, Route, STANDARD_IDENTIFIER_MAX
 from drive_can_bridge.protocols.canopen import abort_codes, network
 from drive_can_bridge.protocols.canopen.network import Emergency, NmtCommand, NmtState
 from drive_can_bridge.protocols.canopen.sdo import REQUEST_BASE, RESPONSE_BASE
-from drive_can_bridge.simulation.canopen.sdo import checked_length, Objects, Refused, SdoServer
+from drive_can_bridge.simulation.canopen.sdo import checked_length, Objects, SdoServer
 from drive_can_bridge.simulation.drive import Companion, Ignored, SimulatedDrive
+from drive_can_bridge.simulation.registers import Refused
 
 #: objects by index and sub-index
 Contents = dict[tuple[int, int], bytes]
@@ -45,19 +46,19 @@ class CanopenNode(Companion):
 
     :param objects: those that are registers.
     :param constants: returns the content of the family's other, read-only objects, by address.
-    :param trip_code: returns the maker's code for the trip that there is.
+    :param trip_code: the maker's code of a trip that has none of its own.
     :ivar state: boot-up: without power, or still starting.
     """
 
     def __init__(self, drive: SimulatedDrive, objects: Objects, *,
-                 constants: Callable[[], Contents], trip_code: Callable[[], int]) -> None:
+                 constants: Callable[[], Contents], trip_code: int) -> None:
         self._drive = drive
         self._objects, self._constants, self._trip_code = objects, constants, trip_code
         self.number = drive.configuration.station
         watched: float = drive.configuration.options.heartbeat_timeout
         self._default_heartbeat = round(
             1000.0 * watched / HEARTBEATS_WATCHED) if watched else HEARTBEAT
-        self._server = SdoServer(self.read_object, self.write_object)
+        self._server = SdoServer(self)
         self._now = -math.inf
         self._looks_at = math.inf
         # the boot-up frame leaves as soon as somebody looks
@@ -118,9 +119,9 @@ class CanopenNode(Companion):
         """Report a trip that has come or gone, and plan the next look at a running motor."""
         operation = self._drive.plant.operation
         self._looks_at = now + TICK if operation.enabled else math.inf
-        error = Emergency(
-            TRIP_EMERGENCY, TRIP_ERROR_REGISTER, self._trip_code().to_bytes(5, 'little'),
-        ) if operation.faulted else _NO_ERROR
+        code = int(operation.fault_code(self._trip_code))
+        error = Emergency(TRIP_EMERGENCY, TRIP_ERROR_REGISTER, code.to_bytes(5, 'little'),
+                          ) if operation.faulted else _NO_ERROR
         if self._communicates and error.code != self._error.code:
             self._error = error
             self._drive.send(network.encode_emergency(self.number, error))
@@ -154,26 +155,24 @@ class CanopenNode(Companion):
         self._beats_at = now + self._heartbeat / 1000.0 if self._heartbeat else math.inf
 
     def read_object(self, index: int, subindex: int) -> bytes:
-        fixed = self._fixed(index)
-        if (index, subindex) in fixed:
-            return fixed[index, subindex]
-        if fixed:
-            raise Refused(abort_codes.NO_SUCH_SUBINDEX)
-        return self._objects.read_object(index, subindex)
+        content = self._content(index, subindex)
+        return self._objects.read_object(index, subindex) if content is None else content
 
     def write_object(self, index: int, subindex: int, data: bytes) -> None:
-        fixed = self._fixed(index)
         if (index, subindex) == HEARTBEAT_TIME:
             self._heartbeat = int.from_bytes(checked_length(data, 2), 'little')
             self._plan_heartbeat(self._now)
-        elif fixed:
-            raise Refused(abort_codes.WRITE_OF_READ_ONLY if (index, subindex) in fixed else
-                          abort_codes.NO_SUCH_SUBINDEX)
+        elif self._content(index, subindex) is not None:
+            raise Refused(abort_codes.WRITE_OF_READ_ONLY)
         else:
             self._objects.write_object(index, subindex, data)
 
-    def _fixed(self, index: int) -> Contents:
-        """Return the objects of an index that has no registers."""
+    def _content(self, index: int, subindex: int) -> bytes | None:
+        """
+        Return an object that is no register; None: its index has registers.
+
+        :raises Refused: its index has none, and no such sub-index.
+        """
         code, register, _ = self._error
         objects = {
             # what every node has: device type, errors, identifiers, heartbeat, identity
@@ -187,4 +186,6 @@ class CanopenNode(Companion):
             (0x1018, 1): bytes(4),
             **self._constants(),
         }
-        return {place: content for place, content in objects.items() if place[0] == index}
+        if (index, subindex) not in objects and any(place[0] == index for place in objects):
+            raise Refused(abort_codes.NO_SUCH_SUBINDEX)
+        return objects.get((index, subindex))

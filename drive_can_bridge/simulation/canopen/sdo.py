@@ -6,13 +6,10 @@ Block transfer is refused, and so are segmented writes: no object here is longer
 and may be written.
 """
 
-from collections.abc import Callable
 from typing import Protocol
 
-from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.protocols.canopen import abort_codes
-from drive_can_bridge.simulation.drive import Table
-from drive_can_bridge.simulation.registers import Refusal
+from drive_can_bridge.simulation.registers import Refusal, Refused
 
 LENGTH = 8
 EXPEDITED_MAX = 4
@@ -34,20 +31,8 @@ CODES = {
 }
 
 
-class Refused(DriveCanError):
-    """
-    An access that the device does not carry out.
-
-    :param code: SDO abort code.
-    """
-
-    def __init__(self, code: int) -> None:
-        super().__init__(abort_codes.describe(code))
-        self.code = code
-
-
-class Objects(Table, Protocol):
-    """An object dictionary. Reading and writing raise :class:`Refused`."""
+class Objects(Protocol):
+    """An object dictionary. Reading and writing raise :class:`Refused`, with SDO abort codes."""
 
     def read_object(self, index: int, subindex: int) -> bytes:
         """Return the content of an object."""
@@ -59,9 +44,8 @@ class Objects(Table, Protocol):
 class SdoServer:
     """Answers the requests of one client."""
 
-    def __init__(self, read: Callable[[int, int], bytes],
-                 write: Callable[[int, int, bytes], None]) -> None:
-        self._read, self._write = read, write
+    def __init__(self, objects: Objects) -> None:
+        self._objects = objects
         self._address = b'\0\0\0'
         self._rest = b''
         self._toggle = 0
@@ -83,10 +67,10 @@ class SdoServer:
             self._address = request[1:4]
             place = int.from_bytes(self._address[:2], 'little'), self._address[2]
             if command == UPLOAD:
-                return self._upload(self._read(*place))
+                return self._upload(self._objects.read_object(*place))
             if command == DOWNLOAD and head & EXPEDITED:
                 unused = head >> 2 & 0x03 if head & SIZE_GIVEN else 0
-                self._write(*place, request[4:LENGTH - unused])
+                self._objects.write_object(*place, request[4:LENGTH - unused])
                 return self._response(RESPONSE_DOWNLOAD)
             raise Refused(abort_codes.UNKNOWN_COMMAND)
         except Refused as error:
