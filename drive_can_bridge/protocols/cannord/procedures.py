@@ -19,6 +19,7 @@ from drive_can_bridge.protocols.cannord.channel import Ask, Reply
 from drive_can_bridge.protocols.cannord.parameter_frame import (
     error_text, ParameterFrame, Response, Task, WRITE_TASKS,
 )
+from drive_can_bridge.protocols.placement import ParameterPlacement
 
 WRONG_INDEX = 3
 PROCESS_DATA_ONLY = 'exists in process data only'
@@ -38,19 +39,8 @@ def write_refusal(parameter: Parameter) -> str:
     return PROCESS_DATA_ONLY if parameter.number is None else ''
 
 
-class TaskAccess(Access[Parameter, Ask, Reply]):
-    """
-    Parameters by number and sub-index, one a task.
-
-    :param last_value: (parameter name) -> raw integer last received in process data, or None.
-    :param persist: write to EEPROM where the profile does not say where.
-    """
-
-    def __init__(self, retry: RetryPolicy, *, last_value: Callable[[str], int | None],
-                 persist: bool) -> None:
-        super().__init__(retry)
-        self._last_value = last_value
-        self._persist = persist
+class Elements(ParameterPlacement[Parameter]):
+    """Parameters are read one by one, whatever their width."""
 
     def span(self, parameter: Parameter) -> Parameter:
         return parameter
@@ -61,8 +51,20 @@ class TaskAccess(Access[Parameter, Ask, Reply]):
     def plan(self, spans: Sequence[Parameter]) -> list[Parameter]:
         return list(dict.fromkeys(spans))
 
-    def raw(self, parameter: Parameter, words: tuple[int, ...]) -> int:
-        return parameter.raw_from_word(words[0])
+
+class TaskAccess(Access[Parameter, Ask, Reply]):
+    """
+    Parameters by number and sub-index, one a task.
+
+    :param last_value: (parameter name) -> raw integer last received in process data, or None.
+    :param persist: write to EEPROM where the profile does not say where.
+    """
+
+    def __init__(self, retry: RetryPolicy, *, last_value: Callable[[str], int | None],
+                 persist: bool) -> None:
+        super().__init__(retry, Elements())
+        self._last_value = last_value
+        self._persist = persist
 
     def read(self, span: Parameter) -> Generator[Ask, Reply, Found]:
         answer = yield from self._ask(span)
@@ -129,7 +131,6 @@ class TaskAccess(Access[Parameter, Ask, Reply]):
             refusal = yield from _refusal(parameter, reply.response)
             return refusal
         return reply.response
-
 
 
 def _refusal(parameter: Parameter, response: ParameterFrame) -> Generator[Ask, Reply, Failure]:

@@ -10,9 +10,8 @@ from typing import NamedTuple
 
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.requests import Failure, NOT_SENT, Outcome, Outcomes, Written
-from drive_can_bridge.core.retry import RetryPolicy
 from drive_can_bridge.protocols.access import Access, Found, Item
-from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, plan, Span
+from drive_can_bridge.protocols.canopen_pkw.addresses import Span
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
     Answered, Read, Refused, Reply, Silence, Step, Write,
 )
@@ -28,37 +27,22 @@ NOT_TOGETHER = ('cannot be written in one frame, nothing was written: two 16-bit
 class RegisterAccess(Access[Span, Step, Reply]):
     """Parameters by register or object; adjacent registers share a request."""
 
-    def __init__(self, retry: RetryPolicy, placement: Placement) -> None:
-        super().__init__(retry)
-        self._placement = placement
-
-    def span(self, parameter: Parameter) -> Span:
-        return self._placement.span(parameter)
-
-    def addresses(self, span: Span) -> Sequence[Address]:
-        return span.addresses
-
-    def plan(self, spans: Sequence[Span]) -> list[Span]:
-        return plan(spans)
-
     def read(self, span: Span) -> Generator[Step, Reply, Found]:
         reply = yield Read(span.address, span.count)
         if isinstance(reply, Answered):
             return reply.words[:span.count]
         return self.retry.unanswered() if isinstance(reply, Silence) else Failure(reply.text)
 
-    def raw(self, parameter: Parameter, words: tuple[int, ...]) -> int:
-        return self._placement.raw(parameter, words)
-
     def write(self, parameter: Parameter, raw: int) -> Generator[Step, Reply, Outcome]:
-        return self._put(self.span(parameter).address, self._placement.words(parameter, raw))
+        return self._put(
+            self.placement.span(parameter).address, self.placement.words(parameter, raw))
 
     def write_together(self, items: Sequence[Item]) -> Generator[Step, Reply, Outcomes]:
         words: dict[Address, int] = {}
-        spans = [self.span(parameter) for parameter, _ in items]
+        spans = [self.placement.span(parameter) for parameter, _ in items]
         for span, item in zip(spans, items):
-            words.update(zip(span.addresses, self._placement.words(*item)))
-        shared = plan(spans)
+            words.update(zip(span.addresses, self.placement.words(*item)))
+        shared = self.placement.plan(spans)
         if len(shared) != 1 or sum(span.count for span in spans) != shared[0].count:
             return (Failure(NOT_TOGETHER),) * len(items)
         outcome = yield from self._put(

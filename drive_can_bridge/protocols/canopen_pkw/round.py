@@ -4,7 +4,6 @@
 from collections.abc import Callable, Generator, Mapping, Sequence
 
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.process_image import status_word
 from drive_can_bridge.protocols.canopen_pkw.addresses import (
     instead_of, Placement, round_plan, round_spans, Span,
@@ -83,15 +82,10 @@ class Round:
 
     def raws(self, words: Mapping[Address, int]) -> list[int | None]:
         """Return the values that a round has brought; None for what was refused."""
-        return [self._raw(parameter, span, words)
+        return [self._placement.raw_among(parameter, span, words)
                 for parameter, span in zip(self._drive.cyclic_response, self._spans)]
 
     def status(self, words: Mapping[Address, int]) -> int | None:
         """Return the status word, if it is among the words."""
-        return None if self._status is None else self._raw(*self._status, words)
-
-    def _raw(self, parameter: Parameter, span: Span,
-             words: Mapping[Address, int]) -> int | None:
-        if any(address not in words for address in span.addresses):
-            return None
-        return self._placement.raw(parameter, [words[address] for address in span.addresses])
+        return None if self._status is None else self._placement.raw_among(
+            *self._status, words)

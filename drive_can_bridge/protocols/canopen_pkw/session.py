@@ -39,9 +39,9 @@ from drive_can_bridge.protocols.canopen_pkw.identifiers import Identifiers
 from drive_can_bridge.protocols.canopen_pkw.mailbox import MailboxChannel, MailboxCourier
 from drive_can_bridge.protocols.canopen_pkw.pkw import Layout, Message
 from drive_can_bridge.protocols.canopen_pkw.polled_exchange import PolledExchange
-from drive_can_bridge.protocols.canopen_pkw.sent_writes import SentWrites
 from drive_can_bridge.protocols.canopen_pkw.writers import Writers
 from drive_can_bridge.protocols.channel import Lane
+from drive_can_bridge.protocols.placement import SentWrites
 
 #: s that a stop may take all together: of a drive that answers, and of one that has fallen silent
 STOP_TIME = 3.0
@@ -72,9 +72,10 @@ class PkwSession(Session):
         self._layout = Layout(options.layout)
         self._supervision = Supervision(self)
         self._node = self._supervision.node
+        sent = SentWrites(self.sent, placement)
         self._channel = MailboxChannel(MailboxCourier(
-            self._send, order=options.abort_code_order, retry=self.retry))
-        self._sent_writes = SentWrites(self.sent, placement)
+            self._send, order=options.abort_code_order, retry=self.retry,
+            wrote=lambda write: sent.note(write.span, write.words)))
         self._writers = Writers(self, self._channel, self._stop_ended)
         self._exchange = PolledExchange(
             self, self._channel, self._node, found=self._found, silent=self.node_silent)
@@ -209,8 +210,7 @@ class PkwSession(Session):
 
     def _send(self, message: Message, left: Left) -> None:
         request = pkw.encode(message, self._layout)
-        self.outbox.put(Frame(self._identifiers.request, request, False),
-                        self._sent_writes.noting(message, left))
+        self.outbox.put(Frame(self._identifiers.request, request, False), left)
 
     def frames_left(self, now: float, refused: Collection[int] = ()) -> None:
         super().frames_left(now, refused)

@@ -21,14 +21,16 @@ from drive_can_bridge.protocols.access import ChannelServer
 from drive_can_bridge.protocols.datamodel import procedures
 from drive_can_bridge.protocols.datamodel.acyclic_control import AcyclicControl
 from drive_can_bridge.protocols.datamodel.channel import (
-    AcyclicChannel, Polling, Read, Reply, Step, Words, Write,
+    AcyclicChannel, Polling, Read, Reply, Step, Words,
 )
 from drive_can_bridge.protocols.datamodel.extended import PAYLOAD, SLOTS
+from drive_can_bridge.protocols.datamodel.numbers import Numbers
 from drive_can_bridge.protocols.datamodel.options import DataModelOptions
 from drive_can_bridge.protocols.datamodel.process_words import slot_of
 from drive_can_bridge.protocols.datamodel.stop_writes import (
     ANSWER_TIME, confirm, StopWrite,
 )
+from drive_can_bridge.protocols.placement import SentWrites
 from drive_can_bridge.protocols.safe_stop import SafeStop
 
 
@@ -42,6 +44,7 @@ class AcyclicSide:
     :param together: parameters that fit one write frame.
     :param stop_ended: called when a stop by acyclic writes has run its course.
     :param polling: given where the exchange itself goes through the channel.
+    :ivar numbers: where the parameters of the drive stand.
     :ivar control_slot: of the control word in ``cyclic_request``, or None.
     :ivar status_slot: of the status word in ``cyclic_response``, or None.
     :ivar control_writer: looks after words that have no slot, or None.
@@ -52,19 +55,16 @@ class AcyclicSide:
                  decode: Callable[[Frame, Union[Read, None]], Words], together: int,
                  stop_ended: Callable[[], None], polling: Polling | None = None) -> None:
         drive, options = session.configuration, session.configuration.options
-        self.offset: int = options.parameter_offset
+        self.numbers = Numbers(drive)
         self._session = session
         self._decode = decode
-        # where each of ``request_parameters`` is written by number
-        self._sent_by_number = {
-            (parameter.number or 0) + self.offset: place
-            for place, parameter in enumerate(session.sent.parameters)}
+        sent = SentWrites(session.sent, self.numbers)
         self.channel = AcyclicChannel(
             encode_read=encode_read, encode_write=encode_write, send=session.outbox.put,
-            wrote=self._note_write, retry=session.retry,
+            wrote=lambda write: sent.note(write.chunk, write.words), retry=session.retry,
             eeprom_gap=options.eeprom_write_gap, polling=polling)
         session.users = Users(session, ChannelServer(self.channel, procedures.ParameterAccess(
-            session.retry, verify=drive.verify_writes, offset=self.offset, together=together)))
+            session.retry, self.numbers, verify=drive.verify_writes, together=together)))
         table = drive.profile.control
         word_name = table.parameter if table is not None else ''
         status_name = table.status_parameter or '' if table is not None else ''
@@ -74,16 +74,10 @@ class AcyclicSide:
         word = word_name if self.control_slot is None else ''
         status = status_name if self.status_slot is None else ''
         self.control_writer = None if session.control is None or not word + status else (
-            AcyclicControl(session, session.control, self.channel,
+            AcyclicControl(session, session.control, self.channel, self.numbers,
                            word=drive.profile.parameters.get(word),
                            status=drive.profile.parameters.get(status)))
         self.stop: SafeStop[Step, Reply] = SafeStop(session, self.channel, stop_ended)
-
-    def _note_write(self, write: Write) -> None:
-        """Take note of a write that left."""
-        for number, word in enumerate(write.words, write.number):
-            if number in self._sent_by_number:
-                self._session.sent.take((word,), self._sent_by_number[number])
 
     def clear(self) -> None:
         """Forget everything acyclic, and whatever waits for its outcome."""
@@ -189,7 +183,7 @@ class AcyclicSide:
             session.told.answered()
 
     def _stop_write(self, parameter: Parameter, raw: int) -> StopWrite:
-        return StopWrite(parameter, (parameter.number or 0) + self.offset, raw)
+        return StopWrite(parameter, self.numbers.write(parameter, raw))
 
 
 def map_cells(options: DataModelOptions) -> Cells:

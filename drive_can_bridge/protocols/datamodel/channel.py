@@ -33,6 +33,7 @@ from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.retry import RetryPolicy
 from drive_can_bridge.protocols.channel import Channel
 from drive_can_bridge.protocols.courier import ANYTHING, Courier
+from drive_can_bridge.protocols.polling import Chunk
 
 #: s between an unacknowledged write and the next acyclic frame, so that a drive with a single
 #: receive buffer has fetched the first; and, where answers carry no address, between an answer and
@@ -71,6 +72,11 @@ class Write:
     number: int
     words: tuple[int, ...]
     eeprom: bool
+
+    @property
+    def chunk(self) -> Chunk:
+        """The numbers that it is about."""
+        return Chunk(self.number, len(self.words))
 
 
 Step = Union[Read, Write]

@@ -95,8 +95,3 @@ def slot_of(parameters: tuple[Parameter, ...], name: str) -> int | None:
         if parameter.name == name:
             return slot
     return None
-
-
-def wire_numbers(parameters: tuple[Parameter, ...], offset: int) -> tuple[int, ...]:
-    """Return the numbers of parameters as they go over the wire, in slot order."""
-    return tuple((parameter.number or 0) + offset for parameter in parameters)

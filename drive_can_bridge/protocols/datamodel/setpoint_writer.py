@@ -30,7 +30,7 @@ class SetpointWriter:
         self.word_written_at = -math.inf
         self._session = session
         self._courier = side.channel.courier
-        self._offset = side.offset
+        self._numbers = side.numbers
         self._slot = side.control_slot
         self._parameters = drive.cyclic_request
         self._schedule = WriteSchedule(len(drive.cyclic_request), drive.options.refresh_interval)
@@ -69,7 +69,7 @@ class SetpointWriter:
         runs = raw != self._raws(neutral=True)[index]
         # What is sent cyclically is volatile: EEPROM parameters are refused by the configuration.
         self._courier.write(
-            Write((parameter.number or 0) + self._offset, (parameter.word_from_raw(raw),),
+            Write(self._numbers.number(parameter), self._numbers.words(parameter, raw),
                   eeprom=False),
             lambda sent, then: self._left(index, raw, sent, then, runs=runs), now)
         self._schedule.written(index, raw, now)  # at once: a look meanwhile must not find it due

@@ -9,7 +9,7 @@ acknowledges them, so each is read back, and written again where it is not what 
 from collections.abc import Generator, Sequence
 from typing import NamedTuple
 
-from drive_can_bridge.core.parameters import Parameter, Storage
+from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.datamodel.channel import Read, Step, Words, Write
 
 #: how often everything is written at most
@@ -19,21 +19,10 @@ ANSWER_TIME = 0.1
 
 
 class StopWrite(NamedTuple):
-    """
-    What makes a drive stand still.
-
-    :param number: of the parameter, on the wire.
-    """
+    """What makes a drive stand still."""
 
     parameter: Parameter
-    number: int
-    raw: int
-
-    @property
-    def write(self) -> Write:
-        """The step."""
-        return Write(self.number, (self.parameter.word_from_raw(self.raw),),
-                     self.parameter.storage is not Storage.RAM)
+    write: Write
 
     @property
     def name(self) -> str:
@@ -54,7 +43,7 @@ def confirm(writes: Sequence[StopWrite], timeout: float,
         wrong = []
         for each in doubtful:
             reply = None if silent else (yield Read(
-                each.number, attempts=1, late_will_do=True, timeout=timeout))
+                each.write.number, attempts=1, late_will_do=True, timeout=timeout))
             silent = reply is None
             if reply is None:
                 failed.append(f'{each.name}: no answer')
