@@ -11,24 +11,25 @@ import math
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.cycle_timer import stop_spacing
 from drive_can_bridge.protocols.datamodel.acyclic_side import AcyclicSide
-from drive_can_bridge.protocols.datamodel.channel import Write
+from drive_can_bridge.protocols.datamodel.channel import Reply, Step, Write
+from drive_can_bridge.protocols.polled_exchange import PolledExchange
 from drive_can_bridge.protocols.polling import WriteSchedule
+
+Rounds = PolledExchange[Step, Reply]
 
 
 class SetpointWriter:
     """
     Writes what is in ``cyclic_request`` of one drive.
 
-    :ivar doubt: a read went unanswered since the status was read: nobody knows whether the drive
-        was off meanwhile.
     :ivar word_written_at: when the control word left last.
     """
 
-    def __init__(self, session: Session, side: AcyclicSide) -> None:
+    def __init__(self, session: Session, side: AcyclicSide, exchange: Rounds) -> None:
         drive = session.configuration
-        self.doubt = False
         self.word_written_at = -math.inf
         self._session = session
+        self._exchange = exchange
         self._courier = side.channel.courier
         self._numbers = side.numbers
         self._slot = side.control_slot
@@ -49,8 +50,9 @@ class SetpointWriter:
         :param unanswered: what was asked a period ago still waits for its answer.
         """
         control = self._session.control
-        # it is not started by a repetition
-        doubt = (self.doubt or unanswered) and control is not None and not (
+        # when a read goes unanswered, nobody knows whether the drive was off meanwhile: it is not
+        # started by a repetition
+        doubt = (self._exchange.silent or unanswered) and control is not None and not (
             control.at_rest or control.stopping)
         hold = [self._slot] if doubt else []
         unknown = self._session.setpoints.unknown
