@@ -22,7 +22,6 @@ from drive_can_bridge.protocols.canopen_pkw.addresses import Placement
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
     Answered, MailboxChannel, Read, Refused, Reply, Silence, Step, Write,
 )
-from drive_can_bridge.protocols.canopen_pkw.procedures import LastWrite
 from drive_can_bridge.protocols.channel import Lane
 
 #: s until a ``disable`` that was refused is written again
@@ -83,11 +82,6 @@ class ControlWriter:
             self._hurried = None
         if self._channel.is_idle(Lane.CONTROL):
             self._channel.run(self._write(), lambda _: None, now, Lane.CONTROL)
-
-    def disable_write(self) -> LastWrite:
-        """Return what writes ``disable``."""
-        return LastWrite(f'{self._parameter.name} {self._disable:04X}h', self._span,
-                         self._words(self._disable))
 
     def _words(self, word: int) -> tuple[int, ...]:
         return self._placement.words(self._parameter, word)

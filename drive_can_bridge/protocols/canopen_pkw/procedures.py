@@ -6,16 +6,16 @@ Every generator here is for :class:`.mailbox.MailboxChannel`.
 """
 
 from collections.abc import Generator, Sequence
-from typing import NamedTuple
 
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.requests import Failure, NOT_SENT, Outcome, Outcomes, Written
 from drive_can_bridge.protocols.access import Access, Found, Item
-from drive_can_bridge.protocols.canopen_pkw.addresses import Span
+from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
     Answered, Read, Refused, Reply, Silence, Step, Write,
 )
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address
+from drive_can_bridge.protocols.safe_stop import StopWrite
 
 NOT_TOGETHER = ('cannot be written in one frame, nothing was written: two 16-bit parameters in '
                 'adjacent registers fit, or one of 32 bits')
@@ -76,20 +76,8 @@ class RegisterAccess(Access[Span, Step, Reply]):
 StopProcedure = Generator[Step, Reply, list[str]]
 
 
-class LastWrite(NamedTuple):
-    """
-    Something that makes a drive stand still.
-
-    :param name: of the parameter.
-    """
-
-    name: str
-    span: Span
-    words: tuple[int, ...]
-
-
-def write_until_answered(writes: Sequence[LastWrite], attempts: int, timeout: float,
-                         last: float) -> StopProcedure:
+def write_until_answered(writes: Sequence[StopWrite], placement: Placement, attempts: int,
+                         timeout: float, last: float) -> StopProcedure:
     """
     Tell a drive to stand still, each thing until it is answered or was tried ``attempts`` times.
 
@@ -101,10 +89,12 @@ def write_until_answered(writes: Sequence[LastWrite], attempts: int, timeout: fl
     :return: what failed, in words.
     """
     failed = []
-    for name, span, words in writes:
+    for parameter, raw, is_word in writes:
+        name = f'{parameter.name} {raw:04X}h' if is_word else parameter.name
+        address, words = placement.span(parameter).address, placement.words(parameter, raw)
         reply: Reply = Silence()
         for attempt in range(1, attempts + 1):
-            reply = yield Write(span.address, words, blind=True,
+            reply = yield Write(address, words, blind=True,
                                 timeout=last if attempt == attempts else timeout)
             if not isinstance(reply, Silence):
                 break

@@ -9,7 +9,6 @@ from drive_can_bridge.protocols.canopen_pkw.addresses import Placement
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
     Answered, MailboxChannel, Reply, Silence, Step, Write,
 )
-from drive_can_bridge.protocols.canopen_pkw.procedures import LastWrite
 from drive_can_bridge.protocols.channel import Lane
 from drive_can_bridge.protocols.polling import WriteSchedule
 
@@ -50,13 +49,6 @@ class SetpointWriter:
                   if not setpoint.known])
         if self._schedule.waiting and self._channel.is_idle(Lane.SETPOINTS):
             self._channel.run(self._write(), lambda _: None, now, Lane.SETPOINTS)
-
-    def neutral_writes(self) -> list[LastWrite]:
-        """Return what writes the neutral value of every setpoint of which it is known."""
-        return [LastWrite(setpoint.parameter.name, span, self._placement.words(
-                    setpoint.parameter, setpoint.neutral))
-                for setpoint, span in zip(self._setpoints.items, self._spans)
-                if setpoint.known]
 
     def _write(self) -> Generator[Step, Reply, None]:
         told = self._session.told

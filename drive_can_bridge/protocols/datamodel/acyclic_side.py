@@ -12,10 +12,8 @@ from typing import Union
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.events import ForeignMasterSeen
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.roles import Cells
 from drive_can_bridge.core.session import Session
-from drive_can_bridge.core.told import CONTROL_WORD
 from drive_can_bridge.core.users import Users
 from drive_can_bridge.protocols.access import ChannelServer
 from drive_can_bridge.protocols.datamodel import procedures
@@ -27,9 +25,7 @@ from drive_can_bridge.protocols.datamodel.extended import PAYLOAD, SLOTS
 from drive_can_bridge.protocols.datamodel.numbers import Numbers
 from drive_can_bridge.protocols.datamodel.options import DataModelOptions
 from drive_can_bridge.protocols.datamodel.process_words import slot_of
-from drive_can_bridge.protocols.datamodel.stop_writes import (
-    ANSWER_TIME, confirm, StopWrite,
-)
+from drive_can_bridge.protocols.datamodel.stop_writes import ANSWER_TIME, confirm
 from drive_can_bridge.protocols.placement import SentWrites
 from drive_can_bridge.protocols.safe_stop import SafeStop
 
@@ -68,7 +64,6 @@ class AcyclicSide:
         table = drive.profile.control
         word_name = table.parameter if table is not None else ''
         status_name = table.status_parameter or '' if table is not None else ''
-        self._word = drive.profile.parameters.get(word_name)
         self.control_slot = slot_of(drive.cyclic_request, word_name)
         self.status_slot = slot_of(drive.cyclic_response, status_name)
         word = word_name if self.control_slot is None else ''
@@ -154,36 +149,18 @@ class AcyclicSide:
 
         :param setpoints: False: what is in ``cyclic_request`` is stopped by cyclic frames.
         """
-        session, writes = self._session, []
-        if session.control is not None and self._word is not None and (
-                setpoints or self.control_slot is None):
-            writes.append(self._stop_write(self._word, session.control.word))
-        if setpoints:   # but no position where the axis may not be any more
-            writes += [self._stop_write(setpoint.parameter, setpoint.neutral)
-                       for setpoint in session.setpoints.items if setpoint.known]
-            setpoints = session.control is not None or session.setpoints.known
-        if not writes or self.stop.running:
+        stop = self.stop
+        told = stop.writes(word=setpoints or self.control_slot is None, setpoints=setpoints)
+        if not told or stop.running:
             return
+        writes = [(each.parameter, self.numbers.write(each.parameter, each.raw)) for each in told]
         # what is kept in RAM does not wait until an EEPROM is done
-        writes.sort(key=lambda each: each.write.eeprom)
-        self.stop.running = True    # before the first of them leaves
-        for each in writes:
-            self.channel.write_now(each.write, lambda sent, then: None, now)
-        timeout = min(session.retry.timeout, ANSWER_TIME)
-        self.stop.begin(
-            confirm(writes, timeout), self._all_stopped if setpoints else self._word_stopped, now)
-
-    def _all_stopped(self) -> None:
-        self._session.told.stopped()
-
-    def _word_stopped(self) -> None:
-        session = self._session
-        session.told.note(CONTROL_WORD, runs=False)
-        if not session.active:  # in its end, to be disabled is enough
-            session.told.answered()
-
-    def _stop_write(self, parameter: Parameter, raw: int) -> StopWrite:
-        return StopWrite(parameter, self.numbers.write(parameter, raw))
+        writes.sort(key=lambda each: each[1].eeprom)
+        stop.running = True     # before the first of them leaves
+        for _, write in writes:
+            self.channel.write_now(write, lambda sent, then: None, now)
+        timeout = min(self._session.retry.timeout, ANSWER_TIME)
+        stop.begin(confirm(writes, timeout), now, setpoints=setpoints)
 
 
 def map_cells(options: DataModelOptions) -> Cells:
