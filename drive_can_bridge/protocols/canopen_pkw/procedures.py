@@ -5,10 +5,11 @@ What takes more than one request: parameters of users, and the safe stop.
 Every generator here is for :class:`.mailbox.MailboxChannel`.
 """
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Hashable, Sequence
 
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.requests import Failure, NOT_SENT, Outcome, Outcomes, Written
+from drive_can_bridge.core.told import Told
 from drive_can_bridge.protocols.access import Access, Found, Item
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
@@ -67,6 +68,31 @@ class RegisterAccess(Access[Span, Step, Reply]):
             if reply.sent:
                 return self.retry.unanswered(1)
         return self.retry.unanswered()
+
+
+# -- what the drive is told -----------------------------------------------------------------------
+
+
+def tell(told: Told, what: Hashable, write: Write, *, runs: bool,
+         ) -> Generator[Step, Reply, Reply]:
+    """
+    Write a setpoint or control word, and keep the books of what the drive was told.
+
+    What may start it counts from now on, what stops it when it is answered: whether a write
+    without an answer was executed, nobody knows. One that was not sent changes nothing.
+
+    :param runs: it may start the drive; as it is now: a neutral value that follows the axis is
+        another one when the answer comes.
+    """
+    before = told.runs(what)
+    if runs:
+        told.note(what, runs=True)
+    reply = yield write
+    if isinstance(reply, Answered):
+        told.note(what, runs=runs)
+    elif isinstance(reply, Silence) and not reply.sent:
+        told.note(what, runs=before)
+    return reply
 
 
 # -- the stop -------------------------------------------------------------------------------------

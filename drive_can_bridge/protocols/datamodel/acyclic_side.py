@@ -19,7 +19,7 @@ from drive_can_bridge.protocols.access import ChannelServer
 from drive_can_bridge.protocols.datamodel import procedures
 from drive_can_bridge.protocols.datamodel.acyclic_control import AcyclicControl
 from drive_can_bridge.protocols.datamodel.channel import (
-    AcyclicChannel, Polling, Read, Reply, Step, Words,
+    AcyclicChannel, ParameterCourier, Read, Reply, Step, Words,
 )
 from drive_can_bridge.protocols.datamodel.extended import PAYLOAD, SLOTS
 from drive_can_bridge.protocols.datamodel.numbers import Numbers
@@ -39,7 +39,7 @@ class AcyclicSide:
     :param decode: makes words of an answer, given the read that waits for one.
     :param together: parameters that fit one write frame.
     :param stop_ended: called when a stop by acyclic writes has run its course.
-    :param polling: given where the exchange itself goes through the channel.
+    :param quarantine: given where the exchange itself goes through the channel.
     :ivar numbers: where the parameters of the drive stand.
     :ivar control_slot: of the control word in ``cyclic_request``, or None.
     :ivar status_slot: of the status word in ``cyclic_response``, or None.
@@ -49,16 +49,16 @@ class AcyclicSide:
     def __init__(self, session: Session, *, encode_read: Callable[[int, int], Frame],
                  encode_write: Callable[[int, Words], Frame],
                  decode: Callable[[Frame, Union[Read, None]], Words], together: int,
-                 stop_ended: Callable[[], None], polling: Polling | None = None) -> None:
+                 stop_ended: Callable[[], None], quarantine: float | None = None) -> None:
         drive, options = session.configuration, session.configuration.options
         self.numbers = Numbers(drive)
         self._session = session
         self._decode = decode
         sent = SentWrites(session.sent, self.numbers)
-        self.channel = AcyclicChannel(
+        self.channel = AcyclicChannel(ParameterCourier(
             encode_read=encode_read, encode_write=encode_write, send=session.outbox.put,
             wrote=lambda write: sent.note(write.chunk, write.words), retry=session.retry,
-            eeprom_gap=options.eeprom_write_gap, polling=polling)
+            eeprom_gap=options.eeprom_write_gap, quarantine=quarantine))
         session.users = Users(session, ChannelServer(self.channel, procedures.ParameterAccess(
             session.retry, self.numbers, verify=drive.verify_writes, together=together)))
         table = drive.profile.control

@@ -18,7 +18,6 @@ from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.datamodel import standard
 from drive_can_bridge.protocols.datamodel.acyclic_side import AcyclicSide, map_cells
-from drive_can_bridge.protocols.datamodel.channel import Polling
 from drive_can_bridge.protocols.datamodel.setpoint_writer import SetpointWriter
 from drive_can_bridge.protocols.datamodel.standard_round import StandardRound
 from drive_can_bridge.protocols.datamodel.stop_writes import ANSWER_TIME, ATTEMPTS
@@ -52,7 +51,7 @@ class StandardSession(Session):
             encode_write=lambda number, words: standard.encode_write(request, number, *words),
             decode=lambda frame, step: standard.decode_read_response(
                 frame, step.count if step else 0, strict=strict),
-            together=1, stop_ended=self._stop_ended, polling=Polling(options.quarantine))
+            together=1, stop_ended=self._stop_ended, quarantine=options.quarantine)
         self._channel = self._side.channel
         self._status_slot = self._side.status_slot
         self._request_identifier = request

@@ -10,7 +10,7 @@ from drive_can_bridge.core.outbox import Outbox
 from drive_can_bridge.core.retry import RetryPolicy
 from drive_can_bridge.protocols.channel import Lane
 from drive_can_bridge.protocols.datamodel.channel import (
-    AcyclicChannel, Polling, Procedure, Read, Words, Write,
+    AcyclicChannel, ParameterCourier, Procedure, Read, Words, Write,
 )
 
 
@@ -24,11 +24,11 @@ class Line:
     def __init__(self, *, timeout: float = 0.1, attempts: int = 2, gap: float = 0.02,
                  quarantine: float | None = None) -> None:
         self.outbox = Outbox()
-        self.channel = AcyclicChannel(
+        self.channel = AcyclicChannel(ParameterCourier(
             encode_read=lambda number, count: Frame(number, b'?' * count, True),
             encode_write=lambda number, words: Frame(number, bytes(words), True),
             send=self.outbox.put, retry=RetryPolicy(timeout, attempts), eeprom_gap=gap,
-            polling=None if quarantine is None else Polling(quarantine))
+            quarantine=quarantine))
         self.results: list[object] = []
 
     def sent(self, now: float | None = None) -> list[str]:
