@@ -17,6 +17,7 @@ from drive_can_bridge.core.requests import (
     Failure, NO_ANSWER_OFFLINE, NOT_SENT, Outcome, Outcomes, ReadRequest, ReadValue, Request,
 )
 from drive_can_bridge.core.retry import RetryPolicy
+from drive_can_bridge.core.words import value_text
 from drive_can_bridge.protocols.channel import Channel, Lane
 from drive_can_bridge.protocols.courier import ReplyT, StepT
 from drive_can_bridge.protocols.placement import ParameterPlacement, SpanT
@@ -24,6 +25,12 @@ from drive_can_bridge.protocols.placement import ParameterPlacement, SpanT
 Item = tuple[Parameter, int]
 #: the words that a read brought, one for each address of its span
 Found = Union[tuple[int, ...], Failure]
+
+
+def read_back(parameter: Parameter, found: int, wanted: int) -> Failure:
+    """Say that a drive has another raw integer than the one that was written."""
+    return Failure(f'read back {value_text(parameter.value_from_raw(found))} '
+                   f'instead of {value_text(parameter.value_from_raw(wanted))}')
 
 
 class Access(ABC, Generic[SpanT, StepT, ReplyT]):

@@ -54,6 +54,19 @@ class ParameterPlacement(ABC, Generic[SpanT]):
         return self.raw(parameter, [words[address] for address in addresses])
 
 
+class OneByOne(ParameterPlacement[Parameter]):
+    """Parameters of drives that answer for one at a time, as one word of whatever width."""
+
+    def span(self, parameter: Parameter) -> Parameter:
+        return parameter
+
+    def addresses(self, span: Parameter) -> tuple[Parameter]:
+        return (span,)
+
+    def plan(self, spans: Sequence[Parameter]) -> list[Parameter]:
+        return list(dict.fromkeys(spans))
+
+
 class SentWrites(Generic[SpanT]):
     """
     Which of the writes that left are setpoints and control words: what a drive was told last.

@@ -4,11 +4,11 @@ The conversation with one device over the PKW mailbox.
 
 .. code-block:: text
 
-    IDLE ──activate, bus up──► RUNNING ──deactivate──► STOPPING ──► IDLE
+    IDLE ──activate, bus up──► POLLING ──deactivate──► STOPPING ──► IDLE
       ▲                           │ bus down
       └───────────────────────────┘
 
-While running, a round of reads begins every period, as long as the node takes PDOs (see
+While polling, a round of reads begins every period, as long as the node takes PDOs (see
 :mod:`.canopen.node`). A complete round is published as one sample and makes the drive online;
 three rounds (``missed_limit``) with a read that nobody answered make it offline, and so do a
 boot-up frame, a heartbeat that says that the node is not operational, and heartbeats that cease.
@@ -21,7 +21,6 @@ setpoints again after ``refresh_interval``.
 """
 
 from collections.abc import Collection
-from enum import Enum
 import math
 
 from drive_can_bridge.core.configuration import DriveConfiguration
@@ -43,7 +42,7 @@ from drive_can_bridge.protocols.canopen_pkw.round import Rounds
 from drive_can_bridge.protocols.canopen_pkw.writers import Writers
 from drive_can_bridge.protocols.channel import Lane
 from drive_can_bridge.protocols.placement import SentWrites
-from drive_can_bridge.protocols.polled_exchange import PolledExchange
+from drive_can_bridge.protocols.polled_exchange import Phase, PolledExchange
 
 SILENT = ('no complete round of reads: drive silent, not operational, or other COB-IDs than '
           'configured')
@@ -51,14 +50,6 @@ SILENT = ('no complete round of reads: drive silent, not operational, or other C
 #: s that a stop may take all together: of a drive that answers, and of one that has fallen silent
 STOP_TIME = 3.0
 STOP_TIME_SILENT = 0.4
-
-
-class Phase(Enum):
-    """What the session is doing."""
-
-    IDLE = 'idle'
-    RUNNING = 'running'
-    STOPPING = 'last writes'
 
 
 class PkwSession(Session):
@@ -128,13 +119,13 @@ class PkwSession(Session):
 
     def time_lost(self, now: float) -> None:
         self._channel.time_lost(now)
-        if self._phase is Phase.RUNNING:
+        if self._phase is Phase.POLLING:
             self.stood_still(now)
             self.start_over(now)
 
     def begin(self, now: float) -> None:
         self.report.advice = LOOKING
-        self._phase = Phase.RUNNING
+        self._phase = Phase.POLLING
         self._forget_exchange()
         self._rounds.start_over()
         self._supervision.begin(now)
@@ -256,7 +247,7 @@ class PkwSession(Session):
 
     def handle_timer(self, now: float) -> None:
         self._supervision.handle_timer(now)
-        if self._phase is Phase.RUNNING:
+        if self._phase is Phase.POLLING:
             if self.control is not None and now >= self.control.next_timer():
                 self.control.handle_timer(now)
                 self.control_changed(now)
@@ -276,7 +267,7 @@ class PkwSession(Session):
 
     def next_timer(self) -> float:
         soonest = self._channel.next_timer()
-        if self._phase is not Phase.RUNNING:
+        if self._phase is not Phase.POLLING:
             return soonest
         soonest = min(soonest, self._round_due, self._supervision.next_timer())
         return soonest if self.control is None else min(soonest, self.control.next_timer())

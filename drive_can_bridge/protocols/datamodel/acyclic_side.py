@@ -12,6 +12,8 @@ from typing import Union
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.events import ForeignMasterSeen
 from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.process_image import control_word, status_word
 from drive_can_bridge.core.roles import Cells
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.users import Users
@@ -24,7 +26,6 @@ from drive_can_bridge.protocols.datamodel.channel import (
 from drive_can_bridge.protocols.datamodel.extended import PAYLOAD, SLOTS
 from drive_can_bridge.protocols.datamodel.numbers import Numbers
 from drive_can_bridge.protocols.datamodel.options import DataModelOptions
-from drive_can_bridge.protocols.datamodel.process_words import slot_of
 from drive_can_bridge.protocols.datamodel.stop_writes import ANSWER_TIME, confirm
 from drive_can_bridge.protocols.placement import SentWrites
 from drive_can_bridge.protocols.safe_stop import SafeStop
@@ -61,17 +62,15 @@ class AcyclicSide:
             eeprom_gap=options.eeprom_write_gap, quarantine=quarantine))
         session.users = Users(session, ChannelServer(self.channel, procedures.ParameterAccess(
             session.retry, self.numbers, verify=drive.verify_writes, together=together)))
-        table = drive.profile.control
-        word_name = table.parameter if table is not None else ''
-        status_name = table.status_parameter or '' if table is not None else ''
-        self.control_slot = slot_of(drive.cyclic_request, word_name)
-        self.status_slot = slot_of(drive.cyclic_response, status_name)
-        word = word_name if self.control_slot is None else ''
-        status = status_name if self.status_slot is None else ''
-        self.control_writer = None if session.control is None or not word + status else (
+        word = control_word(drive, controlled=session.control is not None)
+        status = status_word(drive)
+        self.control_slot = _slot(drive.cyclic_request, word)
+        self.status_slot = _slot(drive.cyclic_response, status)
+        word = word if self.control_slot is None else None
+        status = status if self.status_slot is None else None
+        self.control_writer = None if session.control is None or not (word or status) else (
             AcyclicControl(session, session.control, self.channel, self.numbers,
-                           word=drive.profile.parameters.get(word),
-                           status=drive.profile.parameters.get(status)))
+                           word=word, status=status))
         self.stop: SafeStop[Step, Reply] = SafeStop(session, self.channel, stop_ended)
 
     def clear(self) -> None:
@@ -161,6 +160,10 @@ class AcyclicSide:
             self.channel.write_now(write, lambda sent, then: None, now)
         timeout = min(self._session.retry.timeout, ANSWER_TIME)
         stop.begin(confirm(writes, timeout), now, setpoints=setpoints)
+
+
+def _slot(parameters: tuple[Parameter, ...], parameter: Parameter | None) -> int | None:
+    return parameters.index(parameter) if parameter in parameters else None
 
 
 def map_cells(options: DataModelOptions) -> Cells:

@@ -13,8 +13,7 @@ from drive_can_bridge.core.requests import (
     Failure, NOT_SENT, Outcome, Outcomes, SENT_UNACKNOWLEDGED, Written,
 )
 from drive_can_bridge.core.retry import RetryPolicy
-from drive_can_bridge.core.words import value_text
-from drive_can_bridge.protocols.access import Access, Found, Item
+from drive_can_bridge.protocols.access import Access, Found, Item, read_back
 from drive_can_bridge.protocols.datamodel.channel import Read, Reply, Step, Words, Write
 from drive_can_bridge.protocols.datamodel.extended import CYCLIC_PARAMETER, SLOTS
 from drive_can_bridge.protocols.datamodel.mapping import effective, padded
@@ -182,5 +181,4 @@ def write_maps(request_base: int, response_base: int, *, request: Sequence[int],
 def _compare(parameter: Parameter, found: int, wanted: int) -> Outcome:
     if found == wanted or parameter.type is ParameterType.BOOL and bool(found) is bool(wanted):
         return Written()
-    return Failure(f'read back {value_text(parameter.value_from_raw(found))} '
-                   f'instead of {value_text(parameter.value_from_raw(wanted))}')
+    return read_back(parameter, found, wanted)

@@ -9,7 +9,6 @@ silent; that is how it is found. Setpoints are written only to a drive that answ
 back (:mod:`.stop_writes`).
 """
 
-from enum import Enum
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control_machine import ControlMachine
@@ -21,17 +20,9 @@ from drive_can_bridge.protocols.datamodel.acyclic_side import AcyclicSide, map_c
 from drive_can_bridge.protocols.datamodel.setpoint_writer import SetpointWriter
 from drive_can_bridge.protocols.datamodel.standard_round import StandardRound
 from drive_can_bridge.protocols.datamodel.stop_writes import ANSWER_TIME, ATTEMPTS
-from drive_can_bridge.protocols.polled_exchange import PolledExchange, Raws
+from drive_can_bridge.protocols.polled_exchange import Phase, PolledExchange, Raws
 
 SILENT = 'no answer to reads: drive silent, wrong station, bit rate or identifier mode'
-
-
-class Phase(Enum):
-    """What the session is doing."""
-
-    IDLE = 'idle'
-    POLLING = 'polling'
-    STOPPING = 'last neutral setpoints'
 
 
 class StandardSession(Session):
