@@ -9,7 +9,7 @@ from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address
 from drive_can_bridge.protocols.datamodel.numbers import Numbers
-from drive_can_bridge.protocols.placement import SentWrites
+from drive_can_bridge.protocols.placement import OneByOne, SentWrites
 from drive_can_bridge.protocols.polling import Chunk
 
 WIDE = parameter('wide', 500, type=ParameterType.INT32)
@@ -32,6 +32,12 @@ def test_numbers_on_the_wire_are_moved() -> None:
     assert numbers.raw_among(ACTUAL, Chunk(208), {208: 0xFC18, 209: 7}) == -1000
     assert numbers.numbers((SPEED, LIMIT)) == (49, 50)
     assert (numbers.write(SPEED, -1).eeprom, numbers.write(KEY, 1).eeprom) == (False, True)
+
+
+def test_what_is_read_one_by_one_is_read_once() -> None:
+    alone = OneByOne()
+    assert alone.plan([WIDE, NARROW, WIDE]) == [WIDE, NARROW]
+    assert alone.raw_among(WIDE, WIDE, {WIDE: 0xFFFF_FFFE}) == -2
 
 
 def told(*parameters: Parameter) -> tuple[LastSent, SentWrites[Span]]:

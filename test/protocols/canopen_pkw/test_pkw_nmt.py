@@ -3,8 +3,8 @@
 
 from builders import read
 from pkw_builders import (
-    ANSWER_0, ANSWER_1, BOOT_UP, FLC, IDLE, IDLE_ANSWER, online, OPERATIONAL, PRE_OPERATIONAL,
-    READ_0, READ_1, SPEED, START, started, STOPPED,
+    ANSWER_0, ANSWER_1, BOOT_UP, FLC, IDLE, IDLE_ANSWER, LEVEL, online, OPERATIONAL,
+    PRE_OPERATIONAL, READ_0, READ_1, SPEED, START, started, STATUS, STOPPED,
 )
 import pytest
 
@@ -106,6 +106,21 @@ def test_boot_up_of_a_node_with_heartbeats_waits_for_operational() -> None:
     assert talk.until(10.9) == []
     assert talk.hears(OPERATIONAL, 10.9) == []
     assert talk.at(10.9) == [IDLE]
+
+
+def test_lost_heartbeat_ends_the_round_under_way() -> None:
+    talk = started(response=(STATUS, LEVEL), heartbeat_timeout=0.025, parameter_timeout=0.1)
+    talk.at(10.05)
+    talk.hears(IDLE_ANSWER, 10.051)
+    talk.hears('485#C70100A541000000', 10.052)
+    talk.hears('485#D101002507000000', 10.053)
+    talk.hears(OPERATIONAL, 10.06)
+    assert talk.until(10.0701) == [(10.07, '505#C70100A500000000')]
+    assert talk.hears('485#C70100A541000000', 10.072) == ['505#D101002500000000']
+    assert talk.until(10.1351) == [(10.135, IDLE)]
+    assert not talk.session.online
+    # what comes next is the beginning of another one
+    assert talk.hears(IDLE_ANSWER, 10.136) == ['505#C70100A500000000']
 
 
 def test_lost_heartbeat_makes_it_offline_until_it_is_back() -> None:

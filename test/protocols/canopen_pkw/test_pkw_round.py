@@ -225,6 +225,21 @@ def test_half_of_a_round_publishes_nothing() -> None:
 # -- refusals -------------------------------------------------------------------------------------
 
 
+def test_a_refused_round_between_two_that_are_missed() -> None:
+    talk = started(response=(STATUS, LEVEL), parameter_timeout=0.015, missed_limit=2)
+    talk.at(10.05)
+    talk.hears(IDLE_ANSWER, 10.051)
+    talk.hears('485#C70100A541000000', 10.052)
+    talk.hears('485#D101002507000000', 10.053)
+    assert talk.until(10.0901) == [(10.07, '505#C70100A500000000'), (10.09, IDLE)]
+    assert talk.hears(IDLE_ANSWER, 10.091) == [READ_SINGLE_0]
+    assert talk.hears('485#C701004E00000206', 10.092) == ['505#D10100A500000000']
+    assert talk.hears('485#D10100CE00000206', 10.093) == []
+    assert talk.until(10.1301) == [(10.11, READ_SINGLE_0), (10.13, IDLE)]
+    assert talk.session.statistics.missed == 2
+    assert talk.session.online, 'they were not in a row'
+
+
 def test_refused_poll_is_an_answer_but_shown() -> None:
     talk = started(response=(STATUS, LEVEL))
     talk.at(10.05)

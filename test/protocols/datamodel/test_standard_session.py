@@ -30,6 +30,14 @@ GAP = parameter('torque', 213, access=RO)
 # -- rounds ---------------------------------------------------------------------------------------
 
 
+def test_a_round_cut_short_by_the_end_does_not_keep_the_next_from_beginning() -> None:
+    talk = polling()
+    assert talk.deactivate(10.001) == []
+    assert talk.session.stopped
+    assert talk.activate(10.5) == []
+    assert [text for _, text in talk.until(10.515)] == [ASK]
+
+
 def test_a_round_is_published_with_the_time_of_its_last_answer() -> None:
     talk = polling()
     assert talk.hears(ANSWER, 10.002) == []
