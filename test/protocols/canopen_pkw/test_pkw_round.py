@@ -240,6 +240,20 @@ def test_a_refused_round_between_two_that_are_missed() -> None:
     assert talk.session.online, 'they were not in a row'
 
 
+def test_a_value_is_of_its_own_round_or_of_none() -> None:
+    talk = started(response=(STATUS, LEVEL))
+    talk.at(10.05)
+    talk.hears(IDLE_ANSWER, 10.051)
+    talk.hears('485#C70100A541000000', 10.052)
+    talk.hears('485#D101002507000000', 10.053)
+    assert talk.samples() == [(0x41, 7)]
+    talk.until(10.0701)
+    talk.hears('485#C70100A541000000', 10.071)
+    talk.hears('485#D101004E00000206', 10.072)
+    assert talk.session.online
+    assert talk.samples() == []
+
+
 def test_refused_poll_is_an_answer_but_shown() -> None:
     talk = started(response=(STATUS, LEVEL))
     talk.at(10.05)
