@@ -96,7 +96,6 @@ class StandardSession(Session):
         self.report.advice = SILENT
         self._round.gap = ''
         self._phase = Phase.POLLING
-        self._exchange.forget()
         self._tell_to_stop(now)
         self._timer.start(now)
 

@@ -279,6 +279,18 @@ def test_the_pause_of_the_eeprom_begins_when_the_write_has_left() -> None:
 # -- where the exchange itself goes through the channel -------------------------------------------
 
 
+def test_a_stall_ends_a_read_whose_answer_would_not_say_what_it_answers() -> None:
+    """However short the silence after it."""
+    line = Line(quarantine=0.0, attempts=1)
+    line.reads(7)
+    line.channel.time_lost(1.01)
+    assert line.results == [[None]]
+    line = Line(attempts=1)
+    line.reads(7)
+    line.channel.time_lost(1.01)
+    assert line.results == []
+
+
 def test_a_round_is_interrupted_once_at_most() -> None:
     line = Line(quarantine=0.1)
     line.reads(1, 2, 3)
