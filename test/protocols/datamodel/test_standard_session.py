@@ -43,7 +43,7 @@ def test_answer_to_an_older_question_does_not_show_that_a_stop_arrived() -> None
 
 
 def test_answer_that_finds_a_drive_does_not_show_that_a_stop_arrived() -> None:
-    talk = online(rearm_immediate=True, command_timeout=0.0)
+    talk = online(rearm_immediate=True, command_timeout=0.05)
     talk.commands(0, 100.0, 10.01)
     assert talk.until(10.0215) == [(10.02, '3F1#063200E803000000'), (10.021, ASK)]
     talk.until(12.0)
