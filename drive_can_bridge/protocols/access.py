@@ -10,22 +10,27 @@ the family's. All functions here are generators for :class:`.channel.Channel`.
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Generator, Hashable, Sequence
-from typing import Generic, TypeVar, Union
+from typing import Generic, Union
 
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.requests import (
     Failure, NO_ANSWER_OFFLINE, NOT_SENT, Outcome, Outcomes, ReadRequest, ReadValue, Request,
 )
 from drive_can_bridge.core.retry import RetryPolicy
+from drive_can_bridge.core.words import value_text
 from drive_can_bridge.protocols.channel import Channel, Lane
 from drive_can_bridge.protocols.courier import ReplyT, StepT
-
-#: what one read asks for, and what one parameter takes
-SpanT = TypeVar('SpanT', bound=Hashable)
+from drive_can_bridge.protocols.placement import ParameterPlacement, SpanT
 
 Item = tuple[Parameter, int]
 #: the words that a read brought, one for each address of its span
 Found = Union[tuple[int, ...], Failure]
+
+
+def read_back(parameter: Parameter, found: int, wanted: int) -> Failure:
+    """Say that a drive has another raw integer than the one that was written."""
+    return Failure(f'read back {value_text(parameter.value_from_raw(found))} '
+                   f'instead of {value_text(parameter.value_from_raw(wanted))}')
 
 
 class Access(ABC, Generic[SpanT, StepT, ReplyT]):
@@ -33,10 +38,12 @@ class Access(ABC, Generic[SpanT, StepT, ReplyT]):
     The parameters of one drive.
 
     :param retry: what is said when nobody answers.
+    :param placement: where they stand.
     """
 
-    def __init__(self, retry: RetryPolicy) -> None:
+    def __init__(self, retry: RetryPolicy, placement: ParameterPlacement[SpanT]) -> None:
         self.retry = retry
+        self.placement = placement
 
     def serve(self, request: Request) -> Generator[StepT, ReplyT, Outcomes]:
         """Return the procedure that serves a request of a user."""
@@ -49,24 +56,8 @@ class Access(ABC, Generic[SpanT, StepT, ReplyT]):
     # -- what a family knows ----------------------------------------------------------------------
 
     @abstractmethod
-    def span(self, parameter: Parameter) -> SpanT:
-        """Return what a parameter takes."""
-
-    @abstractmethod
-    def addresses(self, span: SpanT) -> Sequence[Hashable]:
-        """Return the address of each word of a span."""
-
-    @abstractmethod
-    def plan(self, spans: Sequence[SpanT]) -> list[SpanT]:
-        """Cover everything by as few reads as possible."""
-
-    @abstractmethod
     def read(self, span: SpanT) -> Generator[StepT, ReplyT, Found]:
         """Read what one frame can bring."""
-
-    @abstractmethod
-    def raw(self, parameter: Parameter, words: tuple[int, ...]) -> int:
-        """Return the raw integer of a parameter."""
 
     @abstractmethod
     def write(self, parameter: Parameter, raw: int) -> Generator[StepT, ReplyT, Outcome]:
@@ -84,32 +75,33 @@ class Access(ABC, Generic[SpanT, StepT, ReplyT]):
 
     def _read_all(self, parameters: Sequence[Parameter]) -> Generator[StepT, ReplyT, Outcomes]:
         """Read parameters; what shares a frame with one that fails is asked for alone."""
-        spans = [self.span(parameter) for parameter in parameters]
+        placement = self.placement
+        spans = [placement.span(parameter) for parameter in parameters]
         words: dict[Hashable, int] = {}
         failures: dict[SpanT, Failure] = {}
         gone: Failure | None = None
-        pending = self.plan([span for parameter, span in zip(parameters, spans)
-                             if self.aside(parameter, write=False) is None])
+        pending = placement.plan([span for parameter, span in zip(parameters, spans)
+                                  if self.aside(parameter, write=False) is None])
         while pending and gone is None:
             span = pending.pop(0)
             found = yield from self.read(span)
             if not isinstance(found, Failure):
-                words.update(zip(self.addresses(span), found))
+                words.update(zip(placement.addresses(span), found))
             elif found.reason == NO_ANSWER_OFFLINE:
                 gone = found
             else:
                 failures[span] = found
-                covered = set(self.addresses(span))
+                covered = set(placement.addresses(span))
                 pending[:0] = [part for part in dict.fromkeys(spans)
-                               if part != span and covered.issuperset(self.addresses(part))]
+                               if part != span and covered.issuperset(placement.addresses(part))]
 
         def outcome(parameter: Parameter, span: SpanT) -> Outcome:
             known = self.aside(parameter, write=False)
             if known is not None:
                 return known
-            addresses = self.addresses(span)
-            if all(address in words for address in addresses):
-                return ReadValue(self.raw(parameter, tuple(words[each] for each in addresses)))
+            raw = placement.raw_among(parameter, span, words)
+            if raw is not None:
+                return ReadValue(raw)
             return failures.get(span) or gone or self.retry.unanswered()
 
         return tuple(map(outcome, parameters, spans))

@@ -9,7 +9,7 @@ again after ``refresh_interval``. What to read and when to write is decided here
 families.
 """
 
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Sequence
 import math
 from typing import NamedTuple
 
@@ -19,31 +19,24 @@ _TOLERANCE = 1e-6
 REQUEST_TIME = 0.001
 
 
-class Place(NamedTuple):
-    """
-    Where a parameter stands.
-
-    :param address: number of its first word.
-    :param width: words that it takes: 1, or 2 for 32 bits.
-    """
-
-    address: int
-    width: int = 1
-
-
 class Chunk(NamedTuple):
     """
-    What one read asks for.
+    What a parameter takes, and what one read asks for.
 
     :param address: number of the first word.
-    :param size: consecutive words.
+    :param size: consecutive words; of a parameter: 1, or 2 for 32 bits.
     """
 
     address: int
-    size: int
+    size: int = 1
+
+    @property
+    def addresses(self) -> range:
+        """The number of each word."""
+        return range(self.address, self.address + self.size)
 
 
-def plan_reads(places: Iterable[Place], size: int, *, known: Container[int] = ()) -> list[Chunk]:
+def plan_reads(wanted: Iterable[Chunk], size: int, *, known: Container[int] = ()) -> list[Chunk]:
     """
     Cover parameters by as few reads as possible.
 
@@ -54,24 +47,24 @@ def plan_reads(places: Iterable[Place], size: int, *, known: Container[int] = ()
     :param known: addresses that may be read although nobody wants them, in order to bridge a gap.
         An address that the drive does not know would cost the whole read.
 
-    >>> plan_reads([Place(212), Place(209), Place(210)], 4, known={211})
+    >>> plan_reads([Chunk(212), Chunk(209), Chunk(210)], 4, known={211})
     [Chunk(address=209, size=4)]
-    >>> plan_reads([Place(212), Place(209), Place(210)], 4)
+    >>> plan_reads([Chunk(212), Chunk(209), Chunk(210)], 4)
     [Chunk(address=209, size=2), Chunk(address=212, size=1)]
     """
     chunks: list[Chunk] = []
-    for place in sorted(set(places)):
-        end = place.address + place.width
+    for chunk in sorted(set(wanted)):
+        end = chunk.address + chunk.size
         if chunks:
             address, length = chunks[-1]
             reached = address + length
             if end <= reached:
                 continue
             if end - address <= size and all(
-                    gap in known for gap in range(reached, place.address)):
+                    gap in known for gap in range(reached, chunk.address)):
                 chunks[-1] = Chunk(address, end - address)
                 continue
-        chunks.append(Chunk(*place))
+        chunks.append(chunk)
     return chunks
 
 
@@ -143,26 +136,3 @@ class WriteSchedule:
     def failed(self, index: int) -> None:
         """Take note that nobody knows what the drive has: it is due at the next look."""
         self._written[index] = None
-
-
-class Round:
-    """
-    The words that a round has brought so far.
-
-    :param places: of all parameters, in the order of ``cyclic_response``.
-    """
-
-    def __init__(self, places: Sequence[Place]) -> None:
-        self._places = places
-        self._words: dict[int, int] = {}
-
-    def take(self, chunk: Chunk, words: Sequence[int]) -> None:
-        """Take the answer of a read."""
-        self._words.update(zip(range(chunk.address, chunk.address + chunk.size), words))
-
-    def words(self) -> list[tuple[int, ...]]:
-        """Return the words of each parameter, lowest address first."""
-        found: Mapping[int, int] = self._words
-        return [tuple(found[address] for address in range(place.address,
-                                                          place.address + place.width))
-                for place in self._places]

@@ -1,16 +1,28 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-The stop of a drive by acyclic writes, whatever its family: begun, and what is said in the end.
+The stop of a drive by acyclic writes, whatever its family: what has to be told, and what follows.
 
-What has to be told, and how often, is a procedure of the family, in the lane that comes first.
+How that is written and confirmed, and how often it is tried, is a procedure of the family, in the
+lane that comes first.
 """
 
 from collections.abc import Callable, Generator
-from typing import Any, Generic
+from typing import Generic, NamedTuple
 
+from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.process_image import control_word
 from drive_can_bridge.core.session import Session
+from drive_can_bridge.core.told import CONTROL_WORD
 from drive_can_bridge.protocols.channel import Channel, Lane
 from drive_can_bridge.protocols.courier import ReplyT, StepT
+
+
+class StopWrite(NamedTuple):
+    """What makes a drive stand still; ``is_word``: it is the control word."""
+
+    parameter: Parameter
+    raw: int
+    is_word: bool = False
 
 
 class SafeStop(Generic[StepT, ReplyT]):
@@ -27,33 +39,60 @@ class SafeStop(Generic[StepT, ReplyT]):
         self._session = session
         self._channel = channel
         self._ended = ended
+        self._word = control_word(
+            session.configuration, controlled=session.control is not None)
         self._owed = False          # there was something to be stopped when it began
         self._insisting = False
+        self._whole = False         # all that the drive can be told is in it
 
-    def begin(self, procedure: Generator[StepT, ReplyT, list[str]],
-              confirmed: Callable[[], Any], now: float, *, insist: bool = False) -> None:
+    def writes(self, *, word: bool = True, setpoints: bool = True) -> list[StopWrite]:
+        """
+        Return what the drive has to be told: ``disable``, then neutral setpoints.
+
+        But no position where the axis may not be any more.
+
+        :param word: the control word has to be told.
+        :param setpoints: they have to be told.
+        """
+        control, found = self._session.control, []
+        if word and control is not None and self._word is not None:
+            found.append(StopWrite(self._word, control.table.disable, is_word=True))
+        if setpoints:
+            found += [StopWrite(setpoint.parameter, setpoint.neutral)
+                      for setpoint in self._session.setpoints.items if setpoint.known]
+        return found
+
+    def begin(self, procedure: Generator[StepT, ReplyT, list[str]], now: float, *,
+              setpoints: bool = True, insist: bool = False) -> None:
         """
         Begin.
 
         :param procedure: returns what failed, in words; nothing: the drive has confirmed it all.
-        :param confirmed: called in this case.
+        :param setpoints: False: they are stopped in another way.
         :param insist: what failed is told even if the drive was not told to run.
         """
+        session = self._session
         self.running = True
-        self._owed, self._insisting = self._session.told.owed, insist
-        self._channel.run(procedure, lambda failed: self._done(failed, confirmed), now, Lane.STOP)
+        self._owed, self._insisting = session.told.owed, insist
+        self._whole = setpoints and not session.gate.mute
+        self._channel.run(procedure, self._done, now, Lane.STOP)
 
     def forget(self) -> None:
         """Take note that the channel was cleared."""
         self.running = False
 
-    def _done(self, failed: list[str], confirmed: Callable[[], Any]) -> None:
+    def _done(self, failed: list[str]) -> None:
         self.running = False
+        session = self._session
         if not failed:
-            confirmed()
+            if self._whole:
+                session.told.stopped()
+            else:
+                session.told.note(CONTROL_WORD, runs=False)
+                if not session.active:  # in its end, to be disabled is enough
+                    session.told.answered()
         elif self._owed or self._insisting:
-            self._session.report.warn(
-                f'told to stop, but {"; ".join(failed)}', may_run=self._owed)
-            if not self._session.active:    # which ends with it: there is no more to be said
-                self._session.told.stopped()
+            session.report.warn(f'told to stop, but {"; ".join(failed)}', may_run=self._owed)
+            if not session.active:      # which ends with it: there is no more to be said
+                session.told.stopped()
         self._ended()

@@ -9,7 +9,7 @@ the position is known first, and what is sent until then and after a loss. 70 is
 from typing import Any
 
 from builders import (
-    CONTROL, Conversation, drive, INT16, parameter, RAM, RO, STATUS, TABLE, WORD,
+    CONTROL, Conversation, drive, INT16, parameter, RAM, RO, SPEED, STATUS, TABLE, WORD,
 )
 
 from drive_can_bridge.core.control import ControlAction
@@ -111,6 +111,25 @@ def test_standard_without_control_is_told_nothing_after_a_loss() -> None:
     assert not talk.session.online
     after = [text for _, text in talk.until(15.0)]
     assert not [text for text in after if text.startswith('3F1#06')]
+
+
+def test_standard_stop_of_the_rest_is_none_of_an_axis_that_may_be_anywhere() -> None:
+    setpoint, actual = pair(60, 212)
+    talk = standard(control=None, request=(setpoint, SPEED), response=(STATUS, actual),
+                    command_timeout=0.0)
+    talk.hears('7F1#01004600ADDEADDE', 10.002)
+    talk.until(10.01)
+    talk.commands(0, 7.0, 10.011)
+    talk.commands(0, 9.0, 10.011)
+    assert [text for _, text in talk.until(10.0215)] == ['3F1#063C005A00000000', ASK]
+    talk.hears('7F1#01004700ADDEADDE', 10.022)
+    assert talk.time_lost(12.0) == ['3F1#0632000000000000']
+    assert talk.until(12.0015) == [(12.001, '3F1#0332000100000000')]
+    talk.events()
+    assert talk.hears('7F1#0000ADDEADDEADDE', 12.002) == []
+    talk.bus_down(12.003)
+    assert [event.text for event in talk.events(Noted) if event.warning] == [
+        'the bus was lost before it could be told to stop: it may still be running']
 
 
 # -- cannord: 002 and 003, words low byte first ---------------------------------------------------

@@ -9,13 +9,13 @@ import pytest
 
 from drive_can_bridge.protocols.cycle_timer import CycleTimer
 from drive_can_bridge.protocols.polling import (
-    Chunk, Place, plan_reads, Round, round_time, WriteSchedule,
+    Chunk, plan_reads, round_time, WriteSchedule,
 )
 
 
 def plan(*numbers: int, size: int = 4, known: set[int] | None = None) -> list[tuple[int, int]]:
     return [tuple(chunk) for chunk in
-            plan_reads([Place(number) for number in numbers], size, known=known or set())]
+            plan_reads([Chunk(number) for number in numbers], size, known=known or set())]
 
 
 def test_consecutive_numbers_share_a_read() -> None:
@@ -36,15 +36,15 @@ def test_a_gap_is_bridged_over_what_the_drive_knows() -> None:
 
 
 def test_words_of_32_bits_stay_together() -> None:
-    assert plan_reads([Place(455), Place(500, 2), Place(502, 2)], 2) == [
+    assert plan_reads([Chunk(455), Chunk(500, 2), Chunk(502, 2)], 2) == [
         Chunk(455, 1), Chunk(500, 2), Chunk(502, 2)]
-    assert plan_reads([Place(500, 2), Place(501)], 2) == [Chunk(500, 2)]
-    assert plan_reads([Place(499), Place(500, 2)], 2) == [Chunk(499, 1), Chunk(500, 2)]
+    assert plan_reads([Chunk(500, 2), Chunk(501)], 2) == [Chunk(500, 2)]
+    assert plan_reads([Chunk(499), Chunk(500, 2)], 2) == [Chunk(499, 1), Chunk(500, 2)]
 
 
 @given(st.sets(st.integers(0, 12), min_size=1), st.sets(st.integers(0, 12)), st.integers(1, 4))
 def test_no_plan_needs_fewer_reads(wanted: set[int], known: set[int], size: int) -> None:
-    chunks = plan_reads([Place(number) for number in wanted], size, known=known)
+    chunks = plan_reads([Chunk(number) for number in wanted], size, known=known)
     covered = [number for chunk in chunks
                for number in range(chunk.address, chunk.address + chunk.size)]
     assert wanted <= set(covered) <= wanted | known
@@ -144,10 +144,3 @@ def test_what_failed_and_what_was_forgotten_is_due_again() -> None:
     writes.forget()
     writes.look([1, 2], 10.2)
     assert [writes.next(), writes.next()] == [0, 1]
-
-
-def test_a_round_hands_out_words_by_parameter() -> None:
-    result = Round([Place(500, 2), Place(455), Place(501)])
-    result.take(Chunk(455, 1), (0x2083,))
-    result.take(Chunk(500, 2), (0, 900))
-    assert result.words() == [(0, 900), (0x2083,), (900,)]

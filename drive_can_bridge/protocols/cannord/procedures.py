@@ -13,12 +13,12 @@ from drive_can_bridge.core.requests import (
 )
 from drive_can_bridge.core.retry import RetryPolicy
 from drive_can_bridge.core.roles import Cells
-from drive_can_bridge.core.words import value_text
-from drive_can_bridge.protocols.access import Access, Found, Item
+from drive_can_bridge.protocols.access import Access, Found, Item, read_back
 from drive_can_bridge.protocols.cannord.channel import Ask, Reply
 from drive_can_bridge.protocols.cannord.parameter_frame import (
     error_text, ParameterFrame, Response, Task, WRITE_TASKS,
 )
+from drive_can_bridge.protocols.placement import OneByOne
 
 WRONG_INDEX = 3
 PROCESS_DATA_ONLY = 'exists in process data only'
@@ -48,21 +48,9 @@ class TaskAccess(Access[Parameter, Ask, Reply]):
 
     def __init__(self, retry: RetryPolicy, *, last_value: Callable[[str], int | None],
                  persist: bool) -> None:
-        super().__init__(retry)
+        super().__init__(retry, OneByOne())
         self._last_value = last_value
         self._persist = persist
-
-    def span(self, parameter: Parameter) -> Parameter:
-        return parameter
-
-    def addresses(self, span: Parameter) -> tuple[Parameter]:
-        return (span,)
-
-    def plan(self, spans: Sequence[Parameter]) -> list[Parameter]:
-        return list(dict.fromkeys(spans))
-
-    def raw(self, parameter: Parameter, words: tuple[int, ...]) -> int:
-        return parameter.raw_from_word(words[0])
 
     def read(self, span: Parameter) -> Generator[Ask, Reply, Found]:
         answer = yield from self._ask(span)
@@ -101,8 +89,7 @@ class TaskAccess(Access[Parameter, Ask, Reply]):
         if reply.contrary is not None:
             found = parameter.raw_from_word(
                 reply.contrary.value if double else reply.contrary.word)
-            return Failure(f'read back {value_text(parameter.value_from_raw(found))} '
-                           f'instead of {value_text(parameter.value_from_raw(raw))}')
+            return read_back(parameter, found, raw)
         return self.retry.unanswered(1)
 
     def write_together(self, items: Sequence[Item]) -> Generator[Ask, Reply, Outcomes]:
@@ -129,7 +116,6 @@ class TaskAccess(Access[Parameter, Ask, Reply]):
             refusal = yield from _refusal(parameter, reply.response)
             return refusal
         return reply.response
-
 
 
 def _refusal(parameter: Parameter, response: ParameterFrame) -> Generator[Ask, Reply, Failure]:

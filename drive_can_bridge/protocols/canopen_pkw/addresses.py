@@ -13,7 +13,8 @@ from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.protocols.canopen.addressing import object_of_name
 from drive_can_bridge.protocols.canopen_pkw import object_map, pkw
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address
-from drive_can_bridge.protocols.polling import Place, plan_reads
+from drive_can_bridge.protocols.placement import ParameterPlacement
+from drive_can_bridge.protocols.polling import Chunk, plan_reads
 
 #: registers that one request can read or write
 REGISTERS_MAX = 2
@@ -70,7 +71,7 @@ def address_of(parameter: Parameter, addressing: Addressing) -> Address | None:
 
 
 @dataclass(frozen=True, slots=True)
-class Placement:
+class Placement(ParameterPlacement[Span]):
     """
     Where the parameters of one drive stand, and how their values lie in the registers.
 
@@ -101,19 +102,27 @@ class Placement:
             raise ValueError(f'{parameter.name} has no address to be reached by {self.addressing}')
         return Span(address, parameter.type.bits // 16)
 
-    def raw(self, parameter: Parameter, words: Sequence[int]) -> int:
-        """
-        Return the raw integer of a parameter.
+    def addresses(self, span: Span) -> tuple[Address, ...]:
+        return span.addresses
 
-        :param words: of its registers, that of the lower number first; more do no harm.
-        """
+    def plan(self, spans: Iterable[Span]) -> list[Span]:
+        """Cover registers by as few requests as possible: two adjacent ones share one."""
+        found: list[Span] = []
+        spans = list(spans)
+        for by_object in (False, True):
+            wanted = [Chunk(_linear(span.address), span.count) for span in spans
+                      if span.address.by_object is by_object]
+            found += [Span(_address(chunk.address, by_object), chunk.size)
+                      for chunk in plan_reads(wanted, REGISTERS_MAX)]
+        return found
+
+    def raw(self, parameter: Parameter, words: Sequence[int]) -> int:
         if parameter.type.bits == 16:
             return parameter.raw_from_word(words[0])
         return parameter.raw_from_word(pkw.value_from_words(
             (words[0], words[1]), self._high_first(parameter)))
 
     def words(self, parameter: Parameter, raw: int) -> tuple[int, ...]:
-        """Return the words of a parameter's registers, that of the lower number first."""
         value = parameter.word_from_raw(raw)
         if parameter.type.bits == 16:
             return (value,)
@@ -124,18 +133,6 @@ class Placement:
 
 
 # -- reads ----------------------------------------------------------------------------------------
-
-
-def plan(spans: Iterable[Span]) -> list[Span]:
-    """Cover registers by as few requests as possible: two adjacent registers share one."""
-    found: list[Span] = []
-    spans = list(spans)
-    for by_object in (False, True):
-        places = [Place(_linear(span.address), span.count) for span in spans
-                  if span.address.by_object is by_object]
-        found += [Span(_address(chunk.address, by_object), chunk.size)
-                  for chunk in plan_reads(places, REGISTERS_MAX)]
-    return found
 
 
 def round_spans(drive: DriveConfiguration) -> list[Span]:
@@ -155,7 +152,7 @@ def round_spans(drive: DriveConfiguration) -> list[Span]:
 
 def round_plan(drive: DriveConfiguration) -> list[Span]:
     """Return the reads of a round."""
-    return plan(round_spans(drive))
+    return Placement.of(drive).plan(round_spans(drive))
 
 
 def instead_of(span: Span, wanted: Sequence[Span]) -> list[Span]:

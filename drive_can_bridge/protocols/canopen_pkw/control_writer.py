@@ -22,7 +22,7 @@ from drive_can_bridge.protocols.canopen_pkw.addresses import Placement
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
     Answered, MailboxChannel, Read, Refused, Reply, Silence, Step, Write,
 )
-from drive_can_bridge.protocols.canopen_pkw.procedures import LastWrite
+from drive_can_bridge.protocols.canopen_pkw.procedures import tell
 from drive_can_bridge.protocols.channel import Lane
 
 #: s until a ``disable`` that was refused is written again
@@ -84,14 +84,6 @@ class ControlWriter:
         if self._channel.is_idle(Lane.CONTROL):
             self._channel.run(self._write(), lambda _: None, now, Lane.CONTROL)
 
-    def disable_write(self) -> LastWrite:
-        """Return what writes ``disable``."""
-        return LastWrite(f'{self._parameter.name} {self._disable:04X}h', self._span,
-                         self._words(self._disable))
-
-    def _words(self, word: int) -> tuple[int, ...]:
-        return self._placement.words(self._parameter, word)
-
     def _write(self) -> Generator[Step, Reply, None]:
         """Write the newest word, until it is answered or silence says to wait a while."""
         while True:
@@ -106,17 +98,14 @@ class ControlWriter:
                         return
                     continue
                 word = self._control.word
-            told = self._session.told
-            before = told.runs(CONTROL_WORD)
-            if word != self._disable:
-                told.note(CONTROL_WORD, runs=True)
-            reply = yield Write(self._span.address, self._words(word),
-                                blind=self._control.stopping)
+            reply = yield from tell(
+                self._session.told, CONTROL_WORD,
+                Write(self._span.address, self._placement.words(self._parameter, word),
+                      blind=self._control.stopping),
+                runs=word != self._disable)
             if isinstance(reply, Silence):
                 if reply.sent:
                     self._settled, self._doubtful = None, word
-                else:
-                    told.note(CONTROL_WORD, runs=before)
                 if word == self._control.word:
                     return
                 continue
@@ -156,7 +145,6 @@ class ControlWriter:
     def _settle(self, word: int) -> None:
         """Take note that the drive has a word."""
         self._doubtful = None
-        self._session.told.note(CONTROL_WORD, runs=word != self._disable)
         self._settled, self._settled_at = word, self._channel.now
         if word == self._control.word:
             self._control.word_sent(self._channel.now)

@@ -23,12 +23,14 @@ sent*, unless whoever asks for it says that this does not matter (:attr:`Write.b
 
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
+from functools import partial
 import math
 from typing import Any, NamedTuple, Union
 
 from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.retry import RetryPolicy
 from drive_can_bridge.protocols.canopen_pkw import pkw, refusals
+from drive_can_bridge.protocols.canopen_pkw.addresses import Span
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Function, Message
 from drive_can_bridge.protocols.channel import Channel
 from drive_can_bridge.protocols.courier import Courier
@@ -66,6 +68,11 @@ class Write:
     words: tuple[int, ...]
     blind: bool = False
     timeout: float | None = None
+
+    @property
+    def span(self) -> Span:
+        """The registers that it is about."""
+        return Span(self.address, len(self.words))
 
 
 Step = Union[Read, Write]
@@ -111,12 +118,14 @@ class MailboxCourier(Courier[Step, Reply]):
     :param send: takes a request that leaves now, and who is told whether it did.
     :param order: of the halves of abort codes: ``auto``, ``low_first``, ``high_first``.
     :param retry: how long and how often the device is asked.
+    :param wrote: takes every write that left.
     """
 
-    def __init__(self, send: Callable[[Message, Left], None], *, order: str,
-                 retry: RetryPolicy) -> None:
+    def __init__(self, send: Callable[[Message, Left], None], *, order: str, retry: RetryPolicy,
+                 wrote: Callable[[Write], None] = lambda _: None) -> None:
         super().__init__(retry)
         self._send = send
+        self._wrote = wrote
         self._order = order
         self._synchronised = False
         self._toggle = False            # of the last request
@@ -219,6 +228,11 @@ class MailboxCourier(Courier[Step, Reply]):
         if self._request.code != Function.NONE:
             self._toggle = not self._toggle     # the device has not seen this one
 
+    def _write_left(self, write: Write, sent: bool, now: float) -> None:
+        if sent:
+            self._wrote(write)
+        self._left(sent, now)
+
     @property
     def _waits_for_nobody(self) -> bool:
         return isinstance(self.step, Write) and self.step.blind
@@ -238,15 +252,16 @@ class MailboxCourier(Courier[Step, Reply]):
     def _send_step(self, step: Step, now: float) -> None:
         # inverted after function 00h, too: a late answer to the request before never fits
         self._toggle = not self._toggle
-        timeout = self.retry.timeout
+        timeout, left = self.retry.timeout, self._left
         if isinstance(step, Read):
             self._request = pkw.read_request(step.address, step.count, self._toggle)
         else:
             self._request = pkw.write_request(step.address, step.words, self._toggle)
             timeout = timeout if step.timeout is None else step.timeout
+            left = partial(self._write_left, step)
         self._patience = timeout
         self.deadline = self._until = now + timeout
-        self._send(self._request, self._left)
+        self._send(self._request, left)
 
 
 MailboxChannel = Channel[Step, Reply]

@@ -5,18 +5,18 @@ What takes more than one request: parameters of users, and the safe stop.
 Every generator here is for :class:`.mailbox.MailboxChannel`.
 """
 
-from collections.abc import Generator, Sequence
-from typing import NamedTuple
+from collections.abc import Generator, Hashable, Sequence
 
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.requests import Failure, NOT_SENT, Outcome, Outcomes, Written
-from drive_can_bridge.core.retry import RetryPolicy
+from drive_can_bridge.core.told import Told
 from drive_can_bridge.protocols.access import Access, Found, Item
-from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, plan, Span
+from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
     Answered, Read, Refused, Reply, Silence, Step, Write,
 )
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address
+from drive_can_bridge.protocols.safe_stop import StopWrite
 
 NOT_TOGETHER = ('cannot be written in one frame, nothing was written: two 16-bit parameters in '
                 'adjacent registers fit, or one of 32 bits')
@@ -28,37 +28,22 @@ NOT_TOGETHER = ('cannot be written in one frame, nothing was written: two 16-bit
 class RegisterAccess(Access[Span, Step, Reply]):
     """Parameters by register or object; adjacent registers share a request."""
 
-    def __init__(self, retry: RetryPolicy, placement: Placement) -> None:
-        super().__init__(retry)
-        self._placement = placement
-
-    def span(self, parameter: Parameter) -> Span:
-        return self._placement.span(parameter)
-
-    def addresses(self, span: Span) -> Sequence[Address]:
-        return span.addresses
-
-    def plan(self, spans: Sequence[Span]) -> list[Span]:
-        return plan(spans)
-
     def read(self, span: Span) -> Generator[Step, Reply, Found]:
         reply = yield Read(span.address, span.count)
         if isinstance(reply, Answered):
             return reply.words[:span.count]
         return self.retry.unanswered() if isinstance(reply, Silence) else Failure(reply.text)
 
-    def raw(self, parameter: Parameter, words: tuple[int, ...]) -> int:
-        return self._placement.raw(parameter, words)
-
     def write(self, parameter: Parameter, raw: int) -> Generator[Step, Reply, Outcome]:
-        return self._put(self.span(parameter).address, self._placement.words(parameter, raw))
+        return self._put(
+            self.placement.span(parameter).address, self.placement.words(parameter, raw))
 
     def write_together(self, items: Sequence[Item]) -> Generator[Step, Reply, Outcomes]:
         words: dict[Address, int] = {}
-        spans = [self.span(parameter) for parameter, _ in items]
+        spans = [self.placement.span(parameter) for parameter, _ in items]
         for span, item in zip(spans, items):
-            words.update(zip(span.addresses, self._placement.words(*item)))
-        shared = plan(spans)
+            words.update(zip(span.addresses, self.placement.words(*item)))
+        shared = self.placement.plan(spans)
         if len(shared) != 1 or sum(span.count for span in spans) != shared[0].count:
             return (Failure(NOT_TOGETHER),) * len(items)
         outcome = yield from self._put(
@@ -85,6 +70,31 @@ class RegisterAccess(Access[Span, Step, Reply]):
         return self.retry.unanswered()
 
 
+# -- what the drive is told -----------------------------------------------------------------------
+
+
+def tell(told: Told, what: Hashable, write: Write, *, runs: bool,
+         ) -> Generator[Step, Reply, Reply]:
+    """
+    Write a setpoint or control word, and keep the books of what the drive was told.
+
+    What may start it counts from now on, what stops it when it is answered: whether a write
+    without an answer was executed, nobody knows. One that was not sent changes nothing.
+
+    :param runs: it may start the drive; as it is now: a neutral value that follows the axis is
+        another one when the answer comes.
+    """
+    before = told.runs(what)
+    if runs:
+        told.note(what, runs=True)
+    reply = yield write
+    if isinstance(reply, Answered):
+        told.note(what, runs=runs)
+    elif isinstance(reply, Silence) and not reply.sent:
+        told.note(what, runs=before)
+    return reply
+
+
 # -- the stop -------------------------------------------------------------------------------------
 
 
@@ -92,20 +102,8 @@ class RegisterAccess(Access[Span, Step, Reply]):
 StopProcedure = Generator[Step, Reply, list[str]]
 
 
-class LastWrite(NamedTuple):
-    """
-    Something that makes a drive stand still.
-
-    :param name: of the parameter.
-    """
-
-    name: str
-    span: Span
-    words: tuple[int, ...]
-
-
-def write_until_answered(writes: Sequence[LastWrite], attempts: int, timeout: float,
-                         last: float) -> StopProcedure:
+def write_until_answered(writes: Sequence[StopWrite], placement: Placement, attempts: int,
+                         timeout: float, last: float) -> StopProcedure:
     """
     Tell a drive to stand still, each thing until it is answered or was tried ``attempts`` times.
 
@@ -117,10 +115,12 @@ def write_until_answered(writes: Sequence[LastWrite], attempts: int, timeout: fl
     :return: what failed, in words.
     """
     failed = []
-    for name, span, words in writes:
+    for parameter, raw, is_word in writes:
+        name = f'{parameter.name} {raw:04X}h' if is_word else parameter.name
+        address, words = placement.span(parameter).address, placement.words(parameter, raw)
         reply: Reply = Silence()
         for attempt in range(1, attempts + 1):
-            reply = yield Write(span.address, words, blind=True,
+            reply = yield Write(address, words, blind=True,
                                 timeout=last if attempt == attempts else timeout)
             if not isinstance(reply, Silence):
                 break

@@ -1,41 +1,43 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""A round of reads: what it asks for, and what its answers say."""
+"""
+Rounds of reads: what they ask for, and what the answers say.
 
-from collections.abc import Callable, Generator, Mapping, Sequence
+The status word counts from the moment it was read, before the round is complete.
+"""
 
-from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.parameters import Parameter
+from collections.abc import Generator, Sequence
+
 from drive_can_bridge.core.process_image import status_word
+from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.canopen_pkw.addresses import (
     instead_of, Placement, round_plan, round_spans, Span,
 )
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
-    Read, Refused, Reply, Silence, Step,
+    MailboxChannel, Read, Refused, Reply, Silence, Step,
 )
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address
-
-#: the words of all registers that were read; those that were refused are missing
-Words = dict[Address, int]
+from drive_can_bridge.protocols.polled_exchange import Raws
 
 
-class Round:
+class Rounds:
     """
     The rounds of one drive.
 
-    :param warn: takes what the drive refuses, once.
-    :ivar has_status: a status word is among what is read.
+    :ivar status_known: the status was read just now, or there is none to be read.
     :ivar refusals: the names of what the drive refuses, and why, by what was read.
     """
 
-    def __init__(self, drive: DriveConfiguration, warn: Callable[[str], None]) -> None:
-        self._drive = drive
+    def __init__(self, session: Session, channel: MailboxChannel) -> None:
+        drive = self._drive = session.configuration
+        self._session = session
+        self._channel = channel
         self._placement = Placement.of(drive)
         self._spans = [self._placement.span(parameter) for parameter in drive.cyclic_response]
-        self._warn = warn
         status = status_word(drive)
         self._status = None if status is None else (status, self._placement.span(status))
-        self.has_status = status is not None
+        self.status_known = status is None
         self.refusals: dict[Span, str] = {}
+        self._words: dict[Address, int] = {}    # those of refused registers are missing
         self._plan: list[Span] = []
         self.start_over()
 
@@ -44,14 +46,9 @@ class Round:
         self.refusals.clear()
         self._plan = round_plan(self._drive)
 
-    def read(self, answered: Callable[[Words], None]) -> Generator[Step, Reply, Words | None]:
-        """
-        Read everything once, each in one attempt.
-
-        :param answered: told of every answer when it arrives.
-        :return: what was read; None: something was not answered.
-        """
-        words: Words = {}
+    def read(self) -> Generator[Step, Reply, Raws | None]:
+        """Read everything once, each in one attempt; return None if something went unanswered."""
+        self._words = {}
         pending = list(self._plan)
         while pending:
             span = pending.pop(0)
@@ -63,9 +60,25 @@ class Round:
                 continue
             self.refusals.pop(span, None)
             found = dict(zip(span.addresses, reply.words))
-            words.update(found)
-            answered(found)
-        return words
+            self._words.update(found)
+            if self._session.online:
+                self._take_status(found)
+        return [self._placement.raw_among(parameter, span, self._words)
+                for parameter, span in zip(self._drive.cyclic_response, self._spans)]
+
+    def ended(self, raws: Raws, now: float, found: bool) -> None:
+        """Take the status of a drive that was found by this round."""
+        if found:
+            self._take_status(self._words)
+
+    def _take_status(self, words: dict[Address, int]) -> None:
+        now, control = self._channel.now, self._session.control
+        raw = None if self._status is None else self._placement.raw_among(*self._status, words)
+        if raw is not None and control is not None:
+            self.status_known = True
+            control.status_received(raw, now)
+        self._session.control_changed(now)
+        self.status_known = self._status is None
 
     def _instead(self, span: Span, refused: Refused) -> Sequence[Span]:
         """Take a refusal: two parameters that share a read are read alone from now on."""
@@ -77,21 +90,11 @@ class Round:
         names = ', '.join(parameter.name for parameter, own in zip(
             self._drive.cyclic_response, self._spans) if own == span)
         if span not in self.refusals:
-            self._warn(f'read {names or span.address}: {refused.text}')
+            self._session.report.warn(f'read {names or span.address}: {refused.text}')
         self.refusals[span] = f'{names or span.address} {refused.text}'
         return parts
 
-    def raws(self, words: Mapping[Address, int]) -> list[int | None]:
-        """Return the values that a round has brought; None for what was refused."""
-        return [self._raw(parameter, span, words)
-                for parameter, span in zip(self._drive.cyclic_response, self._spans)]
-
-    def status(self, words: Mapping[Address, int]) -> int | None:
-        """Return the status word, if it is among the words."""
-        return None if self._status is None else self._raw(*self._status, words)
-
-    def _raw(self, parameter: Parameter, span: Span,
-             words: Mapping[Address, int]) -> int | None:
-        if any(address not in words for address in span.addresses):
-            return None
-        return self._placement.raw(parameter, [words[address] for address in span.addresses])
+    def warnings(self) -> list[str]:
+        """Say what the drive refuses, and what to do."""
+        return [f'poll of {text}: correct cyclic_response or the profile'
+                for text in self.refusals.values()]

@@ -4,11 +4,11 @@ The conversation with one device over the PKW mailbox.
 
 .. code-block:: text
 
-    IDLE ──activate, bus up──► RUNNING ──deactivate──► STOPPING ──► IDLE
+    IDLE ──activate, bus up──► POLLING ──deactivate──► STOPPING ──► IDLE
       ▲                           │ bus down
       └───────────────────────────┘
 
-While running, a round of reads begins every period, as long as the node takes PDOs (see
+While polling, a round of reads begins every period, as long as the node takes PDOs (see
 :mod:`.canopen.node`). A complete round is published as one sample and makes the drive online;
 three rounds (``missed_limit``) with a read that nobody answered make it offline, and so do a
 boot-up frame, a heartbeat that says that the node is not operational, and heartbeats that cease.
@@ -21,7 +21,7 @@ setpoints again after ``refresh_interval``.
 """
 
 from collections.abc import Collection
-from enum import Enum
+import math
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control_machine import ControlMachine
@@ -38,22 +38,18 @@ from drive_can_bridge.protocols.canopen_pkw import addresses, pkw, procedures
 from drive_can_bridge.protocols.canopen_pkw.identifiers import Identifiers
 from drive_can_bridge.protocols.canopen_pkw.mailbox import MailboxChannel, MailboxCourier
 from drive_can_bridge.protocols.canopen_pkw.pkw import Layout, Message
-from drive_can_bridge.protocols.canopen_pkw.polled_exchange import PolledExchange
-from drive_can_bridge.protocols.canopen_pkw.sent_writes import SentWrites
+from drive_can_bridge.protocols.canopen_pkw.round import Rounds
 from drive_can_bridge.protocols.canopen_pkw.writers import Writers
 from drive_can_bridge.protocols.channel import Lane
+from drive_can_bridge.protocols.placement import SentWrites
+from drive_can_bridge.protocols.polled_exchange import Phase, PolledExchange
+
+SILENT = ('no complete round of reads: drive silent, not operational, or other COB-IDs than '
+          'configured')
 
 #: s that a stop may take all together: of a drive that answers, and of one that has fallen silent
 STOP_TIME = 3.0
 STOP_TIME_SILENT = 0.4
-
-
-class Phase(Enum):
-    """What the session is doing."""
-
-    IDLE = 'idle'
-    RUNNING = 'running'
-    STOPPING = 'last writes'
 
 
 class PkwSession(Session):
@@ -72,12 +68,16 @@ class PkwSession(Session):
         self._layout = Layout(options.layout)
         self._supervision = Supervision(self)
         self._node = self._supervision.node
+        sent = SentWrites(self.sent, placement)
         self._channel = MailboxChannel(MailboxCourier(
-            self._send, order=options.abort_code_order, retry=self.retry))
-        self._sent_writes = SentWrites(self.sent, placement)
+            self._send, order=options.abort_code_order, retry=self.retry,
+            wrote=lambda write: sent.note(write.span, write.words)))
         self._writers = Writers(self, self._channel, self._stop_ended)
+        self._rounds = Rounds(self, self._channel)
         self._exchange = PolledExchange(
-            self, self._channel, self._node, found=self._found, silent=self.node_silent)
+            self, self._channel, self._rounds.read, found=self._found,
+            answered=self._rounds.ended, missed=self._missed,
+            present=lambda: not self._node.heartbeat_lost)
         self.users = Users(
             self, ChannelServer(self._channel, procedures.RegisterAccess(self.retry, placement)),
             blocked=self._supervision.refusal, control_refusal=self._writers.control_refusal)
@@ -91,7 +91,7 @@ class PkwSession(Session):
 
     def begin_stop(self, now: float) -> bool:
         self._supervision.stop()
-        self._exchange.timer.stop()
+        self._exchange.stop()
         self._channel.drop(now)
         self._phase = Phase.STOPPING
         self._writers.stop(self._stop_time, now, insist=True)
@@ -119,15 +119,15 @@ class PkwSession(Session):
 
     def time_lost(self, now: float) -> None:
         self._channel.time_lost(now)
-        if self._phase is Phase.RUNNING:
+        if self._phase is Phase.POLLING:
             self.stood_still(now)
             self.start_over(now)
 
     def begin(self, now: float) -> None:
         self.report.advice = LOOKING
-        self._phase = Phase.RUNNING
+        self._phase = Phase.POLLING
         self._forget_exchange()
-        self._exchange.forget()
+        self._rounds.start_over()
         self._supervision.begin(now)
         self._stop_if_owed(now)
 
@@ -136,6 +136,7 @@ class PkwSession(Session):
         self._supervision.stop()
         self._channel.clear()
         self._exchange.stop()
+        self._rounds.refusals.clear()
         self.be_offline(advice)
 
     # -- online and offline -----------------------------------------------------------------------
@@ -147,12 +148,19 @@ class PkwSession(Session):
         self.control_changed(now)
         self._writers.write_setpoints(now)
 
+    def _missed(self, reason: str, now: float) -> None:
+        if reason and self.online:
+            self.node_silent(reason, now)
+        elif reason and not self._node.heartbeat_lost:
+            self.report.advice = SILENT
+
     def lost(self, now: float, *, was_online: bool) -> None:
         self._forget_exchange()
 
     def _forget_exchange(self) -> None:
         """Forget the round and the writes that are under way."""
         self._exchange.cancel()
+        self._exchange.forget()
         self._writers.cancel()
 
     def withdrawn(self, now: float) -> None:
@@ -203,14 +211,13 @@ class PkwSession(Session):
 
     def see_to_control_word(self, now: float) -> None:
         if self.online:
-            self._writers.write_control(now, known=self._exchange.status_known)
+            self._writers.write_control(now, known=self._rounds.status_known)
 
     # -- frames -----------------------------------------------------------------------------------
 
     def _send(self, message: Message, left: Left) -> None:
         request = pkw.encode(message, self._layout)
-        self.outbox.put(Frame(self._identifiers.request, request, False),
-                        self._sent_writes.noting(message, left))
+        self.outbox.put(Frame(self._identifiers.request, request, False), left)
 
     def frames_left(self, now: float, refused: Collection[int] = ()) -> None:
         super().frames_left(now, refused)
@@ -240,24 +247,29 @@ class PkwSession(Session):
 
     def handle_timer(self, now: float) -> None:
         self._supervision.handle_timer(now)
-        if self._phase is Phase.RUNNING:
+        if self._phase is Phase.POLLING:
             if self.control is not None and now >= self.control.next_timer():
                 self.control.handle_timer(now)
                 self.control_changed(now)
             self._write_expired(now)
         self._channel.advance(now)
-        if now >= self._exchange.due:
+        if now >= self._round_due:
             self._write_expired(now)
             if self.online:
                 self._writers.write_setpoints(now)
                 self.see_to_control_word(now)
             self._exchange.begin(now)
 
+    @property
+    def _round_due(self) -> float:
+        """When the next round is due; infinity: not before this one has ended."""
+        return math.inf if self._exchange.reading else self._exchange.timer.due
+
     def next_timer(self) -> float:
         soonest = self._channel.next_timer()
-        if self._phase is not Phase.RUNNING:
+        if self._phase is not Phase.POLLING:
             return soonest
-        soonest = min(soonest, self._exchange.due, self._supervision.next_timer())
+        soonest = min(soonest, self._round_due, self._supervision.next_timer())
         return soonest if self.control is None else min(soonest, self.control.next_timer())
 
     # -- state ------------------------------------------------------------------------------------
@@ -266,7 +278,7 @@ class PkwSession(Session):
     def warning(self) -> str:
         node = self._supervision.report
         return '; '.join(filter(None, (
-            node.ailing, *self._exchange.warnings(), *self._writers.warnings(), node.missing)))
+            node.ailing, *self._rounds.warnings(), *self._writers.warnings(), node.missing)))
 
     def facts(self) -> dict[str, str]:
         return self._supervision.report.facts()

@@ -9,7 +9,7 @@ from drive_can_bridge.protocols.canopen_pkw.addresses import Placement
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
     Answered, MailboxChannel, Reply, Silence, Step, Write,
 )
-from drive_can_bridge.protocols.canopen_pkw.procedures import LastWrite
+from drive_can_bridge.protocols.canopen_pkw.procedures import tell
 from drive_can_bridge.protocols.channel import Lane
 from drive_can_bridge.protocols.polling import WriteSchedule
 
@@ -51,32 +51,20 @@ class SetpointWriter:
         if self._schedule.waiting and self._channel.is_idle(Lane.SETPOINTS):
             self._channel.run(self._write(), lambda _: None, now, Lane.SETPOINTS)
 
-    def neutral_writes(self) -> list[LastWrite]:
-        """Return what writes the neutral value of every setpoint of which it is known."""
-        return [LastWrite(setpoint.parameter.name, span, self._placement.words(
-                    setpoint.parameter, setpoint.neutral))
-                for setpoint, span in zip(self._setpoints.items, self._spans)
-                if setpoint.known]
-
     def _write(self) -> Generator[Step, Reply, None]:
-        told = self._session.told
         while self._schedule.waiting:
             index = self._schedule.next()
             setpoint = self._setpoints.items[index]
             parameter, raw = setpoint.parameter, setpoint.raw
             # at once: a look while the answer is awaited must not find it due again
             self._schedule.written(index, raw, self._channel.now)
-            # now: a neutral value that follows the axis is another one when the answer comes
-            before, runs = told.runs(index), raw != setpoint.neutral
-            if runs:
-                told.note(index, runs=True)
-            reply = yield Write(self._spans[index].address, self._placement.words(parameter, raw))
+            reply = yield from tell(
+                self._session.told, index,
+                Write(self._spans[index].address, self._placement.words(parameter, raw)),
+                runs=raw != setpoint.neutral)
             if isinstance(reply, Silence):
                 self._schedule.failed(index)
-                if not reply.sent:
-                    told.note(index, runs=before)
             elif isinstance(reply, Answered):
-                told.note(index, runs=runs)
                 self.refusals.pop(parameter.name, None)
             else:
                 self._take_refusal(parameter, f'{parameter.name} {reply.text}')

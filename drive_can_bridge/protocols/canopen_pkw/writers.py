@@ -11,6 +11,7 @@ from collections.abc import Callable
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.canopen_pkw import procedures
+from drive_can_bridge.protocols.canopen_pkw.addresses import Placement
 from drive_can_bridge.protocols.canopen_pkw.control_writer import ControlWriter
 from drive_can_bridge.protocols.canopen_pkw.mailbox import MailboxChannel, Reply, Step
 from drive_can_bridge.protocols.canopen_pkw.setpoint_writer import SetpointWriter
@@ -32,6 +33,7 @@ class Writers:
                  stop_ended: Callable[[], None]) -> None:
         self._session = session
         self._channel = channel
+        self._placement = Placement.of(session.configuration)
         self._setpoints = SetpointWriter(session, channel)
         self._control = None if session.control is None else ControlWriter(
             session, session.control, channel)
@@ -75,20 +77,15 @@ class Writers:
             may be slow, and nobody waits for the end of this stop.
         :param insist: what failed is told even if the drive was not told to run.
         """
-        writes = [] if self._control is None else [self._control.disable_write()]
-        writes += self._setpoints.neutral_writes()
+        writes = self._stop.writes()
         self._channel.cancel(Lane.STOP)
         self._channel.make_room(now)
         timeout = min(self._session.configuration.parameter_timeout,
                       time / (STOP_ATTEMPTS * max(1, len(writes))))
         self._stop.begin(
             procedures.write_until_answered(
-                writes, STOP_ATTEMPTS, timeout, max(timeout, in_the_end)),
-            self._stop_confirmed, now, insist=insist)
-
-    def _stop_confirmed(self) -> None:
-        if not self._session.gate.mute:
-            self._session.told.stopped()
+                writes, self._placement, STOP_ATTEMPTS, timeout, max(timeout, in_the_end)),
+            now, insist=insist)
 
     # -- what the drive refuses -------------------------------------------------------------------
 

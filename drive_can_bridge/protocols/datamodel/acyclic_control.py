@@ -18,7 +18,8 @@ from drive_can_bridge.core.parameters import Parameter, Storage
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.told import CONTROL_WORD
 from drive_can_bridge.protocols.cycle_timer import stop_spacing
-from drive_can_bridge.protocols.datamodel.channel import AcyclicChannel, Procedure, Read, Write
+from drive_can_bridge.protocols.datamodel.channel import AcyclicChannel, Procedure
+from drive_can_bridge.protocols.datamodel.numbers import Numbers
 
 #: s between two looks at the status word, while a request is under way and otherwise
 STATUS_PERIOD_PENDING = 0.05
@@ -42,8 +43,9 @@ class AcyclicControl:
     :ivar retry_at: when a word that the bus refused, or a pulse, is to be written again.
     """
 
-    def __init__(self, session: Session, control: ControlMachine, channel: AcyclicChannel, *,
-                 word: Parameter | None, status: Parameter | None) -> None:
+    def __init__(self, session: Session, control: ControlMachine, channel: AcyclicChannel,
+                 numbers: Numbers, *, word: Parameter | None,
+                 status: Parameter | None) -> None:
         self.look_at = self.retry_at = math.inf
         self._session = session
         self._control = control
@@ -51,7 +53,7 @@ class AcyclicControl:
         self._word = word
         self._status = status
         self._spacing = stop_spacing(session.configuration.period)
-        self._offset: int = session.configuration.options.parameter_offset
+        self._numbers = numbers
         self._written: int | None = None
         self._repeat_at = math.inf
         self._repeats = 0
@@ -92,7 +94,7 @@ class AcyclicControl:
         write = (self._channel.write_now if self._control.stopping
                  else self._channel.write_first)
         runs = not self._control.at_rest
-        write(self._write(self._word, word),
+        write(self._numbers.write(self._word, word),
               lambda sent, then: self._left(word, sent, then, runs=runs), now)
         if self._watching and self._status is not None:
             self.look_at = now
@@ -116,10 +118,6 @@ class AcyclicControl:
             return self._control.unconfirmed
         return self._control.disregard != '' and self._repeats < EEPROM_REPEATS
 
-    def _write(self, parameter: Parameter, word: int) -> Write:
-        return Write((parameter.number or 0) + self._offset, (word,),
-                     parameter.storage is not Storage.RAM)
-
     def _left(self, word: int, sent: bool, now: float, *, runs: bool) -> None:
         if not sent:
             if word == self._written:
@@ -136,7 +134,7 @@ class AcyclicControl:
         self._session.control_changed(now)
 
     def _read(self, status: Parameter) -> Procedure:
-        words = yield Read((status.number or 0) + self._offset)
+        words = yield self._numbers.read(status)
         return None if words is None else status.raw_from_word(words[0])
 
     def _received(self, raw: int | None) -> None:

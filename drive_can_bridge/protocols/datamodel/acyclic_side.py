@@ -13,22 +13,21 @@ from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.events import ForeignMasterSeen
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.process_image import control_word, status_word
 from drive_can_bridge.core.roles import Cells
 from drive_can_bridge.core.session import Session
-from drive_can_bridge.core.told import CONTROL_WORD
 from drive_can_bridge.core.users import Users
 from drive_can_bridge.protocols.access import ChannelServer
 from drive_can_bridge.protocols.datamodel import procedures
 from drive_can_bridge.protocols.datamodel.acyclic_control import AcyclicControl
 from drive_can_bridge.protocols.datamodel.channel import (
-    AcyclicChannel, Polling, Read, Reply, Step, Words, Write,
+    AcyclicChannel, ParameterCourier, Read, Reply, Step, Words,
 )
 from drive_can_bridge.protocols.datamodel.extended import PAYLOAD, SLOTS
+from drive_can_bridge.protocols.datamodel.numbers import Numbers
 from drive_can_bridge.protocols.datamodel.options import DataModelOptions
-from drive_can_bridge.protocols.datamodel.process_words import slot_of
-from drive_can_bridge.protocols.datamodel.stop_writes import (
-    ANSWER_TIME, confirm, StopWrite,
-)
+from drive_can_bridge.protocols.datamodel.stop_writes import ANSWER_TIME, confirm
+from drive_can_bridge.protocols.placement import SentWrites
 from drive_can_bridge.protocols.safe_stop import SafeStop
 
 
@@ -41,7 +40,8 @@ class AcyclicSide:
     :param decode: makes words of an answer, given the read that waits for one.
     :param together: parameters that fit one write frame.
     :param stop_ended: called when a stop by acyclic writes has run its course.
-    :param polling: given where the exchange itself goes through the channel.
+    :param quarantine: given where the exchange itself goes through the channel.
+    :ivar numbers: where the parameters of the drive stand.
     :ivar control_slot: of the control word in ``cyclic_request``, or None.
     :ivar status_slot: of the status word in ``cyclic_response``, or None.
     :ivar control_writer: looks after words that have no slot, or None.
@@ -50,40 +50,28 @@ class AcyclicSide:
     def __init__(self, session: Session, *, encode_read: Callable[[int, int], Frame],
                  encode_write: Callable[[int, Words], Frame],
                  decode: Callable[[Frame, Union[Read, None]], Words], together: int,
-                 stop_ended: Callable[[], None], polling: Polling | None = None) -> None:
+                 stop_ended: Callable[[], None], quarantine: float | None = None) -> None:
         drive, options = session.configuration, session.configuration.options
-        self.offset: int = options.parameter_offset
+        self.numbers = Numbers(drive)
         self._session = session
         self._decode = decode
-        # where each of ``request_parameters`` is written by number
-        self._sent_by_number = {
-            (parameter.number or 0) + self.offset: place
-            for place, parameter in enumerate(session.sent.parameters)}
-        self.channel = AcyclicChannel(
+        sent = SentWrites(session.sent, self.numbers)
+        self.channel = AcyclicChannel(ParameterCourier(
             encode_read=encode_read, encode_write=encode_write, send=session.outbox.put,
-            wrote=self._note_write, retry=session.retry,
-            eeprom_gap=options.eeprom_write_gap, polling=polling)
+            wrote=lambda write: sent.note(write.chunk, write.words), retry=session.retry,
+            eeprom_gap=options.eeprom_write_gap, quarantine=quarantine))
         session.users = Users(session, ChannelServer(self.channel, procedures.ParameterAccess(
-            session.retry, verify=drive.verify_writes, offset=self.offset, together=together)))
-        table = drive.profile.control
-        word_name = table.parameter if table is not None else ''
-        status_name = table.status_parameter or '' if table is not None else ''
-        self._word = drive.profile.parameters.get(word_name)
-        self.control_slot = slot_of(drive.cyclic_request, word_name)
-        self.status_slot = slot_of(drive.cyclic_response, status_name)
-        word = word_name if self.control_slot is None else ''
-        status = status_name if self.status_slot is None else ''
-        self.control_writer = None if session.control is None or not word + status else (
-            AcyclicControl(session, session.control, self.channel,
-                           word=drive.profile.parameters.get(word),
-                           status=drive.profile.parameters.get(status)))
+            session.retry, self.numbers, verify=drive.verify_writes, together=together)))
+        word = control_word(drive, controlled=session.control is not None)
+        status = status_word(drive)
+        self.control_slot = _slot(drive.cyclic_request, word)
+        self.status_slot = _slot(drive.cyclic_response, status)
+        word = word if self.control_slot is None else None
+        status = status if self.status_slot is None else None
+        self.control_writer = None if session.control is None or not (word or status) else (
+            AcyclicControl(session, session.control, self.channel, self.numbers,
+                           word=word, status=status))
         self.stop: SafeStop[Step, Reply] = SafeStop(session, self.channel, stop_ended)
-
-    def _note_write(self, write: Write) -> None:
-        """Take note of a write that left."""
-        for number, word in enumerate(write.words, write.number):
-            if number in self._sent_by_number:
-                self._session.sent.take((word,), self._sent_by_number[number])
 
     def clear(self) -> None:
         """Forget everything acyclic, and whatever waits for its outcome."""
@@ -160,36 +148,22 @@ class AcyclicSide:
 
         :param setpoints: False: what is in ``cyclic_request`` is stopped by cyclic frames.
         """
-        session, writes = self._session, []
-        if session.control is not None and self._word is not None and (
-                setpoints or self.control_slot is None):
-            writes.append(self._stop_write(self._word, session.control.word))
-        if setpoints:   # but no position where the axis may not be any more
-            writes += [self._stop_write(setpoint.parameter, setpoint.neutral)
-                       for setpoint in session.setpoints.items if setpoint.known]
-            setpoints = session.control is not None or session.setpoints.known
-        if not writes or self.stop.running:
+        stop = self.stop
+        told = stop.writes(word=setpoints or self.control_slot is None, setpoints=setpoints)
+        if not told or stop.running:
             return
+        writes = [(each.parameter, self.numbers.write(each.parameter, each.raw)) for each in told]
         # what is kept in RAM does not wait until an EEPROM is done
-        writes.sort(key=lambda each: each.write.eeprom)
-        self.stop.running = True    # before the first of them leaves
-        for each in writes:
-            self.channel.write_now(each.write, lambda sent, then: None, now)
-        timeout = min(session.retry.timeout, ANSWER_TIME)
-        self.stop.begin(
-            confirm(writes, timeout), self._all_stopped if setpoints else self._word_stopped, now)
+        writes.sort(key=lambda each: each[1].eeprom)
+        stop.running = True     # before the first of them leaves
+        for _, write in writes:
+            self.channel.write_now(write, lambda sent, then: None, now)
+        timeout = min(self._session.retry.timeout, ANSWER_TIME)
+        stop.begin(confirm(writes, timeout), now, setpoints=setpoints)
 
-    def _all_stopped(self) -> None:
-        self._session.told.stopped()
 
-    def _word_stopped(self) -> None:
-        session = self._session
-        session.told.note(CONTROL_WORD, runs=False)
-        if not session.active:  # in its end, to be disabled is enough
-            session.told.answered()
-
-    def _stop_write(self, parameter: Parameter, raw: int) -> StopWrite:
-        return StopWrite(parameter, (parameter.number or 0) + self.offset, raw)
+def _slot(parameters: tuple[Parameter, ...], parameter: Parameter | None) -> int | None:
+    return parameters.index(parameter) if parameter in parameters else None
 
 
 def map_cells(options: DataModelOptions) -> Cells:

@@ -19,7 +19,7 @@ next read (manual, "Scrittura di un parametro": "almeno 20msec"); a frame leaves
 cyclic request is under way, because nothing is known about how many requests a drive can hold.
 
 Quarantine: with 29-bit identifiers an answer repeats what it answers, number and count; with
-11-bit identifiers it says nothing (:class:`Polling`).
+11-bit identifiers it says nothing.
 """
 
 from collections import deque
@@ -33,6 +33,7 @@ from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.retry import RetryPolicy
 from drive_can_bridge.protocols.channel import Channel
 from drive_can_bridge.protocols.courier import ANYTHING, Courier
+from drive_can_bridge.protocols.polling import Chunk
 
 #: s between an unacknowledged write and the next acyclic frame, so that a drive with a single
 #: receive buffer has fetched the first; and, where answers carry no address, between an answer and
@@ -72,6 +73,11 @@ class Write:
     words: tuple[int, ...]
     eeprom: bool
 
+    @property
+    def chunk(self) -> Chunk:
+        """The numbers that it is about."""
+        return Chunk(self.number, len(self.words))
+
 
 Step = Union[Read, Write]
 Words = tuple[int, ...]
@@ -82,44 +88,39 @@ Send = Callable[[Frame, Union[Left, None]], None]
 SENT: Words = ()
 
 
-@dataclass(frozen=True)
-class Polling:
-    """
-    What is different where the exchange itself goes through the channel.
-
-    :param quarantine: s of silence after a read that nobody answered, or an answer that nobody
-        asked for.
-    """
-
-    quarantine: float
-
-
 class ParameterCourier(Courier[Step, Reply]):
     """
     Sends reads and writes, paced.
 
-    See :class:`AcyclicChannel` for the parameters.
-
+    :param encode_read: (number, count) -> frame.
+    :param encode_write: (number, words) -> frame.
+    :param send: takes frames that are to leave now, and who is told whether they did.
+    :param retry: how long and how often the drive is asked.
+    :param eeprom_gap: s after an EEPROM write.
+    :param wrote: takes every write that left.
+    :param quarantine: given where answers do not say what they answer, and the exchange itself
+        goes through the channel: s of silence after a read that nobody answered, or an answer that
+        nobody asked for. Writes that go first do not wait for the answer of a read then.
     :ivar asked_at: when the last read was sent; ``wrote_at``: when the last write was.
     :ivar free_at: when the next write to RAM may follow.
     """
 
     silent = None
 
-    def __init__(self, encode_read: Callable[[int, int], Frame],
-                 encode_write: Callable[[int, Words], Frame], send: Send, *,
-                 retry: RetryPolicy, eeprom_gap: float,
-                 wrote: Callable[[Write], None], polling: Polling | None) -> None:
+    def __init__(self, *, encode_read: Callable[[int, int], Frame],
+                 encode_write: Callable[[int, Words], Frame], send: Send, retry: RetryPolicy,
+                 eeprom_gap: float, wrote: Callable[[Write], None] = lambda _: None,
+                 quarantine: float | None = None) -> None:
         super().__init__(retry)
         self.asked_at = self.wrote_at = -math.inf
         self.free_at = -math.inf
-        self.anonymous = polling is not None
+        self.anonymous = quarantine is not None
         self._encode_read = encode_read
         self._encode_write = encode_write
         self._emit = send
         self._wrote = wrote
         self._eeprom_gap = eeprom_gap
-        self._polling = polling
+        self._quarantine = quarantine
         self._eeprom_free_at = -math.inf
         self._stop_wait_until = -math.inf   # whatever the EEPROM's gap may be
         self._first: tuple[Write, Left] | None = None
@@ -127,7 +128,7 @@ class ParameterCourier(Courier[Step, Reply]):
 
     @property
     def silence(self) -> float:
-        return self.retry.timeout if self._polling is None else self._polling.quarantine
+        return self.retry.timeout if self._quarantine is None else self._quarantine
 
     # -- one exchange -----------------------------------------------------------------------------
 
@@ -252,26 +253,13 @@ class AcyclicChannel(Channel[Step, Reply]):
     """
     Runs procedures, one frame at a time.
 
-    :param encode_read: (number, count) -> frame.
-    :param encode_write: (number, words) -> frame.
-    :param retry: how long and how often the drive is asked.
-    :param eeprom_gap: s after an EEPROM write.
-    :param send: takes frames that are to leave now, and who is told whether they did.
-    :param wrote: takes every write that left.
-    :param polling: given where the exchange itself goes through the channel. Our own procedures
-        then run to their end, and writes that go first do not wait for the answer of a read.
+    Where the exchange itself goes through it, our own procedures run to their end.
     """
 
-    def __init__(self, *, encode_read: Callable[[int, int], Frame],
-                 encode_write: Callable[[int, Words], Frame], send: Send,
-                 retry: RetryPolicy, eeprom_gap: float,
-                 wrote: Callable[[Write], None] = lambda _: None,
-                 polling: Polling | None = None) -> None:
-        self.courier = ParameterCourier(
-            encode_read, encode_write, send, retry=retry,
-            eeprom_gap=eeprom_gap, wrote=wrote, polling=polling)
-        self.write_first, self.write_now = self.courier.write_first, self.courier.write_now
-        super().__init__(self.courier, own_to_end=polling is not None)
+    def __init__(self, courier: ParameterCourier) -> None:
+        self.courier = courier
+        self.write_first, self.write_now = courier.write_first, courier.write_now
+        super().__init__(courier, own_to_end=courier.anonymous)
 
     @property
     def outstanding(self) -> Read | None:

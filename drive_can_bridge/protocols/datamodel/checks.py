@@ -1,11 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""
-What both DataModel protocols refuse, and their raw parameter names.
-
-Numbers in a profile are those of the drive's manual. What goes over the wire, in identifiers,
-telegrams and map entries, is ``number + parameter_offset``; a few drives count from 0 on one side
-and from 1 on the other.
-"""
+"""What both DataModel protocols refuse, and their raw parameter names."""
 
 from collections.abc import Iterator
 import re

@@ -35,7 +35,7 @@ from drive_can_bridge.protocols.datamodel.map_supervision import (
     MapSupervision, SILENT_LOOKS, Verdict,
 )
 from drive_can_bridge.protocols.datamodel.positions import Positions
-from drive_can_bridge.protocols.datamodel.process_words import CyclicCodec, wire_numbers
+from drive_can_bridge.protocols.datamodel.process_words import CyclicCodec
 from drive_can_bridge.protocols.datamodel.stop_writes import ANSWER_TIME, ATTEMPTS
 from drive_can_bridge.protocols.exchange_book import ExchangeBook
 
@@ -79,16 +79,16 @@ class ExtendedSession(Session):
             control_slot=self._side.control_slot, strict=strict)
         self._request_identifier = self._codec.request_identifier
         self._response_identifier = self._codec.response_identifier
-        offset = self._side.offset
+        numbers = self._side.numbers
         self._maps = MapSupervision(
-            self._channel, request_base=options.request_map_base + offset,
-            response_base=options.response_map_base + offset,
-            request=wire_numbers(drive.cyclic_request, offset),
-            response=wire_numbers(drive.cyclic_response, offset),
+            self._channel, request_base=options.request_map_base + numbers.offset,
+            response_base=options.response_map_base + numbers.offset,
+            request=numbers.numbers(drive.cyclic_request),
+            response=numbers.numbers(drive.cyclic_response),
             rewrite=options.mapping == 'configure',
             emit=self._maps_reported, judged=self._maps_judged)
         self._positions = Positions(
-            self, self._channel, offset, known=self._start_cycling,
+            self, self._channel, numbers, known=self._start_cycling,
             # it may have started anew meanwhile, with other maps
             silent=self._maps.look_afresh if self._verify else None)
         self._book = ExchangeBook(drive, self.statistics)

@@ -5,7 +5,8 @@ from collections.abc import Callable
 import math
 
 from drive_can_bridge.core.session import Session
-from drive_can_bridge.protocols.datamodel.channel import AcyclicChannel, Procedure, Read
+from drive_can_bridge.protocols.datamodel.channel import AcyclicChannel, Procedure
+from drive_can_bridge.protocols.datamodel.numbers import Numbers
 
 #: s until a position that a setpoint cannot carry is read again
 PAUSE = 0.1
@@ -15,21 +16,20 @@ class Positions:
     """
     Reads positions.
 
-    :param offset: added to parameter numbers on the wire.
     :param known: called when all are known.
     :param silent: called when the drive has not answered; None: they are read again at once, paced
         by the time-out of the read.
     :ivar due: when they are to be read again; infinity: not planned.
     """
 
-    def __init__(self, session: Session, channel: AcyclicChannel, offset: int, *,
+    def __init__(self, session: Session, channel: AcyclicChannel, numbers: Numbers, *,
                  known: Callable[[float], None],
                  silent: Callable[[float], None] | None) -> None:
         self.due = math.inf
         self._channel = channel
         self._setpoints = session.setpoints
         self._report = session.report
-        self._offset = offset
+        self._numbers = numbers
         self._known = known
         self._silent = silent or self.read
         self._asked = -1    # ``setpoints.forgotten`` when they were; -1: they are not
@@ -48,7 +48,7 @@ class Positions:
     def _all(self) -> Procedure:
         raws: list[int] = []
         for setpoint in self._setpoints.held:
-            words = yield Read((setpoint.measured.number or 0) + self._offset)
+            words = yield self._numbers.read(setpoint.measured)
             if words is None:
                 return None
             raws.append(setpoint.measured.raw_from_word(words[0]))

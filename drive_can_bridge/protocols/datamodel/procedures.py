@@ -13,12 +13,12 @@ from drive_can_bridge.core.requests import (
     Failure, NOT_SENT, Outcome, Outcomes, SENT_UNACKNOWLEDGED, Written,
 )
 from drive_can_bridge.core.retry import RetryPolicy
-from drive_can_bridge.core.words import value_text
-from drive_can_bridge.protocols.access import Access, Found, Item
+from drive_can_bridge.protocols.access import Access, Found, Item, read_back
 from drive_can_bridge.protocols.datamodel.channel import Read, Reply, Step, Words, Write
 from drive_can_bridge.protocols.datamodel.extended import CYCLIC_PARAMETER, SLOTS
 from drive_can_bridge.protocols.datamodel.mapping import effective, padded
-from drive_can_bridge.protocols.polling import Chunk, Place, plan_reads
+from drive_can_bridge.protocols.datamodel.numbers import Numbers
+from drive_can_bridge.protocols.polling import Chunk
 
 NOT_WRITABLE = f'parameter {CYCLIC_PARAMETER} is never written: its number marks cyclic frames'
 
@@ -63,35 +63,23 @@ class ParameterAccess(Access[Chunk, Step, Reply]):
     Parameters by number; runs of consecutive ones share a frame.
 
     :param verify: read back what was written.
-    :param offset: added to every parameter number that goes over the wire.
     :param together: parameters that fit one write frame.
     """
 
-    def __init__(self, retry: RetryPolicy, *, verify: bool, offset: int, together: int) -> None:
-        super().__init__(retry)
+    def __init__(self, retry: RetryPolicy, numbers: Numbers, *, verify: bool,
+                 together: int) -> None:
+        super().__init__(retry, numbers)
+        self._numbers = numbers
         self._verify = verify
-        self._offset = offset
         self._together = together
-
-    def span(self, parameter: Parameter) -> Chunk:
-        return Chunk((parameter.number or 0) + self._offset, 1)
-
-    def addresses(self, span: Chunk) -> range:
-        return range(span.address, span.address + span.size)
-
-    def plan(self, spans: Sequence[Chunk]) -> list[Chunk]:
-        return plan_reads([Place(*span) for span in spans], SLOTS)
 
     def read(self, span: Chunk) -> Generator[Step, Reply, Found]:
         # one bad number makes the drive ignore the whole frame
         words = yield Read(span.address, span.size)
         return self.retry.unanswered() if words is None else words
 
-    def raw(self, parameter: Parameter, words: tuple[int, ...]) -> int:
-        return parameter.raw_from_word(words[0])
-
     def write(self, parameter: Parameter, raw: int) -> Generator[Step, Reply, Outcome]:
-        if self.span(parameter).address == CYCLIC_PARAMETER:
+        if self._numbers.number(parameter) == CYCLIC_PARAMETER:
             return Failure(NOT_WRITABLE)
         outcome, = yield from self._put([(parameter, raw)])
         return outcome
@@ -105,7 +93,7 @@ class ParameterAccess(Access[Chunk, Step, Reply]):
 
     def _put(self, items: Sequence[Item]) -> Generator[Step, Reply, Outcomes]:
         """Write parameters with consecutive numbers in one frame."""
-        numbers = [self.span(parameter).address for parameter, _ in items]
+        numbers = [self._numbers.number(parameter) for parameter, _ in items]
         first = min(numbers)
         words = [0] * len(items)
         for number, (parameter, raw) in zip(numbers, items):
@@ -193,5 +181,4 @@ def write_maps(request_base: int, response_base: int, *, request: Sequence[int],
 def _compare(parameter: Parameter, found: int, wanted: int) -> Outcome:
     if found == wanted or parameter.type is ParameterType.BOOL and bool(found) is bool(wanted):
         return Written()
-    return Failure(f'read back {value_text(parameter.value_from_raw(found))} '
-                   f'instead of {value_text(parameter.value_from_raw(wanted))}')
+    return read_back(parameter, found, wanted)

@@ -87,16 +87,3 @@ def _words_struct(parameters: Sequence[Parameter], *, unsigned: int | None = Non
     return struct.Struct('>' + ''.join(
         'h' if parameter.type.signed and slot != unsigned else 'H'
         for slot, parameter in enumerate(parameters)))
-
-
-def slot_of(parameters: tuple[Parameter, ...], name: str) -> int | None:
-    """Return the slot of the parameter of this name, or None."""
-    for slot, parameter in enumerate(parameters):
-        if parameter.name == name:
-            return slot
-    return None
-
-
-def wire_numbers(parameters: tuple[Parameter, ...], offset: int) -> tuple[int, ...]:
-    """Return the numbers of parameters as they go over the wire, in slot order."""
-    return tuple((parameter.number or 0) + offset for parameter in parameters)

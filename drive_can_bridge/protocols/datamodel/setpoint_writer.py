@@ -11,26 +11,27 @@ import math
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.cycle_timer import stop_spacing
 from drive_can_bridge.protocols.datamodel.acyclic_side import AcyclicSide
-from drive_can_bridge.protocols.datamodel.channel import Write
+from drive_can_bridge.protocols.datamodel.channel import Reply, Step, Write
+from drive_can_bridge.protocols.polled_exchange import PolledExchange
 from drive_can_bridge.protocols.polling import WriteSchedule
+
+Rounds = PolledExchange[Step, Reply]
 
 
 class SetpointWriter:
     """
     Writes what is in ``cyclic_request`` of one drive.
 
-    :ivar doubt: a read went unanswered since the status was read: nobody knows whether the drive
-        was off meanwhile.
     :ivar word_written_at: when the control word left last.
     """
 
-    def __init__(self, session: Session, side: AcyclicSide) -> None:
+    def __init__(self, session: Session, side: AcyclicSide, exchange: Rounds) -> None:
         drive = session.configuration
-        self.doubt = False
         self.word_written_at = -math.inf
         self._session = session
+        self._exchange = exchange
         self._courier = side.channel.courier
-        self._offset = side.offset
+        self._numbers = side.numbers
         self._slot = side.control_slot
         self._parameters = drive.cyclic_request
         self._schedule = WriteSchedule(len(drive.cyclic_request), drive.options.refresh_interval)
@@ -49,8 +50,9 @@ class SetpointWriter:
         :param unanswered: what was asked a period ago still waits for its answer.
         """
         control = self._session.control
-        # it is not started by a repetition
-        doubt = (self.doubt or unanswered) and control is not None and not (
+        # when a read goes unanswered, nobody knows whether the drive was off meanwhile: it is not
+        # started by a repetition
+        doubt = (self._exchange.silent or unanswered) and control is not None and not (
             control.at_rest or control.stopping)
         hold = [self._slot] if doubt else []
         unknown = self._session.setpoints.unknown
@@ -69,7 +71,7 @@ class SetpointWriter:
         runs = raw != self._raws(neutral=True)[index]
         # What is sent cyclically is volatile: EEPROM parameters are refused by the configuration.
         self._courier.write(
-            Write((parameter.number or 0) + self._offset, (parameter.word_from_raw(raw),),
+            Write(self._numbers.number(parameter), self._numbers.words(parameter, raw),
                   eeprom=False),
             lambda sent, then: self._left(index, raw, sent, then, runs=runs), now)
         self._schedule.written(index, raw, now)  # at once: a look meanwhile must not find it due

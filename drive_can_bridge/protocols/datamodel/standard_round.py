@@ -5,17 +5,11 @@ import math
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.protocols.datamodel.channel import ParameterCourier, Procedure, Read
-from drive_can_bridge.protocols.datamodel.standard import SLOTS
-from drive_can_bridge.protocols.polling import Chunk, Place, plan_reads, Round, round_time
+from drive_can_bridge.protocols.datamodel.numbers import Numbers
+from drive_can_bridge.protocols.polling import Chunk, round_time
 
 #: worst-case stuffing, eight bytes, 11-bit identifier, with the interframe space
 FRAME_BITS = 135
-
-
-def places(drive: DriveConfiguration) -> list[Place]:
-    """Return where the parameters of ``cyclic_response`` stand, as numbers on the wire."""
-    offset: int = drive.options.parameter_offset
-    return [Place((parameter.number or 0) + offset) for parameter in drive.cyclic_response]
 
 
 def reads(drive: DriveConfiguration) -> list[Chunk]:
@@ -25,10 +19,11 @@ def reads(drive: DriveConfiguration) -> list[Chunk]:
     Gaps are bridged over parameters that the profile lists: about others nobody knows whether the
     drive has them, and it answers a read as a whole or not at all.
     """
-    offset: int = drive.options.parameter_offset
-    known = {parameter.number + offset for parameter in drive.profile.parameters.values()
+    numbers = Numbers(drive)
+    known = {numbers.number(parameter) for parameter in drive.profile.parameters.values()
              if parameter.number is not None and parameter.readable}
-    return plan_reads(places(drive), SLOTS, known=known)
+    return numbers.plan([numbers.span(parameter) for parameter in drive.cyclic_response],
+                        known=known)
 
 
 def frames(drive: DriveConfiguration) -> int:
@@ -57,15 +52,14 @@ class StandardRound:
         self.status_asked_at = -math.inf
         self._courier = courier
         self._parameters = drive.cyclic_response
-        self._places = places(drive)
+        self._numbers = Numbers(drive).numbers(drive.cyclic_response)
         self._reads = reads(drive)
         self._status_read = None if status_slot is None else next(
-            chunk for chunk in self._reads
-            if self._places[status_slot].address in _numbers(chunk))
+            chunk for chunk in self._reads if self._numbers[status_slot] in chunk.addresses)
 
     def read(self) -> Procedure:
         """Read all; return the raw integers, or None when one read was not answered."""
-        result = Round(self._places)
+        found: dict[int, int] = {}
         for chunk in self._reads:
             words = yield Read(chunk.address, chunk.size, attempts=1)
             if words is None:
@@ -75,16 +69,12 @@ class StandardRound:
                 return None
             if chunk is self._status_read:
                 self.status_asked_at = self._courier.asked_at
-            result.take(chunk, words)
-        return tuple(parameter.raw_from_word(word)
-                     for parameter, (word,) in zip(self._parameters, result.words()))
+            found.update(zip(chunk.addresses, words))
+        return tuple(parameter.raw_from_word(found[number])
+                     for parameter, number in zip(self._parameters, self._numbers))
 
     def _names(self, chunk: Chunk) -> str:
         """Name what a read is for."""
         return ', '.join(f'{parameter.name} ({parameter.address})'
-                         for parameter, place in zip(self._parameters, self._places)
-                         if place.address in _numbers(chunk))
-
-
-def _numbers(chunk: Chunk) -> range:
-    return range(chunk.address, chunk.address + chunk.size)
+                         for parameter, number in zip(self._parameters, self._numbers)
+                         if number in chunk.addresses)

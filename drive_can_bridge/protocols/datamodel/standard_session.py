@@ -9,32 +9,20 @@ silent; that is how it is found. Setpoints are written only to a drive that answ
 back (:mod:`.stop_writes`).
 """
 
-from enum import Enum
-import math
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control_machine import ControlMachine
-from drive_can_bridge.core.events import ProcessDataReceived
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.datamodel import standard
 from drive_can_bridge.protocols.datamodel.acyclic_side import AcyclicSide, map_cells
-from drive_can_bridge.protocols.datamodel.channel import Polling
 from drive_can_bridge.protocols.datamodel.setpoint_writer import SetpointWriter
 from drive_can_bridge.protocols.datamodel.standard_round import StandardRound
 from drive_can_bridge.protocols.datamodel.stop_writes import ANSWER_TIME, ATTEMPTS
-from drive_can_bridge.protocols.exchange_book import ExchangeBook
+from drive_can_bridge.protocols.polled_exchange import Phase, PolledExchange, Raws
 
 SILENT = 'no answer to reads: drive silent, wrong station, bit rate or identifier mode'
-
-
-class Phase(Enum):
-    """What the session is doing."""
-
-    IDLE = 'idle'
-    POLLING = 'polling'
-    STOPPING = 'last neutral setpoints'
 
 
 class StandardSession(Session):
@@ -54,20 +42,19 @@ class StandardSession(Session):
             encode_write=lambda number, words: standard.encode_write(request, number, *words),
             decode=lambda frame, step: standard.decode_read_response(
                 frame, step.count if step else 0, strict=strict),
-            together=1, stop_ended=self._stop_ended, polling=Polling(options.quarantine))
+            together=1, stop_ended=self._stop_ended, quarantine=options.quarantine)
         self._channel = self._side.channel
         self._status_slot = self._side.status_slot
         self._request_identifier = request
         self._identifiers = request, standard.identifier(
             options.response_id_base, drive.station)
         self._round = StandardRound(drive, self._channel.courier, self._status_slot)
-        self._writer = SetpointWriter(self, self._side)
+        self._exchange = PolledExchange(
+            self, self._channel, self._round.read, found=self._found, answered=self._answered,
+            missed=self._missed)
+        self._timer = self._exchange.timer
+        self._writer = SetpointWriter(self, self._side, self._exchange)
         self._phase = Phase.IDLE
-        self._book = ExchangeBook(drive, self.statistics)
-        self._timer = self._book.timer
-        self._in_round = False
-        self._void = False  # this round began before the process stood still
-        self._received_at = -math.inf
         self._expected = False  # the answer of a read that nobody wants any more may come
 
     # -- life cycle -------------------------------------------------------------------------------
@@ -81,7 +68,6 @@ class StandardSession(Session):
         return owes
 
     def begin_stop(self, now: float) -> bool:
-        self._timer.stop()
         self._writer.forget()
         self._side.begin_stop(now)
         return self._side.stop.running
@@ -100,7 +86,7 @@ class StandardSession(Session):
 
     def time_lost(self, now: float) -> None:
         self._expected = self._expected or self._channel.outstanding is not None
-        self._void = self._in_round
+        self._exchange.disregard()
         self._channel.time_lost(now)
         if self._phase is Phase.POLLING:
             self.stood_still(now)
@@ -110,7 +96,6 @@ class StandardSession(Session):
         self.report.advice = SILENT
         self._round.gap = ''
         self._phase = Phase.POLLING
-        self._book.missed_in_row = 0
         self._tell_to_stop(now)
         self._timer.start(now)
 
@@ -126,7 +111,6 @@ class StandardSession(Session):
 
     def go_idle(self, advice: str) -> None:
         self._phase = Phase.IDLE
-        self._timer.stop()
         self._writer.forget()
         self.setpoints.allow(False)
         self._clear_acyclic()
@@ -135,7 +119,7 @@ class StandardSession(Session):
     def _clear_acyclic(self) -> None:
         self._expected = self._expected or self._channel.outstanding is not None
         self._side.clear()
-        self._in_round = False
+        self._exchange.stop()
 
     # -- the beat ---------------------------------------------------------------------------------
 
@@ -155,17 +139,12 @@ class StandardSession(Session):
         """Begin a period: look what is to be written, then read."""
         if self.online:
             self.gate.expire(now)
-            self._writer.look(now, unanswered=self._in_round)
-        if not self._in_round:
-            self._book.begin(now)
-            self._in_round = True
-            self._void = False
-            self._writer.write(now)  # before the first read
-            self._channel.run(self._round.read(), self._round_done, now)
+            self._writer.look(now, unanswered=self._exchange.reading)
+        if self._exchange.reading:
+            self._exchange.wait(now, self._patience)    # somebody may keep disturbing
             return
-        self._timer.begun(now)
-        if now - self._book.began_at > self._patience:
-            self._miss(now)  # somebody keeps disturbing; nothing was read for too long
+        self._writer.write(now)  # before the first read
+        self._exchange.begin(now)
 
     @property
     def _patience(self) -> float:
@@ -184,43 +163,26 @@ class StandardSession(Session):
 
     # -- rounds -----------------------------------------------------------------------------------
 
-    def _round_done(self, raws: tuple[int, ...] | None) -> None:
-        now = self._channel.now
-        self._in_round = False
-        if self._void:
-            return
-        if raws is None:
-            self._miss(now)
-            return
-        self._writer.doubt = False
-        self._book.answered(self._received_at)
-        courier = self._channel.courier
-        if self.online and self.told.ran and courier.asked_at > courier.wrote_at:
-            self.told.answered()
-        if not self.online:
-            self.gate.measured(raws)    # before anything is written
-            self._found(now)
-        # a status that was asked for before the word left says nothing about the word
-        if (self.control is not None and self._status_slot is not None
-                and self._round.status_asked_at > self._writer.word_written_at):
-            self.control.status_received(raws[self._status_slot], now)
-            self.control_changed(now)
-        self.gate.measured(raws)
-        self.report.note(ProcessDataReceived(raws, self._received_at))
-
     def _found(self, now: float) -> None:
         self.be_online()
         self._writer.forget()
         self._writer.look(now)
         self._side.found(now)
 
-    def _miss(self, now: float) -> None:
-        too_many = self._book.missed()
-        self._writer.doubt = True
+    def _answered(self, raws: Raws, now: float, found: bool) -> None:
+        courier = self._channel.courier
+        if self.told.ran and not found and courier.asked_at > courier.wrote_at:
+            self.told.answered()
+        # a status that was asked for before the word left says nothing about the word
+        if (self.control is not None and self._status_slot is not None
+                and self._round.status_asked_at > self._writer.word_written_at):
+            self.control.status_received(raws[self._status_slot], now)
+            self.control_changed(now)
+
+    def _missed(self, reason: str, now: float) -> None:
         if not self.online:
             self.report.advice = self._round.gap or SILENT
-        elif too_many:
-            reason = f'no complete round of reads for {self.configuration.missed_limit} periods'
+        elif reason:
             self.lose(': '.join(filter(None, (reason, self._round.gap))), now)
 
     # -- control ----------------------------------------------------------------------------------
@@ -250,5 +212,5 @@ class StandardSession(Session):
             else:
                 self.report.reject(f'{frame}: nobody asked for it')
             return
-        self._received_at = now - age
+        self._exchange.received_at = now - age
         self._side.receive(frame, now)

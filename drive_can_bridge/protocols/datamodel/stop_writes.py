@@ -7,9 +7,8 @@ acknowledges them, so each is read back, and written again where it is not what 
 """
 
 from collections.abc import Generator, Sequence
-from typing import NamedTuple
 
-from drive_can_bridge.core.parameters import Parameter, Storage
+from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.datamodel.channel import Read, Step, Words, Write
 
 #: how often everything is written at most
@@ -18,52 +17,27 @@ ATTEMPTS = 3
 ANSWER_TIME = 0.1
 
 
-class StopWrite(NamedTuple):
-    """
-    What makes a drive stand still.
-
-    :param number: of the parameter, on the wire.
-    """
-
-    parameter: Parameter
-    number: int
-    raw: int
-
-    @property
-    def write(self) -> Write:
-        """The step."""
-        return Write(self.number, (self.parameter.word_from_raw(self.raw),),
-                     self.parameter.storage is not Storage.RAM)
-
-    @property
-    def name(self) -> str:
-        """What is written, for people."""
-        return f'{self.parameter.name} ({self.parameter.address})'
-
-
-def confirm(writes: Sequence[StopWrite], timeout: float,
+def confirm(writes: Sequence[tuple[Parameter, Write]], timeout: float,
             ) -> Generator[Step, Words | None, list[str]]:
     """Read back what was written, and write it again as needed; return what failed, in words."""
-    blind = [each for each in writes if not each.parameter.readable]
-    wrong = [each for each in writes if each.parameter.readable]
+    blind = [each for each in writes if not each[0].readable]
+    wrong = [each for each in writes if each[0].readable]
     failed: list[str] = []
     for attempt in range(ATTEMPTS):
         for each in (*blind, *wrong) if attempt else ():
-            yield each.write
+            yield each[1]
         doubtful, failed, silent = wrong, [], False
         wrong = []
-        for each in doubtful:
+        for parameter, write in doubtful:
             reply = None if silent else (yield Read(
-                each.number, attempts=1, late_will_do=True, timeout=timeout))
+                write.number, attempts=1, late_will_do=True, timeout=timeout))
             silent = reply is None
-            if reply is None:
-                failed.append(f'{each.name}: no answer')
-            elif reply[0] != each.write.words[0]:
-                failed.append(f'{each.name}: read back {reply[0]} instead of '
-                              f'{each.write.words[0]}')
-            else:
+            if reply == write.words:
                 continue
-            wrong.append(each)
+            wrong.append((parameter, write))
+            failed.append(f'{parameter.name} ({parameter.address}): ' + (
+                'no answer' if reply is None else
+                f'read back {reply[0]} instead of {write.words[0]}'))
         if not wrong and not blind:
             break
     return failed

@@ -3,8 +3,8 @@
 
 from builders import read
 from pkw_builders import (
-    ANSWER_0, ANSWER_1, BOOT_UP, FLC, IDLE, IDLE_ANSWER, online, OPERATIONAL, PRE_OPERATIONAL,
-    READ_0, READ_1, SPEED, START, started, STOPPED,
+    ANSWER_0, ANSWER_1, BOOT_UP, CONTROL, FLC, IDLE, IDLE_ANSWER, LEVEL, online, OPERATIONAL,
+    PRE_OPERATIONAL, READ_0, READ_1, SPEED, START, started, STATUS, STOPPED, TRIPPED_1,
 )
 import pytest
 
@@ -106,6 +106,44 @@ def test_boot_up_of_a_node_with_heartbeats_waits_for_operational() -> None:
     assert talk.until(10.9) == []
     assert talk.hears(OPERATIONAL, 10.9) == []
     assert talk.at(10.9) == [IDLE]
+
+
+def test_lost_heartbeat_ends_the_round_under_way() -> None:
+    talk = started(response=(STATUS, LEVEL), heartbeat_timeout=0.025, parameter_timeout=0.1)
+    talk.at(10.05)
+    talk.hears(IDLE_ANSWER, 10.051)
+    talk.hears('485#C70100A541000000', 10.052)
+    talk.hears('485#D101002507000000', 10.053)
+    talk.hears(OPERATIONAL, 10.06)
+    assert talk.until(10.0701) == [(10.07, '505#C70100A500000000')]
+    assert talk.hears('485#C70100A541000000', 10.072) == ['505#D101002500000000']
+    assert talk.until(10.1351) == [(10.135, IDLE)]
+    assert not talk.session.online
+    # what comes next is the beginning of another one
+    assert talk.hears(IDLE_ANSWER, 10.136) == ['505#C70100A500000000']
+
+
+def test_status_of_a_drive_whose_heartbeats_have_ceased_says_nothing() -> None:
+    talk = online(heartbeat_timeout=0.025, control=CONTROL, missed_limit=1, parameter_timeout=0.02)
+    talk.hears(OPERATIONAL, 10.055)
+    talk.until(10.0701)
+    talk.hears(ANSWER_1, 10.071)
+    assert talk.until(10.141)[-1] == (10.14, IDLE)
+    assert not talk.session.online
+    talk.events()
+    assert talk.hears(IDLE_ANSWER, 10.141) == [READ_1]
+    assert talk.hears(TRIPPED_1, 10.142) == []
+    assert talk.events() == []
+
+
+def test_lost_heartbeat_stays_the_advice_while_nothing_is_answered() -> None:
+    talk = online(heartbeat_timeout=0.025, missed_limit=1, parameter_timeout=0.02)
+    talk.hears(OPERATIONAL, 10.055)
+    talk.until(10.0701)
+    talk.hears(ANSWER_0, 10.071)
+    talk.until(10.2)
+    assert talk.session.statistics.missed > 1
+    assert talk.session.offline_advice == 'no heartbeat for 0.025 s'
 
 
 def test_lost_heartbeat_makes_it_offline_until_it_is_back() -> None:

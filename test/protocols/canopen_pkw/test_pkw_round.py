@@ -225,6 +225,61 @@ def test_half_of_a_round_publishes_nothing() -> None:
 # -- refusals -------------------------------------------------------------------------------------
 
 
+def test_a_refused_round_between_two_that_are_missed() -> None:
+    talk = started(response=(STATUS, LEVEL), parameter_timeout=0.015, missed_limit=2)
+    talk.at(10.05)
+    talk.hears(IDLE_ANSWER, 10.051)
+    talk.hears('485#C70100A541000000', 10.052)
+    talk.hears('485#D101002507000000', 10.053)
+    assert talk.until(10.0901) == [(10.07, '505#C70100A500000000'), (10.09, IDLE)]
+    assert talk.hears(IDLE_ANSWER, 10.091) == [READ_SINGLE_0]
+    assert talk.hears('485#C701004E00000206', 10.092) == ['505#D10100A500000000']
+    assert talk.hears('485#D10100CE00000206', 10.093) == []
+    assert talk.until(10.1301) == [(10.11, READ_SINGLE_0), (10.13, IDLE)]
+    assert talk.session.statistics.missed == 2
+    assert talk.session.online, 'they were not in a row'
+
+
+def test_a_value_is_of_its_own_round_or_of_none() -> None:
+    talk = started(response=(STATUS, LEVEL))
+    talk.at(10.05)
+    talk.hears(IDLE_ANSWER, 10.051)
+    talk.hears('485#C70100A541000000', 10.052)
+    talk.hears('485#D101002507000000', 10.053)
+    assert talk.samples() == [(0x41, 7)]
+    talk.until(10.0701)
+    talk.hears('485#C70100A541000000', 10.071)
+    talk.hears('485#D101004E00000206', 10.072)
+    assert talk.session.online
+    assert talk.samples() == []
+
+
+def test_what_was_refused_is_asked_for_again_after_a_new_beginning() -> None:
+    talk = started()
+    talk.at(10.05)
+    talk.hears(IDLE_ANSWER, 10.051)
+    assert talk.hears('485#C70100CE00000206', 10.052) == [READ_SINGLE_0]
+    assert talk.hears('485#C701002541000000', 10.053) == ['505#C80100A500000000']
+    assert talk.hears('485#C80100A500000000', 10.054) == []
+    talk.bus_down(10.06)
+    talk.bus_up(11.0)
+    assert talk.until(11.0501) == [(11.05, IDLE)]
+    assert talk.hears(IDLE_ANSWER, 11.051) == [READ_0]      # both in one
+
+
+def test_what_was_missed_before_a_restart_counts_no_more() -> None:
+    talk = online(parameter_timeout=0.015)
+    talk.until(10.106)
+    assert talk.session.statistics.missed == 1
+    assert talk.hears('705#00', 10.107) == [START]
+    talk.until(10.22)
+    assert talk.session.statistics.missed == 3
+    assert talk.session.offline_advice == 'the device restarted: waiting for it to answer'
+    talk.until(10.26)
+    assert talk.session.statistics.missed == 4
+    assert talk.session.offline_advice.startswith('no complete round of reads: drive silent')
+
+
 def test_refused_poll_is_an_answer_but_shown() -> None:
     talk = started(response=(STATUS, LEVEL))
     talk.at(10.05)

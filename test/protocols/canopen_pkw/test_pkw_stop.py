@@ -34,6 +34,23 @@ def worries(talk: Conversation) -> list[str]:
 # -- in every state -------------------------------------------------------------------------------
 
 
+def test_the_end_of_a_drive_that_never_ran_and_does_not_answer_is_told() -> None:
+    talk = online(control=CONTROL)
+    assert talk.deactivate(10.06) == [DISABLE_1]
+    assert talk.until(14.0) == [(10.56, DISABLE_0), (11.06, DISABLE_1)]
+    assert talk.session.stopped
+    assert [note.text for note in talk.events(Noted)] == [
+        'told to stop, but control_register_1 0000h not acknowledged in 3 attempts']
+
+
+def test_what_was_not_answered_may_run_all_the_same() -> None:
+    talk = ready()
+    assert talk.asks(ControlAction.ENABLE, 10.075) == [ENABLE_0]
+    talk.until(10.58)
+    talk.bus_down(10.59)
+    assert worries(talk) == [f'the bus was lost before it could be told to stop: {RUNNING_ON}']
+
+
 def test_stall() -> None:
     talk = running()
     assert talk.time_lost(15.0) == [START, DISABLE_0]

@@ -10,7 +10,7 @@ from drive_can_bridge.core.outbox import Outbox
 from drive_can_bridge.core.retry import RetryPolicy
 from drive_can_bridge.protocols.channel import Lane
 from drive_can_bridge.protocols.datamodel.channel import (
-    AcyclicChannel, Polling, Procedure, Read, Words, Write,
+    AcyclicChannel, ParameterCourier, Procedure, Read, Words, Write,
 )
 
 
@@ -24,11 +24,11 @@ class Line:
     def __init__(self, *, timeout: float = 0.1, attempts: int = 2, gap: float = 0.02,
                  quarantine: float | None = None) -> None:
         self.outbox = Outbox()
-        self.channel = AcyclicChannel(
+        self.channel = AcyclicChannel(ParameterCourier(
             encode_read=lambda number, count: Frame(number, b'?' * count, True),
             encode_write=lambda number, words: Frame(number, bytes(words), True),
             send=self.outbox.put, retry=RetryPolicy(timeout, attempts), eeprom_gap=gap,
-            polling=None if quarantine is None else Polling(quarantine))
+            quarantine=quarantine))
         self.results: list[object] = []
 
     def sent(self, now: float | None = None) -> list[str]:
@@ -277,6 +277,18 @@ def test_the_pause_of_the_eeprom_begins_when_the_write_has_left() -> None:
 
 
 # -- where the exchange itself goes through the channel -------------------------------------------
+
+
+def test_a_stall_ends_a_read_whose_answer_would_not_say_what_it_answers() -> None:
+    """However short the silence after it."""
+    line = Line(quarantine=0.0, attempts=1)
+    line.reads(7)
+    line.channel.time_lost(1.01)
+    assert line.results == [[None]]
+    line = Line(attempts=1)
+    line.reads(7)
+    line.channel.time_lost(1.01)
+    assert line.results == []
 
 
 def test_a_round_is_interrupted_once_at_most() -> None:

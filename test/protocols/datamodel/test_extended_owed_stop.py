@@ -69,6 +69,16 @@ def test_stop_right_after_a_stall() -> None:
     assert warnings(talk) == []
 
 
+def test_stop_under_way_is_not_begun_anew() -> None:
+    talk = running()
+    assert talk.time_lost(12.0) == [SPEED_ZERO]
+    assert talk.until(12.004) == [(12.001, LIMIT_ZERO), (12.002, ASK_SPEED)]
+    assert talk.time_lost(12.05) == []
+    assert talk.until(12.06) == []
+    assert talk.hears(SPEED_IS_ZERO, 12.061) == [ASK_LIMIT]
+    assert talk.hears(LIMIT_IS_ZERO, 12.062) == [ASK_REQUEST_MAP]
+
+
 def test_stop_right_after_a_stall_that_nobody_confirms() -> None:
     talk = running()
     talk.time_lost(12.0)

@@ -194,6 +194,23 @@ def enabled(**options: object) -> Conversation:
     raise AssertionError('not enabled')
 
 
+def test_confirmed_disable_stops_no_setpoint_of_the_cycle() -> None:
+    talk = enabled()
+    talk.commands(0, 0.0, talk.now)
+    talk.commands(0, 100.0, talk.now)
+    assert talk.until(10.41)[-1][1] == '003FFFF0#03E8000000000000'
+    talk.refusing = lambda text: text.startswith('003FFFF0')
+    assert talk.deactivate(10.411) == ['00300341#0000000000000000']
+    assert [text for _, text in talk.until(10.413)] == ['00200341#0000000000000000']
+    assert talk.hears('10200341#0000000000000000', 10.414) == []
+    talk.until(11.4)
+    assert not talk.session.stopped
+    talk.session.give_up(11.4)
+    assert talk.sent() == []
+    assert [event.text for event in talk.events(Noted) if event.warning] == [
+        'could not be told to stop: it may still be running']
+
+
 def test_disable_goes_with_the_cycles() -> None:
     talk = enabled(request=(WORD, SPEED), mapping='assume')
     beat = talk.session.next_timer()

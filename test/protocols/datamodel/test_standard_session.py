@@ -30,6 +30,41 @@ GAP = parameter('torque', 213, access=RO)
 # -- rounds ---------------------------------------------------------------------------------------
 
 
+def test_answer_to_an_older_question_does_not_show_that_a_stop_arrived() -> None:
+    talk = online(rearm_immediate=True, command_timeout=0.05)
+    talk.commands(0, 100.0, 10.01)
+    assert talk.until(10.0215) == [(10.02, '3F1#063200E803000000'), (10.021, ASK)]
+    assert talk.until(10.09) == [(10.08, SPEED_ZERO)]
+    assert talk.hears(ANSWER, 10.091) == []
+    assert talk.session.told.ran
+    assert talk.until(10.105) == [(10.1, ASK)]
+    assert talk.hears(ANSWER, 10.106) == []
+    assert not talk.session.told.ran
+
+
+def test_answer_that_finds_a_drive_does_not_show_that_a_stop_arrived() -> None:
+    talk = online(rearm_immediate=True, command_timeout=0.05)
+    talk.commands(0, 100.0, 10.01)
+    assert talk.until(10.0215) == [(10.02, '3F1#063200E803000000'), (10.021, ASK)]
+    talk.until(12.0)
+    assert not talk.session.online
+    talk.events()
+    assert talk.until(12.0215) == [(12.021, ASK)]
+    assert talk.hears(ANSWER, 12.022) == []
+    assert talk.session.online
+    talk.bus_down(12.0221)
+    assert [note.text for note in talk.events(Noted) if note.warning] == [
+        'the bus was lost before it could be told to stop: it may still be running']
+
+
+def test_a_round_cut_short_by_the_end_does_not_keep_the_next_from_beginning() -> None:
+    talk = polling()
+    assert talk.deactivate(10.001) == []
+    assert talk.session.stopped
+    assert talk.activate(10.5) == []
+    assert [text for _, text in talk.until(10.515)] == [ASK]
+
+
 def test_a_round_is_published_with_the_time_of_its_last_answer() -> None:
     talk = polling()
     assert talk.hears(ANSWER, 10.002) == []

@@ -11,7 +11,7 @@ import random
 
 from builders import Conversation, drive, frame, GAIN, read
 import pytest
-from standard_builders import ANSWER, ASK, online
+from standard_builders import ANSWER, ASK, online, polling
 from test_standard_late import ASKED, LateDrive, POLLED
 
 from drive_can_bridge.core.events import ProcessDataReceived, RequestCompleted
@@ -65,6 +65,26 @@ def test_when_nothing_was_in_the_buffers_it_goes_on_soon() -> None:
     sent = talk.until(10.44)
     assert len(sent) == 1
     assert sent[0][0] == pytest.approx(10.43)
+
+
+def test_a_round_from_before_a_stall_says_nothing() -> None:
+    talk = polling(request=(), parameter_retries=0)
+    assert talk.hears(ANSWER, 10.002) == []
+    assert talk.until(10.0205) == [(10.02, ASK)]
+    assert talk.hears(ANSWER, 10.022) == []
+    # a round begins at 10.04 s, and waits for a user
+    assert talk.submits(read(GAIN), 10.03) == ['3F1#0328000100000000']
+    assert talk.until(10.0405) == []
+    talk.samples()
+    assert talk.time_lost(11.2) == []
+    assert talk.until(11.35) == [(11.3, ASK)]
+    assert talk.hears(ANSWER, 11.351) == []
+    assert not talk.session.online
+    assert talk.samples() == []
+    assert talk.until(11.365) == [(11.36, ASK)]
+    assert talk.hears(ANSWER, 11.366) == []
+    assert talk.session.online
+    assert talk.samples() == [(1000, 250, 1)]
 
 
 def test_who_is_always_late_reads_all_the_same() -> None:

@@ -1,0 +1,124 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The exchange of protocols without a cyclic service: rounds of reads, one a period, as samples.
+
+How a round is read, the family says. A complete one is a sample, and finds a drive that was
+offline; one with a read that nobody answered is missed. One with a read that the drive refused is
+neither: there is no complete sample.
+"""
+
+from collections.abc import Callable, Generator, Sequence
+from enum import Enum
+import math
+from typing import Generic
+
+from drive_can_bridge.core.events import ProcessDataReceived
+from drive_can_bridge.core.session import Session
+from drive_can_bridge.protocols.channel import Channel, Lane
+from drive_can_bridge.protocols.courier import ReplyT, StepT
+from drive_can_bridge.protocols.exchange_book import ExchangeBook
+
+#: of a round, in the order of samples; None: of what was refused
+Raws = Sequence[int | None]
+
+
+class Phase(Enum):
+    """What a session with a polled exchange is doing."""
+
+    IDLE = 'idle'
+    POLLING = 'polling'
+    STOPPING = 'last writes'
+
+
+class PolledExchange(Generic[StepT, ReplyT]):
+    """
+    The rounds of one drive.
+
+    :param read: makes the procedure of a round; it returns None when a read was not answered.
+    :param found: called when a drive that was offline has answered a round.
+    :param answered: (raws, now, was it found just now): called before these become a sample.
+    :param missed: (why the drive counts as lost, '' if it does not yet; now).
+    :param present: tells whether a drive is there at all that answers.
+    :ivar timer: when the next round is due.
+    :ivar reading: a round is under way.
+    :ivar received_at: when the last answer was received.
+    """
+
+    def __init__(self, session: Session, channel: Channel[StepT, ReplyT],
+                 read: Callable[[], Generator[StepT, ReplyT, Raws | None]], *,
+                 found: Callable[[float], None],
+                 answered: Callable[[Raws, float, bool], None],
+                 missed: Callable[[str, float], None],
+                 present: Callable[[], bool] = lambda: True) -> None:
+        self._session = session
+        self._channel = channel
+        self._read = read
+        self._found, self._answered, self._missed = found, answered, missed
+        self._present = present
+        self._book = ExchangeBook(session.configuration, session.statistics)
+        self._void = False  # this round began before the process stood still
+        self.timer = self._book.timer
+        self.reading = False
+        self.received_at = -math.inf
+
+    @property
+    def silent(self) -> bool:
+        """The last round was missed."""
+        return self._book.missed_in_row > 0
+
+    def begin(self, now: float) -> None:
+        """Begin a round; none is under way."""
+        self._book.begin(now)
+        self.reading, self._void = True, False
+        self._channel.run(self._read(), self._ended, now)
+
+    def wait(self, now: float, patience: float) -> None:
+        """Let a period pass: the round under way has not ended, and has so many s for it."""
+        self.timer.begun(now)
+        if now - self._book.began_at > patience:
+            self._miss(now)
+
+    def forget(self) -> None:
+        """Count anew what is missed."""
+        self._book.missed_in_row = 0
+
+    def disregard(self) -> None:
+        """Take note that the round under way, if any, says nothing."""
+        self._void = self.reading
+
+    def cancel(self) -> None:
+        """Leave the round that is under way alone."""
+        self._channel.cancel(Lane.OWN)
+        self.reading = False
+
+    def stop(self) -> None:
+        """Begin no further round; that under way is cancelled with others."""
+        self.timer.stop()
+        self.reading = False
+
+    def _ended(self, raws: Raws | None) -> None:
+        now, session = self._channel.now, self._session
+        self.reading = False
+        if self._void:
+            return
+        if raws is None:
+            self._miss(now)
+            return
+        self.forget()
+        fresh = not session.online
+        if fresh:
+            if not self._present():
+                return
+            session.gate.measured(raws)     # before anything is written
+            self._found(now)
+        self._answered(raws, now, fresh)
+        session.gate.measured(raws)
+        sample = tuple(raw for raw in raws if raw is not None)
+        if len(sample) == len(raws):
+            self._book.answered(self.received_at)
+            session.report.note(ProcessDataReceived(sample, self.received_at))
+
+    def _miss(self, now: float) -> None:
+        limit = self._session.configuration.missed_limit
+        self._missed(f'no complete round of reads for {limit} periods'
+                     if self._book.missed() else '', now)
