@@ -78,6 +78,15 @@ def test_parameters() -> None:
     assert (observed.requests, observed.refused, observed.unanswered) == (6, 1, 1)
 
 
+def test_a_refusal_without_index_is_of_the_newest_task() -> None:
+    witness = Witness(inverter())
+    for time, task in ((0.0, '2C8#6660010000000000'), (0.1, '2C8#66C0020000006400'),
+                       (0.2, '2C8#6660010000000000')):
+        witness.hears(task, time)
+    assert '< read: acceleration_time_set_2: REFUSED' in witness.hears(
+        '2C9#6670000000000300', 0.206)[0]
+
+
 def test_a_broadcast_group() -> None:
     witness = Witness(inverter('first', 0, broadcast='group'),
                       inverter('second', 1, broadcast='group'))

@@ -124,6 +124,17 @@ def test_rounds_of_a_polled_drive() -> None:
         2, 1, 1, 1)
 
 
+def test_a_read_of_a_round_stays_one_when_another_read_follows() -> None:
+    witness = Witness(drive('datamodel_standard'))
+    witness.hears('3F1#03D1000300000000', 0.0)
+    witness.hears('3F1#031E000100000000', 0.09)
+    assert [line.split('main ')[1] for line in witness.waits(0.3)] == [
+        'conveyor < read: actual_speed, motor_current, status_word: LOST: no answer',
+        'conveyor < read: ramp_time: LOST: no answer']
+    observed = witness.observed('conveyor')
+    assert (observed.missed, observed.requests, observed.unanswered) == (1, 1, 1)
+
+
 def test_only() -> None:
     def said(*only: Only) -> list[str]:
         witness = Witness(drive(), only=set(only))

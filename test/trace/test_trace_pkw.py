@@ -53,6 +53,20 @@ def test_requests_of_users() -> None:
     assert (observed.requests, observed.refused) == (4, 2)
 
 
+def test_a_refusal_is_about_the_newest_request_that_it_fits() -> None:
+    """It names the register and the toggle, not the function."""
+    witness = Witness(starter())
+    for time, request, answer in ((0.0, '505#C701002500000000', '485#C701002583200000'),
+                                  (0.1, '505#C70100AA01000000', '485#C70100CE02000106'),
+                                  (0.2, '505#C701002A01000000', '485#C701004E02000106')):
+        witness.hears(request, time)
+        witness.hears(answer, time + 0.01)
+    witness.hears('505#C70100A500000000', 0.3)
+    witness.hears('485#C70100A583200000', 0.31)
+    witness.hears('505#C701002500000000', 0.4)
+    assert '< read: system_status: REFUSED' in witness.hears('485#C701004E00000206', 0.41)[0]
+
+
 def test_what_starts_nothing_is_named() -> None:
     witness = Witness(starter())
     witness.hears('505#C701002500000000', 0.0)

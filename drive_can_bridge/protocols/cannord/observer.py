@@ -139,7 +139,8 @@ class CannordObserver(DriveObserver):
             return
         frame, task = decoded
         key = frame.number, frame.index
-        self._tasks[key] = frame
+        self._tasks.pop(key, None)
+        self._tasks[key] = frame    # the newest is the last
         if len(self._tasks) > 64:
             del self._tasks[next(iter(self._tasks))]
         self.observed.requests += 1

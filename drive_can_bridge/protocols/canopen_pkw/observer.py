@@ -76,7 +76,8 @@ class PkwObserver(DriveObserver):
         kind = self.count_request(cyclic=(
             span in self._setpoints if writes else self._round.asked(span, now)))
         key = _key(message)
-        self._kinds[key] = kind
+        self._kinds.pop(key, None)
+        self._kinds[key] = kind     # the newest is the last
         if len(self._kinds) > 1024:
             del self._kinds[next(iter(self._kinds))]
         if not repeated:

@@ -158,7 +158,8 @@ class StandardObserver(DriveObserver):
         self._setpoints = {(parameter.number or 0) + self._traffic.offset
                            for parameter in drive.cyclic_request}
         self._round: RoundWatch[Chunk] = RoundWatch(reads(drive), self.observed)
-        self._last: tuple[Chunk, Kind] | None = None
+        self._last: Chunk | None = None
+        self._kinds: dict[Chunk, Kind] = {}
 
     def handler(self, identifier: int, extended_format: bool) -> Handler | None:
         if extended_format:
@@ -176,22 +177,23 @@ class StandardObserver(DriveObserver):
         elif request is not None:
             chunk = Chunk(request.number, request.count)
             kind = self.count_request(cyclic=self._round.asked(chunk, now))
-            self._last = chunk, kind
+            self._last = chunk
+            self._kinds[chunk] = kind
             self._traffic.read(chunk, now, kind)
 
     def _take_response(self, data: bytes, now: float) -> None:
         if self._last is None:      # asked before the trace began
             self.tell(now, _RESPONSE, _PARAMETER, 'read', remark=f'data {data.hex(" ").upper()}')
             return
-        chunk, kind = self._last
+        chunk = self._last
         words = self.decoded(
             lambda data: standard.decode_read_response(
                 Frame(self._response, data, False), chunk.size, strict=self._strict),
             data, now, _RESPONSE, _PARAMETER, 'read')
-        if words is not None and self._traffic.answered(chunk, words, now, kind) is _NORMAL:
+        if words is not None and self._traffic.answered(
+                chunk, words, now, self._kinds[chunk]) is _NORMAL:
             self._round.answered(chunk, now)
 
     def _unanswered(self, chunk: Chunk, due: float) -> None:
-        kind = self._last[1] if self._last and self._last[0] == chunk else _PARAMETER
         self._round.failed(chunk)
-        self.tell_unanswered(due, kind, 'read', self._traffic.named(*chunk))
+        self.tell_unanswered(due, self._kinds[chunk], 'read', self._traffic.named(*chunk))
