@@ -103,8 +103,8 @@ class StandardScout(Scout):
         station = frame.identifier - standard.RESPONSE_ID_BASE
         if frame.extended or not 1 <= station <= STANDARD_STATION_MAX:
             return
-        if len(frame.data) == standard.PAYLOAD and self._answers(station, now):
-            self._pair(station, 'answers to reads')
+        if len(frame.data) == standard.PAYLOAD:
+            self._answer(station, 'answers to reads', now)
 
     def settings(self, station: int) -> dict[str, Any]:
         return {'request_numbers': [], 'response_numbers': [HARMLESS_NUMBER]}
