@@ -12,7 +12,7 @@ from typing import NamedTuple
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.protocols.canopen.addressing import name_of_object
-from drive_can_bridge.protocols.canopen.observer import NodeWatch
+from drive_can_bridge.protocols.canopen.observer import node_handlers
 from drive_can_bridge.protocols.canopen_pkw import addresses, pkw, refusals
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
 from drive_can_bridge.protocols.canopen_pkw.identifiers import Identifiers
@@ -45,7 +45,7 @@ class PkwObserver(DriveObserver):
         self._abort_order: str = options.abort_code_order
         identifiers = Identifiers.of(drive)
         self._handlers: dict[int, Handler] = {
-            **NodeWatch(self, self._booted).handlers(drive.station),
+            **node_handlers(self, drive.station, self._booted),
             identifiers.request: self._take_request,
             identifiers.response: self._take_response,
         }
