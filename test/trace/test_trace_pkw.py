@@ -74,6 +74,8 @@ def test_what_starts_nothing_is_named() -> None:
     assert witness.hears('505#C801002500000000', 0.1)[0].endswith(
         'p456: SUSPICIOUS: the function byte is that of the request before: nothing is started')
     assert witness.waits(10.0) == []
+    # a device that took it all the same
+    assert '< read: p456: REFUSED' in witness.hears('485#C801004E00000206', 10.1)[0]
 
 
 def test_silence() -> None:
@@ -81,7 +83,8 @@ def test_silence() -> None:
     witness.hears('505#C701002500000000', 0.0)
     assert witness.waits(1.0) == [
         '0.500000 +0.000 main pump < read: system_status: LOST: no answer']
-    assert witness.observed('pump').missed == 1
+    observed = witness.observed('pump')
+    assert (observed.missed, observed.unanswered) == (1, 0)     # of a round, not of a user
     assert witness.hears('485#C701002583200000', 1.0)[0].endswith('LATE [1000.0 ms]')
 
 

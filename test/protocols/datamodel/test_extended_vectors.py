@@ -241,6 +241,16 @@ def test_example_read() -> None:
     assert extended.decode(answer) == extended.ReadResponse(30, (1000, 2000))
 
 
+def test_an_answer_is_of_the_station_that_was_asked() -> None:
+    answer = Frame(0x102001E2, bytes.fromhex('03E807D000000000'), True)
+    assert extended.decode_answer(answer, 1, (30, 2)) == (1000, 2000)
+    with pytest.raises(RemoteProtocolError, match='not from station 2'):
+        extended.decode_answer(answer, 2, (30, 2))
+    for question in ((30, 1), (31, 2), None):
+        with pytest.raises(RemoteProtocolError, match='nobody asked'):
+            extended.decode_answer(answer, 1, question)
+
+
 def test_bit_row_of_the_manual() -> None:
     """0 AAAAAAA 1 1111111111111111 0000, bit 28 first."""
     for station in (1, 5, 64, 127):
