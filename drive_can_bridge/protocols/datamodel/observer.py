@@ -59,10 +59,10 @@ class _Traffic:
         if any(parameter.storage is not Storage.RAM for parameter in parameters):
             wrong = self._gap.written(now)
             observer.observed.fast_writes += bool(wrong)
-        observer.tell(now, _REQUEST, observer.count_request(
-            cyclic=request.number in self._setpoints), 'write', parameters, raws_of(
-                parameters, request.words),
-            verdict=Verdict.SUSPICIOUS if wrong else Verdict.NORMAL, remark=wrong)
+        kind = observer.count_request(cyclic=request.number in self._setpoints)
+        observer.tell(now, _REQUEST, kind, 'write', parameters,
+                      raws_of(parameters, request.words),
+                      verdict=Verdict.SUSPICIOUS if wrong else Verdict.NORMAL, remark=wrong)
 
     def answered(self, chunk: Chunk, words: Sequence[int], now: float) -> None:
         """Take the answer to a read."""
