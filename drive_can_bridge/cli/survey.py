@@ -14,7 +14,7 @@ from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusUnavailable, TransportError
 from drive_can_bridge.core.frame import bits_on_bus, Frame, STUFFING
 from drive_can_bridge.protocols.families import FAMILIES
-from drive_can_bridge.protocols.scout import all_sightings, Scout, Sighting
+from drive_can_bridge.protocols.scout import Scout, Sighting
 from drive_can_bridge.transport.end_point import EndPoint
 
 #: share of the bus that questions and their answers may take at most
@@ -60,8 +60,9 @@ class Survey:
 
     @property
     def sightings(self) -> list[Sighting]:
-        """All drives found."""
-        return list(all_sightings(list(self.scouts.values())))
+        """All drives found, by family and station."""
+        return [scout.sightings[station] for scout in self.scouts.values()
+                for station in sorted(scout.sightings)]
 
     def forbidden(self, scout: Scout) -> bool:
         """Tell whether somebody is there who might obey what a scout asks."""

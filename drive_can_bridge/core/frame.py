@@ -52,3 +52,9 @@ class Route(NamedTuple):
 def bits_on_bus(length: int, extended: bool) -> int:
     """Return a frame's length on the bus without stuff bits, interframe space included."""
     return (67 if extended else 47) + 8 * length
+
+
+def worst_bits(length: int, *, extended: bool) -> int:
+    """Return the longest that a frame can get by bit stuffing, interframe space included."""
+    stuffed = (54 if extended else 34) + 8 * length
+    return bits_on_bus(length, extended) + (stuffed - 1) // 4

@@ -171,12 +171,12 @@ class Family(ABC):
         """Import who talks and listens to drives: checks of a configuration need none of it."""
 
     def make_session(self, drive: DriveConfiguration) -> Session:
-        """Make the drive's session. Nothing is sent before ``activate``."""
-        return self.talk().session(drive)
+        """Make the session of a drive that is alone. Nothing is sent before ``activate``."""
+        return self.make_sessions([drive])[0]
 
     def make_sessions(self, drives: Sequence[DriveConfiguration]) -> list[Session]:
         """Make the sessions of all drives of this family on one bus, in the same order."""
-        return [self.make_session(drive) for drive in drives]
+        return [self.talk().session(drive) for drive in drives]
 
     def make_observers(self, drives: Sequence[DriveConfiguration], emit: Emit,
                        ) -> list[DriveObserver]:

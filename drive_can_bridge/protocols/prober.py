@@ -14,17 +14,29 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Frame, Route
 
 
+#: data bytes of answers, in every family
+LENGTH = 8
+
+
 class Question(NamedTuple):
     """
     A read.
 
-    :param answers: tells whether a frame from the bus is an answer to it.
+    :param response: identifier of the answer, which has the format of the question and eight
+        bytes.
+    :param fits: tells whether the data of such a frame answer it.
     :param quiet: s of silence that follow when there is no answer.
     """
 
     frame: Frame
-    answers: Callable[[Frame], bool]
+    response: int
+    fits: Callable[[bytes], bool] = lambda data: True
     quiet: float = 0.0
+
+    def answers(self, frame: Frame) -> bool:
+        """Tell whether a frame from the bus is an answer to it."""
+        return (frame.identifier == self.response and frame.extended == self.frame.extended
+                and len(frame.data) == LENGTH and self.fits(frame.data))
 
 
 class Finding(NamedTuple):

@@ -8,7 +8,8 @@ another, so that each scout says what its questions would mean to others.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
+from collections import Counter
+from collections.abc import Callable
 from enum import Enum
 from typing import Any, NamedTuple
 
@@ -25,7 +26,6 @@ class Certainty(Enum):
 
     CERTAIN = 'certain'
     LIKELY = 'likely'
-    POSSIBLE = 'possible'
 
 
 class Sighting(NamedTuple):
@@ -61,11 +61,11 @@ class Scout(ABC):
         self.sightings: dict[int, Sighting] = {}
         self.nodes: dict[int, str] = {}
         self.master = ''
-        self._asked: dict[int, tuple[float, bytes, bool]] = {}
+        #: by station and service of it
+        self._asked: dict[tuple[int, int], tuple[float, bytes, bool]] = {}
         self._ours = False      # what is heard now is a question of our own
-        self._answered_ours = False
-        self._pairs: dict[int, int] = {}
-        self._alone: dict[int, int] = {}
+        self._pairs: Counter[int] = Counter()
+        self._alone: Counter[tuple[int, int]] = Counter()
         self._questions: list[Frame] = []
 
     @abstractmethod
@@ -96,40 +96,34 @@ class Scout(ABC):
 
     def _see(self, station: int, text: str, certainty: Certainty) -> None:
         """Note a station; what is more certain, or as certain and newer, wins."""
-        order = list(Certainty)
         known = self.sightings.get(station)
-        if known is None or order.index(certainty) <= order.index(known.certainty):
+        if known is None or certainty in (Certainty.CERTAIN, known.certainty):
             self.sightings[station] = Sighting(self.protocol, station, text, certainty)
 
-    def _request(self, station: int, data: bytes, now: float) -> None:
+    def _request(self, station: int, data: bytes, now: float, *, service: int = 0) -> None:
         """Note what looks like a request to a station; some in a row are a master's."""
-        self._asked[station] = now, data, self._ours
+        key = station, service
+        self._asked[key] = now, data, self._ours
         if not self._ours:
-            self._alone[station] = self._alone.get(station, 0) + 1
-            if self._alone[station] >= _MASTER_REQUESTS:
+            self._alone[key] += 1
+            if self._alone[key] >= _MASTER_REQUESTS:
                 self.master = f'what looks like requests of {self.protocol}'
 
-    def _answers(self, station: int, now: float,
-                 fits: Callable[[bytes], bool] = lambda request: True) -> bool:
-        """Tell whether a frame of a station follows a request that it fits to."""
-        asked = self._asked.pop(station, None)
+    def _answer(self, station: int, text: str, now: float,
+                fits: Callable[[bytes], bool] = lambda request: True, *,
+                service: int = 0) -> bool:
+        """
+        Note a frame of a station if it follows a request that it fits to; tell whether it does.
+
+        An answer to a question that is not our own may be chance: it takes two.
+        """
+        asked = self._asked.pop((station, service), None)
         if asked is None or now - asked[0] > ANSWER_TIME or not fits(asked[1]):
             return False
-        self._answered_ours = asked[2]
-        return True
-
-    def _pair(self, station: int, text: str) -> None:
-        """Note a request with its answer: one that is not our own may be chance."""
-        if self._answered_ours:
-            self._see(station, text, Certainty.LIKELY)
-            return
-        self._pairs[station] = self._pairs.get(station, 0) + 1
-        if self._pairs[station] >= 2:
-            self._see(station, text, Certainty.LIKELY)
+        if not asked[2]:
+            self._pairs[station] += 1
+            if self._pairs[station] < 2:
+                return True
             self.master = f'requests to station {station} of {self.protocol}'
-
-
-def all_sightings(scouts: list[Scout]) -> Iterator[Sighting]:
-    """Yield everything that was seen, by family and station."""
-    for scout in scouts:
-        yield from (scout.sightings[station] for station in sorted(scout.sightings))
+        self._see(station, text, Certainty.LIKELY)
+        return True

@@ -16,7 +16,11 @@ STAMP_TOLERANCE = 0.002
 #: periods after which a cyclic request counts as unanswered although no other followed
 CYCLES_WAITED = 2.0
 
+#: requests that are remembered after their answers
+REMEMBERED = 1024
+
 Key = TypeVar('Key', bound=Hashable)
+About = TypeVar('About')
 
 
 class CyclicWatch:
@@ -92,18 +96,21 @@ class CyclicWatch:
         self._observed.missed += 1
 
 
-class Questions(Generic[Key]):
+class Questions(Generic[Key, About]):
     """
     Requests under way, by what their answers will say.
 
     What is answered so early in a trace that it may have been asked before is no surprise.
 
     :param timeout: s that an answer may take.
-    :param unanswered: takes what was not answered, and when it should have been.
+    :param unanswered: takes what was not answered, what it was about, and when it should have
+        been.
+    :ivar about: what there is to know about requests, answered or not; the newest is the last.
     """
 
     def __init__(self, observer: DriveObserver, timeout: float,
-                 unanswered: Callable[[Key, float], None]) -> None:
+                 unanswered: Callable[[Key, About, float], None]) -> None:
+        self.about: dict[Key, About] = {}
         self._observer = observer
         self._timeout = timeout
         self._unanswered = unanswered
@@ -112,14 +119,23 @@ class Questions(Generic[Key]):
         self._given_up: dict[Key, float] = {}   # key -> when it was asked
         observer.watches.append(self)
 
-    def ask(self, key: Key, now: float) -> None:
+    def ask(self, key: Key, about: About, now: float) -> None:
         """Take note of a request; one that is repeated waits anew."""
+        self.note(key, about, now)
         due = now + self._timeout
         if self._certain_from != self._certain_from:    # NaN
             self._certain_from = due
         self._open.pop(key, None)
         self._open[key] = now
         self._observer.due(due)
+
+    def note(self, key: Key, about: About, now: float) -> None:
+        """Remember a request that starts nothing: an answer is that to one before."""
+        self.about.pop(key, None)
+        self.about[key] = about
+        while len(self.about) > REMEMBERED and (
+                oldest := next(iter(self.about))) not in self._open:
+            del self.about[oldest]
 
     def answer(self, key: Key, now: float) -> tuple[Verdict, float]:
         """Return what an answer is, and s since it was asked for (NaN: it was not)."""
@@ -142,7 +158,7 @@ class Questions(Generic[Key]):
                 return due
             del self._open[key]
             self._given_up[key] = asked
-            self._unanswered(key, due)
+            self._unanswered(key, self.about[key], due)
             if len(self._given_up) > 64:
                 self._given_up = {key: at for key, at in self._given_up.items()
                                   if now - at <= LATE_TIME}

@@ -22,7 +22,7 @@ from dataclasses import dataclass, field
 
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.cannord.parameter_frame import (
-    NUMBER_MAX, ParameterFrame, Response, RESPONSES, Task, WRITE_TASKS,
+    NUMBER_MAX, ParameterFrame, Response, Task, VALUE_RESPONSES, WRITES,
 )
 from drive_can_bridge.simulation.registers import Refusal, Refused, Registers
 
@@ -30,7 +30,6 @@ from drive_can_bridge.simulation.registers import Refusal, Refused, Registers
  ) = range(6)
 INVALID_TASK, CANNOT_BE_REPRESENTED = 201, 202
 
-_WRITES = {int(task): how for how, task in WRITE_TASKS.items()}
 _ARRAY_READS = (Task.READ_ARRAY, Task.READ_ELEMENTS)
 _NEGATIVE = 0xFFFF
 _LIMITS = (Refusal.OUT_OF_RANGE, Refusal.CROSSED)
@@ -88,7 +87,7 @@ class CannordTable:
         group = self._groups.get(task.number)
         if group is None:
             raise Refused(INVALID_NUMBER)
-        array, double, eeprom = _WRITES.get(what, (what in _ARRAY_READS, False, False))
+        array, double, eeprom = WRITES.get(what, (what in _ARRAY_READS, False, False))
         if array and not group.array:
             raise Refused(NOT_AN_ARRAY)
         if what == Task.READ_ELEMENTS:
@@ -98,12 +97,12 @@ class CannordTable:
         parameter = group.members.get(task.index if group.array else 0)
         if parameter is None:
             raise Refused(WRONG_SUBINDEX)
-        if what in _WRITES:
+        if what in WRITES:
             self._write(parameter, task.value, double=double, eeprom=eeprom)
         elif not parameter.readable:
             raise Refused(CANNOT_BE_REPRESENTED)
-        narrow, wide = RESPONSES[Task.READ_ARRAY if array else Task.READ]
-        return wide if parameter.type.bits == 32 else narrow, self._registers.raw(parameter.name)
+        response = VALUE_RESPONSES[array, parameter.type.bits == 32]
+        return response, self._registers.raw(parameter.name)
 
     def select_set(self, parameter_set: int) -> None:
         """Make a parameter set, 1 to 4, the active one."""

@@ -68,19 +68,17 @@ class StandardWire:
     """Those with 11 bits: reads of one to four parameters, writes of one, nothing cyclic."""
 
     def __init__(self, configuration: DriveConfiguration) -> None:
-        options, self._station = configuration.options, configuration.station
-        self._own = [standard.identifier(base, self._station)
+        options = configuration.options
+        self._own = [standard.identifier(base, configuration.station)
                      for base in (options.request_id_base, options.response_id_base)]
 
     def decode(self, frame: Frame) -> tuple[Request, str] | None:
         if frame.extended or frame.identifier != self._own[0]:
             return None
         request = standard.decode_request(frame)
-        if isinstance(request, standard.Write):
-            odd = 'write with unused bytes other than 00h' if any(frame.data[5:]) else ''
-            return extended.Write(self._station, request.number, (request.word,)), odd
-        odd = 'read request with unused bytes other than 00h' if any(frame.data[4:]) else ''
-        return extended.ReadRequest(self._station, request.number, request.count), odd
+        what, unused = ('write', frame.data[5:]) if isinstance(request, extended.Write) else (
+            'read request', frame.data[4:])
+        return request, f'{what} with unused bytes other than 00h' if any(unused) else ''
 
     def answer(self, request: Frame, words: Sequence[int]) -> Frame:
         return _with_junk(standard.encode_read_response(self._own[1], words), words)

@@ -8,9 +8,9 @@ from configuration_builders import changed, load, problems, warnings
 import pytest
 
 from drive_can_bridge.cli.main import main
-from drive_can_bridge.core.frame import Frame, Route
+from drive_can_bridge.core.frame import Frame, Route, worst_bits
 from drive_can_bridge.core.parameters import ParameterType, ValueKind
-from drive_can_bridge.protocols.cannord.family import Cannord, frame_bits
+from drive_can_bridge.protocols.cannord.family import Cannord
 from drive_can_bridge.protocols.families import FAMILIES
 
 FAMILY = Cannord()
@@ -253,8 +253,8 @@ def test_members_on_another_bus_are_strangers(tmp_path: Path) -> None:
 @pytest.mark.parametrize(('length', 'extended', 'bits'), [
     (8, False, 135), (8, True, 160), (4, False, 95), (5, False, 105), (0, False, 55),
     (4, True, 120)])
-def test_frame_bits(length: int, extended: bool, bits: int) -> None:
-    assert frame_bits(length, extended=extended) == bits
+def test_worst_bits(length: int, extended: bool, bits: int) -> None:
+    assert worst_bits(length, extended=extended) == bits
 
 
 def test_load(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+from builders import parameter
 from foreign_devices import cannord, canopen, datamodel_extended, datamodel_standard
 import pytest
 
@@ -17,6 +18,7 @@ from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration
 from drive_can_bridge.core.errors import TransportError
 from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.parameters import Access
 from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.protocols.prober import Finding
 from drive_can_bridge.resources import config_file
@@ -120,6 +122,18 @@ def test_cannord_by_the_bytes_of_the_manual() -> None:
     assert '66 70 FF 00 00 00 03 00' in found['index_byte'].reason
 
 
+def test_cannord_arrays_and_others_of_the_profile_come_first() -> None:
+    table = (parameter('ramp', 400), parameter('curve', 401, subindex=2),
+             parameter('set_1', 402), parameter('set_2', 402, subindex=1),
+             parameter('order', 403, access=Access.WRITE_ONLY))
+    bench = Bench(lambda frame: [])
+    bench.probe(replace(INVERTER, profile=replace(
+        INVERTER.profile, parameters={each.name: each for each in table})))
+    asked = [int.from_bytes(sent.data[:2], 'little') & 0x7FF for sent in bench.sent
+             if sent.data[1] >> 4 == 6]
+    assert list(dict.fromkeys(asked)) == [400, 514, 513, 401, 402, 102, 700]
+
+
 def test_cannord_the_other_way_round() -> None:
     bench = Bench(scripted({
         '0262000000000000': '0272000004000000',
@@ -217,10 +231,26 @@ def test_pkw_a_frame_of_another_request_is_no_answer() -> None:
     assert '--nmt-start' in found['layout'].reason
 
 
+@pytest.mark.parametrize('drive', [LIFT, ELEVEN, STARTER, INVERTER],
+                         ids=lambda each: each.protocol)
+@pytest.mark.parametrize('change', [
+    lambda answer: answer._replace(extended=not answer.extended),
+    lambda answer: answer._replace(identifier=answer.identifier ^ 0x40),
+    lambda answer: answer._replace(data=answer.data[:7])], ids=['format', 'identifier', 'length'])
+def test_a_frame_that_is_not_quite_the_answer_is_none(
+        drive: DriveConfiguration, change: Callable[[Frame], Frame]) -> None:
+    device = simulated(drive)
+    found = Bench(lambda frame: list(map(change, device(frame)))).probe(drive)
+    assert set(values(found).values()) == {None}
+    assert all('no answer' in finding.reason for finding in found.values()
+               if 'comes first' not in finding.reason)
+
+
 def test_pkw_is_not_asked_where_the_receive_pdo_is_no_mailbox() -> None:
     def node(frame: Frame) -> list[Frame]:
         assert frame == Frame(0x605, bytes.fromhex('4003160100000000'), False)
-        return [Frame(0x585, bytes.fromhex('4303160110004060'), False)]     # 6040h, control word
+        return [Frame(0x585, bytes.fromhex('4300100010000030'), False),     # another object
+                Frame(0x585, bytes.fromhex('4303160110004060'), False)]     # 6040h, control word
     found = Bench(node).probe(STARTER)
     assert values(found) == {'layout': None, 'word_order': None, 'abort_code_order': None}
     assert found['layout'].reason.startswith('receive PDO4 (1603h) maps 6040h')
@@ -289,6 +319,13 @@ def test_datamodel_other_maps_where_nothing_else_answers() -> None:
     assert 'the profile lacks P100' in found['cyclic_response'].reason
 
 
+def test_silence_after_a_read_whose_late_answer_nobody_could_tell() -> None:
+    quiet = {drive.protocol: next(FAMILIES[drive.protocol].make_prober(drive).converse()).quiet
+             for drive in (LIFT, ELEVEN)}
+    assert quiet == {'datamodel_extended': 0.0,
+                     'datamodel_standard': ELEVEN.options.quarantine}
+
+
 def test_datamodel_undecided() -> None:
     def everything(frame: Frame) -> list[Frame]:
         return [Frame(frame.identifier | 0x10000000, bytes.fromhex('0001000200030004'), True)]
@@ -346,9 +383,9 @@ def test_simulated_starter(layout: str, word_order: str, abort_code_order: str) 
     assert values(Bench(simulated(device, used)).probe(STARTER)) == options
 
     def new(drive: SimulatedDrive) -> None:
-        for parameter in STARTER.profile.parameters.values():
-            if parameter.type.bits == 32:
-                drive.set_value(parameter.name, 0, 0.0)
+        for each in STARTER.profile.parameters.values():
+            if each.type.bits == 32:
+                drive.set_value(each.name, 0, 0.0)
 
     assert values(Bench(simulated(device, new)).probe(STARTER)) == {**options, 'word_order': None}
 

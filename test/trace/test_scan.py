@@ -131,6 +131,30 @@ def test_drives_are_found() -> None:
     assert not survey.master
 
 
+def heard(protocol: str, *frames: tuple[float, str]) -> list[str]:
+    scout = FAMILIES[protocol].make_scout()
+    for time, text in frames:
+        identifier, _, data = text.partition('#')
+        scout.hear(Frame(int(identifier, 16), bytes.fromhex(data), False), time)
+    return [sighting.text for sighting in scout.sightings.values()]
+
+
+def test_one_pair_of_others_may_be_chance() -> None:
+    request, answer, late = (0.0, '0C8#7F040020'), (0.01, '0C9#370F0020'), (0.2, '0C9#370F0020')
+    task, response = (0.5, '2C8#6610000000000000'), (0.51, '2C9#6610000000006700')
+    other = (0.51, '2C9#6510000000006700')
+    assert heard('cannord', request, answer) == []
+    assert heard('cannord', request, answer, request, answer) == [
+        'process data, state "operation enabled"']
+    assert heard('cannord', request, answer, task, response) == ['answers to tasks for P102']
+    assert heard('cannord', request, answer, task, other) == []
+    assert heard('cannord', request, answer, request, late) == []
+    assert heard('cannord', request, answer, request, (0.01, '0C9#370F002000000000')) == []
+    # each service has a request under way
+    assert heard('cannord', (0.0, task[1]), request, answer, (0.02, response[1])) == [
+        'answers to tasks for P102']
+
+
 @pytest.mark.parametrize('protocol', list(FAMILIES))
 def test_questions_leave_most_of_the_bus_to_others(protocol: str) -> None:
     bench = Bench()

@@ -34,6 +34,22 @@ def test_process_data() -> None:
     assert witness.observed('mixer').exchanges == 1
 
 
+def test_values_four_and_five_come_in_a_frame_of_their_own() -> None:
+    values = [parameter(f'setpoint_{place}', None, type=INT16) for place in range(1, 6)]
+    actual = [parameter(f'actual_{place}', None, type=INT16, access=RO) for place in range(1, 6)]
+    witness = Witness(drive('cannord', name='mixer', station=100, table=(*values, *actual),
+                            request=values, response=actual, extra_setpoints=True))
+    assert witness.hears('0C8#7F04010002000300', 0.0)[0].endswith(
+        '> cyclic request: control_word 1151, setpoint_1 1, setpoint_2 2, setpoint_3 3')
+    assert witness.hears('0C8#0400FFFF00', 0.001)[0].endswith(
+        '> cyclic request: setpoint_4 4, setpoint_5 -1')
+    assert 'actual_1 1, actual_2 2, actual_3 3 (operation enabled) [2.0 ms]' in witness.hears(
+        '0C9#370F010002000300', 0.002)[0]
+    assert witness.hears('0C9#0400FFFF00', 0.003)[0].endswith(
+        '< cyclic response: actual_4 4, actual_5 -1')
+    assert witness.observed('mixer').exchanges == 1
+
+
 def test_a_fault_is_told_without_being_asked() -> None:
     witness = Witness(inverter())
     witness.hears('0C8#7F040020', 0.0)
@@ -65,6 +81,7 @@ def test_parameters() -> None:
     assert witness.hears('2C8#658215000100A086', 0.2)[0].endswith('> write: position 100000')
     assert witness.hears('2C9#655215000100A086', 0.206)[0].endswith(
         '< write: position 100000 [6.0 ms]')
+    assert witness.telegrams[-1].parameters == (POSITION,)
     witness.hears('2C8#BC62000000000000', 0.3)
     assert witness.hears('2C9#BC42000000006400', 0.306)[0].endswith(
         '< read: fault_code 100 [6.0 ms]')
@@ -76,6 +93,38 @@ def test_parameters() -> None:
         '< parameter response: acceleration_time: LOST: no answer')
     observed = witness.observed('mixer')
     assert (observed.requests, observed.refused, observed.unanswered) == (6, 1, 1)
+
+
+def test_a_response_that_no_such_task_has() -> None:
+    witness = Witness(inverter())
+    witness.hears('2C8#6610000000000000', 0.0)
+    assert witness.hears('2C9#6640000000006700', 0.006)[0].endswith(
+        '< read: acceleration_time 1.03 s: MALFORMED: response 4 to task 1 [6.0 ms]')
+    # asked before the trace began: nobody knows by which task
+    assert witness.hears('2C9#BC42000000006400', 0.007)[0].endswith('< read: p700 100')
+
+
+def test_a_refusal_without_index_is_of_the_newest_task() -> None:
+    witness = Witness(inverter())
+    for time, task in ((0.0, '2C8#6660010000000000'), (0.1, '2C8#66C0020000006400'),
+                       (0.2, '2C8#6660010000000000')):
+        witness.hears(task, time)
+    assert '< read: acceleration_time_set_2: REFUSED' in witness.hears(
+        '2C9#6670000000000300', 0.206)[0]
+
+
+def test_what_is_remembered_of_tasks_has_an_end_but_for_those_under_way() -> None:
+    witness = Witness(inverter())
+    witness.hears('2C8#66C0010000006400', 0.0)
+    for index in range(1100):
+        witness.hears(f'2C8#{1 + index // 256:02X}60{index % 256:02X}0000000000', 0.001)
+    lost = witness.waits(10.0)
+    assert len(lost) == 1101
+    assert 'acceleration_time_set_2: LOST' in lost[0]
+    witness.hears('2C8#6610000000000000', 20.0)
+    witness.hears('2C9#6610000000006700', 20.1)
+    # nobody knows any more that it was written
+    assert '< read: acceleration_time_set_2' in witness.hears('2C9#6640010000006400', 30.0)[0]
 
 
 def test_a_broadcast_group() -> None:

@@ -6,6 +6,7 @@ from hypothesis import given, strategies as st
 from trace_builders import Witness
 
 from drive_can_bridge.core.record import Record, RecordKind
+from drive_can_bridge.protocols.observer import Kind
 from drive_can_bridge.trace.lines import Only
 
 
@@ -110,10 +111,13 @@ def test_rounds_of_a_polled_drive() -> None:
         assert witness.hears('7F1#24FA000003000000', start + 0.001)[0].endswith(
             'main conveyor < read: actual_speed -150.0 rpm, motor_current 0.00 A, '
             'status_word 0003h (ready, enabled) [1.0 ms]')
+    assert {telegram.kind for telegram in witness.telegrams} == {Kind.CYCLIC}
     # V61: a setpoint is no request of a user; V54: a read of one is
     assert witness.hears('3F1#063200DC05000000', 0.03)[0].endswith(
         '> write: speed_setpoint 150.0 rpm')
+    assert witness.telegrams[-1].kind is Kind.CYCLIC
     witness.hears('3F1#03D1000100000000', 0.031)
+    assert witness.telegrams[-1].kind is Kind.PARAMETER
     assert witness.waits(0.2) == [
         '0.131000 +0.110 main conveyor < read: actual_speed: LOST: no answer']
     witness.hears('3F1#03D1000300000000', 0.2)
@@ -122,6 +126,17 @@ def test_rounds_of_a_polled_drive() -> None:
     observed = witness.observed('conveyor')
     assert (observed.exchanges, observed.missed, observed.requests, observed.unanswered) == (
         2, 1, 1, 1)
+
+
+def test_a_read_of_a_round_stays_one_when_another_read_follows() -> None:
+    witness = Witness(drive('datamodel_standard'))
+    witness.hears('3F1#03D1000300000000', 0.0)
+    witness.hears('3F1#031E000100000000', 0.09)
+    assert [line.split('main ')[1] for line in witness.waits(0.3)] == [
+        'conveyor < read: actual_speed, motor_current, status_word: LOST: no answer',
+        'conveyor < read: ramp_time: LOST: no answer']
+    observed = witness.observed('conveyor')
+    assert (observed.missed, observed.requests, observed.unanswered) == (1, 1, 1)
 
 
 def test_only() -> None:

@@ -53,6 +53,20 @@ def test_requests_of_users() -> None:
     assert (observed.requests, observed.refused) == (4, 2)
 
 
+def test_a_refusal_is_about_the_newest_request_that_it_fits() -> None:
+    """It names the register and the toggle, not the function."""
+    witness = Witness(starter())
+    for time, request, answer in ((0.0, '505#C701002500000000', '485#C701002583200000'),
+                                  (0.1, '505#C70100AA01000000', '485#C70100CE02000106'),
+                                  (0.2, '505#C701002A01000000', '485#C701004E02000106')):
+        witness.hears(request, time)
+        witness.hears(answer, time + 0.01)
+    witness.hears('505#C70100A500000000', 0.3)
+    witness.hears('485#C70100A583200000', 0.31)
+    witness.hears('505#C701002500000000', 0.4)
+    assert '< read: system_status: REFUSED' in witness.hears('485#C701004E00000206', 0.41)[0]
+
+
 def test_what_starts_nothing_is_named() -> None:
     witness = Witness(starter())
     witness.hears('505#C701002500000000', 0.0)
@@ -60,6 +74,8 @@ def test_what_starts_nothing_is_named() -> None:
     assert witness.hears('505#C801002500000000', 0.1)[0].endswith(
         'p456: SUSPICIOUS: the function byte is that of the request before: nothing is started')
     assert witness.waits(10.0) == []
+    # a device that took it all the same
+    assert '< read: p456: REFUSED' in witness.hears('485#C801004E00000206', 10.1)[0]
 
 
 def test_silence() -> None:
@@ -67,7 +83,8 @@ def test_silence() -> None:
     witness.hears('505#C701002500000000', 0.0)
     assert witness.waits(1.0) == [
         '0.500000 +0.000 main pump < read: system_status: LOST: no answer']
-    assert witness.observed('pump').missed == 1
+    observed = witness.observed('pump')
+    assert (observed.missed, observed.unanswered) == (1, 0)     # of a round, not of a user
     assert witness.hears('485#C701002583200000', 1.0)[0].endswith('LATE [1000.0 ms]')
 
 

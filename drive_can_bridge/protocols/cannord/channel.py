@@ -21,14 +21,10 @@ from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.retry import RetryPolicy
 from drive_can_bridge.protocols.cannord.parameter_frame import (
-    ParameterFrame, ParameterLayout, Response, RESPONSES, Task,
+    DOUBLE_RESPONSES, ParameterFrame, ParameterLayout, Response, RESPONSES, Task, WRITES,
 )
 from drive_can_bridge.protocols.channel import Channel
 from drive_can_bridge.protocols.courier import Courier
-
-READS = frozenset((Task.READ, Task.READ_ARRAY, Task.READ_ELEMENTS))
-#: responses that carry a word; the high half of the value says nothing then
-WORDS = frozenset((Response.WORD, Response.ARRAY_WORD, Response.ELEMENTS, Response.REFUSED))
 
 
 @dataclass(frozen=True)
@@ -84,7 +80,7 @@ class TaskCourier(Courier[Ask, Reply]):
 
         def left(sent: bool, then: float) -> None:
             # a read that the bus refused is repeated when its time is over
-            if not sent and step.task not in READS:
+            if not sent and step.task in WRITES:
                 self.end(step, NOT_SENT, then)
         self._send(self._layout.encode(step.task, step.number, step.index, step.value), left)
 
@@ -96,7 +92,7 @@ class TaskCourier(Courier[Ask, Reply]):
             raise RemoteProtocolError(f'parameter response {response.identifier} for '
                                       f'P{response.number}.{response.index} does not belong to '
                                       f'task {task.task} for P{task.number}.{task.index}')
-        if task.task not in READS and response.identifier != Response.REFUSED and not _echoes(
+        if task.task in WRITES and response.identifier != Response.REFUSED and not _echoes(
                 response, task):
             self.silent = Reply(None, response)
             raise RemoteProtocolError(f'response to writing P{task.number}.{task.index} with '
@@ -105,7 +101,7 @@ class TaskCourier(Courier[Ask, Reply]):
         return Reply(response)
 
     def attempts(self, step: Ask) -> int:
-        return self.retry.attempts if step.task in READS else 1
+        return 1 if step.task in WRITES else self.retry.attempts
 
     def unanswered(self, step: Ask, reply: Reply) -> bool:
         return reply is self.silent
@@ -129,5 +125,6 @@ def _belongs(response: ParameterFrame, task: Ask) -> bool:
 
 def _echoes(response: ParameterFrame, task: Ask) -> bool:
     """Tell whether a response to a write holds the value that was written."""
-    width = 0xFFFF if response.identifier in WORDS else 0xFFFFFFFF
+    # the high half of a word says nothing
+    width = 0xFFFFFFFF if response.identifier in DOUBLE_RESPONSES else 0xFFFF
     return response.value & width == task.value & width

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 import re
 
 from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.frame import worst_bits
 from drive_can_bridge.core.parameters import Parameter, ParameterType, Storage
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.cannord.broadcast import broadcast_identifier, groups
@@ -36,12 +37,6 @@ _COMMON_OPTIONS = ('swap_setpoints_2_3', 'extra_setpoints', 'parameter_set')
 #: of a setpoint, what makes the same word mean the same
 _COMMON_SCALES = ('type', 'scale', 'offset', 'unit')
 _COMMANDS = ('position_command', 'velocity_command', 'effort_command')
-
-
-def frame_bits(length: int, *, extended: bool) -> int:
-    """Return the longest that a frame can get by bit stuffing, interframe space included."""
-    header, stuffed = (67, 54) if extended else (47, 34)
-    return header + 8 * length + (stuffed + 8 * length - 1) // 4
 
 
 def _placeable(drives: Sequence[DriveConfiguration]) -> list[DriveConfiguration]:
@@ -129,17 +124,12 @@ class Cannord(Family):
         from drive_can_bridge.protocols.cannord.session import CannordSession
         return Talk(CannordSession, CannordObserver, CannordScout, CannordProber)
 
-    def make_session(self, drive: DriveConfiguration) -> Session:
-        """Make the session of a drive that is alone, or alone in its broadcast group."""
-        return self.make_sessions([drive])[0]
-
     def make_sessions(self, drives: Sequence[DriveConfiguration]) -> list[Session]:
         from drive_can_bridge.protocols.cannord.group import make_group
         made: dict[str, Session] = {
             session.configuration.name: session for group in groups(drives)
             for session in make_group(group)}
-        return [made[drive.name] if drive.name in made else self.talk().session(drive)
-                for drive in drives]
+        return [made.get(drive.name) or self.talk().session(drive) for drive in drives]
 
     def make_observers(self, drives: Sequence[DriveConfiguration], emit: Emit,
                        ) -> list[DriveObserver]:
@@ -154,9 +144,9 @@ class Cannord(Family):
         """Return the worst-case length of the process frames in one direction."""
         extended = drive.options.extended_identifiers
         values = max(len(drive.cyclic_request), len(drive.cyclic_response))
-        bits = frame_bits(main_length(min(values, MAIN_VALUES)), extended=extended)
+        bits = worst_bits(main_length(min(values, MAIN_VALUES)), extended=extended)
         if values > MAIN_VALUES:
-            bits += frame_bits(EXTRA_LENGTH, extended=extended)
+            bits += worst_bits(EXTRA_LENGTH, extended=extended)
         return bits
 
     def _check_kinds(self, drives: Sequence[DriveConfiguration],

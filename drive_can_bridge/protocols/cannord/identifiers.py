@@ -20,9 +20,8 @@ The 29-bit form is the 11-bit identifier followed by 18 zero bits.
 """
 
 from enum import Enum
-from typing import NamedTuple
 
-from drive_can_bridge.core.errors import LocalProtocolError, RemoteProtocolError
+from drive_can_bridge.core.errors import LocalProtocolError
 from drive_can_bridge.core.frame import EXTENDED_IDENTIFIER_MAX, Route, STANDARD_IDENTIFIER_MAX
 
 ADDRESS_MAX = 255
@@ -42,18 +41,6 @@ class MessageObject(Enum):
     PROCESS_RESPONSE = 1
     PARAMETER_TASK = PARAMETER_BASE
     PARAMETER_RESPONSE = PARAMETER_BASE + 1
-
-
-class Addressed(NamedTuple):
-    """
-    What an identifier says.
-
-    :param kind: None for a broadcast of process data.
-    :param addresses: the inverters meant: one, 32, or all 256.
-    """
-
-    kind: MessageObject | None
-    addresses: range
 
 
 def identifier(kind: MessageObject, address: int, *, extended: bool = False) -> int:
@@ -77,32 +64,12 @@ def all_identifier(*, extended: bool = False) -> int:
     return _formed(BROADCAST_ALL, extended)
 
 
-def decode_identifier(value: int, *, extended: bool = False) -> Addressed:
-    """
-    Tell what an identifier of either form means.
-
-    :raises RemoteProtocolError: no identifier of CANnord; in the 29-bit form also when one of the
-        18 appended bits is set.
-    """
-    largest = EXTENDED_IDENTIFIER_MAX if extended else STANDARD_IDENTIFIER_MAX
-    if not 0 <= value <= largest:
-        raise RemoteProtocolError(f'identifier {value:X}h is out of range')
-    short = value
-    if extended:
-        short = value >> EXTENDED_SHIFT
-        if short << EXTENDED_SHIFT != value:
-            raise RemoteProtocolError(f'identifier {value:08X}h does not end in '
-                                      f'{EXTENDED_SHIFT} zero bits')
-    if short == BROADCAST_ALL:
-        return Addressed(None, range(ADDRESS_MAX + 1))
-    if short > BROADCAST_ALL:
-        raise RemoteProtocolError(f'identifier {value:X}h does not exist in CANnord')
-    if short >= BROADCAST_BASE:
-        first = GROUP_SIZE * (short - BROADCAST_BASE)
-        return Addressed(None, range(first, first + GROUP_SIZE))
-    address = short % PARAMETER_BASE // 2
-    kind = MessageObject(short - 2 * address)
-    return Addressed(kind, range(address, address + 1))
+def decode_identifier(value: int) -> tuple[MessageObject, int] | None:
+    """Return what 11 bits mean, and the address of the inverter; None: it is none's own."""
+    if value >= BROADCAST_BASE:
+        return None
+    address = value % PARAMETER_BASE // 2
+    return MessageObject(value - 2 * address), address
 
 
 def route(value: int, *, extended: bool = False) -> Route:

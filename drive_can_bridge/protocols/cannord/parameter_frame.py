@@ -68,21 +68,14 @@ class Response(IntEnum):
     REFUSED = 7
 
 
-#: what may follow a task when it was carried out
-RESPONSES: dict[Task, tuple[Response, ...]] = {
-    Task.NONE: (Response.NONE,),
-    Task.READ: (Response.WORD, Response.DOUBLE),
-    Task.WRITE_WORD: (Response.WORD,),
-    Task.WRITE_DOUBLE: (Response.DOUBLE,),
-    Task.READ_ARRAY: (Response.ARRAY_WORD, Response.ARRAY_DOUBLE),
-    Task.WRITE_ARRAY_WORD: (Response.ARRAY_WORD,),
-    Task.WRITE_ARRAY_DOUBLE: (Response.ARRAY_DOUBLE,),
-    Task.READ_ELEMENTS: (Response.ELEMENTS,),
-    Task.WRITE_ARRAY_DOUBLE_RAM: (Response.ARRAY_DOUBLE,),
-    Task.WRITE_ARRAY_WORD_RAM: (Response.ARRAY_WORD,),
-    Task.WRITE_DOUBLE_RAM: (Response.DOUBLE,),
-    Task.WRITE_WORD_RAM: (Response.WORD,),
+#: (array, double word) -> response that carries a value
+VALUE_RESPONSES: dict[tuple[bool, bool], Response] = {
+    (False, False): Response.WORD,
+    (False, True): Response.DOUBLE,
+    (True, False): Response.ARRAY_WORD,
+    (True, True): Response.ARRAY_DOUBLE,
 }
+DOUBLE_RESPONSES = (Response.DOUBLE, Response.ARRAY_DOUBLE)
 
 #: (array, double word, EEPROM) -> task
 WRITE_TASKS: dict[tuple[bool, bool, bool], Task] = {
@@ -94,6 +87,18 @@ WRITE_TASKS: dict[tuple[bool, bool, bool], Task] = {
     (False, True, False): Task.WRITE_DOUBLE_RAM,
     (True, False, False): Task.WRITE_ARRAY_WORD_RAM,
     (True, True, False): Task.WRITE_ARRAY_DOUBLE_RAM,
+}
+#: the same the other way round: task -> (array, double word, EEPROM)
+WRITES: dict[int, tuple[bool, bool, bool]] = {task: how for how, task in WRITE_TASKS.items()}
+
+#: what may follow a task when it was carried out
+RESPONSES: dict[Task, tuple[Response, ...]] = {
+    Task.NONE: (Response.NONE,),
+    Task.READ: (Response.WORD, Response.DOUBLE),
+    Task.READ_ARRAY: (Response.ARRAY_WORD, Response.ARRAY_DOUBLE),
+    Task.READ_ELEMENTS: (Response.ELEMENTS,),
+    **{task: (VALUE_RESPONSES[array, double],)
+       for (array, double, _), task in WRITE_TASKS.items()},
 }
 
 #: what the error numbers of a refused task mean
@@ -132,6 +137,11 @@ class ParameterFrame:
     def word(self) -> int:
         """The value of a task or response that carries a word: the low half, unsigned."""
         return self.value & 0xFFFF
+
+    @property
+    def answered(self) -> int:
+        """The value of a response: a double word, or else a word."""
+        return self.value if self.identifier in DOUBLE_RESPONSES else self.word
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ that does not exist is refused with error 3; in the other byte FFh means nothing
 answers. The error number stands out in either order, so that neither key needs the other.
 """
 
-from collections.abc import Generator, Iterator
+from collections.abc import Generator
 from typing import NamedTuple
 
 from drive_can_bridge.core.configuration import DriveConfiguration
@@ -17,7 +17,7 @@ from drive_can_bridge.protocols.cannord.identifiers import (
     all_identifier, group_identifier, identifier, MessageObject, route,
 )
 from drive_can_bridge.protocols.cannord.parameter_frame import (
-    error_text, ERRORS, LENGTH, NUMBER_MAX, ParameterLayout, Response, RESPONSES, Task,
+    error_text, ERRORS, NUMBER_MAX, ParameterLayout, Response, RESPONSES, Task,
 )
 from drive_can_bridge.protocols.prober import (
     conclude, Conversation, Finding, Prober, Question, spaced,
@@ -93,7 +93,7 @@ class CannordProber(Prober):
 
     def _value_order(self) -> Generator[Question, Frame | None, Finding]:
         votes: dict[str, list[str]] = {}
-        for number in self._simple():
+        for number in self._numbers(SIMPLE, arrays=False):
             refusal = yield from self._twice(Task.READ_ARRAY, number)
             if refusal is None or refusal.error is None or refusal.alone is None:
                 continue
@@ -112,7 +112,7 @@ class CannordProber(Prober):
 
     def _index_byte(self) -> Generator[Question, Frame | None, Finding]:
         told = 'no parameter is an array'
-        for number in self._arrays():
+        for number in self._numbers(ARRAYS, arrays=True):
             results = {}
             for key, ind in (('low', _BEYOND), ('high', _BEYOND << 8)):
                 results[key] = yield from self._twice(Task.READ_ARRAY, number, ind)
@@ -136,14 +136,12 @@ class CannordProber(Prober):
         data = data[:2] + ind.to_bytes(2, 'little') + data[4:]
         expected = {*RESPONSES[task], Response.REFUSED}
 
-        def answers(frame: Frame) -> bool:
-            return (frame.identifier == self._response and frame.extended is self._extended
-                    and len(frame.data) == LENGTH
-                    and int.from_bytes(frame.data[_NUMBER_AND_TASK], 'little') & 0xFFF == number
-                    and frame.data[1] >> 4 in expected)
+        def fits(answer: bytes) -> bool:
+            return (int.from_bytes(answer[_NUMBER_AND_TASK], 'little') & 0xFFF == number
+                    and answer[1] >> 4 in expected)
 
         answer = yield from self.ask(
-            Question(Frame(self._task, data, self._extended), answers))
+            Question(Frame(self._task, data, self._extended), self._response, fits))
         return None if answer is None else _Answer(answer)
 
     def _twice(self, task: Task, number: int, ind: int = 0) -> _Asking:
@@ -156,27 +154,15 @@ class CannordProber(Prober):
             return None
         return second
 
-    def _simple(self) -> list[int]:
-        """Return the numbers of parameters that are no arrays, as far as the profile knows."""
-        return _some((number for number, indices in self._numbers().items() if indices == {None}),
-                     SIMPLE)
-
-    def _arrays(self) -> list[int]:
-        return _some((number for number, indices in self._numbers().items() if indices != {None}),
-                     ARRAYS)
-
-    def _numbers(self) -> dict[int, set[int | None]]:
-        """Return the sub-indices of all numbers that can be read."""
-        found: dict[int, set[int | None]] = {}
+    def _numbers(self, others: tuple[int, ...], *, arrays: bool) -> list[int]:
+        """Return numbers of arrays, or of parameters that are none, as far as anybody knows."""
+        indices: dict[int, set[int | None]] = {}
         for parameter in self.drive.profile.parameters.values():
             number = parameter.number
             if number is not None and number <= NUMBER_MAX and parameter.readable:
-                found.setdefault(number, set()).add(parameter.subindex)
-        return found
-
-
-def _some(numbers: Iterator[int], others: tuple[int, ...]) -> list[int]:
-    return list(dict.fromkeys((*list(numbers)[:_TRIES], *others)))
+                indices.setdefault(number, set()).add(parameter.subindex)
+        known = [number for number, found in indices.items() if (found != {None}) is arrays]
+        return list(dict.fromkeys((*known[:_TRIES], *others)))
 
 
 def _told(answer: _Answer | None) -> str:

@@ -16,7 +16,7 @@ from drive_can_bridge.core.roles import Cells
 from drive_can_bridge.protocols.access import Access, Found, Item, read_back
 from drive_can_bridge.protocols.cannord.channel import Ask, Reply
 from drive_can_bridge.protocols.cannord.parameter_frame import (
-    error_text, ParameterFrame, Response, Task, WRITE_TASKS,
+    DOUBLE_RESPONSES, error_text, ParameterFrame, Response, Task, WRITE_TASKS,
 )
 from drive_can_bridge.protocols.placement import OneByOne
 
@@ -24,7 +24,6 @@ WRONG_INDEX = 3
 PROCESS_DATA_ONLY = 'exists in process data only'
 NOT_ATOMIC = ('cannot be written in one frame, nothing was written: a CANnord frame carries one '
               'parameter')
-_DOUBLE = (Response.DOUBLE, Response.ARRAY_DOUBLE)
 
 
 def cells(parameter: Parameter) -> Cells:
@@ -56,9 +55,10 @@ class TaskAccess(Access[Parameter, Ask, Reply]):
         answer = yield from self._ask(span)
         if isinstance(answer, Failure):
             return answer
-        if span.width_known and (answer.identifier in _DOUBLE) != (span.type.bits == 32):
-            return Failure(_width_text(span, answer))
-        return (answer.value if answer.identifier in _DOUBLE else answer.word,)
+        double = answer.identifier in DOUBLE_RESPONSES
+        if span.width_known and double != (span.type.bits == 32):
+            return Failure(_width_text(span, double=double))
+        return (answer.answered,)
 
     def write(self, parameter: Parameter, raw: int) -> Generator[Ask, Reply, Outcome]:
         """
@@ -71,7 +71,7 @@ class TaskAccess(Access[Parameter, Ask, Reply]):
             answer = yield from self._ask(parameter)
             if isinstance(answer, Failure):
                 return answer
-            double = answer.identifier in _DOUBLE
+            double = answer.identifier in DOUBLE_RESPONSES
             if not double and not -0x8000 <= raw <= 0xFFFF:
                 return Failure(f'{raw} is not representable in 16 bits: -32768 to 65535')
         array = parameter.subindex is not None
@@ -87,8 +87,7 @@ class TaskAccess(Access[Parameter, Ask, Reply]):
         if not reply.sent:
             return Failure(NOT_SENT)
         if reply.contrary is not None:
-            found = parameter.raw_from_word(
-                reply.contrary.value if double else reply.contrary.word)
+            found = parameter.raw_from_word(reply.contrary.answered)
             return read_back(parameter, found, raw)
         return self.retry.unanswered(1)
 
@@ -130,8 +129,8 @@ def _refusal(parameter: Parameter, response: ParameterFrame) -> Generator[Ask, R
     return Failure(text)
 
 
-def _width_text(parameter: Parameter, answer: ParameterFrame) -> str:
-    width = 'a double word' if answer.identifier in _DOUBLE else 'a word'
-    wanted = 'int32 or uint32' if answer.identifier in _DOUBLE else 'bool, int16 or uint16'
+def _width_text(parameter: Parameter, *, double: bool) -> str:
+    width = 'a double word' if double else 'a word'
+    wanted = 'int32 or uint32' if double else 'bool, int16 or uint16'
     return (f'the drive answers with {width}, the profile says {parameter.type.value}: '
             f'correct the profile to {wanted}')

@@ -1,7 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Finding CANnord inverters: by requests and answers that follow each other, or by a read."""
 
-from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.protocols.cannord.identifiers import (
     ADDRESS_MAX, decode_identifier, identifier, MessageObject,
@@ -17,6 +16,8 @@ from drive_can_bridge.protocols.scout import Scout
 #: function, so that it writes nothing there
 PARAMETER = 700
 _NUMBER_BITS = 0x07FF
+#: the service that goes on beside process data
+_PARAMETERS = 1
 #: control words that masters send; the bits of direction and parameter set left out
 _CONTROL_WORDS = (READY, RUN, QUICK_STOP, ACKNOWLEDGE)
 _CONTROL_MASK = 0x27FF
@@ -38,27 +39,23 @@ class CannordScout(Scout):
         self.hear(frame, now)
 
     def hear(self, frame: Frame, now: float) -> None:
-        if frame.extended:
+        found = None if frame.extended else decode_identifier(frame.identifier)
+        if found is None:
             return
-        try:
-            addressed = decode_identifier(frame.identifier)
-        except RemoteProtocolError:
-            return
-        kind, station = addressed.kind, addressed.addresses[0]
+        kind, station = found
         data = frame.data
         if kind is MessageObject.PROCESS_REQUEST and len(data) in (4, 8) and (
                 decode_main(data).word & _CONTROL_MASK in _CONTROL_WORDS):
             self._request(station, data, now)
         elif kind is MessageObject.PARAMETER_TASK and len(data) == LENGTH:
-            self._request(-1 - station, data, now)
+            self._request(station, data, now, service=_PARAMETERS)
         elif kind is MessageObject.PROCESS_RESPONSE and len(data) in (4, 8):
-            if self._answers(station, now, lambda request: len(request) == len(data)):
-                state = state_of(decode_main(data).word)
-                self._pair(station, f'process data, state "{state.value}"')
+            state = state_of(decode_main(data).word)
+            self._answer(station, f'process data, state "{state.value}"', now,
+                         lambda request: len(request) == len(data))
         elif kind is MessageObject.PARAMETER_RESPONSE and len(data) == LENGTH:
-            if self._answers(-1 - station, now,
-                             lambda request: _number(request) == _number(data)):
-                self._pair(station, f'answers to tasks for P{_number(data)}')
+            self._answer(station, f'answers to tasks for P{_number(data)}', now,
+                         lambda request: _number(request) == _number(data), service=_PARAMETERS)
 
 
 def _number(data: bytes) -> int:

@@ -13,41 +13,33 @@ _COMMANDS = {command.value: command.name.lower().replace('_', ' ')
              for command in network.NmtCommand}
 
 
-class NodeWatch:
+def node_handlers(observer: DriveObserver, node: int,
+                  booted: Callable[[], None]) -> dict[int, Handler]:
     """
-    Says what the heartbeats and emergency messages of a node mean.
+    Return who says what the heartbeats and emergency messages of a node mean, by identifier.
 
     :param booted: called when the node has started.
     """
-
-    def __init__(self, observer: DriveObserver, booted: Callable[[], None]) -> None:
-        self._observer = observer
-        self._booted = booted
-
-    def handlers(self, node: int) -> dict[int, Handler]:
-        """Return who takes the frames of a node, by identifier."""
-        return {network.HEARTBEAT_BASE + node: self._take_heartbeat,
-                network.EMERGENCY_BASE + node: self._take_emergency}
-
-    def _take_heartbeat(self, data: bytes, now: float) -> None:
-        state = self._observer.decoded(
+    def take_heartbeat(data: bytes, now: float) -> None:
+        state = observer.decoded(
             network.decode_heartbeat, data, now, _RESPONSE, _NETWORK, 'heartbeat')
-        if state is None:
-            return
         if state is network.NmtState.BOOT_UP:
-            self._booted()
-            self._observer.tell(now, _RESPONSE, _NETWORK, 'boot-up', verdict=Verdict.SUSPICIOUS,
-                                remark='the device has started')
-        else:
-            self._observer.tell(now, _RESPONSE, _NETWORK, 'heartbeat', remark=state.text)
+            booted()
+            observer.tell(now, _RESPONSE, _NETWORK, 'boot-up', verdict=Verdict.SUSPICIOUS,
+                          remark='the device has started')
+        elif state is not None:
+            observer.tell(now, _RESPONSE, _NETWORK, 'heartbeat', remark=state.text)
 
-    def _take_emergency(self, data: bytes, now: float) -> None:
-        emergency = self._observer.decoded(
+    def take_emergency(data: bytes, now: float) -> None:
+        emergency = observer.decoded(
             network.decode_emergency, data, now, _RESPONSE, _NETWORK, 'emergency')
         if emergency is not None:
             over = emergency.code == network.NO_ERROR
-            self._observer.tell(now, _RESPONSE, _NETWORK, 'emergency', remark=emergency.text,
-                                verdict=Verdict.NORMAL if over else Verdict.SUSPICIOUS)
+            observer.tell(now, _RESPONSE, _NETWORK, 'emergency', remark=emergency.text,
+                          verdict=Verdict.NORMAL if over else Verdict.SUSPICIOUS)
+
+    return {network.HEARTBEAT_BASE + node: take_heartbeat,
+            network.EMERGENCY_BASE + node: take_emergency}
 
 
 class NmtObserver(DriveObserver):

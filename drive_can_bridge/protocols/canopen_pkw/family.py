@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.frame import worst_bits
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.process_image import control_word
 from drive_can_bridge.protocols.canopen import network
@@ -19,8 +20,8 @@ from drive_can_bridge.protocols.family import Claim, Complaint, Family, Talk
 from drive_can_bridge.protocols.observer import DriveObserver, Emit
 from drive_can_bridge.protocols.polling import round_time
 
-#: worst-case stuffing, eight bytes, 11-bit identifier, with the interframe space
-FRAME_BITS = 135
+#: of every frame of the mailbox
+FRAME_BITS = worst_bits(pkw.PAYLOAD, extended=False)
 
 
 class CanopenPkw(Family):

@@ -7,11 +7,12 @@ shown, and no answer is expected.
 """
 
 from functools import partial
+from typing import NamedTuple
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.protocols.canopen.addressing import name_of_object
-from drive_can_bridge.protocols.canopen.observer import NodeWatch
+from drive_can_bridge.protocols.canopen.observer import node_handlers
 from drive_can_bridge.protocols.canopen_pkw import addresses, pkw, refusals
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
 from drive_can_bridge.protocols.canopen_pkw.identifiers import Identifiers
@@ -26,6 +27,14 @@ _CYCLIC, _PARAMETER = Kind.CYCLIC, Kind.PARAMETER
 _TITLES = {True: 'write', False: 'read'}
 
 
+class _Asked(NamedTuple):
+    """What a request is about."""
+
+    span: Span
+    writes: bool
+    kind: Kind = _PARAMETER
+
+
 class PkwObserver(DriveObserver):
     """Watches one device."""
 
@@ -36,7 +45,7 @@ class PkwObserver(DriveObserver):
         self._abort_order: str = options.abort_code_order
         identifiers = Identifiers.of(drive)
         self._handlers: dict[int, Handler] = {
-            **NodeWatch(self, self._booted).handlers(drive.station),
+            **node_handlers(self, drive.station, self._booted),
             identifiers.request: self._take_request,
             identifiers.response: self._take_response,
         }
@@ -47,9 +56,8 @@ class PkwObserver(DriveObserver):
         self._wanted = addresses.round_spans(drive)
         self._setpoints = {placement.span(parameter) for parameter in drive.cyclic_request}
         self._round: RoundWatch[Span] = RoundWatch(addresses.round_plan(drive), self.observed)
-        self._questions: Questions[Message] = Questions(
+        self._questions: Questions[Message, _Asked] = Questions(
             self, drive.parameter_timeout, self._unanswered)
-        self._kinds: dict[Message, Kind] = {}
         self._last_byte: int | None = None
 
     def handler(self, identifier: int, extended: bool) -> Handler | None:
@@ -67,20 +75,14 @@ class PkwObserver(DriveObserver):
             self._round.prelude = now
             self.tell(now, _REQUEST, _PARAMETER, 'idle request')
             return
-        span = _span(message)
-        if span is None:
-            self.tell(now, _REQUEST, _PARAMETER, 'PKW request', verdict=Verdict.MALFORMED,
-                      remark=f'unknown function {message.code:02X}h')
+        asked = self._meant(message, now, _REQUEST, 'PKW request')
+        if asked is None:
             return
-        writes = _writes(message)
+        span, writes, _ = asked
         kind = self.count_request(cyclic=(
             span in self._setpoints if writes else self._round.asked(span, now)))
-        key = _key(message)
-        self._kinds[key] = kind
-        if len(self._kinds) > 1024:
-            del self._kinds[next(iter(self._kinds))]
-        if not repeated:
-            self._questions.ask(key, now)
+        note = self._questions.note if repeated else self._questions.ask
+        note(_key(message), asked._replace(kind=kind), now)
         parameters, raws = self._content(span, message.words if writes else None)
         self.tell(now, _REQUEST, kind, _TITLES[writes], parameters, raws,
                   verdict=Verdict.SUSPICIOUS if repeated else Verdict.NORMAL,
@@ -95,20 +97,19 @@ class PkwObserver(DriveObserver):
             self.tell(now, _RESPONSE, _PARAMETER, 'idle response')
             return
         refused = message.code == Function.ERROR
-        key = self._refused_request(message) if refused else _key(message)
+        known = self._questions.about
+        key = _key(message) if not refused else next(
+            (key for key in reversed(known) if pkw.answers(message, key)), None)
         if key is None:
             self.tell(now, _RESPONSE, _PARAMETER, 'PKW response', verdict=Verdict.UNASKED,
                       remark=f'{message}: {self._refusal(message)}')
             return
-        span = _span(key)
-        if span is None:
-            self.tell(now, _RESPONSE, _PARAMETER, 'PKW response', verdict=Verdict.MALFORMED,
-                      remark=f'unknown function {message.code:02X}h')
+        asked = known.get(key) or self._meant(message, now, _RESPONSE, 'PKW response')
+        if asked is None:
             return
+        span, writes, kind = asked
         verdict, latency = self._questions.answer(key, now)
-        writes, kind = _writes(key), self._kinds.get(key, _PARAMETER)
-        answered = not refused and not writes
-        parameters, raws = self._content(span, message.words if answered else None)
+        parameters, raws = self._content(span, None if refused or writes else message.words)
         if verdict is Verdict.NORMAL and not writes:
             if refused:
                 self._round.refused(span, addresses.instead_of(span, self._wanted), now)
@@ -119,12 +120,15 @@ class PkwObserver(DriveObserver):
         self.tell(now, _RESPONSE, kind, _TITLES[writes], parameters, raws, verdict=verdict,
                   remark=self._refusal(message) if refused else '', latency=latency)
 
-    def _refused_request(self, message: Message) -> Message | None:
-        """Return the request under way, or the last one, that a refusal is about."""
-        for key in reversed(self._kinds):
-            if pkw.answers(message, key):
-                return key
-        return None
+    def _meant(self, message: Message, now: float, direction: Direction,
+               title: str) -> _Asked | None:
+        """Return what a message is about; None: its function does not exist, which was told."""
+        meaning = message.meaning
+        if meaning is None:
+            self.tell(now, direction, _PARAMETER, title, verdict=Verdict.MALFORMED,
+                      remark=f'unknown function {message.code:02X}h')
+            return None
+        return _Asked(Span(message.address, meaning.count), meaning.writes)
 
     def _refusal(self, message: Message) -> str:
         return refusals.describe(refusals.code_from_words(message.words, self._abort_order))
@@ -145,25 +149,11 @@ class PkwObserver(DriveObserver):
     def _booted(self) -> None:
         self._last_byte = None
 
-    def _unanswered(self, key: Message, due: float) -> None:
-        span, writes = _span(key), _writes(key)
-        if span is None:
-            return
-        if not writes:
-            self._round.failed(span)
-        self.tell_unanswered(due, self._kinds.get(key, _PARAMETER), _TITLES[writes],
-                             self._content(span, None)[0])
-
-
-def _writes(message: Message) -> bool:
-    meaning = message.meaning
-    return meaning is not None and meaning.writes
-
-
-def _span(message: Message) -> Span | None:
-    """Return the registers that a message is about; None: its function does not exist."""
-    meaning = message.meaning
-    return None if meaning is None else Span(message.address, meaning.count)
+    def _unanswered(self, key: Message, asked: _Asked, due: float) -> None:
+        if not asked.writes:
+            self._round.failed(asked.span)
+        self.tell_unanswered(due, asked.kind, _TITLES[asked.writes],
+                             self._content(asked.span, None)[0])
 
 
 def _key(message: Message) -> Message:

@@ -92,20 +92,6 @@ class Function(IntEnum):
     ERROR = 0x4E
 
 
-#: (by CANopen address, writes, number of registers) -> code
-_FUNCTIONS = {
-    (False, False, 1): Function.READ_REGISTER_16,
-    (False, False, 2): Function.READ_REGISTER_32,
-    (False, True, 1): Function.WRITE_REGISTER_16,
-    (False, True, 2): Function.WRITE_REGISTER_32,
-    (True, False, 1): Function.READ_OBJECT_16,
-    (True, False, 2): Function.READ_OBJECT_32,
-    (True, True, 1): Function.WRITE_OBJECT_16,
-    (True, True, 2): Function.WRITE_OBJECT_32,
-}
-_MEANINGS = {int(code): meaning for meaning, code in _FUNCTIONS.items()}
-
-
 @dataclass(frozen=True)
 class Meaning:
     """What a function code asks for."""
@@ -113,6 +99,19 @@ class Meaning:
     by_object: bool
     writes: bool
     count: int
+
+
+_FUNCTIONS = {
+    Meaning(False, False, 1): Function.READ_REGISTER_16,
+    Meaning(False, False, 2): Function.READ_REGISTER_32,
+    Meaning(False, True, 1): Function.WRITE_REGISTER_16,
+    Meaning(False, True, 2): Function.WRITE_REGISTER_32,
+    Meaning(True, False, 1): Function.READ_OBJECT_16,
+    Meaning(True, False, 2): Function.READ_OBJECT_32,
+    Meaning(True, True, 1): Function.WRITE_OBJECT_16,
+    Meaning(True, True, 2): Function.WRITE_OBJECT_32,
+}
+_MEANINGS = {int(code): meaning for meaning, code in _FUNCTIONS.items()}
 
 
 class Address(NamedTuple):
@@ -170,8 +169,7 @@ class Message(NamedTuple):
     @property
     def meaning(self) -> Meaning | None:
         """What the function code asks for; None: it is none of the eight."""
-        found = _MEANINGS.get(self.code)
-        return None if found is None else Meaning(*found)
+        return _MEANINGS.get(self.code)
 
     @property
     def address(self) -> Address:
@@ -236,21 +234,10 @@ def answers(message: Message, request: Message) -> bool:
             and (not request.address.by_object or message.low == request.low))
 
 
-def function_of(by_object: bool, writes: bool, count: int) -> Function:
-    """
-    Return the function code for an access.
-
-    :raises LocalProtocolError: neither one register nor two.
-    """
-    try:
-        return _FUNCTIONS[by_object, writes, count]
-    except KeyError:
-        raise LocalProtocolError(f'{count} registers in one request: 1 or 2 are possible',
-                                 ) from None
-
-
 def _request(address: Address, writes: bool, count: int, toggle: bool, words: Words) -> Message:
-    function = function_of(address.by_object, writes, count)
+    function = _FUNCTIONS.get(Meaning(address.by_object, writes, count))
+    if function is None:
+        raise LocalProtocolError(f'{count} registers in one request: 1 or 2 are possible')
     last = address if count == 1 else address.next
     for entry in (address, last):
         if not 0 <= entry.word <= WORD_MAX or not 0 <= (entry.subindex or 0) <= SUBINDEX_MAX:

@@ -12,7 +12,7 @@ Before anything is sent to the mailbox, 1603h is read by SDO: where the receive 
 map something else than 3000h, a read of the mailbox would be process data, and nothing is asked.
 """
 
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
 
 from drive_can_bridge.core.configuration import DriveConfiguration
@@ -100,9 +100,8 @@ class PkwProber(Prober):
         if self._identifiers.request != network.REQUEST_BASE + node:
             return None     # some other PDO
         answer = yield Question(
-            sdo.encode_upload(node, sdo.RPDO4_MAPPING, 1),
-            lambda frame: (frame.identifier == sdo.RESPONSE_BASE + node and not frame.extended
-                           and _uploaded(frame.data) is not None))
+            sdo.encode_upload(node, sdo.RPDO4_MAPPING, 1), sdo.RESPONSE_BASE + node,
+            lambda data: _uploaded(data) is not None)
         uploaded = None if answer is None else _uploaded(answer.data)
         return None if uploaded is None or uploaded.value is None else uploaded.value >> 16
 
@@ -150,11 +149,12 @@ class PkwProber(Prober):
 
     def _idle(self) -> Question:
         """Return what starts nothing in any layout, so that any function may follow."""
-        return Question(Frame(self._identifiers.request, bytes(pkw.PAYLOAD), False), self._comes)
+        return self._question(bytes(pkw.PAYLOAD))
 
-    def _comes(self, frame: Frame) -> bool:
-        return (frame.identifier == self._identifiers.response and not frame.extended
-                and len(frame.data) == pkw.PAYLOAD)
+    def _question(self, data: bytes, fits: Callable[[bytes], bool] = lambda data: True,
+                  ) -> Question:
+        request, response = self._identifiers
+        return Question(Frame(request, data, False), response, fits)
 
     def _ask(self, address: Address, count: int, layout: Layout) -> _Asking:
         request = pkw.read_request(address, count, self._toggle)
@@ -162,18 +162,14 @@ class PkwProber(Prober):
         data = pkw.encode(request, layout)
         if not harmless(data):
             return None
-        answer = yield from self.ask(Question(
-            Frame(self._identifiers.request, data, False),
-            lambda frame: self._comes(frame) and pkw.answers(pkw.decode(frame.data, layout),
-                                                             request)))
+        answer = yield from self.ask(self._question(
+            data, lambda data: pkw.answers(pkw.decode(data, layout), request)))
         return None if answer is None else (answer, pkw.decode(answer, layout))
 
     def _wide(self) -> list[Parameter]:
-        found: Iterator[Parameter] = (
-            each for each in self.drive.profile.parameters.values()
-            if each.type.bits == 32 and each.readable and not each.bits
-            and each.word_order is None)
-        return list(found)[:_WIDE_MAX]
+        return [each for each in self.drive.profile.parameters.values()
+                if each.type.bits == 32 and each.readable and not each.bits
+                and each.word_order is None][:_WIDE_MAX]
 
 
 def harmless(data: bytes) -> bool:

@@ -61,10 +61,9 @@ class CanopenScout(Scout):
             elif base == network.REQUEST_BASE and len(frame.data) == 8:
                 self._request(node, frame.data, now)
             elif base == network.RESPONSE_BASE and len(frame.data) == 8:
-                if self._answers(node, now, lambda request: _repeats(request, frame.data)):
-                    self._pair(node, 'PKW answers')
-                    if node in self.sightings:
-                        self._fact(node, 'PKW', 'answers')
+                if self._answer(node, 'PKW answers', now, lambda request: _repeats(
+                        request, frame.data)) and node in self.sightings:
+                    self._fact(node, 'PKW', 'answers')
         except RemoteProtocolError:
             return
 

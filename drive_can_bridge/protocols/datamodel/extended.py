@@ -30,7 +30,7 @@ import struct
 from typing import Union
 
 from drive_can_bridge.core.errors import LocalProtocolError, RemoteProtocolError
-from drive_can_bridge.core.frame import Frame, Route
+from drive_can_bridge.core.frame import Frame
 
 DIR = 0x10000000
 STATION_MASK = 0x0FE00000
@@ -54,7 +54,6 @@ PADDING = [bytes(PAYLOAD - 2 * count) for count in range(SLOTS + 1)]
 class CyclicRequest:
     """Values for the parameters named by the drive's request map. The drive answers at once."""
 
-    station: int
     words: tuple[int, ...]
 
 
@@ -62,15 +61,13 @@ class CyclicRequest:
 class CyclicResponse:
     """Values of the parameters named by the drive's response map."""
 
-    station: int
     words: tuple[int, ...]
 
 
 @dataclass(frozen=True)
 class Write:
-    """Write 1 to 4 consecutive parameters. The drive never answers."""
+    """Write 1 to 4 consecutive parameters, with 11 bits one. The drive never answers."""
 
-    station: int
     number: int
     words: tuple[int, ...]
 
@@ -79,7 +76,6 @@ class Write:
 class ReadRequest:
     """Ask for 1 to 4 consecutive parameters."""
 
-    station: int
     number: int
     count: int
 
@@ -88,12 +84,16 @@ class ReadRequest:
 class ReadResponse:
     """The answer to a read request; repeats its station, number and count."""
 
-    station: int
     number: int
     words: tuple[int, ...]
 
 
 Telegram = Union[CyclicRequest, CyclicResponse, Write, ReadRequest, ReadResponse]
+
+
+def station_of(identifier: int) -> int:
+    """Return the station whose telegrams have this identifier."""
+    return (identifier & STATION_MASK) >> STATION_SHIFT
 
 
 # -- encoding -------------------------------------------------------------------------------------
@@ -132,6 +132,19 @@ def cyclic_request_identifier(station: int) -> int:
     return station << STATION_SHIFT | CYCLIC
 
 
+def check_window(number: int, count: int) -> None:
+    """
+    Check which parameters a frame is to be about.
+
+    :raises LocalProtocolError: none or more than four, or some of them cannot exist.
+    """
+    if not 1 <= count <= SLOTS:
+        raise LocalProtocolError(f'{count} parameters in one frame: 1 to {SLOTS} are possible')
+    if number < 0 or number + count - 1 > 0xFFFF:
+        raise LocalProtocolError(f'parameters {number} to {number + count - 1} are not all within '
+                                 f'0 to 65535')
+
+
 def pack_words(words: Sequence[int]) -> bytes:
     """Pack up to four unsigned words, high byte first, padded with 00h to eight bytes."""
     count = len(words)
@@ -159,25 +172,33 @@ def decode(frame: Frame, *, count: int = SLOTS, strict: bool = False) -> Telegra
     identifier, data, extended = frame
     if not extended:
         raise RemoteProtocolError(f'{frame}: not a 29-bit identifier')
-    station = (identifier & STATION_MASK) >> STATION_SHIFT
     response = bool(identifier & DIR)
     if identifier & CYCLIC == CYCLIC and not identifier & COUNT_MASK:
         words = unpack_words(data, count, strict=strict)
-        return CyclicResponse(station, words) if response else CyclicRequest(station, words)
+        return CyclicResponse(words) if response else CyclicRequest(words)
     number = (identifier & PARAMETER_MASK) >> PARAMETER_SHIFT
     length = identifier & COUNT_MASK
-    if not 1 <= length <= SLOTS:
-        raise RemoteProtocolError(f'{frame}: parameter count {length} is not 1 to {SLOTS}')
-    if number + length - 1 > 0xFFFF:
-        raise RemoteProtocolError(f'{frame}: parameters {number} to {number + length - 1} '
-                                  f'run past 65535')
+    check_received(frame, number, length)
     if identifier & W:
         if response:
             raise RemoteProtocolError(f'{frame}: drives do not acknowledge writes')
-        return Write(station, number, unpack_words(data, length, strict=strict))
+        return Write(number, unpack_words(data, length, strict=strict))
     if response:
-        return ReadResponse(station, number, unpack_words(data, length, strict=strict))
-    return ReadRequest(station, number, length)
+        return ReadResponse(number, unpack_words(data, length, strict=strict))
+    return ReadRequest(number, length)
+
+
+def check_received(frame: Frame, number: int, count: int) -> None:
+    """
+    Check which parameters a frame is about.
+
+    :raises RemoteProtocolError: none or more than four, or some of them cannot exist.
+    """
+    if not 1 <= count <= SLOTS:
+        raise RemoteProtocolError(f'{frame}: parameter count {count} is not 1 to {SLOTS}')
+    if number + count - 1 > 0xFFFF:
+        raise RemoteProtocolError(f'{frame}: parameters {number} to {number + count - 1} run '
+                                  f'past 65535')
 
 
 def decode_answer(frame: Frame, station: int, question: tuple[int, int] | None, *,
@@ -190,7 +211,7 @@ def decode_answer(frame: Frame, station: int, question: tuple[int, int] | None, 
     :raises RemoteProtocolError: anything else, malformed, or of another station.
     """
     telegram = decode(frame, strict=strict)
-    if telegram.station != station:
+    if station_of(frame.identifier) != station:
         raise RemoteProtocolError(f'{frame}: not from station {station}')
     if not isinstance(telegram, ReadResponse) or (
             (telegram.number, len(telegram.words)) != question):
@@ -211,19 +232,9 @@ def unpack_words(data: bytes, count: int, *, strict: bool = False) -> tuple[int,
     return WORDS[count].unpack_from(data)
 
 
-def station_route(station: int) -> Route:
-    """Return the route of all telegrams of a station, both directions."""
-    _check_station(station)
-    return Route(station << STATION_SHIFT, STATION_MASK, True)
-
-
 def _acyclic_identifier(station: int, number: int, count: int) -> int:
     _check_station(station)
-    if not 1 <= count <= SLOTS:
-        raise LocalProtocolError(f'{count} parameters in one frame: 1 to {SLOTS} are possible')
-    if number < 0 or number + count - 1 > 0xFFFF:
-        raise LocalProtocolError(f'parameters {number} to {number + count - 1} are not all within '
-                                 f'0 to 65535')
+    check_window(number, count)
     return station << STATION_SHIFT | number << PARAMETER_SHIFT | count
 
 

@@ -4,19 +4,19 @@
 from collections.abc import Iterator
 
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.frame import Route
+from drive_can_bridge.core.frame import Route, worst_bits
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.datamodel.checks import (
     check_parameters, check_period_and_maps, raw_parameter,
 )
 from drive_can_bridge.protocols.datamodel.extended import (
-    SLOTS, STATION_MASK, STATION_MAX, STATION_SHIFT,
+    PAYLOAD, SLOTS, STATION_MASK, STATION_MAX, STATION_SHIFT,
 )
 from drive_can_bridge.protocols.datamodel.options import ExtendedOptions, NUMBER_MAX
 from drive_can_bridge.protocols.family import Claim, Complaint, Family, Talk
 
-#: worst-case stuffing, eight bytes, 29-bit identifier, with the interframe space
-FRAME_BITS = 160
+#: of every frame
+FRAME_BITS = worst_bits(PAYLOAD, extended=True)
 #: both maps are read once a second, request and response each
 MAPPING_CHECK_BITS = 4 * FRAME_BITS
 

@@ -1,13 +1,14 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Watching drives with the DataModel protocol, 29-bit and 11-bit identifiers."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter, ParameterType, Storage
 from drive_can_bridge.protocols.datamodel import extended, standard
+from drive_can_bridge.protocols.datamodel.extended import ReadRequest, Write
 from drive_can_bridge.protocols.datamodel.process_words import CyclicCodec
 from drive_can_bridge.protocols.datamodel.standard_round import reads
 from drive_can_bridge.protocols.observer import (
@@ -24,47 +25,64 @@ _NORMAL = Verdict.NORMAL
 
 
 class _Traffic:
-    """What reads and writes of parameters look like with both protocols."""
+    """
+    What reads and writes of parameters look like with both protocols.
 
-    def __init__(self, observer: DriveObserver, drive: DriveConfiguration,
-                 unanswered: Callable[[Chunk, float], None]) -> None:
-        self.offset: int = drive.options.parameter_offset
-        self.questions: Questions[Chunk] = Questions(
-            observer, drive.parameter_timeout, unanswered)
+    :param plan: the reads of a round, where the exchange is made of reads and writes.
+    :param setpoints: what is written in it.
+    """
+
+    def __init__(self, observer: DriveObserver, drive: DriveConfiguration, *,
+                 plan: Sequence[Chunk] = (), setpoints: Sequence[Parameter] = ()) -> None:
+        self._offset: int = drive.options.parameter_offset
         self._observer = observer
-        self._listed = {parameter.number + self.offset: parameter
+        self._listed = {parameter.number + self._offset: parameter
                         for parameter in reversed(list(drive.profile.parameters.values()))
                         if parameter.number is not None}
+        self._setpoints = {(parameter.number or 0) + self._offset for parameter in setpoints}
+        self._round: RoundWatch[Chunk] = RoundWatch(plan, observer.observed)
+        self._questions: Questions[Chunk, Kind] = Questions(
+            observer, drive.parameter_timeout, self._unanswered)
         self._gap = WriteGap(drive.options.eeprom_write_gap)
 
-    def named(self, number: int, count: int) -> list[Parameter]:
-        """Return the parameters with these numbers on the wire."""
-        return [self._listed.get(each) or Parameter(
-            f'p{each - self.offset}', number=each - self.offset, listed=False)
-            for each in range(number, number + count)]
-
-    def read(self, chunk: Chunk, now: float, kind: Kind) -> None:
-        """Take the request to read parameters."""
-        self.questions.ask(chunk, now)
-        self._observer.tell(now, _REQUEST, kind, 'read', self.named(*chunk))
-
-    def answered(self, chunk: Chunk, words: Sequence[int], now: float, kind: Kind) -> Verdict:
-        """Take the answer; return what it is."""
-        verdict, latency = self.questions.answer(chunk, now)
-        parameters = self.named(*chunk)
-        self._observer.tell(now, _RESPONSE, kind, 'read', parameters, raws_of(parameters, words),
-                            verdict=verdict, latency=latency)
-        return verdict
-
-    def written(self, number: int, words: Sequence[int], now: float, kind: Kind) -> None:
-        """Take a write."""
-        parameters = self.named(number, len(words))
+    def take(self, request: ReadRequest | Write, now: float) -> None:
+        """Take a request."""
+        observer = self._observer
+        if isinstance(request, ReadRequest):
+            chunk = Chunk(request.number, request.count)
+            kind = observer.count_request(cyclic=self._round.asked(chunk, now))
+            self._questions.ask(chunk, kind, now)
+            observer.tell(now, _REQUEST, kind, 'read', self._named(chunk))
+            return
+        parameters = self._named(Chunk(request.number, len(request.words)))
         wrong = ''
         if any(parameter.storage is not Storage.RAM for parameter in parameters):
             wrong = self._gap.written(now)
-            self._observer.observed.fast_writes += bool(wrong)
-        self._observer.tell(now, _REQUEST, kind, 'write', parameters, raws_of(parameters, words),
-                            verdict=Verdict.SUSPICIOUS if wrong else Verdict.NORMAL, remark=wrong)
+            observer.observed.fast_writes += bool(wrong)
+        kind = observer.count_request(cyclic=request.number in self._setpoints)
+        observer.tell(now, _REQUEST, kind, 'write', parameters,
+                      raws_of(parameters, request.words),
+                      verdict=Verdict.SUSPICIOUS if wrong else Verdict.NORMAL, remark=wrong)
+
+    def answered(self, chunk: Chunk, words: Sequence[int], now: float) -> None:
+        """Take the answer to a read."""
+        kind = self._questions.about.get(chunk, _PARAMETER)
+        verdict, latency = self._questions.answer(chunk, now)
+        parameters = self._named(chunk)
+        self._observer.tell(now, _RESPONSE, kind, 'read', parameters, raws_of(parameters, words),
+                            verdict=verdict, latency=latency)
+        if verdict is _NORMAL:
+            self._round.answered(chunk, now)
+
+    def _unanswered(self, chunk: Chunk, kind: Kind, due: float) -> None:
+        self._round.failed(chunk)
+        self._observer.tell_unanswered(due, kind, 'read', self._named(chunk))
+
+    def _named(self, chunk: Chunk) -> list[Parameter]:
+        """Return the parameters with these numbers on the wire."""
+        return [self._listed.get(each) or Parameter(
+            f'p{each - self._offset}', number=each - self._offset, listed=False)
+            for each in range(chunk.address, chunk.address + chunk.size)]
 
 
 class ExtendedObserver(DriveObserver):
@@ -90,7 +108,7 @@ class ExtendedObserver(DriveObserver):
             drive.station, drive.cyclic_request, self._response,
             control_slot=slots[0] if slots else None, strict=self._strict)
         self._cycle = CyclicWatch(self, CYCLES_WAITED * drive.period)
-        self._traffic = _Traffic(self, drive, self._unanswered)
+        self._traffic = _Traffic(self, drive)
 
     def handler(self, identifier: int, extended_format: bool) -> Handler | None:
         if not extended_format or identifier & extended.STATION_MASK != self._station:
@@ -131,18 +149,11 @@ class ExtendedObserver(DriveObserver):
         telegram = self.decoded(
             lambda data: extended.decode(Frame(identifier, data, True), strict=self._strict),
             data, now, _RESPONSE if identifier & extended.DIR else _REQUEST, _PARAMETER, 'frame')
-        if isinstance(telegram, extended.ReadRequest):
-            self._traffic.read(Chunk(telegram.number, telegram.count), now,
-                               self.count_request(cyclic=False))
-        elif isinstance(telegram, extended.Write):
-            self._traffic.written(telegram.number, telegram.words, now,
-                                  self.count_request(cyclic=False))
+        if isinstance(telegram, (ReadRequest, Write)):
+            self._traffic.take(telegram, now)
         elif isinstance(telegram, extended.ReadResponse):
             self._traffic.answered(Chunk(telegram.number, len(telegram.words)), telegram.words,
-                                   now, _PARAMETER)
-
-    def _unanswered(self, chunk: Chunk, due: float) -> None:
-        self.tell_unanswered(due, _PARAMETER, 'read', self._traffic.named(*chunk))
+                                   now)
 
 
 class StandardObserver(DriveObserver):
@@ -154,11 +165,8 @@ class StandardObserver(DriveObserver):
         self._strict: bool = options.length_policy == 'strict'
         self._request = standard.identifier(options.request_id_base, drive.station)
         self._response = standard.identifier(options.response_id_base, drive.station)
-        self._traffic = _Traffic(self, drive, self._unanswered)
-        self._setpoints = {(parameter.number or 0) + self._traffic.offset
-                           for parameter in drive.cyclic_request}
-        self._round: RoundWatch[Chunk] = RoundWatch(reads(drive), self.observed)
-        self._last: tuple[Chunk, Kind] | None = None
+        self._traffic = _Traffic(self, drive, plan=reads(drive), setpoints=drive.cyclic_request)
+        self._last: Chunk | None = None
 
     def handler(self, identifier: int, extended_format: bool) -> Handler | None:
         if extended_format:
@@ -170,28 +178,19 @@ class StandardObserver(DriveObserver):
         request = self.decoded(
             lambda data: standard.decode_request(Frame(self._request, data, False)),
             data, now, _REQUEST, _PARAMETER, 'frame')
-        if isinstance(request, standard.Write):
-            kind = self.count_request(cyclic=request.number in self._setpoints)
-            self._traffic.written(request.number, (request.word,), now, kind)
-        elif request is not None:
-            chunk = Chunk(request.number, request.count)
-            kind = self.count_request(cyclic=self._round.asked(chunk, now))
-            self._last = chunk, kind
-            self._traffic.read(chunk, now, kind)
+        if request is not None:
+            if isinstance(request, ReadRequest):
+                self._last = Chunk(request.number, request.count)
+            self._traffic.take(request, now)
 
     def _take_response(self, data: bytes, now: float) -> None:
-        if self._last is None:      # asked before the trace began
+        chunk = self._last
+        if chunk is None:       # asked before the trace began
             self.tell(now, _RESPONSE, _PARAMETER, 'read', remark=f'data {data.hex(" ").upper()}')
             return
-        chunk, kind = self._last
         words = self.decoded(
             lambda data: standard.decode_read_response(
                 Frame(self._response, data, False), chunk.size, strict=self._strict),
             data, now, _RESPONSE, _PARAMETER, 'read')
-        if words is not None and self._traffic.answered(chunk, words, now, kind) is _NORMAL:
-            self._round.answered(chunk, now)
-
-    def _unanswered(self, chunk: Chunk, due: float) -> None:
-        kind = self._last[1] if self._last and self._last[0] == chunk else _PARAMETER
-        self._round.failed(chunk)
-        self.tell_unanswered(due, kind, 'read', self._traffic.named(*chunk))
+        if words is not None:
+            self._traffic.answered(chunk, words, now)

@@ -129,9 +129,7 @@ def extended_prober(drive: DriveConfiguration) -> DataModelProber:
 
     def question(number: int) -> Question:
         frame = extended.encode_read_request(drive.station, number, SLOTS)
-        return Question(frame, lambda answer: (
-            answer.extended and len(answer.data) == extended.PAYLOAD
-            and answer.identifier == frame.identifier | extended.DIR))
+        return Question(frame, frame.identifier | extended.DIR)
     return DataModelProber(
         drive, [Route(station, extended.DIR | extended.STATION_MASK, True)], question,
         lambda data: extended.unpack_words(data, SLOTS))
@@ -148,10 +146,8 @@ def standard_prober(drive: DriveConfiguration) -> DataModelProber:
     response = standard.identifier(options.response_id_base, drive.station)
 
     def question(number: int) -> Question:
-        return Question(
-            standard.encode_read_request(request, number, SLOTS), lambda answer: (
-                not answer.extended and answer.identifier == response
-                and len(answer.data) == standard.PAYLOAD), options.quarantine)
+        return Question(standard.encode_read_request(request, number, SLOTS), response,
+                        quiet=options.quarantine)
     # bytes 0 and 1 are 03h 7Ah: task 7, a write to EEPROM, of P515
     hazard = '' if request & 1 or request not in _CANNORD_TASKS else (
         f'a read of the maps on {request:03X}h is a write of a parameter in EEPROM to a CANnord '

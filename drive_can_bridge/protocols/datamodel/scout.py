@@ -42,7 +42,7 @@ class ExtendedScout(Scout):
             telegram = extended.decode(frame)
         except RemoteProtocolError:
             return
-        station = telegram.station
+        station = extended.station_of(frame.identifier)
         if isinstance(telegram, extended.CyclicResponse):
             self._see(station, 'cyclic responses', Certainty.CERTAIN)
         elif isinstance(telegram, extended.ReadResponse):
@@ -95,7 +95,7 @@ class StandardScout(Scout):
             request = standard.decode_request(frame)
         except RemoteProtocolError:
             return
-        if isinstance(request, standard.ReadRequest):
+        if isinstance(request, extended.ReadRequest):
             self._request(station, frame.data, now)
 
     def hear(self, frame: Frame, now: float) -> None:
@@ -103,8 +103,8 @@ class StandardScout(Scout):
         station = frame.identifier - standard.RESPONSE_ID_BASE
         if frame.extended or not 1 <= station <= STANDARD_STATION_MAX:
             return
-        if len(frame.data) == standard.PAYLOAD and self._answers(station, now):
-            self._pair(station, 'answers to reads')
+        if len(frame.data) == standard.PAYLOAD:
+            self._answer(station, 'answers to reads', now)
 
     def settings(self, station: int) -> dict[str, Any]:
         return {'request_numbers': [], 'response_numbers': [HARMLESS_NUMBER]}

@@ -33,12 +33,13 @@ never acknowledged.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 import struct
-from typing import Union
 
 from drive_can_bridge.core.errors import LocalProtocolError, RemoteProtocolError
 from drive_can_bridge.core.frame import Frame, STANDARD_IDENTIFIER_MAX
+from drive_can_bridge.protocols.datamodel.extended import (
+    check_received, check_window, ReadRequest, Write,
+)
 
 REQUEST_ID_BASE = 0x3F0
 RESPONSE_ID_BASE = 0x7F0
@@ -50,25 +51,6 @@ PAYLOAD = 8
 _READ_REQUEST = struct.Struct('<BHB4x')
 _WRITE = struct.Struct('<BHH3x')
 _WORDS = [struct.Struct(f'<{count}H') for count in range(SLOTS + 1)]
-
-
-@dataclass(frozen=True)
-class ReadRequest:
-    """Ask for 1 to 4 consecutive parameters."""
-
-    number: int
-    count: int
-
-
-@dataclass(frozen=True)
-class Write:
-    """Write one parameter. The drive never answers."""
-
-    number: int
-    word: int
-
-
-Request = Union[ReadRequest, Write]
 
 
 def identifier(base: int, station: int) -> int:
@@ -89,11 +71,7 @@ def identifier(base: int, station: int) -> int:
 
 def encode_read_request(request_identifier: int, number: int, count: int) -> Frame:
     """Encode a read request for ``count`` consecutive parameters."""
-    if not 1 <= count <= SLOTS:
-        raise LocalProtocolError(f'{count} parameters in one frame: 1 to {SLOTS} are possible')
-    if number < 0 or number + count - 1 > 0xFFFF:
-        raise LocalProtocolError(f'parameters {number} to {number + count - 1} are not all within '
-                                 f'0 to 65535')
+    check_window(number, count)
     return Frame(request_identifier, _READ_REQUEST.pack(READ, number, count), False)
 
 
@@ -120,7 +98,7 @@ def encode_read_response(response_identifier: int, words: Sequence[int]) -> Fram
 # -- decoding -------------------------------------------------------------------------------------
 
 
-def decode_request(frame: Frame) -> Request:
+def decode_request(frame: Frame) -> ReadRequest | Write:
     """
     Decode what the master sends (the drive's side).
 
@@ -133,15 +111,11 @@ def decode_request(frame: Frame) -> Request:
         raise RemoteProtocolError(f'{frame}: {len(data)} data bytes instead of {PAYLOAD}')
     if data[0] == WRITE:
         _, number, word = _WRITE.unpack(data)
-        return Write(number, word)
+        return Write(number, (word,))
     if data[0] != READ:
         raise RemoteProtocolError(f'{frame}: function {data[0]} is neither {READ} nor {WRITE}')
     _, number, count = _READ_REQUEST.unpack(data)
-    if not 1 <= count <= SLOTS:
-        raise RemoteProtocolError(f'{frame}: parameter count {count} is not 1 to {SLOTS}')
-    if number + count - 1 > 0xFFFF:
-        raise RemoteProtocolError(f'{frame}: parameters {number} to {number + count - 1} run '
-                                  f'past 65535')
+    check_received(frame, number, count)
     return ReadRequest(number, count)
 
 

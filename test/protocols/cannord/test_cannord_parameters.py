@@ -182,6 +182,16 @@ def test_no_answer_to_a_write_while_online() -> None:
     assert talk.outcomes() == [['no answer in 0.1 s, 1 attempt']]
 
 
+def test_both_halves_of_a_double_word_are_acknowledged() -> None:
+    talk = online()
+    talk.submits(write((POSITION, 100000)), 10.003)
+    talk.hears('203#655215000000A086', 10.004)
+    assert talk.events(FrameRejected) == [
+        FrameRejected('response to writing P613.21 with another value')]
+    talk.hears('203#655215000100A086', 10.005)
+    assert talk.outcomes() == [['written']]
+
+
 def test_an_acknowledgement_with_another_value_is_none() -> None:
     talk = online()
     talk.submits(write((ACCELERATION, 9999)), 10.003)

@@ -30,9 +30,10 @@ def test_cyclic_telegrams(station: int, words: list[int]) -> None:
     assert codec.decode_request(request.data) == (tuple(words), '')
     assert codec.decode_response(response.data) == (tuple(words), '')
     assert extended.decode(request, count=len(words), strict=True) == extended.CyclicRequest(
-        station, tuple(words))
+        tuple(words))
     assert extended.decode(response, count=len(words), strict=True) == extended.CyclicResponse(
-        station, tuple(words))
+        tuple(words))
+    assert extended.station_of(request.identifier) == station
     assert response.identifier == request.identifier + 0x10000000
 
 
@@ -41,13 +42,14 @@ def test_acyclic_telegrams(station: int, window: tuple[int, list[int]]) -> None:
     number, words = window
     asked = extended.encode_read_request(station, number, len(words))
     answer = extended.encode_answer(asked.identifier, words)
-    assert extended.decode(asked) == extended.ReadRequest(station, number, len(words))
-    assert extended.decode(answer) == extended.ReadResponse(station, number, tuple(words))
+    assert extended.decode(asked) == extended.ReadRequest(number, len(words))
+    assert extended.decode(answer) == extended.ReadResponse(number, tuple(words))
     assert answer.identifier == asked.identifier + 0x10000000
+    assert extended.station_of(asked.identifier) == station
     assert asked.data == bytes(8)
     if number != 0xFFFF:
         written = extended.encode_write(station, number, words)
-        assert extended.decode(written) == extended.Write(station, number, tuple(words))
+        assert extended.decode(written) == extended.Write(number, tuple(words))
         assert written.identifier == asked.identifier + 0x100000
 
 
@@ -66,7 +68,7 @@ def test_anything(identifier: int, data: bytes, is_extended: bool, count: int,
         assert str(error)
         return
     assert is_extended
-    assert telegram.station == identifier >> 21 & 0x7F
+    assert extended.station_of(identifier) == identifier >> 21 & 0x7F
     if identifier & 0xF:
         assert (identifier >> 4 & 0xFFFF) + (identifier & 0xF) <= 0x10000
     if not isinstance(telegram, extended.ReadRequest):

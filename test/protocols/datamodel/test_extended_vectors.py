@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from builders import parameter
+from builders import drive, parameter
 import pytest
 
 from drive_can_bridge.core.errors import LocalProtocolError, RemoteProtocolError
@@ -14,6 +14,7 @@ from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.protocols.datamodel import extended
 from drive_can_bridge.protocols.datamodel.mapping import effective
 from drive_can_bridge.protocols.datamodel.process_words import CyclicCodec
+from drive_can_bridge.protocols.families import FAMILIES
 
 FILE = json.loads((Path(__file__).parents[2] / 'vectors' / 'datamodel.json').read_text(
     encoding='utf-8'))
@@ -40,7 +41,9 @@ def frame(row: dict[str, Any]) -> Frame:
 def decode(row: dict[str, Any], *, strict: bool = False) -> extended.Telegram:
     mapping = row['fields'].get('mapping')
     count = 4 if mapping is None else len(effective(mapping))
-    return extended.decode(frame(row), count=count, strict=strict)
+    telegram = extended.decode(frame(row), count=count, strict=strict)
+    assert extended.station_of(frame(row).identifier) == row['fields']['station']
+    return telegram
 
 
 def telegram(row: dict[str, Any]) -> extended.Telegram:
@@ -49,10 +52,10 @@ def telegram(row: dict[str, Any]) -> extended.Telegram:
     words = tuple(row['words_u16'])
     kind = KINDS[row['kind']]
     if kind in (extended.CyclicRequest, extended.CyclicResponse):
-        return kind(fields['station'], words)
+        return kind(words)
     if kind is extended.ReadRequest:
-        return extended.ReadRequest(fields['station'], fields['param'], fields['count'])
-    return kind(fields['station'], fields['param'], words)
+        return extended.ReadRequest(fields['param'], fields['count'])
+    return kind(fields['param'], words)
 
 
 def encode(row: dict[str, Any]) -> Frame:
@@ -174,11 +177,17 @@ def test_masks() -> None:
     assert sum(mask for name, mask in masks.items() if name != 'CYCLIC_LOW') == 0x1FFFFFFF
 
 
+def route_of(station: int) -> Route:
+    """Return the only route that the family claims for a drive."""
+    claim, = FAMILIES['datamodel_extended'].claims(drive(station=station))
+    return claim.route
+
+
 def test_filters_let_all_responses_in() -> None:
     found = 0
     for entry in FILE['filters']:
         if entry['name'].startswith('ext responses of station'):
-            route = extended.station_route(int(entry['name'].rsplit(' ', 1)[1]))
+            route = route_of(int(entry['name'].rsplit(' ', 1)[1]))
             assert entry['extended'] and route.extended
             # ours lets the requests in as well, to notice a second master
             assert int(entry['can_id'], 16) & route.mask == route.identifier
@@ -188,14 +197,12 @@ def test_filters_let_all_responses_in() -> None:
 
 
 def test_route_of_a_station_takes_both_directions_and_no_other_station() -> None:
-    route = extended.station_route(1)
+    route = route_of(1)
     assert route == Route(0x00200000, 0x0FE00000, True)
     for identifier in (0x003FFFF0, 0x103FFFF0, 0x002001E2, 0x102001E2, 0x003001E2):
         assert route.matches(Frame(identifier, b'', True))
     assert not route.matches(Frame(0x103FFFF0 + 0x200000, b'', True))
     assert not route.matches(Frame(0x003FFFF0, b'', False))
-    with pytest.raises(LocalProtocolError):
-        extended.station_route(128)
 
 
 # -- the manual's worked examples -----------------------------------------------------------------
@@ -208,7 +215,7 @@ def test_example_cyclic_request() -> None:
     sent = codec(1, mapping).encode_request([1500])
     assert (sent.identifier, sent.data) == (0x003FFFF0, b'\x05\xDC\0\0\0\0\0\0')
     assert extended.decode(Frame(0x003FFFF0, b'\x05\xDC\xDE\xAD\xBE\xEF\1\2', True),
-                           count=len(mapping)) == extended.CyclicRequest(1, (1500,))
+                           count=len(mapping)) == extended.CyclicRequest((1500,))
 
 
 def test_example_cyclic_response() -> None:
@@ -216,14 +223,14 @@ def test_example_cyclic_response() -> None:
     mapping = effective([209, 210, 0, 8])
     assert mapping == (209, 210)
     assert extended.decode(Frame(0x103FFFF0, b'\x11\x22\x33\x44\xA5\xA5\x5A\x5A', True),
-                           count=len(mapping)) == extended.CyclicResponse(1, (0x1122, 0x3344))
+                           count=len(mapping)) == extended.CyclicResponse((0x1122, 0x3344))
 
 
 def test_example_write() -> None:
     """P = 30, N = 2: Reg.30 in BYTE0 and BYTE1, Reg.31 in BYTE2 and BYTE3, high bytes first."""
     sent = extended.encode_write(1, 30, [1000, 2000])
     assert (sent.identifier, sent.data) == (0x003001E2, b'\x03\xE8\x07\xD0\0\0\0\0')
-    assert extended.decode(sent) == extended.Write(1, 30, (1000, 2000))
+    assert extended.decode(sent) == extended.Write(30, (1000, 2000))
 
 
 def test_example_read() -> None:
@@ -231,7 +238,17 @@ def test_example_read() -> None:
     sent = extended.encode_read_request(1, 30, 2)
     assert (sent.identifier, sent.data) == (0x002001E2, bytes(8))
     answer = Frame(sent.identifier | 0x10000000, b'\x03\xE8\x07\xD0\xCA\xFE\xBA\xBE', True)
-    assert extended.decode(answer) == extended.ReadResponse(1, 30, (1000, 2000))
+    assert extended.decode(answer) == extended.ReadResponse(30, (1000, 2000))
+
+
+def test_an_answer_is_of_the_station_that_was_asked() -> None:
+    answer = Frame(0x102001E2, bytes.fromhex('03E807D000000000'), True)
+    assert extended.decode_answer(answer, 1, (30, 2)) == (1000, 2000)
+    with pytest.raises(RemoteProtocolError, match='not from station 2'):
+        extended.decode_answer(answer, 2, (30, 2))
+    for question in ((30, 1), (31, 2), None):
+        with pytest.raises(RemoteProtocolError, match='nobody asked'):
+            extended.decode_answer(answer, 1, question)
 
 
 def test_bit_row_of_the_manual() -> None:

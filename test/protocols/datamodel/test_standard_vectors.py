@@ -13,6 +13,7 @@ import pytest
 from drive_can_bridge.core.errors import LocalProtocolError, RemoteProtocolError
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.protocols.datamodel import standard
+from drive_can_bridge.protocols.datamodel.extended import ReadRequest, Write
 from drive_can_bridge.protocols.families import FAMILIES
 
 ROWS = [row for row in json.loads((Path(__file__).parents[2] / 'vectors' / 'datamodel.json')
@@ -42,7 +43,7 @@ def test_read_requests(row: dict[str, Any]) -> None:
     fields = row['fields']
     request = standard.identifier(fields['rx_base'], fields['address'])
     assert standard.encode_read_request(request, fields['pnu'], fields['count']) == frame(row)
-    assert standard.decode_request(frame(row)) == standard.ReadRequest(
+    assert standard.decode_request(frame(row)) == ReadRequest(
         fields['pnu'], fields['count'])
 
 
@@ -51,7 +52,7 @@ def test_writes(row: dict[str, Any]) -> None:
     fields, (word,) = row['fields'], row['words_u16']
     request = standard.identifier(fields['rx_base'], fields['address'])
     assert standard.encode_write(request, fields['pnu'], word) == frame(row)
-    assert standard.decode_request(frame(row)) == standard.Write(fields['pnu'], word)
+    assert standard.decode_request(frame(row)) == Write(fields['pnu'], (word,))
 
 
 @pytest.mark.parametrize('row', rows('std_read_response', use=('both', 'decode')))
@@ -171,7 +172,7 @@ def test_anything_is_decoded_or_rejected(identifier: int, data: bytes, extended:
         request = standard.decode_request(anything)
     except RemoteProtocolError:
         return
-    if isinstance(request, standard.Write):
+    if isinstance(request, Write):
         assert data[0] == 6
     else:
         assert (data[0], data[3]) == (3, request.count)
