@@ -46,6 +46,7 @@ def write_parameter_file(path: Path, bus: BusConfiguration, sightings: Sequence[
             _write_table(table, sighting, keys)
             written.append(table)
             profile = str(table)
+            lines += [f'      # {remark}' for remark in keys.get('remarks', ())]
         lines += [f'      {kind}_{sighting.station}:   # {sighting.text}', '        bus: main',
                   f'        protocol: {sighting.protocol}',
                   f'        station: {sighting.station}',

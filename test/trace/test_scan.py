@@ -10,6 +10,7 @@ import pytest
 from test_trace_agrees import running
 
 from drive_can_bridge.cli import main as front_end
+from drive_can_bridge.cli.found_file import write_parameter_file
 from drive_can_bridge.cli.survey import LOAD_MAX, Survey
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import BusConfiguration
@@ -246,6 +247,28 @@ def test_simulated_drives_are_found_and_written(tmp_path: Path,
     with running(found) as bus:
         for name in found.drives:
             bus.wait_exchanges(name, 3)
+
+
+@pytest.mark.parametrize(('request_map', 'response_map', 'unfit'), [
+    ('0032003200000000', '00D300D100000000', ['its request map, 50 50,']),
+    ('0032003300000000', '00D300D300000000', ['its response map, 211 211,']),
+    ('007A003300000000', '0081000000000000', ['its request map, 122 51,',
+                                              'its response map, 129,']),
+    ('FFFF000000000000', '00D3000000000000', ['its request map, 65535,']),
+    ('0032003300000000', '00D300D100000000', []),
+    ('0000000000000000', '0000000000000000', [])])
+def test_what_is_written_is_valid_whatever_the_maps(
+        tmp_path: Path, request_map: str, response_map: str, unfit: list[str]) -> None:
+    scout = FAMILIES['datamodel_extended'].make_scout()
+    for identifier, data in ((0x104007A4, request_map), (0x104007E4, response_map)):
+        scout.hear(Frame(identifier, bytes.fromhex(data), True), 1.0)
+    output = tmp_path / 'found.yaml'
+    write_parameter_file(output, BusConfiguration('main', 'virtual', 'a', 500_000),
+                         [scout.sightings[2]], [scout.settings(2)])
+    assert drive_can('validate', output) == 0
+    remarks = [line.strip() for line in output.read_text(encoding='utf-8').splitlines()
+               if 'cannot be exchanged' in line]
+    assert [remark.split(' cannot')[0] for remark in remarks] == [f'# {text}' for text in unfit]
 
 
 def test_beside_a_bridge_all_drives_are_found_by_listening(

@@ -1,6 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Finding DataModel drives, with 29-bit and with 11-bit identifiers."""
 
+from collections.abc import Sequence
 from typing import Any
 
 from drive_can_bridge.core.errors import RemoteProtocolError
@@ -66,8 +67,21 @@ class ExtendedScout(Scout):
 
     def settings(self, station: int) -> dict[str, Any]:
         maps = self.maps.get(station, {})
-        return {'request_numbers': list(maps.get(REQUEST_MAP_BASE, ())),
-                'response_numbers': list(maps.get(RESPONSE_MAP_BASE, ()))}
+        request, response = maps.get(REQUEST_MAP_BASE, ()), maps.get(RESPONSE_MAP_BASE, ())
+        return {'request_numbers': _exchangeable(request),
+                'response_numbers': _exchangeable(response),
+                'remarks': [f'its {name} map, {_numbers(numbers)}, cannot be exchanged: map other '
+                            'parameters, each once'
+                            for name, numbers in (('request', request), ('response', response))
+                            if numbers and not _exchangeable(numbers)]}
+
+
+def _exchangeable(numbers: Sequence[int]) -> list[int]:
+    """Return the parameters of a map; none where no bridge can be configured to exchange them."""
+    unfit = extended.CYCLIC_PARAMETER in numbers or len(set(numbers)) < len(numbers) or any(
+        base <= number < base + extended.SLOTS for number in numbers
+        for base in (REQUEST_MAP_BASE, RESPONSE_MAP_BASE))
+    return [] if unfit else list(numbers)
 
 
 class StandardScout(Scout):
