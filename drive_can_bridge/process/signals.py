@@ -11,6 +11,7 @@ file descriptor, which the interpreter's C handler writes to, by a thread of its
 signal works even while the main thread hangs in a library.
 """
 
+from collections.abc import Callable
 import os
 import queue
 import signal
@@ -40,9 +41,12 @@ class SignalWatcher:
 
     :param keep: go on after the context: in the rest of the process's life, a first signal changes
         nothing any more, and a second still ends it.
+    :ivar last_steps: what is done, in this order, when a second signal ends the process. It must
+        not take long.
     """
 
     def __init__(self, *, keep: bool = False) -> None:
+        self.last_steps: list[Callable[[], object]] = []
         self._keep = keep
         self._reasons: queue.SimpleQueue[str] = queue.SimpleQueue()
         self._read, self._write = socket.socketpair()
@@ -105,6 +109,11 @@ class SignalWatcher:
                     continue
                 self._second = number
                 time.sleep(max(0.0, first + GRACE - time.monotonic()))
+                for step in self.last_steps:
+                    try:
+                        step()
+                    except Exception:  # noqa: BLE001  the process ends, whatever happens
+                        pass
                 os._exit(128 + number)
             first, first_number = time.monotonic(), number
             self._signalled = True

@@ -18,6 +18,7 @@ import sys
 import tempfile
 from typing import TYPE_CHECKING
 
+from drive_can_bridge.core.told import MAY_RUN
 from drive_can_bridge.process.scheduling import be_punctual
 from drive_can_bridge.process.signals import leave, SignalWatcher
 from drive_can_bridge.process.standard_error import StandardError
@@ -25,6 +26,8 @@ from drive_can_bridge.process.standard_error import StandardError
 if TYPE_CHECKING:
     from drive_can_bridge.ros.bridge_node import BridgeNode
 
+#: s that the last words wait for whoever reads them, when a second signal ends the process
+LAST_FLUSH = 0.05
 USAGE = """usage: drive_can_bridge --ros-args --params-file FILE [-r ...] [-p ...]
 Bridge motor drives on CAN buses to ROS 2. Only ROS arguments are taken; 'drive_can validate FILE'
 checks a parameter file, 'drive_can demo' shows the bridge with simulated drives."""
@@ -36,6 +39,7 @@ def main(args: Sequence[str] | None = None) -> int:
     be_punctual()
     # in a process of our own, signals are looked after to the very end
     with SignalWatcher(keep=args is None) as watcher, StandardError() as standard_error:
+        watcher.last_steps.append(lambda: standard_error.flush(LAST_FLUSH))
         if standard_error.is_terminal:  # rcutils sees a pipe
             os.environ.setdefault('RCUTILS_COLORIZED_OUTPUT', '1')
         code = watcher.exit_code(_main(watcher, arguments))
@@ -105,6 +109,7 @@ def _run(watcher: SignalWatcher, arguments: Sequence[str]) -> int:
         bridge.destroy_node()
         return 1
     spinner.start()
+    watcher.last_steps.insert(0, lambda: _name_the_unstopped(bridge))
     code = 0
     try:
         if not watcher.signalled:  # else nothing is begun that had to be stopped
@@ -118,6 +123,15 @@ def _run(watcher: SignalWatcher, arguments: Sequence[str]) -> int:
         bridge.close()
         bridge.destroy_node()
     return code
+
+
+def _name_the_unstopped(bridge: 'BridgeNode') -> None:
+    """Say whose stop is cut short by a second signal."""
+    for name, drive in list(bridge.drives.items()):
+        session = drive.session
+        if not session.stopped and (session.told.owed or session.told.ran):
+            print(f'{name}: the bridge ends before the drive has confirmed its stop: {MAY_RUN}',
+                  file=sys.stderr, flush=True)
 
 
 def _nothing_configured(bridge: 'BridgeNode', arguments: Sequence[str]) -> str:

@@ -10,6 +10,7 @@ import tty
 from parameter_files import bridge_file, CONVEYOR
 from processes import Client, Process, Processes
 import pytest
+from test_system_datamodel_standard import SHORT
 from test_system_reconnection import NEUTRAL, rearm_and_move, start_moving
 from waiting import wait_for, wait_for_end
 
@@ -156,6 +157,25 @@ def test_two_signals_while_active(processes: Processes, client: Client, namespac
     assert bridge.wait() in (128 + signal.SIGINT, 128 + signal.SIGTERM)
     # whoever stops a whole group of processes sends two at once: the drive is told all the same
     wait_for_end(lambda: simulator.frames('^003FFFF0.* R$'), ['003FFFF0#0000000000000000 R'])
+
+
+def test_drives_that_a_second_signal_leaves_unstopped_are_named(
+        processes: Processes, client: Client, namespace: str, tmp_path: Path) -> None:
+    """It has to be told by writes that nobody confirms, which takes longer than the grace."""
+    file = bridge_file(tmp_path, drives={'conveyor': SHORT})
+    simulator = processes.simulator(file)
+    bridge = processes.bridge(file, namespace)
+    start_moving(client, f'/{namespace}/conveyor')
+    simulator.send(signal.SIGSTOP)
+    try:
+        bridge.send(signal.SIGINT)
+        client.ask('rest', seconds=0.1)     # twice in the same breath is one signal
+        bridge.send(signal.SIGINT)
+        assert bridge.wait() == 128 + signal.SIGINT
+    finally:
+        simulator.send(signal.SIGCONT)
+    bridge.error('^conveyor: the bridge ends before the drive has confirmed its stop: '
+                 'it may still be running')
 
 
 def test_process_that_stood_still(processes: Processes, client: Client, namespace: str,
