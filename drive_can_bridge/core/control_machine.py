@@ -33,7 +33,7 @@ class ControlMachine:
     :meth:`next_timer`. Time is that of a steady clock, in s.
 
     :param timeout: seconds until an unconfirmed request fails.
-    :param pulse: how often the reset word leaves.
+    :param pulse: how often the reset word leaves: once where writes are acknowledged.
     :param members: names of the drives, where several share the control word.
     :param unheard: says which of them may run without answering any more; '' if none.
     :param wording: what the family knows of status words.
@@ -396,4 +396,5 @@ class ControlMachine:
         hint = '' if self._wording is None or raw is None else self._wording.hint(raw)
         pulsed = under_way is not None and under_way.pulsed
         return stuck_text(self._reports, self._table, self.state, self._timeout,
-                          f'control word {self.word:04X}h', sent=self._sent, pulsed=pulsed) + hint
+                          f'control word {self.word:04X}h', sent=self._sent, pulsed=pulsed,
+                          acknowledged=self._pulse < RESET_CYCLES) + hint

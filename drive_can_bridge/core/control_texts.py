@@ -36,17 +36,19 @@ def state_text(reports: StatusReports, table: ControlTable, wording: Wording | N
 
 
 def stuck_text(reports: StatusReports, table: ControlTable, state: str, timeout: float,
-               word: str, *, sent: bool, pulsed: bool) -> str:
+               word: str, *, sent: bool, pulsed: bool, acknowledged: bool) -> str:
     """
     Say that nothing was confirmed in time, and as much as is known of the reason.
 
     :param pulsed: the pulse that resets a fault has left.
+    :param acknowledged: ``sent`` says that the drive has acknowledged the word.
     """
     if pulsed and reports.answered:
         return f'fault still present after {timeout:g} s ({reports.text})'
     text = f'no confirmation in {timeout:g} s: stuck in state {state} ({reports.text})'
     if not sent:
-        return f'{text}; {word} could not be sent'
+        why = 'was not acknowledged' if acknowledged else 'could not be sent'
+        return f'{text}; {word} {why}'
     if not reports.answered:
         return f'{text}; no status word since {word}'
     if reports.says(table.enabled):

@@ -945,6 +945,16 @@ def test_reset_that_could_not_be_sent_says_so() -> None:
         'control word 0080h could not be sent')]
 
 
+def test_word_that_was_not_acknowledged_says_so() -> None:
+    """Nobody knows whether it arrived."""
+    control = ControlMachine(FULL, timeout=2.0, pulse=1)
+    cycle(control, FAULT, 0.0)
+    control.request(ControlRequest(RESET_FAULT), 0.0)
+    control.handle_timer(2.0)
+    (_, _, text), = outcomes(control)
+    assert text.endswith('; control word 0080h was not acknowledged')
+
+
 def test_each_reset_is_one_rising_edge() -> None:
     control = faulted()
     control.request(ControlRequest(RESET_FAULT), 0.0)
