@@ -231,7 +231,7 @@ def _report(args: Namespace, drive: Drive, plan: RestorePlan, result: RestoreRes
             f'{_list(result.stopped)}. Repeat the command to go on'))
         return interrupted.exit_code
     if wrong:
-        complain(printable(f'{drive.name}: written: {_list(result.written)}; not as in the '
+        complain(printable(f'{drive.name}: confirmed: {_list(result.written)}; not as in the '
                            'file:'))
         for each in result.wrong:
             found = 'unknown' if each.found is None else _with_unit(plan, each.name, each.found)

@@ -264,7 +264,7 @@ class TestRestore:
         said = command('restore', str(file), '--yes')
         assert said.code == 1
         assert said.errors[-2:] == [
-            'conveyor: written: maximum_speed; not as in the file:',
+            'conveyor: confirmed: maximum_speed; not as in the file:',
             '  ramp_time: 1 s instead of 5 s: read back 1 instead of 5']
         said = command('restore', str(file), '--yes', '--json')
         assert said.documents[-1] == {
