@@ -42,13 +42,16 @@ class Users:
     :param control_refusal: (action, refusal) -> what is said instead of the usual refusal of a
         control action, '' meaning that it is not refused.
     :param answered: called after the answer of a request that was served.
+    :param control: takes what is asked of the drive by its control word; None: its own machine.
     """
 
     def __init__(self, session: 'Session', server: RequestServer, *,
                  blocked: Callable[[float], str] = lambda now: '',
                  control_refusal: Callable[[ControlAction, str], str] = _as_usual,
-                 answered: Callable[[Request, Outcomes], None] = _take_no_note) -> None:
+                 answered: Callable[[Request, Outcomes], None] = _take_no_note,
+                 control: Callable[[ControlRequest, float], None] | None = None) -> None:
         self._session = session
+        self._control = control
         self._blocked = blocked
         self._judge = control_refusal
         self._desk = RequestDesk(
@@ -88,6 +91,9 @@ class Users:
         refusal = self.control_refusal(request.action)
         if refusal or session.control is None:
             session.report.note(ControlCompleted(request, False, refusal))
+            return
+        if self._control is not None:
+            self._control(request, now)
             return
         session.control.request(request, now)
         session.control_changed(now)

@@ -8,7 +8,8 @@ and actual values: with four inverters each is heard every fourth period.
 
 The inverter with the lowest station leads. Its session sends everything and has the setpoints;
 its services bring the whole group to a state. The sessions of the others receive, serve the
-parameters of their inverter, and refuse what only the leader can do.
+parameters of their inverter, and refuse what only the leader can do; but whoever stops one of
+them stops all.
 
 All sessions of a group live on one bus, under one lock, so that they may call each other.
 """
@@ -17,7 +18,8 @@ from collections.abc import Sequence
 import math
 
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
+from drive_can_bridge.core.events import Event
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.requests import BRIDGE_INACTIVE
 from drive_can_bridge.core.told import MAY_RUN
@@ -59,6 +61,7 @@ class Group:
         self.control = make_control(
             parameter_set=own.options.parameter_set, timeout=own.control_timeout,
             members=[drive.name for drive in drives], unheard=self._unheard)
+        self._asked_by: dict[ControlRequest, CannordSession] = {}
         self._turn = 0
         self._turn_begun = 0    # what it was when this cycle began
         self.members: list[CannordSession] = []
@@ -154,12 +157,32 @@ class Group:
 
         :param refusal: what would be said of an inverter alone.
         """
-        if member is not self._leader:
+        if member is not self._leader and action not in _STOPS:
             lead = self._lead.name
             return f'{lead} leads the broadcast group: call ~/{_SERVICES[action]} of {lead}'
         # a stop is good for those that are there
         there = any(each.online for each in self.members)
         return '' if refusal == DRIVE_OFFLINE and there else refusal
+
+    def stop_for(self, member: CannordSession, request: ControlRequest, now: float) -> None:
+        """Stop all, as a user of an inverter that is led has asked for: none stops alone."""
+        self._asked_by[request] = member
+        self.control.request(request, now)
+        self._leader.control_changed(now)
+
+    def delivered(self, events: list[Event]) -> list[Event]:
+        """Hand the outcomes of such requests to whom they belong; return all other events."""
+        if not self._asked_by:
+            return events
+        others = []
+        for event in events:
+            member = (self._asked_by.pop(event.request, None)
+                      if isinstance(event, ControlCompleted) else None)
+            if member is None:
+                others.append(event)
+            else:
+                member.report.note(event)
+        return others
 
     def cyclic_refusal(self, parameter: Parameter) -> str:
         """Say why a setpoint of an inverter that is led is not written by request."""
@@ -182,7 +205,5 @@ class Group:
         return [member.configuration for member in self.members[1:]]
 
 
-_SERVICES = {
-    ControlAction.ENABLE: 'enable', ControlAction.DISABLE: 'enable',
-    ControlAction.QUICK_STOP: 'quick_stop', ControlAction.RESET_FAULT: 'reset_fault',
-}
+_STOPS = (ControlAction.DISABLE, ControlAction.QUICK_STOP)
+_SERVICES = {ControlAction.ENABLE: 'enable', ControlAction.RESET_FAULT: 'reset_fault'}

@@ -17,13 +17,14 @@ data beside them: lower identifiers win on the bus.
 """
 
 from dataclasses import replace
+from functools import partial
 import math
 from typing import TYPE_CHECKING
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.errors import RemoteProtocolError
-from drive_can_bridge.core.events import ForeignMasterSeen
+from drive_can_bridge.core.events import Event, ForeignMasterSeen
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.process_image import ProcessImage
 from drive_can_bridge.core.roles import publish_it, Roles
@@ -100,7 +101,8 @@ class CannordSession(Session):
         self._timeout = TimeoutWatch(drive, self._channel, self._access, self.report.note)
         self.users = Users(
             self, ChannelServer(self._channel, self._access),
-            control_refusal=self._control_refusal, answered=self._timeout.request_answered)
+            control_refusal=self._control_refusal, answered=self._timeout.request_answered,
+            control=None if led_by is None else partial(led_by.stop_for, self))
         self._book = ExchangeBook(drive, self.statistics)
         self._timer = self._book.timer
         self._exchange = CyclicExchange(
@@ -340,6 +342,10 @@ class CannordSession(Session):
     def _control_refusal(self, action: ControlAction, refusal: str) -> str:
         return refusal if self._group is None else self._group.control_refusal(
             self, action, refusal)
+
+    def take_events(self) -> list[Event]:
+        events = super().take_events()
+        return events if self._group is None or self._led else self._group.delivered(events)
 
     def facts(self) -> dict[str, str]:
         return {} if self._group is None else {'broadcast': self._group.fact(self)}

@@ -589,11 +589,49 @@ def test_the_end_of_the_bridge_is_the_reason_whoever_is_told_first(order: tuple[
                                     'drive again'))]
 
 
+@pytest.mark.parametrize(('action', 'word'), [(DISABLE, '7E04'), (QUICK_STOP, '7A04')])
+@pytest.mark.parametrize('name', ['hoist', 'turn'])
+def test_whoever_stops_a_member_stops_all(name: str, action: ControlAction, word: str) -> None:
+    bus = driven()
+    bus.asks(action, name)
+    assert words(bus.live(0.02))[0] == word
+    bus.answers = dict.fromkeys((1, 2, 3), READY)
+    bus.live(0.3)
+    assert bus.outcomes() == []
+    assert bus.outcomes(name) == [(action.value, True, 'ready to switch on')]
+    assert set(words(bus.live(0.1))) == {'7E04'}
+
+
+def test_members_that_are_lost_do_not_keep_the_others_from_being_stopped() -> None:
+    bus = driven()
+    del bus.answers[3]
+    bus.live(0.05)
+    bus.asks(QUICK_STOP, 'turn')
+    assert words(bus.live(0.02))[0] == '7A04'
+    bus.answers = {1: READY, 2: READY}
+    bus.live(3.0)
+    assert bus.outcomes() == []
+    (_, success, message), = bus.outcomes('turn')
+    assert not success
+    assert 'turn' in message
+
+
+def test_stop_of_a_member_while_the_bridge_ends() -> None:
+    bus = driven()
+    bus.asks(QUICK_STOP, 'hoist')
+    for session in bus.sessions:
+        session.deactivate(bus.now)
+    bus.live(0.3)
+    assert bus.outcomes() == []
+    (_, success, message), = bus.outcomes('hoist')
+    assert (success, message) == (False, 'bridge inactive')
+
+
 def test_members_name_their_leader() -> None:
     bus = three()
     texts = [bus.session('hoist').users.control_refusal(action) for action in ControlAction]
-    assert texts == [f'lift leads the broadcast group: call ~/{name} of lift'
-                     for name in ('enable', 'enable', 'quick_stop', 'reset_fault')]
+    assert texts == ['lift leads the broadcast group: call ~/enable of lift', '', '',
+                     'lift leads the broadcast group: call ~/reset_fault of lift']
     control = bus.session('hoist').control
     assert control is not None
     assert control.state == 'ready to switch on'
