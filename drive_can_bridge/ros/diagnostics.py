@@ -18,6 +18,7 @@ from drive_can_bridge.core.words import value_text
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.ros.drive_node import DriveNode
 from drive_can_bridge.ros.quality import overriding
+from drive_can_bridge.transport.end_point import REFUSED_FRAMES
 from drive_can_bridge.transport.error_frames import ADVICE_DISTURBED, BUS_OFF, BusError
 from drive_can_bridge.transport.link import steady_now
 
@@ -43,7 +44,7 @@ class BusReporter:
     def __init__(self, exchange: BusExchange) -> None:
         self._exchange = exchange
         self._bits = 0
-        self._failures = 0
+        self._failures = self._refused = 0
         self._error_frames = 0
         self._overflowed = 0
         self._reported_at = math.nan
@@ -57,13 +58,15 @@ class BusReporter:
         if elapsed > 0:
             self.load_percent = (100.0 * STUFFING * (bits - self._bits)
                                  / (elapsed * exchange.bus.bitrate))
-        failures, error_frames = link.send_failures, link.error_frames
+        refused, error_frames = link.refused_frames, link.error_frames
+        failures = link.send_failures + refused
         overflowed = link.overflowed_frames
         new_failures = failures - self._failures
+        why = REFUSED_FRAMES if refused > self._refused else link.last_error
         new_errors = error_frames - self._error_frames
         new_overflowed = overflowed - self._overflowed
         self._bits, self._reported_at = bits, now
-        self._failures, self._error_frames = failures, error_frames
+        self._failures, self._refused, self._error_frames = failures, refused, error_frames
         self._overflowed = overflowed
         level, message = DiagnosticStatus.OK, f'{exchange.bus.interface} {exchange.bus.channel}'
         state = exchange.bus_state
@@ -82,7 +85,7 @@ class BusReporter:
                        f'traffic, see what else it does')
         elif new_failures:
             level = DiagnosticStatus.WARN
-            message = f'{new_failures} frames not sent: {link.last_error}'
+            message = f'{new_failures} frames not sent: {why}'
         elif self.load_percent > LOAD_WARNING:
             level = DiagnosticStatus.WARN
             message = (f'bus load {self.load_percent:.0f} %: raise the period of some drives or '
@@ -90,7 +93,7 @@ class BusReporter:
         return Report(f'bus {exchange.bus.name}', level, message, {
             'state': state,
             'load_percent': f'{self.load_percent:.1f}',
-            'frames_sent': str(link.frames_sent),
+            'frames_sent': str(link.frames_sent - refused),
             'frames_received': str(link.frames_received),
             'frames_rejected': str(exchange.frames_rejected),
             'error_frames': str(error_frames),

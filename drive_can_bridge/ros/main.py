@@ -11,6 +11,7 @@ everything heavy is imported inside functions here.
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 import gc
 import os
 from pathlib import Path
@@ -109,7 +110,8 @@ def _run(watcher: SignalWatcher, arguments: Sequence[str]) -> int:
         bridge.destroy_node()
         return 1
     spinner.start()
-    watcher.last_steps.insert(0, lambda: _name_the_unstopped(bridge))
+    last_words = partial(_name_the_unstopped, bridge)
+    watcher.last_steps.insert(0, last_words)
     code = 0
     try:
         if not watcher.signalled:  # else nothing is begun that had to be stopped
@@ -119,6 +121,7 @@ def _run(watcher: SignalWatcher, arguments: Sequence[str]) -> int:
                 code = 1
         bridge.stop()
     finally:
+        watcher.last_steps.remove(last_words)   # which keeps the node
         spinner.stop()
         bridge.close()
         bridge.destroy_node()

@@ -24,7 +24,7 @@ from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, TransportError
 from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.transport.clock import steady_now as steady_now
-from drive_can_bridge.transport.end_point import EndPoint, REFUSED_FRAMES
+from drive_can_bridge.transport.end_point import EndPoint
 from drive_can_bridge.transport.error_frames import ADVICE_ALONE, BUS_OFF, BusError
 from drive_can_bridge.transport.failures import in_words
 from drive_can_bridge.transport.port import open_port
@@ -93,14 +93,14 @@ class Link:
         self._closing = threading.Event()
         self._first_attempt = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f'bus {bus.name}', daemon=True)
-        self._sent = 0
+        self.frames_sent = 0
         self.frames_received = 0
-        self._failures = 0
-        self._refused = 0   # counted by the reader alone, unlike what senders count
+        self.send_failures = 0
         self.reconnections = 0
         self._closed_error_frames = 0
         self._closed_bus_off_count = 0
         self._closed_overflowed_frames = 0
+        self._closed_refused_frames = 0
         self._closed_controller = ''
         self._closed_bus_error: BusError | None = None
         self.last_error = ''
@@ -129,24 +129,24 @@ class Link:
         """
         port = self._port
         if port is None or self._loss is not None or self._blocked is not None:
-            self._failures += 1
+            self.send_failures += 1
             return False
         try:
             # one frame waits for room; the others of the bus need not wait for the same
             port.send(frame, self._send_timeout if self._no_room_since is None else 0.0)
         except BusUnavailable as error:
-            self._failures += 1
+            self.send_failures += 1
             self.last_error = in_words(error)
             if self._port is port:  # else the reader has noticed already
                 self._loss = self.last_error
             return False
         except TransportError as error:
-            self._failures += 1
+            self.send_failures += 1
             self.last_error = in_words(error)
             self._no_room()
             return False
         self._no_room_since = None
-        self._sent += 1
+        self.frames_sent += 1
         return True
 
     def _no_room(self) -> None:
@@ -161,16 +161,6 @@ class Link:
     def is_open(self) -> bool:
         """The bus is there."""
         return self._port is not None and self._loss is None and self._blocked is None
-
-    @property
-    def frames_sent(self) -> int:
-        """Frames that the adapter has taken, as far as it tells."""
-        return self._sent - self._refused
-
-    @property
-    def send_failures(self) -> int:
-        """Frames that were not sent."""
-        return self._failures + self._refused
 
     @property
     def last_bus_error(self) -> BusError | None:
@@ -189,6 +179,11 @@ class Link:
         """Received frames that were lost because they were not fetched in time."""
         port = self._port
         return self._closed_overflowed_frames + (port.overflowed_frames if port else 0)
+
+    @property
+    def refused_frames(self) -> int:
+        """Frames that were counted as sent, and that the adapter has refused since."""
+        return self._closed_refused_frames + (self._port.refused_frames if self._port else 0)
 
     @property
     def error_frames(self) -> int:
@@ -249,7 +244,7 @@ class Link:
         receive = port.receive
         listener = self._listener.frame_received
         closing = self._closing
-        rejected = refused = 0
+        rejected = 0
         while not closing.is_set():
             if self._loss is not None:
                 raise BusUnavailable(self._loss)
@@ -262,10 +257,6 @@ class Link:
             elif port.rejected_frames != rejected:
                 self._listener.frames_rejected += port.rejected_frames - rejected
                 rejected = port.rejected_frames
-            elif port.refused_frames != refused:
-                self._refused += port.refused_frames - refused
-                refused = port.refused_frames
-                self.last_error = REFUSED_FRAMES
             frame = receive(RECEIVE_TIMEOUT)
 
     def _sit_out(self, port: EndPoint, reason: str) -> None:
@@ -299,6 +290,7 @@ class Link:
             self._closed_error_frames += port.error_frames
             self._closed_bus_off_count += port.bus_off_count
             self._closed_overflowed_frames += port.overflowed_frames
+            self._closed_refused_frames += port.refused_frames
             # a controller that is being tried again is in no other state that anybody knows
             self._closed_controller = BUS_OFF if port.controller == BUS_OFF else ''
             port.close()

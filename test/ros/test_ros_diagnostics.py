@@ -142,6 +142,22 @@ def test_what_is_over_is_not_told_again(bridge: StartBridge) -> None:
     assert report.facts['send_failures'] == '2'
 
 
+def test_frames_that_the_adapter_refused_afterwards_were_not_sent(
+        bridge: StartBridge, monkeypatch: pytest.MonkeyPatch) -> None:
+    one = bridge(by_hand())
+    one.online()
+    bus, _ = reporters(one)
+    link = one.node.exchanges['main'].link
+    monkeypatch.setattr(type(link), 'refused_frames', 3)
+    link.frames_sent, link.send_failures = 1000, 1
+    report = bus.report(steady_now())
+    assert (report.level, report.message) == (
+        DiagnosticStatus.WARN, '4 frames not sent: the adapter refuses frames')
+    assert report.facts['send_failures'] == '4'
+    assert 997 <= int(report.facts['frames_sent']) < 1100
+    assert bus.report(steady_now()).level == DiagnosticStatus.OK
+
+
 def test_the_load_is_that_of_both_directions(bridge: StartBridge) -> None:
     one = bridge(by_hand())
     one.online()

@@ -5,7 +5,7 @@ from functools import partial
 import math
 from typing import Any
 
-from clients import Client
+from clients import Client, wait_until
 import pytest
 from rcl_interfaces.msg import Parameter, ParameterEvent, ParameterType, ParameterValue
 from rclpy.impl.implementation_singleton import rclpy_implementation
@@ -28,7 +28,7 @@ def received(client: Client, message: Any, numbers: Any, values: list[tuple[Any,
     assert prepared is not None
     for value in values:
         prepared.publish(value)
-    topic.wait(lambda _: len(topic.messages) >= len(values))
+    wait_until(lambda: len(topic.messages) >= len(values))     # they may be there by now
     return list(topic.messages)
 
 
