@@ -91,7 +91,7 @@ class Port(EndPoint):
         if message is None:
             self._earliest = steady_now()
             self._limit_line()
-            if self._answers is not None and self._answers.takes_nothing(time.monotonic()):
+            if self._answers is not None and self._answers.takes_nothing(self._earliest):
                 self._lost = True
                 raise BusUnavailable(f'{REFUSED_FRAMES}; {ADVICE_ALONE}')
             return None

@@ -14,6 +14,7 @@ import time
 from typing import Any
 
 from drive_can_bridge.transport.adapter_answers import AdapterAnswers
+from drive_can_bridge.transport.clock import steady_now
 
 #: s that each command to a serial adapter may take while it is opened
 OPEN_TIMEOUT = 0.5
@@ -100,7 +101,7 @@ class _WatchedSlcan(_WatchedPort):
     def _read(self, timeout: float | None) -> str | None:
         line: str | None = super()._read(timeout)  # type: ignore[misc]
         if line:
-            self.drive_can_answers.take(line, time.monotonic())
+            self.drive_can_answers.take(line, steady_now())
         return line
 
 

@@ -4,12 +4,13 @@
 import math
 
 from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.frame import worst_bits
 from drive_can_bridge.protocols.datamodel.channel import ParameterCourier, Procedure, Read
+from drive_can_bridge.protocols.datamodel.extended import PAYLOAD
 from drive_can_bridge.protocols.datamodel.numbers import Numbers
 from drive_can_bridge.protocols.polling import Chunk, round_time
 
-#: worst-case stuffing, eight bytes, 11-bit identifier, with the interframe space
-FRAME_BITS = 135
+FRAME_BITS = worst_bits(PAYLOAD, extended=False)
 
 
 def reads(drive: DriveConfiguration) -> list[Chunk]:

@@ -9,7 +9,6 @@ silent; that is how it is found. Setpoints are written only to a drive that answ
 back (:mod:`.stop_writes`).
 """
 
-
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.frame import Frame
