@@ -17,15 +17,18 @@ A session never blocks, never raises on anything a drive sends, and sends nothin
 ``activate``, after ``deactivate`` has run its course, or while the bus is down.
 
 What is the same for all families stands here: when a drive is found and lost, what is taken back
-then, how a stop begins and what is said when it was not acknowledged. A family fills in what the
-exchange of its drives is: :meth:`Session.begin`, :meth:`Session.begin_stop`,
-:meth:`Session.go_idle`, frames, timers, and a few occasions to act (below "what a family may
-add"). What goes on beside that stands in the parts that a session is put together from.
+then, how a stop begins and what is said when it was not acknowledged, whose turn it is when. A
+family fills in what the exchange of its drives is: :meth:`Session.begin`,
+:meth:`Session.begin_stop`, :meth:`Session.fall_silent`, frames, and a few occasions to act (below
+"what a family may add"). What goes on beside that stands in the parts that a session is put
+together from (:meth:`Session.look_after`).
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
+from enum import Enum
+import math
 from typing import Any
 
 from drive_can_bridge.core.command_gate import CommandGate
@@ -36,6 +39,7 @@ from drive_can_bridge.core.events import Event
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.last_sent import LastSent
 from drive_can_bridge.core.outbox import Outbox
+from drive_can_bridge.core.parts import AcyclicPart, Part
 from drive_can_bridge.core.process_image import ProcessImage
 from drive_can_bridge.core.reporter import Reporter
 from drive_can_bridge.core.requests import BRIDGE_INACTIVE, BUS_DOWN
@@ -48,6 +52,17 @@ from drive_can_bridge.core.users import Users
 
 #: advice until more is known
 LOOKING = 'being looked for'
+
+
+class Stage(Enum):
+    """What a session is doing for its drive."""
+
+    #: serving requests at most
+    IDLE = 'idle'
+    #: looking for it, or exchanging
+    RUNNING = 'running'
+    #: telling it to stand still, before it is left alone
+    STOPPING = 'stopping'
 
 
 class Session(ABC):
@@ -68,6 +83,7 @@ class Session(ABC):
     :ivar retry: how long and how often the drive is asked.
     :ivar users: what they want of the drive; the family says who serves that.
     :ivar report: events, and what is missing while the drive is offline.
+    :ivar stage: what is being done for the drive.
     :ivar online: the drive exchanges process data.
     :ivar ever_online: it did so at least once since activation.
     :ivar serving: it only cares for parameter requests; ``online``: the last one was answered.
@@ -78,6 +94,7 @@ class Session(ABC):
     """
 
     users: Users
+    _acyclic: AcyclicPart
 
     def __init__(self, drive: DriveConfiguration, control: ControlMachine | None, *,
                  image: ProcessImage | None = None, roles: Roles | None = None,
@@ -100,10 +117,20 @@ class Session(ABC):
         self.retry = RetryPolicy(
             timeout=drive.parameter_timeout, attempts=drive.parameter_retries + 1,
             offline=lambda: self.state is DriveState.OFFLINE)
+        self.stage = Stage.IDLE
         self.active = self.serving = self.bus_available = self.online = self.ever_online = False
         self.how_to_enable = 'call ~/enable'
         self.partners: Sequence[Session] = ()
         self.phase: float | None = None
+        self._timed: list[tuple[Callable[[], float], Callable[[float], None]]] = []
+
+    def look_after(self, *parts: Part, channel: AcyclicPart) -> None:
+        """Name the parts, in the order in which they act; then come control word and channel."""
+        self._acyclic = channel
+        self._timed = [(part.next_timer, part.handle_timer) for part in parts]
+        if self.control is not None:
+            self._timed.append((self.control.next_timer, self._look_after_control))
+        self._timed.append((channel.next_timer, channel.advance))
 
     # -- life cycle -------------------------------------------------------------------------------
 
@@ -131,6 +158,8 @@ class Session(ABC):
         self.active = False
         unheard = not self.online and self.told.doubt()
         owes = self.prepare_stop(now)
+        if owes:
+            self.stage = Stage.STOPPING
         self.users.fail_all(BRIDGE_INACTIVE)
         self.withdraw(BRIDGE_INACTIVE, now)
         if owes and self.begin_stop(now):
@@ -145,9 +174,9 @@ class Session(ABC):
         self.go_idle('deactivated')
 
     @property
-    @abstractmethod
     def stopped(self) -> bool:
         """The stop has run its course (also: it never had to)."""
+        return self.stage is Stage.IDLE
 
     @property
     @abstractmethod
@@ -178,9 +207,18 @@ class Session(ABC):
         self.go_idle('deactivated')
         self.outbox.clear()
 
-    @abstractmethod
+    def go_idle(self, advice: str) -> None:
+        """Send nothing more, and be offline."""
+        self.stage = Stage.IDLE
+        self.fall_silent()
+        self.be_offline(advice)
+
     def time_lost(self, now: float) -> None:
         """Handle a process that stood still: nothing stale goes out, setpoints want re-arming."""
+        self._acyclic.time_lost(now)
+        if self.stage is Stage.RUNNING:
+            self.stood_still(now)
+            self.start_over(now)
 
     def start_over(self, now: float) -> None:
         """Begin anew: nothing is known of the drive."""
@@ -190,6 +228,7 @@ class Session(ABC):
         else:
             self.withdraw(reason, now)
         self.setpoints.forget()
+        self.stage = Stage.RUNNING
         self.begin(now)
 
     def lose(self, reason: str, now: float) -> None:
@@ -243,8 +282,8 @@ class Session(ABC):
         """Begin to tell the drive to stand still; False: there is no way to tell it."""
 
     @abstractmethod
-    def go_idle(self, advice: str) -> None:
-        """Send nothing more, and be offline."""
+    def fall_silent(self) -> None:
+        """Forget everything that was to be sent, or is under way."""
 
     # -- what a family may add --------------------------------------------------------------------
 
@@ -272,13 +311,25 @@ class Session(ABC):
             is sent in answer to it leaves now.
         """
 
-    @abstractmethod
     def handle_timer(self, now: float) -> None:
         """Do what is due. Safe to call at any time."""
+        for due, act in self._timed:
+            if now >= due():
+                act(now)
 
-    @abstractmethod
     def next_timer(self) -> float:
         """Return when ``handle_timer`` wants to be called next; infinity: never."""
+        soonest = math.inf
+        for due, _ in self._timed:      # after every frame: min() costs twice as much
+            at = due()
+            if at < soonest:
+                soonest = at
+        return soonest
+
+    def _look_after_control(self, now: float) -> None:
+        if self.control is not None:
+            self.control.handle_timer(now)
+            self.control_changed(now)
 
     def take_frames(self) -> list[Frame]:
         """Return the frames to be sent now, in order."""

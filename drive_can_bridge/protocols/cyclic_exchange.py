@@ -2,10 +2,15 @@
 """
 The exchange of protocols with a cyclic service: all setpoints and the control word, once a period.
 
-A session says when cycles begin and how its telegrams are encoded; here stands what every such
-session has to see to. What the bus did not take counts for nothing: a cycle has been sent when all
-its frames have left. The last cycles before silence are counted; where a drive that ran has
-answered none of those that stop it, the answer to the last one is waited for a moment.
+A family says how its telegrams are encoded and sent, what an answer means, and when cycles begin;
+here stands what every such session has to see to:
+
+* *The beat.* A cycle begins when its time has come. What has not been answered by then is missed,
+  and after ``missed_limit`` of those in a row the drive is lost.
+* *What has left.* What the bus did not take counts for nothing: a cycle has been sent when all its
+  frames have left.
+* *The end.* The last cycles before silence are counted; where a drive that ran has answered none
+  of those that stop it, the answer to the last one is waited for a moment.
 """
 
 from collections.abc import Callable
@@ -13,7 +18,7 @@ import math
 from typing import Generic, TypeVar
 
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.core.session import Session
+from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.protocols.exchange_book import ExchangeBook
 
 #: cyclic frames with neutral setpoints that are sent before a drive is left alone
@@ -30,47 +35,79 @@ class CyclicExchange(Generic[TelegramT]):
     """
     The cycles of one drive.
 
-    :param book: counts them, and the answers.
     :param encode: makes a telegram of the raw integers of all setpoints, with the control word
         among them if it has its slot.
+    :param send: (telegram, now): hands out its frames (:meth:`put`), and says from whom an answer
+        is expected (:meth:`expect_answer`).
     :param slot: of the control word; None: it is not sent cyclically.
+    :param silence: what is said of a drive that does not answer.
+    :param advice: what to look at then.
+    :param missed: (why the drive counts as lost, '' if it does not yet; now): what becomes of a
+        cycle that was not answered, unless the drive is being stopped; None: it is lost.
+    :param ended: (now): called when the last cycle before silence has left, and that of a stop was
+        answered or waited for; None: that ends the stop.
+    :param settled: called when an exchange ends, answered or not.
     :param left: called when a cycle has left.
-    :param ended: called when the last cycle before silence has left, and that of a stop was
-        answered or waited for.
     :param unheard: tells whether somebody who ran may not have heard the stop; None: the drive
         has answered none of its cycles.
+    :param heeded: an answer shows that what the drive was told last has arrived.
+    :ivar book: counts the cycles, and the answers.
+    :ivar timer: when the next cycle is due.
     :ivar word: the control word of the last cycle.
     :ivar cycles_left: still to be sent before silence; -1: no end is planned.
-    :ivar whole: the bus has taken all frames of the last cycle so far.
+    :ivar again: this cycle follows one of which the bus has not taken everything.
     """
 
-    def __init__(self, session: Session, book: ExchangeBook,
-                 encode: Callable[[list[int]], TelegramT], *, slot: int | None,
-                 ended: Callable[[float], None],
+    def __init__(self, session: Session, encode: Callable[[list[int]], TelegramT],
+                 send: Callable[[TelegramT, float], None], *, slot: int | None, silence: str,
+                 advice: str = '', missed: Callable[[str, float], None] | None = None,
+                 ended: Callable[[float], None] | None = None,
+                 settled: Callable[[], None] | None = None,
                  left: Callable[[], None] | None = None,
-                 unheard: Callable[[], bool] | None = None) -> None:
+                 unheard: Callable[[], bool] | None = None, heeded: bool = True) -> None:
+        self.book = ExchangeBook(session.configuration, session.statistics)
+        self.timer = self.book.timer
         self.word: int | None = None
         self.cycles_left = -1
-        self.whole = True
+        self.again = False
         self._session = session
-        self._book = book
-        self._timer = book.timer
-        self._encode = encode
+        self._encode, self._send = encode, send
         self._slot = slot
-        self._ended = ended
+        self._silence, self._advice = silence, advice
+        self._missed = missed or self._lose
+        self._ended = ended or self._end_stop
+        self._settled = settled
         self._told = left
-        self._unheard = self._unanswered if unheard is None else unheard
+        self._unheard = unheard or self._unanswered
+        self._heeded = heeded
+        self._answer_due = math.inf
         self._telegram: TelegramT | None = None
         self._raws: list[int] | None = None     # in it, until it has left
         self._runs = False                      # it holds anything but neutral and disable
         self._frames_out = 0                    # of which nobody has said what became of them
+        self._whole = True                      # the bus has taken all others of this cycle
         self._stopping = False                  # the last cycles are those of a stop
         self._waiting = False                   # they have left, and an answer is waited for
 
-    # -- sending ----------------------------------------------------------------------------------
+    # -- the beat ---------------------------------------------------------------------------------
 
-    def begin(self, now: float) -> TelegramT:
-        """Begin a cycle: return what is to be sent now. The fast path of the timer."""
+    def next_timer(self) -> float:
+        """Return when :meth:`handle_timer` has something to do."""
+        due = self.timer.due
+        return due if due < self._answer_due else self._answer_due
+
+    def handle_timer(self, now: float) -> None:
+        """Do what is due once a period. The fast path of the timer."""
+        if now < self.timer.due:
+            if now >= self._answer_due:
+                self.settle(now)
+            return
+        if self._waiting:
+            self._end(now)
+            return
+        self.settle(now)
+        if self.timer.due == math.inf:  # what was missed has ended the cycles
+            return
         session = self._session
         session.gate.expire(now)
         control = session.control
@@ -78,10 +115,47 @@ class CyclicExchange(Generic[TelegramT]):
         if (session.setpoints.changed or telegram is None
                 or control is not None and control.word != self.word):
             telegram = self._telegram = self._make()
-        self._book.begin(now, self._timer.stop_spacing if self.cycles_left >= 0 else None)
+        self.book.begin(now, self.timer.stop_spacing if self.cycles_left >= 0 else None)
         self._frames_out = 0
-        self.whole = True
-        return telegram
+        self.again, self._whole = not self._whole, True
+        self._send(telegram, now)
+
+    def start(self, now: float, *, in_turn: bool = False) -> None:
+        """
+        Let the first cycle follow, a period after the last one at least.
+
+        :param now: infinity: none follows, but answers to frames of others may be expected.
+        :param in_turn: it waits for the turn of this drive, if it has one.
+        """
+        self._plan(-1)
+        self.forget()
+        period, phase = self._session.configuration.period, self._session.phase
+        first = max(now, self.timer.began_at + period)
+        if in_turn and phase is not None:
+            first += (phase - first) % period
+        self.timer.start(first)
+
+    def stop(self) -> None:
+        """Send nothing more, and expect no answer; one on its way is no surprise, though."""
+        self._plan(-1)
+        self.forget()
+        self.timer.stop()
+        self.book.expect_nothing()
+        self._answer_due = math.inf
+
+    def hurry(self, now: float, *, setpoints: bool) -> None:
+        """
+        Bring the next cycle forward where it stops the drive.
+
+        :param setpoints: it does so, too, where only they have changed.
+        """
+        control = self._session.control
+        if control is not None and control.stopping and not self._stopping and (
+                self._slot is not None and control.word != self.word
+                or setpoints and self._session.setpoints.changed):
+            self.timer.hurry(now)
+
+    # -- sending ----------------------------------------------------------------------------------
 
     def put(self, frame: Frame) -> None:
         """Hand out a frame of the cycle that has begun."""
@@ -112,10 +186,10 @@ class CyclicExchange(Generic[TelegramT]):
         session = self._session
         self._frames_out -= 1
         if not sent:
-            self.whole = False
+            self._whole = False
         elif self._runs:
             session.told.note_unacknowledged(CYCLE, runs=True)
-        if self._frames_out or not self.whole:
+        if self._frames_out or not self._whole:
             return
         if not self._runs:
             session.told.note(CYCLE, runs=False)
@@ -129,87 +203,115 @@ class CyclicExchange(Generic[TelegramT]):
             if fresh or control.word != self.word:
                 session.control_changed(now)
             if control.pulsing:
-                self._timer.no_later(now + self._timer.stop_spacing)
+                self.timer.no_later(now + self.timer.stop_spacing)
         if self._told is not None:
             self._told()
         if self.cycles_left > 0:
             self.cycles_left -= 1
             if self.cycles_left == 0:
-                self._end(now)
+                self._last_left(now)
 
-    def start(self, now: float, *, in_turn: bool = False) -> None:
-        """
-        Let the first cycle follow, a period after the last one at least.
+    # -- answers ----------------------------------------------------------------------------------
 
-        :param in_turn: it waits for the turn of this drive, if it has one.
+    def expect_answer(self, now: float, until: float = math.inf) -> None:
         """
-        self._plan(-1)
-        self._book.missed_in_row = 0
-        period, phase = self._session.configuration.period, self._session.phase
-        first = max(now, self._timer.began_at + period)
-        if in_turn and phase is not None:
-            first += (phase - first) % period
-        self._timer.start(first)
+        Take note that the drive was sent a cycle.
+
+        :param until: when the answer counts as missed; infinity: with the next cycle.
+        """
+        self.book.awaiting = True
+        self.book.began_at = now
+        self._answer_due = until
+
+    def expects(self, what: str) -> bool:
+        """Tell whether an answer belongs to the last cycle; others are late, or rejected."""
+        book = self.book
+        if not book.awaiting and not book.take_stale():
+            self._session.report.reject(f'{what} that nobody asked for')
+        return book.awaiting
+
+    def answered(self, received_at: float) -> None:
+        """Take note of the answer to the last cycle."""
+        self.book.answered(received_at)
+        if self._heeded and self._session.told.ran:
+            self._session.told.answered()
+
+    def settle(self, now: float) -> None:
+        """End an exchange: what has not arrived by now does not count for it any more."""
+        self._answer_due = math.inf
+        if self._settled is not None:
+            self._settled()
+        book, session = self.book, self._session
+        if book.awaiting:
+            too_many = book.missed()
+            if session.stage is not Stage.STOPPING:
+                limit = session.configuration.missed_limit
+                self._missed(f'{self._silence} for {limit} cycles' if too_many else '', now)
+
+    def forget(self) -> None:
+        """Count anew what is missed."""
+        self.book.missed_in_row = 0
+
+    def _lose(self, reason: str, now: float) -> None:
+        if reason:
+            self.forget()
+            if self._session.online:
+                self._session.lose(reason, now)
+            self._session.report.advice = f'{self._silence}: {self._advice}'
 
     # -- the end ----------------------------------------------------------------------------------
 
     @property
     def longest_stop(self) -> float:
         """How many s the last cycles before silence take at most."""
-        return STOP_CYCLES * self._timer.stop_spacing + LAST_ANSWER
+        return STOP_CYCLES * self.timer.stop_spacing + LAST_ANSWER
 
     def stop_soon(self, now: float) -> None:
         """Let the last cycles before silence follow soon."""
-        soon = max(now, self._timer.began_at + self._timer.stop_spacing)
-        if self._timer.due < math.inf:
+        soon = max(now, self.timer.began_at + self.timer.stop_spacing)
+        if self.timer.due < math.inf:
             self._plan(STOP_CYCLES)
-            self._timer.no_later(soon)
+            self.timer.no_later(soon)
         else:   # those of a stop before this one have left, what goes by writes is under way
             self.run_out(soon)
         self._stopping = True
-        self._timer.hurry(now)
+        self.timer.hurry(now)
 
     def run_out(self, first: float) -> None:
         """Send the last cycles before silence, beginning then."""
         self._plan(STOP_CYCLES)
-        self._timer.start(first)
+        self.timer.start(first)
 
     def _plan(self, cycles_left: int) -> None:
         self.cycles_left = cycles_left
         self._stopping = self._waiting = False
 
-    def _end(self, now: float) -> None:
+    def _last_left(self, now: float) -> None:
         """Come to an end, at once or when somebody has answered."""
         self._waiting = self._stopping and self._unheard()
         if self._waiting:
-            self._timer.start(now + LAST_ANSWER)
+            self.timer.start(now + LAST_ANSWER)
         else:
             self._ended(now)
 
-    def wait_out(self, now: float, *, due: bool = False) -> bool:
-        """
-        Come to an end after all, if an answer came, or its time is over.
+    def wait_out(self, now: float) -> None:
+        """Come to the end of a stop that only waits for an answer, if that came."""
+        if self._waiting and not self._unheard():
+            self._end(now)
 
-        :param due: it is.
-        :return: the last cycle has left: nothing more is sent.
-        """
-        if self._waiting and (due or not self._unheard()):
-            self._waiting = False
-            self._ended(now)
-            return True
-        return self._waiting
+    def _end(self, now: float) -> None:
+        self._waiting = False
+        self._ended(now)
+
+    def _end_stop(self, now: float) -> None:
+        self.doubt_the_end()
+        self._session.stop_left()
 
     def _unanswered(self) -> bool:
         """Tell whether a drive that ran has answered none of the last cycles but one."""
-        return self._session.told.ran and self._book.missed_in_row >= STOP_CYCLES - 1
+        return self._session.told.ran and self.book.missed_in_row >= STOP_CYCLES - 1
 
     def doubt_the_end(self) -> None:
         """Take note of a drive that ran, and has answered none of its last cycles."""
         if self._unanswered():
             self._session.told.doubt()
-
-    def stop(self) -> None:
-        """Send nothing more."""
-        self._plan(-1)
-        self._timer.stop()
-        self._book.expect_nothing()

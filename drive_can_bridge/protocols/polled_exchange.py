@@ -8,7 +8,6 @@ neither: there is no complete sample.
 """
 
 from collections.abc import Callable, Generator, Sequence
-from enum import Enum
 import math
 from typing import Generic
 
@@ -20,14 +19,6 @@ from drive_can_bridge.protocols.exchange_book import ExchangeBook
 
 #: of a round, in the order of samples; None: of what was refused
 Raws = Sequence[int | None]
-
-
-class Phase(Enum):
-    """What a session with a polled exchange is doing."""
-
-    IDLE = 'idle'
-    POLLING = 'polling'
-    STOPPING = 'last writes'
 
 
 class PolledExchange(Generic[StepT, ReplyT]):

@@ -23,7 +23,6 @@ class Idle(Session):
     """Implements what has to be, and keeps what it is given."""
 
     waiting = 0
-    stopped = True
     longest_stop = 0.0
 
     def __init__(self, *arguments: Any) -> None:
@@ -57,23 +56,14 @@ class Idle(Session):
         self.done.append(f'begin at {now:g}, {self.report.advice}')
         self.online = True
 
-    def go_idle(self, advice: str) -> None:
-        self.done.append(f'idle: {advice}')
+    def fall_silent(self) -> None:
+        self.done.append(f'idle: {self.report.advice}')
 
     def lost(self, now: float, *, was_online: bool) -> None:
         self.done.append(f'lost: {self.report.advice}')
 
-    def time_lost(self, now: float) -> None:
-        raise NotImplementedError
-
     def receive_frame(self, frame: Frame, now: float, age: float = 0.0) -> None:
         self.outbox.put(frame)
-
-    def handle_timer(self, now: float) -> None:
-        raise NotImplementedError
-
-    def next_timer(self) -> float:
-        return math.inf
 
 
 def session(**options: object) -> Idle:

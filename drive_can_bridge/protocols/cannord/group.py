@@ -22,6 +22,7 @@ from drive_can_bridge.core.control import ControlAction, ControlCompleted, Contr
 from drive_can_bridge.core.events import Event
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.requests import BRIDGE_INACTIVE
+from drive_can_bridge.core.session import Stage
 from drive_can_bridge.core.told import MAY_RUN
 from drive_can_bridge.core.users import DRIVE_OFFLINE
 from drive_can_bridge.protocols.cannord.broadcast import broadcast_identifier
@@ -72,19 +73,17 @@ class Group:
         return drive is self._lead
 
     @property
-    def _leader(self) -> CannordSession:
+    def leader(self) -> CannordSession:
+        """The session that sends for all."""
         return self.members[0]
 
     # -- sending ----------------------------------------------------------------------------------
 
-    def send(self, payloads: list[bytes], now: float, *, stopping: bool, again: bool) -> None:
-        """
-        Send a cycle: to all, and to one or some of them alone.
-
-        :param again: the bus did not take the last one: nobody of a stop is left out for that.
-        """
-        leader, count = self._leader, len(self.members)
-        if again:
+    def send(self, payloads: list[bytes], now: float) -> None:
+        """Send a cycle: to all, and to one or some of them alone."""
+        leader, count = self.leader, len(self.members)
+        stopping = leader.stage is Stage.STOPPING
+        if stopping and leader.exchange.again:  # nobody of a stop is left out for that
             self._turn = self._turn_begun
         self._turn_begun = self._turn
         leader.send(self.broadcast, payloads)
@@ -93,11 +92,12 @@ class Group:
             member = self.members[self._turn % count]
             self._turn = (self._turn + 1) % count
             leader.send(member.request_identifier, payloads)
+            member.exchange.settle(now)
             member.expect_answer(now, now + leader.configuration.period)
 
     def cycle_left(self) -> None:
         """Take note that a cycle has left: it told everybody the same."""
-        leader = self._leader
+        leader = self.leader
         runs = leader.told.runs(CYCLE)
         for member in self.members[1:]:
             member.sent.raws = leader.sent.raws
@@ -109,11 +109,7 @@ class Group:
         """Tell whether an inverter that ran has not answered since all were told to stop."""
         return any(member.told.ran for member in self.members)
 
-    def wait_out(self, now: float) -> None:
-        """Take note of an answer of an inverter that is led, while the last cycles leave."""
-        self._leader.wait_out(now)
-
-    def stop_left(self) -> None:
+    def stop_left(self, now: float) -> None:
         """End the stop of all: who ran and did not answer may still be running."""
         for member in self.members:
             member.told.doubt()
@@ -124,14 +120,14 @@ class Group:
 
     def member_found(self, member: CannordSession) -> None:
         """Take note that an inverter of the group came online: it must not jump."""
-        self._leader.setpoints.disarm()
+        self.leader.setpoints.disarm()
         self.control.member_found(member.configuration.name)
 
     def member_lost(self, member: CannordSession) -> None:
         """Take note that an inverter of the group is offline."""
         self.control.member_lost(member.configuration.name)
         if member.active:       # else the bridge ends, which the leader tells
-            self._leader.gate.follow()
+            self.leader.gate.follow()
 
     def end(self, now: float) -> None:
         """Take note that the bridge ends: that, and no member that goes, takes the enable back."""
@@ -140,7 +136,7 @@ class Group:
     def member_status(self, member: CannordSession, word: int, now: float) -> None:
         """Take the status word of an inverter that is led."""
         self.control.status_received(word, now, member.configuration.name)
-        self._leader.control_changed(now)
+        self.leader.control_changed(now)
 
     def _unheard(self) -> str:
         """Say which inverters were told to run, and have not answered since they were stopped."""
@@ -157,7 +153,7 @@ class Group:
 
         :param refusal: what would be said of an inverter alone.
         """
-        if member is not self._leader and action not in _STOPS:
+        if member is not self.leader and action not in _STOPS:
             lead = self._lead.name
             return f'{lead} leads the broadcast group: call ~/{_SERVICES[action]} of {lead}'
         # a stop is good for those that are there
@@ -168,7 +164,7 @@ class Group:
         """Stop all, as a user of an inverter that is led has asked for: none stops alone."""
         self._asked_by[request] = member
         self.control.request(request, now)
-        self._leader.control_changed(now)
+        self.leader.control_changed(now)
 
     def delivered(self, events: list[Event]) -> list[Event]:
         """Hand the outcomes of such requests to whom they belong; return all other events."""
@@ -196,7 +192,7 @@ class Group:
 
     def fact(self, member: CannordSession) -> str:
         """Say who leads whom."""
-        if member is not self._leader:
+        if member is not self.leader:
             return f'led by {self._lead.name}'
         return f'leads {", ".join(each.name for each in self._others) or "nobody else"}'
 

@@ -28,7 +28,7 @@ from drive_can_bridge.core.events import Event, ForeignMasterSeen
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.process_image import ProcessImage
 from drive_can_bridge.core.roles import publish_it, Roles
-from drive_can_bridge.core.session import Session
+from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.users import Users
 from drive_can_bridge.protocols.access import ChannelServer
 from drive_can_bridge.protocols.cannord import procedures
@@ -46,12 +46,9 @@ from drive_can_bridge.protocols.cannord.states import (
     CONTROL_PARAMETER, is_faulted, STATUS_PARAMETER,
 )
 from drive_can_bridge.protocols.cyclic_exchange import CyclicExchange
-from drive_can_bridge.protocols.exchange_book import ExchangeBook
 
 if TYPE_CHECKING:
     from drive_can_bridge.protocols.cannord.group import Group
-
-NO_ANSWER = 'no answer to process data'
 
 
 class CannordSession(Session):
@@ -60,6 +57,7 @@ class CannordSession(Session):
 
     :param group: the broadcast group of the inverter, if it is in one. The inverter that leads it
         is sent the frames of all; the others are only listened to, beside their parameters.
+    :ivar exchange: its cycles; of one that is led, only the answers.
     """
 
     def __init__(self, drive: DriveConfiguration, group: 'Group | None' = None) -> None:
@@ -93,90 +91,60 @@ class CannordSession(Session):
             ParameterLayout(options.value_order, options.index_byte),
             lambda payload, left: self.outbox.put(
                 Frame(self._task_identifier, payload, self._extended), left), self.retry))
-        self._access = procedures.TaskAccess(
+        access = procedures.TaskAccess(
             self.retry, last_value=self._samples.last, persist=options.persist_writes)
         # what only a master sends
         self._masters = {self.request_identifier, self._task_identifier,
                          group and group.broadcast}
-        self._timeout = TimeoutWatch(drive, self._channel, self._access, self.report.note)
+        self._timeout = TimeoutWatch(drive, self._channel, access, self.report.note)
         self.users = Users(
-            self, ChannelServer(self._channel, self._access),
+            self, ChannelServer(self._channel, access),
             control_refusal=self._control_refusal, answered=self._timeout.request_answered,
             control=None if led_by is None else partial(led_by.stop_for, self))
-        self._book = ExchangeBook(drive, self.statistics)
-        self._timer = self._book.timer
-        self._exchange = CyclicExchange(
-            self, self._book, self._encode, slot=0,
+        self.exchange = CyclicExchange(
+            self, self._encode, self._send_cycle, slot=0, silence='no answer to process data',
+            advice='drive silent, wrong station, bit rate or identifier format, or P509 not set '
+                   'to CAN',
+            settled=self._samples.settle if self._extra else None,
+            ended=None if group is None else group.stop_left,
             left=None if group is None else group.cycle_left,
-            unheard=None if group is None else group.unheard,
-            ended=lambda _: self._last_cycle_left())
-        self._cycling = self._stopping = False
-        self._answer_due = math.inf
+            unheard=None if group is None else group.unheard)
+        self.look_after(self.exchange, channel=self._channel)
 
     # -- life cycle -------------------------------------------------------------------------------
 
-    def deactivate(self, now: float) -> None:
-        if self._group is not None:
-            self._group.end(now)
-        super().deactivate(now)
-
-    def _last_cycle_left(self) -> None:
-        if self._group is None:
-            self._exchange.doubt_the_end()
-            self.stop_left()
-        else:
-            self._group.stop_left()
-
-    def wait_out(self, now: float) -> None:
-        """Come to the end of a stop that only waits for an answer, if that came."""
-        if self._led and self._group is not None:
-            self._group.wait_out(now)
-        else:
-            self._exchange.wait_out(now)
+    def begin(self, now: float) -> None:
+        self._end_exchange()
+        self.exchange.start(math.inf if self._led else now)     # those of the leader are for all
+        if self.told.owed:
+            self.exchange.timer.hurry(now)
 
     def prepare_stop(self, now: float) -> bool:
+        if self._group is not None:
+            self._group.end(now)
         self._clear_acyclic()
-        return self._cycling
+        return self.stage is not Stage.IDLE
 
     def begin_stop(self, now: float) -> bool:
-        self._stopping = True
         if not self._led:   # else it ends with the last frames of its leader
-            self._exchange.stop_soon(now)
+            self.exchange.stop_soon(now)
         return True
 
     @property
-    def stopped(self) -> bool:
-        return not self._cycling
-
-    @property
     def longest_stop(self) -> float:
-        return self._exchange.longest_stop
+        return self.exchange.longest_stop
 
-    def time_lost(self, now: float) -> None:
-        self._channel.time_lost(now)
-        if self._cycling and not self._stopping:
-            self.stood_still(now)
-            self.start_over(now)
-
-    def begin(self, now: float) -> None:
-        self._stopping = False
-        self._expect_nothing()
-        self._cycling = True
-        self._exchange.start(math.inf if self._led else now)    # those of the leader are for all
-        if self.told.owed:
-            self._timer.hurry(now)
-
-    def go_idle(self, advice: str) -> None:
-        self._cycling = self._stopping = False
-        self.setpoints.allow(False)
+    def fall_silent(self) -> None:
         self._clear_acyclic()
-        self._expect_nothing()
-        self._timer.stop()
-        self.be_offline(advice)
+        self._end_exchange()
 
     def _clear_acyclic(self) -> None:
         self._channel.clear()
         self._timeout.forget()
+
+    def _end_exchange(self) -> None:
+        self.exchange.stop()
+        self.exchange.book.stale += self._samples.expect_nothing()
 
     def went_offline(self) -> None:
         self._samples.forget()
@@ -186,29 +154,8 @@ class CannordSession(Session):
 
     # -- process data, sending --------------------------------------------------------------------
 
-    def _cycle(self, now: float) -> None:
-        """Send what is due once a period. The fast path of the timer."""
-        if self._stopping and self._exchange.wait_out(now, due=True):
-            return
-        self._settle(now)
-        again = self._stopping and not self._exchange.whole
-        payloads = self._exchange.begin(now)
-        if self._group is None:
-            self.send(self.request_identifier, payloads)
-            self.expect_answer(now)
-        else:
-            self._group.send(payloads, now, stopping=self._stopping, again=again)
-
-    def send(self, addressed: int, payloads: list[bytes]) -> None:
-        """Hand out main frame and additional frame of a cycle to one identifier."""
-        for payload in payloads:
-            self._exchange.put(Frame(addressed, payload, self._extended))
-
     def see_to_control_word(self, now: float) -> None:
-        if self._machine.stopping and not self._stopping and (
-                self._machine.word != self._exchange.word
-                or self.setpoints.changed and self.told.owed):
-            self._timer.hurry(now)
+        self.exchange.hurry(now, setpoints=self.told.owed)
 
     def _encode(self, raws: list[int]) -> list[bytes]:
         word, *values = raws
@@ -219,7 +166,17 @@ class CannordSession(Session):
             payloads.append(encode_extra(words[MAIN_VALUES:]))
         return payloads
 
-    # -- process data, receiving ------------------------------------------------------------------
+    def _send_cycle(self, payloads: list[bytes], now: float) -> None:
+        if self._group is None:
+            self.send(self.request_identifier, payloads)
+            self.expect_answer(now)
+        else:
+            self._group.send(payloads, now)
+
+    def send(self, addressed: int, payloads: list[bytes]) -> None:
+        """Hand out main frame and additional frame of a cycle to one identifier."""
+        for payload in payloads:
+            self.exchange.put(Frame(addressed, payload, self._extended))
 
     def expect_answer(self, now: float, until: float = math.inf) -> None:
         """
@@ -227,32 +184,13 @@ class CannordSession(Session):
 
         :param until: when the answer counts as missed; infinity: with the next cycle.
         """
-        if not self._cycling:
-            self._book.stale = 1 + self._extra
+        if self.stage is Stage.IDLE:
+            self.exchange.book.stale = 1 + self._extra
             return
-        self._settle(now)
-        self._book.awaiting = True
-        self._book.began_at = now
+        self.exchange.expect_answer(now, until)
         self._samples.awaiting = self._extra
-        self._answer_due = until
 
-    def _settle(self, now: float) -> None:
-        """End an exchange: what has not arrived by now does not count for it any more."""
-        self._answer_due = math.inf
-        if self._samples.awaiting:
-            self._samples.settle()
-        if self._book.awaiting and self._book.missed() and not self._stopping:
-            self._book.missed_in_row = 0
-            if self.online:
-                self.lose(f'{NO_ANSWER} for {self.configuration.missed_limit} cycles', now)
-            self.report.advice = (f'{NO_ANSWER}: drive silent, wrong station, bit rate or '
-                                  'identifier format, or P509 not set to CAN')
-
-    def _expect_nothing(self) -> None:
-        """Expect no answer any more; one that is on its way is no surprise, though."""
-        self._book.expect_nothing()
-        self._book.stale += self._samples.expect_nothing()
-        self._answer_due = math.inf
+    # -- process data, receiving ------------------------------------------------------------------
 
     def receive_frame(self, frame: Frame, now: float, age: float = 0.0) -> None:
         received, data, extended = frame
@@ -264,8 +202,8 @@ class CannordSession(Session):
                     self._receive_extra(data)
                 else:
                     self._receive_main(data, now, now - age)
-                    if self._stopping:
-                        self.wait_out(now)
+                    if self.stage is Stage.STOPPING:
+                        (self._group.leader if self._group else self).exchange.wait_out(now)
             elif received == self._task_response_identifier:
                 self._channel.receive(data, now)
             elif received in self._masters:
@@ -279,18 +217,16 @@ class CannordSession(Session):
     def _receive_main(self, data: bytes, now: float, received_at: float) -> None:
         """Take status word and actual values. The fast path of the reader."""
         word, values = decode_main(data, swap=self._swap)
-        book = self._book
+        book = self.exchange.book
         asked = book.awaiting
         if asked:
-            book.answered(received_at)
-            if self.told.ran:
-                self.told.answered()
+            self.exchange.answered(received_at)
         elif not (is_faulted(word) and self.online):
             # a fault while offline is told again by the first exchange
             if not book.take_stale() and not is_faulted(word):
                 self.report.reject('process data that nobody asked for')
             return
-        if not self.online and not self._stopping:
+        if not self.online and self.stage is Stage.RUNNING:
             self.be_online()
             self._timeout.look(now)
             if self._group is not None:
@@ -311,25 +247,8 @@ class CannordSession(Session):
         """Take actual values 4 and 5."""
         if self._samples.awaiting:
             self._samples.take_extra(data)
-        elif not self._book.take_stale():
+        elif not self.exchange.book.take_stale():
             self.report.reject('additional process data that nobody asked for')
-
-    # -- timer ------------------------------------------------------------------------------------
-
-    def handle_timer(self, now: float) -> None:
-        if now >= self._answer_due:
-            self._settle(now)
-        if now >= self._timer.due:
-            self._cycle(now)
-        if now >= self._machine.next_timer():
-            self._machine.handle_timer(now)
-            self.control_changed(now)
-        if now >= self._channel.next_timer():
-            self._channel.advance(now)
-
-    def next_timer(self) -> float:
-        return min(self._timer.due, self._answer_due, self._machine.next_timer(),
-                   self._channel.next_timer())
 
     # -- state ------------------------------------------------------------------------------------
 

@@ -30,7 +30,7 @@ from drive_can_bridge.core.events import ForeignMasterSeen
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.roles import Roles
-from drive_can_bridge.core.session import LOOKING, Session
+from drive_can_bridge.core.session import LOOKING, Session, Stage
 from drive_can_bridge.core.users import DRIVE_OFFLINE, Users
 from drive_can_bridge.protocols.access import ChannelServer
 from drive_can_bridge.protocols.canopen.supervision import Supervision
@@ -42,7 +42,7 @@ from drive_can_bridge.protocols.canopen_pkw.round import Rounds
 from drive_can_bridge.protocols.canopen_pkw.writers import Writers
 from drive_can_bridge.protocols.channel import Lane
 from drive_can_bridge.protocols.placement import SentWrites
-from drive_can_bridge.protocols.polled_exchange import Phase, PolledExchange
+from drive_can_bridge.protocols.polled_exchange import PolledExchange
 
 SILENT = ('no complete round of reads: drive silent, not operational, or other COB-IDs than '
           'configured')
@@ -81,33 +81,28 @@ class PkwSession(Session):
         self.users = Users(
             self, ChannelServer(self._channel, procedures.RegisterAccess(self.retry, placement)),
             blocked=self._supervision.refusal, control_refusal=self._writers.control_refusal)
-        self._phase = Phase.IDLE
+        self.look_after(channel=self._channel)
 
     # -- life cycle -------------------------------------------------------------------------------
 
     def prepare_stop(self, now: float) -> bool:
-        return self._phase is not Phase.IDLE and (
+        return self.stage is not Stage.IDLE and (
             self.told.owed or self.ever_online and now >= self._node.free_at)
 
     def begin_stop(self, now: float) -> bool:
         self._supervision.stop()
         self._exchange.stop()
         self._channel.drop(now)
-        self._phase = Phase.STOPPING
         self._writers.stop(self._stop_time, now, insist=True)
         return True
 
     def _stop_ended(self) -> None:
-        if self._phase is Phase.STOPPING:
+        if self.stage is Stage.STOPPING:
             self.go_idle('deactivated')
 
     @property
-    def stopped(self) -> bool:
-        return self._phase is Phase.IDLE
-
-    @property
     def longest_stop(self) -> float:
-        return self._stop_time if self._phase is Phase.STOPPING else 0.0
+        return self._stop_time if self.stage is Stage.STOPPING else 0.0
 
     @property
     def _stop_time(self) -> float:
@@ -117,27 +112,18 @@ class PkwSession(Session):
         self._node.forget()
         super().bus_down(now, reason)
 
-    def time_lost(self, now: float) -> None:
-        self._channel.time_lost(now)
-        if self._phase is Phase.POLLING:
-            self.stood_still(now)
-            self.start_over(now)
-
     def begin(self, now: float) -> None:
         self.report.advice = LOOKING
-        self._phase = Phase.POLLING
         self._forget_exchange()
         self._rounds.start_over()
         self._supervision.begin(now)
         self._stop_if_owed(now)
 
-    def go_idle(self, advice: str) -> None:
-        self._phase = Phase.IDLE
+    def fall_silent(self) -> None:
         self._supervision.stop()
         self._channel.clear()
         self._exchange.stop()
         self._rounds.refusals.clear()
-        self.be_offline(advice)
 
     # -- online and offline -----------------------------------------------------------------------
 
@@ -200,7 +186,7 @@ class PkwSession(Session):
 
     def _end_futile_stop(self, now: float) -> None:
         """End a stop that was for safety only, of a node that takes no PDOs any more."""
-        if self._phase is Phase.STOPPING and now < self._node.free_at and not self.told.owed:
+        if self.stage is Stage.STOPPING and now < self._node.free_at and not self.told.owed:
             self.go_idle('deactivated')
 
     # -- what the device is told ------------------------------------------------------------------
@@ -247,7 +233,7 @@ class PkwSession(Session):
 
     def handle_timer(self, now: float) -> None:
         self._supervision.handle_timer(now)
-        if self._phase is Phase.POLLING:
+        if self.stage is Stage.RUNNING:
             if self.control is not None and now >= self.control.next_timer():
                 self.control.handle_timer(now)
                 self.control_changed(now)
@@ -267,7 +253,7 @@ class PkwSession(Session):
 
     def next_timer(self) -> float:
         soonest = self._channel.next_timer()
-        if self._phase is not Phase.POLLING:
+        if self.stage is not Stage.RUNNING:
             return soonest
         soonest = min(soonest, self._round_due, self._supervision.next_timer())
         return soonest if self.control is None else min(soonest, self.control.next_timer())

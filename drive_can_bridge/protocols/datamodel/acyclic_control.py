@@ -39,14 +39,13 @@ class AcyclicControl:
 
     :param word: parameter of the control word; None: it is sent cyclically.
     :param status: parameter of the status word; None: it comes cyclically, or there is none.
-    :ivar look_at: when the status word is to be read; infinity: not planned.
-    :ivar retry_at: when a word that the bus refused, or a pulse, is to be written again.
     """
 
     def __init__(self, session: Session, control: ControlMachine, channel: AcyclicChannel,
                  numbers: Numbers, *, word: Parameter | None,
                  status: Parameter | None) -> None:
-        self.look_at = self.retry_at = math.inf
+        self._look_at = math.inf    # when the status word is to be read
+        self._retry_at = math.inf   # when a refused word, or a pulse, is to be written again
         self._session = session
         self._control = control
         self._channel = channel
@@ -66,12 +65,12 @@ class AcyclicControl:
         self._written = None
         self._watching = True
         if self._status is not None:
-            self.look_at = now
+            self._look_at = now
 
     def end(self) -> None:
         """Leave the status of a lost drive alone."""
         self._watching = False
-        self.look_at = self.retry_at = math.inf
+        self._look_at = self._retry_at = math.inf
 
     def stop(self) -> None:
         """Plan nothing any more. The channel was cleared."""
@@ -90,24 +89,36 @@ class AcyclicControl:
         else:
             return
         self._written = word
-        self._repeat_at = self.retry_at = math.inf      # until it left
+        self._repeat_at = self._retry_at = math.inf      # until it left
         write = (self._channel.write_now if self._control.stopping
                  else self._channel.write_first)
         runs = not self._control.at_rest
         write(self._numbers.write(self._word, word),
               lambda sent, then: self._left(word, sent, then, runs=runs), now)
         if self._watching and self._status is not None:
-            self.look_at = now
+            self._look_at = now
 
-    def look(self, now: float) -> None:
+    def next_timer(self) -> float:
+        """Return when the status is to be looked at, or a word to be written again."""
+        return min(self._look_at, self._retry_at)
+
+    def handle_timer(self, now: float) -> None:
+        """Do what is due."""
+        if now >= self._look_at:
+            self._look(now)
+        if now >= self._retry_at:
+            self._retry_at = math.inf
+            self._session.see_to_control_word(now)
+
+    # -- inside -----------------------------------------------------------------------------------
+
+    def _look(self, now: float) -> None:
         """Read the status word, unless that is under way."""
-        self.look_at = math.inf
+        self._look_at = math.inf
         if self._status is not None and not self._reading:
             self._reading = True
             self._outdated = False
             self._channel.run(self._read(self._status), self._received, now)
-
-    # -- inside -----------------------------------------------------------------------------------
 
     def _may_repeat(self, parameter: Parameter, now: float) -> bool:
         if now < self._repeat_at:
@@ -122,7 +133,7 @@ class AcyclicControl:
         if not sent:
             if word == self._written:
                 self._written = None
-                self.retry_at = now + REFUSED_PAUSE
+                self._retry_at = now + REFUSED_PAUSE
             return
         self._session.told.note_unacknowledged(CONTROL_WORD, runs=runs)
         self._outdated = self._reading
@@ -130,7 +141,7 @@ class AcyclicControl:
         if word == self._control.word:
             self._control.word_sent(now)
             if self._control.pulsing:
-                self._repeat_at = self.retry_at = now + self._spacing
+                self._repeat_at = self._retry_at = now + self._spacing
         self._session.control_changed(now)
 
     def _read(self, status: Parameter) -> Procedure:
@@ -145,5 +156,5 @@ class AcyclicControl:
         if raw is not None and not self._outdated:
             self._control.status_received(raw, now)
             self._session.control_changed(now)
-        self.look_at = now if self._outdated else min(self.look_at, now + (
+        self._look_at = now if self._outdated else min(self._look_at, now + (
             STATUS_PERIOD_PENDING if self._control.pending else STATUS_PERIOD))

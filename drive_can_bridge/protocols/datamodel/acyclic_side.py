@@ -45,6 +45,7 @@ class AcyclicSide:
     :ivar control_slot: of the control word in ``cyclic_request``, or None.
     :ivar status_slot: of the status word in ``cyclic_response``, or None.
     :ivar control_writer: looks after words that have no slot, or None.
+    :ivar parts: what acts at times of its own.
     """
 
     def __init__(self, session: Session, *, encode_read: Callable[[int, int], Frame],
@@ -71,6 +72,7 @@ class AcyclicSide:
         self.control_writer = None if session.control is None or not (word or status) else (
             AcyclicControl(session, session.control, self.channel, self.numbers,
                            word=word, status=status))
+        self.parts = () if self.control_writer is None else (self.control_writer,)
         self.stop: SafeStop[Step, Reply] = SafeStop(session, self.channel, stop_ended)
 
     def clear(self) -> None:
@@ -113,30 +115,6 @@ class AcyclicSide:
         """Take note that the control word is ``disable`` again."""
         if self.control_writer is not None:
             self.control_writer.end()
-
-    def handle_timer(self, now: float) -> None:
-        """Do what is due for the control and status word."""
-        control = self._session.control
-        if control is None:
-            return
-        writer = self.control_writer
-        if writer is not None:
-            if now >= writer.look_at:
-                writer.look(now)
-            if now >= writer.retry_at:
-                writer.retry_at = math.inf
-                self._session.see_to_control_word(now)
-        if now >= control.next_timer():
-            control.handle_timer(now)
-            self._session.control_changed(now)
-
-    def next_timer(self) -> float:
-        """Return when ``handle_timer`` wants to be called."""
-        control, writer = self._session.control, self.control_writer
-        if control is None:
-            return math.inf
-        due = control.next_timer()
-        return due if writer is None else min(due, writer.look_at, writer.retry_at)
 
     # -- stopping by acyclic writes ---------------------------------------------------------------
 

@@ -27,7 +27,7 @@ from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import Event, MappingDiffered, ProcessDataReceived
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.roles import Roles
-from drive_can_bridge.core.session import Session
+from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.protocols.cyclic_exchange import CYCLE, CyclicExchange
 from drive_can_bridge.protocols.datamodel import extended
 from drive_can_bridge.protocols.datamodel.acyclic_side import AcyclicSide, map_cells
@@ -37,21 +37,19 @@ from drive_can_bridge.protocols.datamodel.map_supervision import (
 from drive_can_bridge.protocols.datamodel.positions import Positions
 from drive_can_bridge.protocols.datamodel.process_words import CyclicCodec
 from drive_can_bridge.protocols.datamodel.stop_writes import ANSWER_TIME, ATTEMPTS
-from drive_can_bridge.protocols.exchange_book import ExchangeBook
 
 #: direction and station of an identifier
 FROM_WHOM = extended.DIR | extended.STATION_MASK
 
 
 class Phase(Enum):
-    """What the session is doing."""
+    """How far the session has come with its drive."""
 
     IDLE = 'idle'
     CHECKING = 'checking the maps'
     DIFFERS = 'maps differ'
     CYCLIC = 'cycling'
     LEAVING = 'last neutral cycles'
-    STOPPING = 'stop by acyclic writes'
 
 
 class ExtendedSession(Session):
@@ -88,70 +86,54 @@ class ExtendedSession(Session):
             rewrite=options.mapping == 'configure',
             emit=self._maps_reported, judged=self._maps_judged)
         self._positions = Positions(
-            self, self._channel, numbers, known=self._start_cycling,
+            self, self._channel, numbers, known=self._start_cycling, again=self._look_again,
             # it may have started anew meanwhile, with other maps
             silent=self._maps.look_afresh if self._verify else None)
-        self._book = ExchangeBook(drive, self.statistics)
-        self._timer = self._book.timer
         self._exchange = CyclicExchange(
-            self, self._book, self._codec.encode_request, slot=self._side.control_slot,
-            ended=self._last_cycle_left)
+            self, self._codec.encode_request, self._send_cycle, slot=self._side.control_slot,
+            silence='no cyclic response', missed=self._missed, ended=self._last_cycle_left,
+            heeded=not self._verify)    # otherwise the maps tell who has heard it
+        self.look_after(self._exchange, self._maps, self._positions, *self._side.parts,
+                        channel=self._channel)
         self._phase = Phase.IDLE
-        self._stopping = False
         self._differs = False  # what the last look at the maps found
 
     # -- life cycle -------------------------------------------------------------------------------
 
+    @property
+    def _cycling(self) -> bool:
+        return self._phase in (Phase.CYCLIC, Phase.LEAVING)
+
     def prepare_stop(self, now: float) -> bool:
         self._clear_acyclic()
-        self._stopping = self._phase in (Phase.CYCLIC, Phase.LEAVING) or (
-            self._phase is not Phase.IDLE and self.told.owed)
-        return self._stopping
+        return self._cycling or (self.stage is not Stage.IDLE and self.told.owed)
 
     def begin_stop(self, now: float) -> bool:
-        cycling = self._phase in (Phase.CYCLIC, Phase.LEAVING)
-        if cycling:
+        if self._cycling:
             self._exchange.stop_soon(now)
-        else:
-            self._phase = Phase.STOPPING
-        self._side.begin_stop(now, setpoints=not cycling)
-        return cycling or self._side.stop.running
-
-    @property
-    def stopped(self) -> bool:
-        return self._phase is Phase.IDLE
+        self._side.begin_stop(now, setpoints=not self._cycling)
+        return self._cycling or self._side.stop.running
 
     @property
     def longest_stop(self) -> float:
         return self._exchange.longest_stop + ATTEMPTS * ANSWER_TIME
 
-    def time_lost(self, now: float) -> None:
-        self._channel.time_lost(now)
-        if self._phase is not Phase.IDLE and not self._stopping:
-            self.stood_still(now)
-            self.start_over(now)
-
     def begin(self, now: float) -> None:
-        self._stopping = False
-        self._book.expect_nothing()
-        self._book.missed_in_row = 0
+        self._exchange.stop()
         self._differs = False
         if self.told.owed:
             self._side.begin_stop(now, setpoints=self._verify)
         if self._verify:
             self._phase = Phase.CHECKING
-            self._timer.stop()
             self._maps.look_afresh(now)
         else:
             self._begin_cycles(now)
 
-    def go_idle(self, advice: str) -> None:
+    def fall_silent(self) -> None:
         self._phase = Phase.IDLE
-        self._stopping = self._differs = False
-        self.setpoints.allow(False)
+        self._differs = False
         self._clear_acyclic()
         self._exchange.stop()
-        self.be_offline(advice)
 
     def _clear_acyclic(self) -> None:
         self._side.clear()
@@ -174,19 +156,19 @@ class ExtendedSession(Session):
                 self.told.note(CYCLE, runs=True)
             owed = self.told.owed
             self.lose(f'mapping differs: {text}', now)
-            self._book.expect_nothing()
             # a request map that is right still takes neutral cycles, unless it is to be rewritten
             by_cycles = owed and self._maps.request_agrees and not self.gate.mute
             if owed:
                 self._side.begin_stop(now, setpoints=not by_cycles)
             if by_cycles:
+                self._exchange.book.expect_nothing()
                 if self._phase is not Phase.LEAVING:
                     self._phase = Phase.LEAVING
-                    self._exchange.run_out(max(
-                        now, self._timer.began_at + self._timer.stop_spacing))
+                    timer = self._exchange.timer
+                    self._exchange.run_out(max(now, timer.began_at + timer.stop_spacing))
             else:
                 self._phase = Phase.DIFFERS
-                self._timer.stop()
+                self._exchange.stop()
         elif self._phase is Phase.LEAVING:
             self._maps.look_at = math.inf  # that comes after the last neutral cycle
         elif self._phase is Phase.CYCLIC:  # there, the cyclic answers tell who is there
@@ -215,65 +197,58 @@ class ExtendedSession(Session):
             self._start_cycling(now)
         else:
             self._phase = Phase.CHECKING
-            self._timer.stop()
+            self._exchange.timer.stop()
             self._positions.read(now)
+
+    def _look_again(self, now: float) -> None:
+        if self._phase is Phase.CHECKING:
+            self._begin_cycles(now)
 
     def _start_cycling(self, now: float) -> None:
         self._phase = Phase.CYCLIC
-        self._book.stale = 0
+        self._exchange.book.stale = 0
         self._exchange.start(now, in_turn=True)
         self.report.advice = 'no cyclic response: drive silent or response identifier taken'
 
-    def _cycle(self, now: float) -> None:
-        """Send one cyclic request. The fast path of the timer."""
-        if self._stopping and self._exchange.wait_out(now, due=True):
-            return
-        if self._book.awaiting:
-            self._miss(now)
-            if self._timer.due == math.inf:
-                return
-        self._exchange.put(self._exchange.begin(now))
-        self._book.awaiting = True
+    def _send_cycle(self, request: Frame, now: float) -> None:
+        self._exchange.put(request)
+        self._exchange.expect_answer(now)
         self._channel.hold(now + 0.5 * self.configuration.period)
 
     def _last_cycle_left(self, now: float) -> None:
-        if self._stopping:
-            self._timer.stop()
+        if self.stage is Stage.STOPPING:
+            self._exchange.timer.stop()
             self._stop_ended()
         elif self._differs:
-            self._timer.stop()
-            self._book.expect_nothing()
+            self._exchange.stop()
             self._phase = Phase.DIFFERS
 
     def _stop_ended(self) -> None:
-        if (self._stopping and not self._side.stop.running
-                and (self._exchange.cycles_left == 0 or self._phase is Phase.STOPPING)):
+        if (self.stage is Stage.STOPPING and not self._side.stop.running
+                and (self._exchange.cycles_left == 0 or not self._cycling)):
             self._exchange.doubt_the_end()
             self.stop_left()
 
-    def _miss(self, now: float) -> None:
-        too_many = self._book.missed()
-        if self._stopping:
-            return
+    def _missed(self, reason: str, now: float) -> None:
         if self._phase is Phase.LEAVING:
             if self._exchange.cycles_left == 0:
                 self.start_over(now)
             return
-        if not too_many:
+        if not reason:
             return
-        self._book.missed_in_row = 0
+        self._exchange.forget()
         if self._verify and not self.online:
             self.start_over(now)
             return
         owed = self.told.owed or self.told.ran
-        self.lose(f'no cyclic response for {self.configuration.missed_limit} cycles', now)
+        self.lose(reason, now)
         if owed:  # of the word that has no slot; setpoints go neutral with the next cycles
             self._side.begin_stop(now, setpoints=False)
         if self.gate.mute:
             self.start_over(now)
         elif self._verify:  # it may still be listening, before it is left alone
             self._phase = Phase.LEAVING
-            self._exchange.run_out(self._timer.due)
+            self._exchange.run_out(self._exchange.timer.due)
 
     # -- frames from the drive --------------------------------------------------------------------
 
@@ -288,10 +263,7 @@ class ExtendedSession(Session):
 
     def _receive_cyclic(self, data: bytes, now: float, received_at: float) -> None:
         """Take a cyclic response. The fast path of the reader."""
-        book = self._book
-        if not book.awaiting:
-            if not book.take_stale():
-                self.report.reject('cyclic response that nobody asked for')
+        if not self._exchange.expects('cyclic response'):
             return
         raws, wrong = self._codec.decode_response(data)
         if wrong:
@@ -300,10 +272,8 @@ class ExtendedSession(Session):
                 return
         elif len(data) != extended.PAYLOAD:
             self.statistics.short += 1
-        book.answered(received_at)
-        if self.told.ran and not self._verify:  # otherwise the maps tell who has heard it
-            self.told.answered()
-        if not self.online and not self._stopping:
+        self._exchange.answered(received_at)
+        if not self.online and self.stage is Stage.RUNNING:
             if self._phase is Phase.LEAVING:
                 if not self._differs:  # it is back: look at its maps before anything else
                     self.start_over(now)
@@ -317,27 +287,7 @@ class ExtendedSession(Session):
         self.gate.measured(raws)
         self.report.note(ProcessDataReceived(raws, received_at))
         self._channel.release(now)
-        if self._stopping:
-            self._exchange.wait_out(now)
-
-    # -- timer ------------------------------------------------------------------------------------
-
-    def handle_timer(self, now: float) -> None:
-        if now >= self._timer.due:
-            self._cycle(now)
-        if now >= self._maps.look_at:
-            self._maps.look(now)
-        if now >= self._positions.due:
-            self._positions.due = math.inf
-            if self._phase is Phase.CHECKING:
-                self._begin_cycles(now)
-        self._side.handle_timer(now)
-        if now >= self._channel.next_timer():
-            self._channel.advance(now)
-
-    def next_timer(self) -> float:
-        return min(self._timer.due, self._channel.next_timer(), self._maps.look_at,
-                   self._positions.due, self._side.next_timer())
+        self._exchange.wait_out(now)
 
     # -- control ----------------------------------------------------------------------------------
 
@@ -346,15 +296,12 @@ class ExtendedSession(Session):
         self._side.withdrawn()
 
     def see_to_control_word(self, now: float) -> None:
-        control = self.control
-        if control is None or self._stopping:
+        if self.stage is Stage.STOPPING:
             return
         writer = self._side.control_writer
         if writer is not None and (self.online or self._phase is Phase.CYCLIC):
             writer.update(now)
-        if control.stopping and (self.setpoints.changed or (
-                self._side.control_slot is not None and control.word != self._exchange.word)):
-            self._timer.hurry(now)
+        self._exchange.hurry(now, setpoints=True)
 
     # -- state ------------------------------------------------------------------------------------
 

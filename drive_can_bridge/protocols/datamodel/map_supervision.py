@@ -70,7 +70,11 @@ class MapSupervision:
         self._pause = MAPPING_PERIOD
         self._rewritten_at = -math.inf
 
-    def look(self, now: float) -> None:
+    def next_timer(self) -> float:
+        """Return when the next look is due."""
+        return self.look_at
+
+    def handle_timer(self, now: float) -> None:
         """Read the maps, unless that is under way."""
         self.look_at = math.inf
         if not self._running:
@@ -84,7 +88,7 @@ class MapSupervision:
         """Read the maps; an answer that may be on its way already does not count."""
         self._outdated = self._running
         self._agreed = False
-        self.look(now)
+        self.handle_timer(now)
 
     def stop(self) -> None:
         """Plan nothing any more. The channel was cleared."""
@@ -104,7 +108,7 @@ class MapSupervision:
         now = self._channel.now
         self._running = False
         if self._outdated:
-            self.look(now)
+            self.handle_timer(now)
             return
         self.look_at = now + MAPPING_PERIOD
         found = '' if maps is None else '; '.join(differences(
@@ -152,7 +156,7 @@ class MapSupervision:
         self._emit(MappingWritten(
             f'request map {list(self._request)}, response map {list(self._response)}'))
         self._told = ''
-        self.look(now)
+        self.handle_timer(now)
 
     def _tell(self, text: str) -> None:
         """Report a difference, once."""

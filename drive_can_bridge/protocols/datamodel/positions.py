@@ -17,26 +17,35 @@ class Positions:
     Reads positions.
 
     :param known: called when all are known.
+    :param again: called when one that a setpoint could not carry is to be read again.
     :param silent: called when the drive has not answered; None: they are read again at once, paced
         by the time-out of the read.
-    :ivar due: when they are to be read again; infinity: not planned.
     """
 
     def __init__(self, session: Session, channel: AcyclicChannel, numbers: Numbers, *,
-                 known: Callable[[float], None],
+                 known: Callable[[float], None], again: Callable[[float], None],
                  silent: Callable[[float], None] | None) -> None:
-        self.due = math.inf
+        self._due = math.inf
         self._channel = channel
         self._setpoints = session.setpoints
         self._report = session.report
         self._numbers = numbers
-        self._known = known
+        self._known, self._again = known, again
         self._silent = silent or self.read
         self._asked = -1    # ``setpoints.forgotten`` when they were; -1: they are not
 
     def forget(self) -> None:
         """Plan nothing any more. The channel was cleared."""
-        self._asked, self.due = -1, math.inf
+        self._asked, self._due = -1, math.inf
+
+    def next_timer(self) -> float:
+        """Return when they are to be read again; infinity: not planned."""
+        return self._due
+
+    def handle_timer(self, now: float) -> None:
+        """Have them read again."""
+        self._due = math.inf
+        self._again(now)
 
     def read(self, now: float) -> None:
         """Read where the axes are, unless that is under way."""
@@ -67,4 +76,4 @@ class Positions:
         if raws is None:
             self._silent(now)
         else:   # but the setpoint cannot carry it
-            self.due = now + PAUSE
+            self._due = now + PAUSE

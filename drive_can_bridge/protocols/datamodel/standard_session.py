@@ -13,13 +13,13 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.roles import Roles
-from drive_can_bridge.core.session import Session
+from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.protocols.datamodel import standard
 from drive_can_bridge.protocols.datamodel.acyclic_side import AcyclicSide, map_cells
 from drive_can_bridge.protocols.datamodel.setpoint_writer import SetpointWriter
 from drive_can_bridge.protocols.datamodel.standard_round import StandardRound
 from drive_can_bridge.protocols.datamodel.stop_writes import ANSWER_TIME, ATTEMPTS
-from drive_can_bridge.protocols.polled_exchange import Phase, PolledExchange, Raws
+from drive_can_bridge.protocols.polled_exchange import PolledExchange, Raws
 
 SILENT = 'no answer to reads: drive silent, wrong station, bit rate or identifier mode'
 
@@ -53,7 +53,7 @@ class StandardSession(Session):
             missed=self._missed)
         self._timer = self._exchange.timer
         self._writer = SetpointWriter(self, self._side, self._exchange)
-        self._phase = Phase.IDLE
+        self.look_after(self._writer, *self._side.parts, channel=self._channel)
         self._expected = False  # the answer of a read that nobody wants any more may come
 
     # -- life cycle -------------------------------------------------------------------------------
@@ -61,10 +61,7 @@ class StandardSession(Session):
     def prepare_stop(self, now: float) -> bool:
         self._clear_acyclic()
         self.told.doubt()   # should the stop be confirmed, that is over
-        owes = self._phase is not Phase.IDLE and (self.online or self.told.owed)
-        if owes:
-            self._phase = Phase.STOPPING
-        return owes
+        return self.stage is not Stage.IDLE and (self.online or self.told.owed)
 
     def begin_stop(self, now: float) -> bool:
         self._writer.forget()
@@ -72,12 +69,8 @@ class StandardSession(Session):
         return self._side.stop.running
 
     def _stop_ended(self) -> None:
-        if self._phase is Phase.STOPPING:
+        if self.stage is Stage.STOPPING:
             self.go_idle('deactivated')
-
-    @property
-    def stopped(self) -> bool:
-        return self._phase is Phase.IDLE
 
     @property
     def longest_stop(self) -> float:
@@ -87,14 +80,13 @@ class StandardSession(Session):
         self._expected = self._expected or self._channel.outstanding is not None
         self._exchange.disregard()
         self._channel.time_lost(now)
-        if self._phase is Phase.POLLING:
+        if self.stage is Stage.RUNNING:
             self.stood_still(now)
             self._timer.start(now)
 
     def begin(self, now: float) -> None:
         self.report.advice = SILENT
         self._round.gap = ''
-        self._phase = Phase.POLLING
         self._tell_to_stop(now)
         self._timer.start(now)
 
@@ -108,12 +100,9 @@ class StandardSession(Session):
         if self.bus_available and (was_online or self.told.owed):
             self._side.begin_stop(now)
 
-    def go_idle(self, advice: str) -> None:
-        self._phase = Phase.IDLE
+    def fall_silent(self) -> None:
         self._writer.forget()
-        self.setpoints.allow(False)
         self._clear_acyclic()
-        self.be_offline(advice)
 
     def _clear_acyclic(self) -> None:
         self._expected = self._expected or self._channel.outstanding is not None
@@ -125,14 +114,10 @@ class StandardSession(Session):
     def handle_timer(self, now: float) -> None:
         if now >= self._timer.due:
             self._tick(now)
-        self._writer.handle_timer(now)
-        self._side.handle_timer(now)
-        if now >= self._channel.next_timer():
-            self._channel.advance(now)
+        super().handle_timer(now)
 
     def next_timer(self) -> float:
-        return min(self._timer.due, self._channel.next_timer(), self._side.next_timer(),
-                   self._writer.next_timer())
+        return min(self._timer.due, super().next_timer())
 
     def _tick(self, now: float) -> None:
         """Begin a period: look what is to be written, then read."""
@@ -153,7 +138,7 @@ class StandardSession(Session):
 
     def see_to_control_word(self, now: float) -> None:
         control, by_number = self.control, self._side.control_writer
-        if control is None or not self.online or self._phase is not Phase.POLLING:
+        if control is None or not self.online or self.stage is not Stage.RUNNING:
             return
         if by_number is not None:
             by_number.update(now)
