@@ -25,3 +25,6 @@ class AcyclicPart(Protocol):
 
     def time_lost(self, now: float) -> None:
         """Take note that nobody listened until now."""
+
+    def clear(self) -> None:
+        """Forget everything under way."""

@@ -19,9 +19,9 @@ A session never blocks, never raises on anything a drive sends, and sends nothin
 What is the same for all families stands here: when a drive is found and lost, what is taken back
 then, how a stop begins and what is said when it was not acknowledged, whose turn it is when. A
 family fills in what the exchange of its drives is: :meth:`Session.begin`,
-:meth:`Session.begin_stop`, :meth:`Session.fall_silent`, frames, and a few occasions to act (below
-"what a family may add"). What goes on beside that stands in the parts that a session is put
-together from (:meth:`Session.look_after`).
+:meth:`Session.begin_stop`, frames, and a few occasions to act (below "what a family may add").
+What goes on beside that stands in the parts that a session is put together from
+(:meth:`Session.look_after`).
 """
 
 from abc import ABC, abstractmethod
@@ -173,6 +173,11 @@ class Session(ABC):
         self._leave_owing('told to stop, but it does not answer')
         self.go_idle('deactivated')
 
+    def stop_ended(self) -> None:
+        """End a stop by writes, if this one was for that: what it could not do, it has told."""
+        if self.stage is Stage.STOPPING:
+            self.go_idle('deactivated')
+
     @property
     def stopped(self) -> bool:
         """The stop has run its course (also: it never had to)."""
@@ -274,18 +279,19 @@ class Session(ABC):
         """Begin the exchange; nothing is known of the drive."""
 
     @abstractmethod
-    def prepare_stop(self, now: float) -> bool:
-        """Forget what the stop will not need; tell whether there is anything to be stopped."""
-
-    @abstractmethod
     def begin_stop(self, now: float) -> bool:
         """Begin to tell the drive to stand still; False: there is no way to tell it."""
 
-    @abstractmethod
+    # -- what a family may add --------------------------------------------------------------------
+
+    def prepare_stop(self, now: float) -> bool:
+        """Forget what the stop will not need; tell whether there is anything to be stopped."""
+        self._acyclic.clear()
+        return self.stage is not Stage.IDLE
+
     def fall_silent(self) -> None:
         """Forget everything that was to be sent, or is under way."""
-
-    # -- what a family may add --------------------------------------------------------------------
+        self._acyclic.clear()
 
     def lost(self, now: float, *, was_online: bool) -> None:  # noqa: B027  optional
         """Take note that the drive is lost."""

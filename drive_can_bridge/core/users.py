@@ -25,14 +25,6 @@ if TYPE_CHECKING:
 DRIVE_OFFLINE = 'drive offline'
 
 
-def _as_usual(action: ControlAction, refusal: str) -> str:
-    return refusal
-
-
-def _take_no_note(request: Request, outcomes: Outcomes) -> None:
-    pass
-
-
 class Users:
     """
     The users' side of one session.
@@ -47,8 +39,9 @@ class Users:
 
     def __init__(self, session: 'Session', server: RequestServer, *,
                  blocked: Callable[[float], str] = lambda now: '',
-                 control_refusal: Callable[[ControlAction, str], str] = _as_usual,
-                 answered: Callable[[Request, Outcomes], None] = _take_no_note,
+                 control_refusal: Callable[[ControlAction, str], str] = (
+                     lambda action, refusal: refusal),
+                 answered: Callable[[Request, Outcomes], None] = lambda request, outcomes: None,
                  control: Callable[[ControlRequest, float], None] | None = None) -> None:
         self._session = session
         self._control = control

@@ -34,6 +34,13 @@ class Complaint(NamedTuple):
     message: str
 
 
+def out_of_range(key: str, value: int, least: int, most: int,
+                 remark: str = '') -> Iterator[Complaint]:
+    """Yield what is wrong with a number that is not within its limits."""
+    if not least <= value <= most:
+        yield Complaint(key, f'{value} is out of range, allowed is {least} to {most}{remark}')
+
+
 class Claim(NamedTuple):
     """
     Identifiers that a drive uses on its bus, and what for.

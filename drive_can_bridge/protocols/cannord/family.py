@@ -19,7 +19,7 @@ from drive_can_bridge.protocols.cannord.process_data import (
     EXTRA_LENGTH, EXTRA_VALUES, main_length, MAIN_VALUES,
 )
 from drive_can_bridge.protocols.cannord.states import STATUS_WORD
-from drive_can_bridge.protocols.family import Claim, Complaint, Family, Talk
+from drive_can_bridge.protocols.family import Claim, Complaint, Family, out_of_range, Talk
 from drive_can_bridge.protocols.observer import DriveObserver, Emit
 
 #: s that an inverter takes at most to answer process data (BU 0060 page 50)
@@ -54,9 +54,7 @@ class Cannord(Family):
     options_type = CannordOptions
 
     def check(self, drive: DriveConfiguration) -> Iterator[Complaint]:
-        if not 0 <= drive.station <= ADDRESS_MAX:
-            yield Complaint('station', f'{drive.station} is out of range, '
-                                       f'allowed is 0 to {ADDRESS_MAX} ({self.name})')
+        yield from out_of_range('station', drive.station, 0, ADDRESS_MAX, f' ({self.name})')
         yield from self._check_lists(drive)
         yield from self.check_names(drive)
         yield from self._check_profile(drive)
@@ -179,12 +177,8 @@ class Cannord(Family):
         foreign = any(protocol != self.name for protocol in drive.profile.protocols)
         for name, parameter in drive.profile.parameters.items():
             place = f'profile.parameters.{name}'
-            if parameter.number is not None and not 0 <= parameter.number <= NUMBER_MAX:
-                yield Complaint(f'{place}.number', f'{parameter.number} is out of range, '
-                                                   f'allowed is 0 to {NUMBER_MAX}')
-            if parameter.subindex is not None and not 0 <= parameter.subindex <= INDEX_MAX:
-                yield Complaint(f'{place}.subindex', f'{parameter.subindex} is out of range, '
-                                                     f'allowed is 0 to {INDEX_MAX}')
+            yield from out_of_range(f'{place}.number', parameter.number or 0, 0, NUMBER_MAX)
+            yield from out_of_range(f'{place}.subindex', parameter.subindex or 0, 0, INDEX_MAX)
             if parameter.number is None and not foreign:
                 yield from self._check_unnumbered(place, parameter)
 

@@ -24,6 +24,7 @@ from drive_can_bridge.core.requests import (
 )
 from drive_can_bridge.protocols.cannord.channel import TaskChannel
 from drive_can_bridge.protocols.cannord.procedures import TaskAccess
+from drive_can_bridge.protocols.channel import Lane
 
 TIMEOUT_NUMBER = 513
 #: periods that the time-out should last at least: one frame lost, the next one late
@@ -72,20 +73,13 @@ class TimeoutWatch:
         self._channel = channel
         self._access = access
         self._emit = emit
-        self._asking = False
         self._ask_at = -math.inf
 
-    def forget(self) -> None:
-        """Take note that the channel was cleared."""
-        self._asking = False
-
     def look(self, now: float) -> None:
-        """Read it, unless nobody answered lately."""
-        if self._parameter is None or self._asking or now < self._ask_at:
-            return
-        self._asking = True
-        self._channel.run(
-            self._access.serve(ReadRequest((self._parameter,))), self._take, now)
+        """Read it, unless that is under way, or nobody answered lately."""
+        if self._parameter is not None and now >= self._ask_at and self._channel.is_idle(Lane.OWN):
+            self._channel.run(
+                self._access.serve(ReadRequest((self._parameter,))), self._take, now)
 
     def request_answered(self, request: Request, outcomes: Outcomes) -> None:
         """Look again when somebody has written it."""
@@ -97,7 +91,6 @@ class TimeoutWatch:
 
     def _take(self, outcomes: Outcomes) -> None:
         outcome, = outcomes
-        self._asking = False
         if self._parameter is None:
             return
         if isinstance(outcome, ReadValue):

@@ -122,8 +122,7 @@ class CannordSession(Session):
     def prepare_stop(self, now: float) -> bool:
         if self._group is not None:
             self._group.end(now)
-        self._clear_acyclic()
-        return self.stage is not Stage.IDLE
+        return super().prepare_stop(now)
 
     def begin_stop(self, now: float) -> bool:
         if not self._led:   # else it ends with the last frames of its leader
@@ -135,12 +134,8 @@ class CannordSession(Session):
         return self.exchange.longest_stop
 
     def fall_silent(self) -> None:
-        self._clear_acyclic()
+        super().fall_silent()
         self._end_exchange()
-
-    def _clear_acyclic(self) -> None:
-        self._channel.clear()
-        self._timeout.forget()
 
     def _end_exchange(self) -> None:
         self.exchange.stop()

@@ -8,7 +8,7 @@ import re
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Route, STANDARD_IDENTIFIER_MAX
 from drive_can_bridge.protocols.canopen import network
-from drive_can_bridge.protocols.family import Claim, Complaint
+from drive_can_bridge.protocols.family import Claim, Complaint, out_of_range
 from drive_can_bridge.protocols.options import option
 
 _RAW_OBJECT = re.compile(r'x([0-9a-fA-F]{1,4})\.([0-9a-fA-F]{1,2})', re.ASCII)
@@ -35,9 +35,8 @@ class NodeOptions:
 
 def station_complaints(drive: DriveConfiguration) -> Iterator[Complaint]:
     """Yield what is wrong with the node-ID."""
-    if not 1 <= drive.station <= network.NODE_MAX:
-        yield Complaint('station', f'{drive.station} is out of range, '
-                                   f'allowed is 1 to {network.NODE_MAX} ({drive.protocol})')
+    yield from out_of_range(
+        'station', drive.station, 1, network.NODE_MAX, f' ({drive.protocol})')
 
 
 def node_claims(drive: DriveConfiguration, exchange: Mapping[int, str]) -> list[Claim]:

@@ -5,6 +5,7 @@ A node beside the session of its drive: NMT commands to it, what it says of itse
 When PDOs may be sent, :mod:`.node` knows; what becomes of the exchange, the session says.
 """
 
+import math
 from typing import Protocol
 
 from drive_can_bridge.core.configuration import DriveConfiguration
@@ -132,5 +133,5 @@ class Supervision:
                                           now)
 
     def next_timer(self) -> float:
-        """Return when ``handle_timer`` has something to do, while the node is in use."""
-        return self.node.next_timer()
+        """Return when ``handle_timer`` has something to do."""
+        return self.node.next_timer() if self._in_use else math.inf

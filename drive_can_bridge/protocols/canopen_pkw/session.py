@@ -72,7 +72,7 @@ class PkwSession(Session):
         self._channel = MailboxChannel(MailboxCourier(
             self._send, order=options.abort_code_order, retry=self.retry,
             wrote=lambda write: sent.note(write.span, write.words)))
-        self._writers = Writers(self, self._channel, self._stop_ended)
+        self._writers = Writers(self, self._channel, self.stop_ended)
         self._rounds = Rounds(self, self._channel)
         self._exchange = PolledExchange(
             self, self._channel, self._rounds.read, found=self._found,
@@ -95,10 +95,6 @@ class PkwSession(Session):
         self._channel.drop(now)
         self._writers.stop(self._stop_time, now, insist=True)
         return True
-
-    def _stop_ended(self) -> None:
-        if self.stage is Stage.STOPPING:
-            self.go_idle('deactivated')
 
     @property
     def longest_stop(self) -> float:
@@ -186,8 +182,8 @@ class PkwSession(Session):
 
     def _end_futile_stop(self, now: float) -> None:
         """End a stop that was for safety only, of a node that takes no PDOs any more."""
-        if self.stage is Stage.STOPPING and now < self._node.free_at and not self.told.owed:
-            self.go_idle('deactivated')
+        if now < self._node.free_at and not self.told.owed:
+            self.stop_ended()
 
     # -- what the device is told ------------------------------------------------------------------
 

@@ -13,7 +13,7 @@ from drive_can_bridge.protocols.datamodel.extended import (
     PAYLOAD, SLOTS, STATION_MASK, STATION_MAX, STATION_SHIFT,
 )
 from drive_can_bridge.protocols.datamodel.options import ExtendedOptions, NUMBER_MAX
-from drive_can_bridge.protocols.family import Claim, Complaint, Family, Talk
+from drive_can_bridge.protocols.family import Claim, Complaint, Family, out_of_range, Talk
 
 #: of every frame
 FRAME_BITS = worst_bits(PAYLOAD, extended=True)
@@ -29,9 +29,7 @@ class DataModelExtended(Family):
     options_type = ExtendedOptions
 
     def check(self, drive: DriveConfiguration) -> Iterator[Complaint]:
-        if not 1 <= drive.station <= STATION_MAX:
-            yield Complaint('station', f'{drive.station} is out of range, '
-                                       f'allowed is 1 to {STATION_MAX} ({self.name})')
+        yield from out_of_range('station', drive.station, 1, STATION_MAX, f' ({self.name})')
         yield from check_period_and_maps(drive)
         yield from self._check_slots(drive)
         yield from check_parameters(drive, self.name)

@@ -41,7 +41,7 @@ class StandardSession(Session):
             encode_write=lambda number, words: standard.encode_write(request, number, *words),
             decode=lambda frame, step: standard.decode_read_response(
                 frame, step.count if step else 0, strict=strict),
-            together=1, stop_ended=self._stop_ended, quarantine=options.quarantine)
+            together=1, stop_ended=self.stop_ended, quarantine=options.quarantine)
         self._channel = self._side.channel
         self._status_slot = self._side.status_slot
         self._request_identifier = request
@@ -67,10 +67,6 @@ class StandardSession(Session):
         self._writer.forget()
         self._side.begin_stop(now)
         return self._side.stop.running
-
-    def _stop_ended(self) -> None:
-        if self.stage is Stage.STOPPING:
-            self.go_idle('deactivated')
 
     @property
     def longest_stop(self) -> float:
