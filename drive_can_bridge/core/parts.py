@@ -13,6 +13,9 @@ class Part(Protocol):
     def handle_timer(self, now: float) -> None:
         """Do what is due, which may be nothing."""
 
+    def stop(self) -> None:
+        """Plan nothing any more. The channel was cleared."""
+
 
 class AcyclicPart(Protocol):
     """The acyclic channel."""

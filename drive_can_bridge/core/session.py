@@ -122,11 +122,12 @@ class Session(ABC):
         self.how_to_enable = 'call ~/enable'
         self.partners: Sequence[Session] = ()
         self.phase: float | None = None
+        self._parts: Sequence[Part] = ()
         self._timed: list[tuple[Callable[[], float], Callable[[float], None]]] = []
 
     def look_after(self, *parts: Part, channel: AcyclicPart) -> None:
         """Name the parts, in the order in which they act; then come control word and channel."""
-        self._acyclic = channel
+        self._parts, self._acyclic = parts, channel
         self._timed = [(part.next_timer, part.handle_timer) for part in parts]
         if self.control is not None:
             self._timed.append((self.control.next_timer, self._look_after_control))
@@ -292,6 +293,8 @@ class Session(ABC):
     def fall_silent(self) -> None:
         """Forget everything that was to be sent, or is under way."""
         self._acyclic.clear()
+        for part in self._parts:
+            part.stop()
 
     def lost(self, now: float, *, was_online: bool) -> None:  # noqa: B027  optional
         """Take note that the drive is lost."""

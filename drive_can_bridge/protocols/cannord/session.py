@@ -114,7 +114,8 @@ class CannordSession(Session):
     # -- life cycle -------------------------------------------------------------------------------
 
     def begin(self, now: float) -> None:
-        self._end_exchange()
+        self.exchange.stop()
+        self._forget_samples()
         self.exchange.start(math.inf if self._led else now)     # those of the leader are for all
         if self.told.owed:
             self.exchange.timer.hurry(now)
@@ -135,10 +136,9 @@ class CannordSession(Session):
 
     def fall_silent(self) -> None:
         super().fall_silent()
-        self._end_exchange()
+        self._forget_samples()
 
-    def _end_exchange(self) -> None:
-        self.exchange.stop()
+    def _forget_samples(self) -> None:
         self.exchange.book.stale += self._samples.expect_nothing()
 
     def went_offline(self) -> None:

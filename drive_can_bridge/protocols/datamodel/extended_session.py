@@ -105,7 +105,9 @@ class ExtendedSession(Session):
         return self._phase in (Phase.CYCLIC, Phase.LEAVING)
 
     def prepare_stop(self, now: float) -> bool:
-        self._clear_acyclic()
+        self._side.clear()
+        self._positions.stop()
+        self._maps.stop()
         return self._cycling or (self.stage is not Stage.IDLE and self.told.owed)
 
     def begin_stop(self, now: float) -> bool:
@@ -130,15 +132,10 @@ class ExtendedSession(Session):
             self._begin_cycles(now)
 
     def fall_silent(self) -> None:
+        super().fall_silent()
+        self._side.clear()
         self._phase = Phase.IDLE
         self._differs = False
-        self._clear_acyclic()
-        self._exchange.stop()
-
-    def _clear_acyclic(self) -> None:
-        self._side.clear()
-        self._positions.forget()
-        self._maps.stop()
 
     # -- maps -------------------------------------------------------------------------------------
 

@@ -34,7 +34,7 @@ class Positions:
         self._silent = silent or self.read
         self._asked = -1    # ``setpoints.forgotten`` when they were; -1: they are not
 
-    def forget(self) -> None:
+    def stop(self) -> None:
         """Plan nothing any more. The channel was cleared."""
         self._asked, self._due = -1, math.inf
 

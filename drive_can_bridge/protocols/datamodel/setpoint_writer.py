@@ -38,8 +38,8 @@ class SetpointWriter:
         self._spacing = stop_spacing(drive.period)
         self._pulse_at = math.inf  # when the control word is due again, whatever it was
 
-    def forget(self) -> None:
-        """Take note that nothing is known of the drive."""
+    def stop(self) -> None:
+        """Plan nothing any more: nothing is known of the drive."""
         self._schedule.forget()
         self._pulse_at = math.inf
 

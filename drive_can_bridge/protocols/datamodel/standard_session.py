@@ -64,7 +64,7 @@ class StandardSession(Session):
         return self.stage is not Stage.IDLE and (self.online or self.told.owed)
 
     def begin_stop(self, now: float) -> bool:
-        self._writer.forget()
+        self._writer.stop()
         self._side.begin_stop(now)
         return self._side.stop.running
 
@@ -92,13 +92,13 @@ class StandardSession(Session):
 
     def _tell_to_stop(self, now: float, was_online: bool = False) -> None:
         """See that a drive stands still that may only have lost its voice, if it may run."""
-        self._writer.forget()
+        self._writer.stop()
         if self.bus_available and (was_online or self.told.owed):
             self._side.begin_stop(now)
 
     def fall_silent(self) -> None:
-        self._writer.forget()
         self._clear_acyclic()
+        super().fall_silent()
 
     def _clear_acyclic(self) -> None:
         self._expected = self._expected or self._channel.outstanding is not None
@@ -145,7 +145,7 @@ class StandardSession(Session):
 
     def _found(self, now: float) -> None:
         self.be_online()
-        self._writer.forget()
+        self._writer.stop()
         self._writer.look(now)
         self._side.found(now)
 
