@@ -201,3 +201,125 @@ def test_control_requests_need_a_drive() -> None:
     without.users.submit(request, 1.0)
     assert without.take_events() == [
         ControlCompleted(request, False, 'the profile has no control section')]
+
+
+class Acting:
+    """A part, or a channel, that notes when it has its turn."""
+
+    def __init__(self, name: str, log: list[str], due: float = math.inf) -> None:
+        self.due = due
+        self._name = name
+        self._log = log
+
+    def next_timer(self) -> float:
+        return self.due
+
+    def handle_timer(self, now: float) -> None:
+        self._log.append(self._name)
+
+    advance = handle_timer
+
+    def stop(self) -> None:
+        self._log.append(f'{self._name} stops')
+
+    def clear(self) -> None:
+        self._log.append(f'{self._name} is cleared')
+
+    def time_lost(self, now: float) -> None:
+        self._log.append(f'{self._name} lost time')
+
+
+class Parts(Session):
+    """Has nothing but parts; a stop of it takes as long as it takes."""
+
+    longest_stop = 1.0
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self.log: list[str] = []
+        self.users = Users(self, Idle.Server(Idle(drive(), None)))
+        self.first, self.second = Acting('first', self.log), Acting('second', self.log)
+        self.channel = Acting('channel', self.log)
+        self.look_after(self.first, self.second, channel=self.channel)
+
+    def begin(self, now: float) -> None:
+        self.log.append('begin')
+
+    def begin_stop(self, now: float) -> bool:
+        self.log.append('stop')
+        return True
+
+    def see_to_control_word(self, now: float) -> None:
+        self.log.append('control word')
+
+    def receive_frame(self, frame: Frame, now: float, age: float = 0.0) -> None:
+        raise NotImplementedError
+
+
+def with_parts(**options: object) -> Parts:
+    configuration = drive(**options)
+    table = configuration.profile.control
+    made = Parts(configuration, None if table is None else ControlMachine(table, timeout=2.0))
+    made.activate(0.0)
+    made.bus_up(0.0)
+    made.log.clear()
+    return made
+
+
+def test_parts_act_when_they_are_due_and_in_their_order() -> None:
+    made = with_parts(control=CONTROL)
+    assert made.next_timer() == math.inf
+    made.first.due, made.second.due, made.channel.due = 7.0, 5.0, 6.0
+    assert made.next_timer() == 5.0
+    made.handle_timer(4.9)
+    assert made.log == []
+    made.handle_timer(5.0)
+    assert made.log == ['second']
+    made.log.clear()
+    made.online = True
+    made.users.submit(ControlRequest(ControlAction.ENABLE), 1.0)
+    assert made.next_timer() == 3.0, 'control waits for 2 s'
+    made.log.clear()
+    made.handle_timer(7.0)
+    assert made.log == ['first', 'second', 'control word', 'channel']
+    (outcome,) = made.take_events()
+    assert isinstance(outcome, ControlCompleted)
+    assert not outcome.success
+
+
+def test_a_stop_forgets_what_is_under_way_and_its_end_everything() -> None:
+    made = with_parts()
+    assert not made.stopped
+    made.deactivate(1.0)
+    assert made.log == ['channel is cleared', 'stop']
+    assert not made.stopped
+    made.log.clear()
+    made.stop_ended()
+    assert made.log == ['channel is cleared', 'first stops', 'second stops']
+    assert made.stopped
+    made.log.clear()
+    made.deactivate(2.0)
+    assert 'stop' not in made.log, 'there is nothing to be stopped'
+
+
+def test_only_a_stop_is_ended() -> None:
+    made = with_parts()
+    made.stop_ended()
+    assert made.log == []
+    assert not made.stopped
+
+
+def test_a_stall_begins_anew_but_lets_a_stop_go_on() -> None:
+    made = with_parts()
+    made.online = True
+    made.time_lost(5.0)
+    assert made.log == ['channel lost time', 'begin']
+    assert made.take_events() == [StationLost('the bridge stood still')]
+    made.deactivate(6.0)
+    made.log.clear()
+    made.time_lost(8.0)
+    assert made.log == ['channel lost time']
+    made.give_up(9.0)
+    made.log.clear()
+    made.time_lost(10.0)
+    assert made.log == ['channel lost time']
