@@ -1,0 +1,215 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""The cycles of a family that has no more to say than it must: one frame each way."""
+
+import math
+
+from builders import CONTROL, drive, SPEED, WORD
+import pytest
+
+from drive_can_bridge.core.control import ControlAction, ControlRequest
+from drive_can_bridge.core.control_machine import ControlMachine
+from drive_can_bridge.core.events import FrameRejected, StationFound, StationLost
+from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.request_desk import RequestServer
+from drive_can_bridge.core.session import Session, Stage
+from drive_can_bridge.core.users import Users
+from drive_can_bridge.protocols.cyclic_exchange import CyclicExchange
+
+REQUEST = 0x10
+
+
+class Silent:
+    """A channel with nothing to do, for a family without acyclic frames."""
+
+    waiting = 0
+
+    def next_timer(self) -> float:
+        return math.inf
+
+    def advance(self, now: float) -> None:
+        pass
+
+    def time_lost(self, now: float) -> None:
+        pass
+
+    def clear(self) -> None:
+        pass
+
+    cancel = clear
+
+    def serve(self, *arguments: object) -> None:
+        raise NotImplementedError
+
+
+class Plain(Session):
+    """As docs/architecture.md has it, and an answer that holds the status word."""
+
+    def __init__(self, period: float) -> None:
+        configuration = drive(control=CONTROL, request=(WORD, SPEED), period=period)
+        super().__init__(configuration, ControlMachine(CONTROL, timeout=2.0))
+        server: RequestServer = Silent()
+        self.users = Users(self, server)
+        self.exchange = CyclicExchange(
+            self, self._encode, self._send_cycle, slot=0, silence='no answer',
+            advice='look at the plug')
+        self.look_after(self.exchange, channel=Silent())
+
+    def begin(self, now: float) -> None:
+        self.exchange.stop()
+        self.exchange.start(now)
+
+    def begin_stop(self, now: float) -> bool:
+        self.exchange.stop_soon(now)
+        return True
+
+    @property
+    def longest_stop(self) -> float:
+        return self.exchange.longest_stop
+
+    def see_to_control_word(self, now: float) -> None:
+        self.exchange.hurry(now, setpoints=self.told.owed)
+
+    def _encode(self, raws: list[int]) -> bytes:
+        return bytes(raws)
+
+    def _send_cycle(self, telegram: bytes, now: float) -> None:
+        self.exchange.put(Frame(REQUEST, telegram, False))
+        self.exchange.expect_answer(now)
+
+    def receive_frame(self, frame: Frame, now: float, age: float = 0.0) -> None:
+        if not self.exchange.expects('answer'):
+            return
+        self.exchange.answered(now - age)
+        if not self.online and self.stage is Stage.RUNNING:
+            self.be_online()
+        assert self.control is not None
+        self.control.status_received(frame.data[0], now)
+        self.control_changed(now)
+        self.exchange.wait_out(now)
+
+
+class Talk:
+    """What is said, as times and payloads in hex."""
+
+    def __init__(self, period: float = 0.02) -> None:
+        self.session = Plain(period)
+        self.exchange = self.session.exchange
+        self.session.bus_up(9.0)
+        self.session.activate(10.0)
+
+    def at(self, now: float) -> list[str]:
+        self.session.handle_timer(now)
+        return self.sent(now)
+
+    def sent(self, now: float) -> list[str]:
+        frames = self.session.take_frames()
+        self.session.frames_left(now)
+        return [frame.data.hex() for frame in frames]
+
+    def answer(self, now: float, status: int = 1) -> None:
+        self.session.receive_frame(Frame(REQUEST + 1, bytes([status]), False), now)
+
+
+def test_once_a_period_as_long_as_it_answers() -> None:
+    talk = Talk()
+    assert talk.at(10.0) == ['0000']
+    talk.answer(10.001)
+    assert talk.session.take_events() == [StationFound()]
+    assert talk.session.next_timer() == pytest.approx(10.02)
+    for number in range(1, 5):
+        assert talk.at(10.0 + 0.02 * number) == ['0000']
+    reason = 'no answer for 3 cycles'
+    assert talk.session.take_events() == [StationLost(reason)]
+    assert talk.session.offline_advice == 'no answer: look at the plug'
+    assert talk.at(10.1) == ['0000'], 'which is how it is found again'
+    talk.answer(10.101)
+    assert talk.session.take_events() == [StationFound()]
+
+
+def test_what_nobody_waits_for() -> None:
+    talk = Talk()
+    talk.at(10.0)
+    talk.answer(10.001)
+    talk.session.take_events()
+    talk.answer(10.002)
+    assert talk.session.take_events() == [FrameRejected('answer that nobody asked for')]
+    talk.at(10.02)
+    talk.at(10.04)
+    talk.answer(10.041)
+    talk.answer(10.042)
+    assert talk.session.take_events() == [], 'one of them was late'
+
+
+def test_what_stops_a_drive_is_brought_forward() -> None:
+    talk = Talk(period=0.3)
+    talk.at(10.0)
+    talk.session.setpoints.changed = True
+    talk.exchange.hurry(10.05, setpoints=False)
+    assert talk.session.next_timer() == pytest.approx(10.3)
+    talk.exchange.hurry(10.05, setpoints=True)
+    assert talk.session.next_timer() == pytest.approx(10.05)
+
+
+def test_what_starts_a_drive_waits_for_its_turn() -> None:
+    talk = Talk(period=0.3)
+    talk.at(10.0)
+    talk.answer(10.001)
+    talk.session.users.submit(ControlRequest(ControlAction.ENABLE), 10.01)
+    assert talk.session.next_timer() == pytest.approx(10.3)
+    assert talk.at(10.301) == ['0100']
+
+
+def test_last_cycles_are_not_hurried() -> None:
+    talk = Talk(period=0.3)
+    talk.at(10.0)
+    talk.session.deactivate(10.2)
+    assert talk.session.next_timer() == pytest.approx(10.2)
+    assert talk.at(10.2) == ['0000']
+    talk.session.setpoints.changed = True
+    talk.exchange.hurry(10.21, setpoints=True)
+    assert talk.session.next_timer() == pytest.approx(10.3)
+    assert talk.at(10.301) == talk.at(10.402) == ['0000']
+    assert talk.session.stopped
+    assert talk.session.next_timer() == math.inf
+
+
+def test_nothing_is_left_of_an_exchange_that_was_stopped() -> None:
+    talk = Talk()
+    talk.at(10.0)
+    talk.exchange.settle(10.02)
+    talk.exchange.settle(10.02)
+    talk.exchange.expect_answer(10.03, until=10.05)
+    talk.exchange.stop_soon(10.03)
+    assert talk.exchange.book.missed_in_row == 1
+    talk.exchange.stop()
+    assert talk.exchange.next_timer() == math.inf
+    assert talk.exchange.cycles_left == -1
+    assert talk.exchange.book.missed_in_row == 0
+    talk.answer(10.04)
+    assert talk.session.take_events() == [], 'it was on its way'
+
+
+@pytest.mark.parametrize('answered', [True, False])
+def test_the_answer_to_the_last_cycle_is_waited_for_where_the_drive_ran(answered: bool) -> None:
+    talk = Talk()
+    talk.at(10.0)
+    talk.answer(10.001)
+    talk.session.users.submit(ControlRequest(ControlAction.ENABLE), 10.01)
+    talk.at(10.02)
+    talk.answer(10.021)
+    assert talk.at(10.04) == ['0100']
+    talk.answer(10.041, 3)
+    talk.session.take_events()
+    talk.session.deactivate(10.05)
+    for now in (10.06, 10.08, 10.1):
+        assert talk.at(now) == ['0000']
+    assert not talk.session.stopped
+    assert talk.session.next_timer() == pytest.approx(10.2)
+    if answered:
+        talk.answer(10.15)
+        assert talk.session.stopped
+    else:
+        talk.at(10.2)
+        assert talk.session.stopped
+    told = [event for event in talk.session.take_events() if 'does not answer' in str(event)]
+    assert bool(told) is not answered
