@@ -568,6 +568,22 @@ def test_member_that_falls_silent_together_with_the_stop(
         (name, 'told to stop, but it does not answer: it may still be running')]
 
 
+def test_a_late_answer_of_one_member_does_not_end_the_wait_for_another() -> None:
+    bus = driven()
+    bus.answers = {}
+    for session in bus.sessions:
+        session.deactivate(bus.now)
+    alone = [text for _, text in bus.live(0.06) if not text.startswith('400')]
+    assert sorted(text[:3] for text in alone) == ['002', '004', '006']
+    last = int(alone[-1][:3], 16)
+    bus.hears(f'{last + 1:03X}#{READY}')
+    assert not bus.sessions[0].stopped
+    bus.live(0.2)
+    assert all(session.stopped for session in bus.sessions)
+    assert [name for name, _ in worries(bus)] == [
+        name for station, name in enumerate(NAMES, 1) if station != last // 2]
+
+
 def test_a_stop_that_all_have_heard_waits_for_nobody() -> None:
     bus = driven()
     for session in bus.sessions:
@@ -829,6 +845,14 @@ def test_silent_member_is_offline_by_its_own_timer() -> None:
     assert now == pytest.approx(10.16, abs=0.002)
     assert [session.online for session in sessions] == [True, False]
     assert StationLost not in {type(event) for event in ears[0].events}
+
+
+def test_latency_counts_from_the_frame_of_the_member() -> None:
+    bus = Bus(*members(2))
+    bus.live(0.2)
+    for session in bus.sessions:
+        assert session.statistics.latency.count >= 5
+        assert session.statistics.latency.maximum == pytest.approx(0.0005)
 
 
 # -- the life of a group --------------------------------------------------------------------------
