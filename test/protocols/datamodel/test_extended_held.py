@@ -340,6 +340,25 @@ def test_position_that_the_setpoint_cannot_carry() -> None:
     assert talk.until(10.1 + 1e-6)[0][1] == request(0, 32000)
 
 
+def test_position_is_not_read_again_where_the_maps_differ_meanwhile() -> None:
+    coarse = parameter('coarse', 60, type=INT16, scale=0.001, unit='deg', storage=RAM,
+                       neutral_from='actual_position', arming_tolerance=0.5)
+    talk = axis(table=(*TABLE, coarse, MEASURED), request=(WORD, coarse))
+    talk.activate(9.99)
+    talk.hears(MAPS[0], 9.991)
+    talk.hears(MAPS[1], 9.992)
+    talk.hears('10200D41#0190000000000000', 9.993)      # 40.0 deg, 32.767 at most
+    for read in range(1, 10):
+        due = 9.993 + 0.1 * read
+        assert [text for _, text in talk.until(due + 1e-6)] == [ASK_POSITION]
+        assert talk.hears('10200D41#0190000000000000', due) == []
+    assert [text for _, text in talk.until(10.9921)] == [ASK_MAPS[0]]
+    assert talk.hears(MAPS[0], 10.9922) == [ASK_MAPS[1]]
+    assert talk.hears('102007E4#00D4000000000000', 10.9923) == []
+    assert talk.until(11.9) == []
+    assert talk.session.offline_advice.startswith('mapping differs')
+
+
 def test_status_by_hand_latches_with_the_word() -> None:
     """A status word that comes seldom does not say from when on the axis is driven."""
     talk = axis(response=(ACTUAL, MEASURED), request=(WORD, POSITION))

@@ -193,6 +193,25 @@ def test_response_map_that_differs_ends_with_neutral_cycles() -> None:
     assert talk.hears(ANSWER, 11.902) == []
     assert talk.samples() == []
     assert talk.session.state is DriveState.MAPPING_DIFFERS
+    talk.deactivate(12.0)
+    assert talk.session.stopped
+    assert talk.session.state is DriveState.OFFLINE
+
+
+def test_cycle_that_another_map_would_answer_is_neither_answered_nor_missed() -> None:
+    talk = running()
+    look(talk)
+    talk.hears(REQUEST_MAP, 11.003)
+    before = talk.session.statistics.missed, talk.session.statistics.exchanges
+    talk.until(11.0209)     # a cycle is under way
+    talk.hears(OTHER_RESPONSE, 11.021)
+    after = talk.session.statistics.missed, talk.session.statistics.exchanges
+    assert after == before
+    talk.events()
+    talk.hears(ANSWER, 11.022)
+    assert talk.events() == []
+    assert (talk.session.statistics.missed, talk.session.statistics.exchanges) == before
+    assert [text for _, text in talk.until(11.9)] == [NEUTRAL] * 3
 
 
 def test_response_map_that_differs_disables_too() -> None:
