@@ -174,7 +174,6 @@ class SimulatedCannordInverter(SimulatedDrive):
         """Trip when no telegram came for too long. The first one starts the watch."""
         if now >= self._silent_since + self._timeout:
             self._silent_since = math.inf
-            self._timed_out = True
             self.trip(now, math.inf, TIMEOUT_FAULT)
             self._notices.append(f'{self.name}: telegram time-out')
 
@@ -189,6 +188,8 @@ class SimulatedCannordInverter(SimulatedDrive):
 
     def trip(self, now: float, duration: float, code: float | None = None) -> None:
         """Fail by itself, and tell at once, unasked."""
+        # a telegram ends the cause of this fault alone
+        self._timed_out = code == TIMEOUT_FAULT
         super().trip(now, duration, code)
         self.answer(self._status(self._length), now)
 

@@ -432,6 +432,19 @@ class TestTelegramTimeout:
         assert tells(made, READY, 20.2)[:4] == DISABLED
         assert made.take_notices() == ['conveyor: telegram time-out']
 
+    def test_a_further_trip_outlasts_the_telegrams(self) -> None:
+        made = inverter()
+        made.set_value('telegram_timeout', 0.5)
+        run(made, 10.0)
+        made.handle_timer(10.5)
+        made.fault('trip=0.8', 11.0)
+        made.take_frames()
+        # the telegrams are back, but that trip has a cause of its own, up to 11.8
+        tells(made, ACKNOWLEDGE, 11.4)
+        assert tells(made, READY, 11.5)[:4] == FAULT
+        tells(made, ACKNOWLEDGE, 11.9)
+        assert tells(made, READY, 12.0)[:4] == DISABLED
+
     def test_noticed_without_a_timer(self) -> None:
         made = inverter()
         made.set_value('telegram_timeout', 0.5)
