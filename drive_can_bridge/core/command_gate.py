@@ -33,16 +33,19 @@ class CommandGate:
     :param control: its control and status word machine, if it has one.
     :param sample: what is measured, in the order of samples.
     :param leader: the machine of the drive whose control word it obeys, if that is another one.
+    :param missed_limit: how many responses in a row may lack the status word of an enabled drive.
     """
 
     def __init__(self, presence: Presence, setpoints: Setpoints, control: ControlMachine | None,
                  sample: Sequence[Parameter], report: Reporter,
-                 leader: ControlMachine | None = None) -> None:
+                 leader: ControlMachine | None = None, missed_limit: int = 3) -> None:
         self._presence = presence
         self._setpoints = setpoints
         self._control = control
         self._obeyed = leader or control
         self._report = report
+        self._missed_limit = missed_limit
+        self._lacking = 0   # responses in a row without a status word
         self._status_in_sample = control is not None and any(
             parameter.name == control.table.status_parameter for parameter in sample)
 
@@ -82,6 +85,21 @@ class CommandGate:
         if self._control is not None:
             self._control.withdraw(reason, now)
             self.follow()
+
+    def status(self, raw: int | None, now: float) -> None:
+        """
+        Take the status word of a response; None: it lacks it.
+
+        A drive that does not say any more whether it is enabled is not driven on.
+        """
+        control = self._control
+        if control is None:
+            return
+        control.status_received(raw, now)
+        self._lacking = 0 if raw is not None else self._lacking + 1
+        if (self._lacking >= self._missed_limit and control.operating
+                and control.table.enabled is not None):
+            control.drop(f'{self._lacking} answers without a status word')
 
     def measured(self, raws: Sequence[int | None]) -> None:
         """Take a sample, for setpoints that stay where the axis is; after its status word."""

@@ -220,11 +220,7 @@ class ControlMachine:
         under_way = self._operation
         if self._reached or (
                 under_way is not None and under_way.action is ControlAction.ENABLE):
-            text = f'{name} offline'
-            if self._reached:
-                self._notes.append(f'enable withdrawn: {text}; only ~/enable starts the group '
-                                   'again')
-            self._end(False, text)
+            self.drop(f'{name} offline', 'the group')
         self._advance()
 
     def word_refused(self, word: int, reason: str, now: float) -> None:
@@ -246,6 +242,12 @@ class ControlMachine:
         """Return when :meth:`handle_timer` has something to do; ``math.inf`` if never."""
         return math.inf if self._operation is None else self._operation.deadline
 
+    def drop(self, reason: str, whom: str = 'the drive') -> None:
+        """End what is under way, and what was reached: no user wants that."""
+        if self._reached:
+            self._notes.append(f'enable withdrawn: {reason}; only ~/enable starts {whom} again')
+        self._end(False, reason)
+
     def withdraw(self, reason: str, now: float) -> None:
         """
         Go back to ``disable``: the drive went offline or restarted, or the bridge stops.
@@ -253,9 +255,7 @@ class ControlMachine:
         Open requests fail with the reason; nothing is known, and the word is :attr:`word_due`.
         """
         self.handle_timer(now)
-        if self._reached:
-            self._notes.append(f'enable withdrawn: {reason}; only ~/enable starts the drive again')
-        self._end(False, reason)
+        self.drop(reason)
         self._sent = False
         self._reports.forget()
         self._disregard.forget()

@@ -112,7 +112,8 @@ class Session(ABC):
             image.setpoints, timeout=drive.command_timeout,
             rearm_immediate=drive.rearm_immediate, sample=image.sample, sent=self.sent)
         self.gate = CommandGate(
-            self, self.setpoints, control, image.sample, self.report, leader)
+            self, self.setpoints, control, image.sample, self.report, leader,
+            missed_limit=drive.missed_limit)
         self.roles = roles or Roles(drive, controlled=control is not None)
         self.retry = RetryPolicy(
             timeout=drive.parameter_timeout, attempts=drive.parameter_retries + 1,

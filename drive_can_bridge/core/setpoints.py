@@ -177,8 +177,13 @@ class Setpoints:
         moved = False
         for setpoint in self.held:
             raw = raws[setpoint.place] if setpoint.place < len(raws) else None
-            if raw is not None and not (driven and setpoint.known):
+            if driven and setpoint.known:
+                continue
+            if raw is not None:
                 moved |= setpoint.measure(raw)
+            elif setpoint.known:    # by now it may be anywhere
+                setpoint.forget()
+                moved = True
         self.changed |= moved
         return moved
 

@@ -70,15 +70,21 @@ class Rounds:
         """Take the status of a drive that was found by this round."""
         if found:
             self._take_status(self._words)
+        elif self._status is not None and self._status_among(self._words) is None:
+            self._session.gate.status(None, now)
+            self._session.control_changed(now)
 
     def _take_status(self, words: dict[Address, int]) -> None:
         now, control = self._channel.now, self._session.control
-        raw = None if self._status is None else self._placement.raw_among(*self._status, words)
+        raw = self._status_among(words)
         if raw is not None and control is not None:
             self.status_known = True
-            control.status_received(raw, now)
+            self._session.gate.status(raw, now)
         self._session.control_changed(now)
         self.status_known = self._status is None
+
+    def _status_among(self, words: dict[Address, int]) -> int | None:
+        return None if self._status is None else self._placement.raw_among(*self._status, words)
 
     def _instead(self, span: Span, refused: Refused) -> Sequence[Span]:
         """Take a refusal: two parameters that share a read are read alone from now on."""

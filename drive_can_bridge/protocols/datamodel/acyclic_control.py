@@ -153,8 +153,8 @@ class AcyclicControl:
         self._reading = False
         if not self._watching:
             return
-        if raw is not None and not self._outdated:
-            self._control.status_received(raw, now)
+        if not self._outdated:
+            self._session.gate.status(raw, now)
             self._session.control_changed(now)
         self._look_at = now if self._outdated else min(self._look_at, now + (
             STATUS_PERIOD_PENDING if self._control.pending else STATUS_PERIOD))

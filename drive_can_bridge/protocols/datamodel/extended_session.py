@@ -279,7 +279,7 @@ class ExtendedSession(Session):
             self._side.found(now)
         slot = self._side.status_slot
         if self.control is not None and slot is not None:
-            self.control.status_received(raws[slot] if slot < len(raws) else None, now)
+            self.gate.status(raws[slot] if slot < len(raws) else None, now)
             self.control_changed(now)
         self.gate.measured(raws)
         self.report.note(ProcessDataReceived(raws, received_at))

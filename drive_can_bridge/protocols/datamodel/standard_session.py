@@ -156,7 +156,7 @@ class StandardSession(Session):
         # a status that was asked for before the word left says nothing about the word
         if (self.control is not None and self._status_slot is not None
                 and self._round.status_asked_at > self._writer.word_written_at):
-            self.control.status_received(raws[self._status_slot], now)
+            self.gate.status(raws[self._status_slot], now)
             self.control_changed(now)
 
     def _missed(self, reason: str, now: float) -> None:

@@ -158,6 +158,33 @@ def test_response_without_its_status_confirms_nothing() -> None:
     assert talk.control_outcomes() == [('enable', True, 'enabled')]
 
 
+def cut(talk: Conversation, now: float) -> str:
+    """Let one cycle pass whose response is too short for the status word."""
+    (_, sent), = talk.until(now + TICK)
+    talk.hears('103FFFF0#03E800FA', now + 0.001)
+    return sent
+
+
+def test_drive_whose_status_is_missing_for_long_is_not_driven_on() -> None:
+    talk = inside(rearm_immediate=True)
+    talk.asks(ControlAction.ENABLE, 10.003)
+    exchange(talk, 10.02, READY)
+    exchange(talk, 10.04, ENABLED)
+    talk.commands(0, 100.0, 10.043)
+    runs = '003FFFF0#000103E800000000'
+    assert cut(talk, 10.06) == cut(talk, 10.08) == runs
+    assert exchange(talk, 10.1, ENABLED) == runs, 'counted anew from here'
+    talk.events()
+    assert cut(talk, 10.12) == cut(talk, 10.14) == cut(talk, 10.16) == runs
+    assert [note.text for note in talk.events(Noted)] == [
+        'enable withdrawn: 3 answers without a status word; only ~/enable starts the drive again']
+    assert talk.session.state is DriveState.DISABLED
+    assert talk.commands(0, 100.0, 10.162) is CommandOutcome.DISABLED
+    assert cut(talk, 10.18) == NEUTRAL
+    assert exchange(talk, 10.2, ENABLED) == NEUTRAL
+    assert talk.session.state is DriveState.DISABLED, 'nothing but a new ~/enable starts it'
+
+
 def test_loss_puts_the_word_back() -> None:
     talk = inside()
     talk.asks(ControlAction.ENABLE, 10.003)
@@ -502,6 +529,27 @@ def test_status_that_does_not_come_is_asked_for_again() -> None:
     asked = [now for now, text in talk.until(11.9) if text == ASK_STATUS]
     assert talk.session.ever_online
     assert len(asked) <= 3
+
+
+def test_drive_whose_status_is_not_read_any_more_is_not_driven_on() -> None:
+    talk = apart(parameter_retries=0)
+    looks(talk, 10.6, '0001')
+    talk.asks(ControlAction.ENABLE, 10.601)
+    looks(talk, 11.0, '0003')
+    assert talk.control_outcomes() == [('enable', True, 'enabled')]
+    talk.events()
+    sent = []
+    while not talk.session.control or talk.session.control.operating:
+        now = talk.session.next_timer()
+        assert now < 14.0
+        for text in talk.at(now):
+            sent.append(text)
+            if text == NEUTRAL:
+                sent += talk.hears(ANSWER, now)
+    assert sent.count(ASK_STATUS) == 3
+    assert DISABLE in sent + [text for _, text in talk.until(talk.now + 0.01)]
+    assert [note.text for note in talk.events(Noted)] == [
+        'enable withdrawn: 3 answers without a status word; only ~/enable starts the drive again']
 
 
 def test_fault_is_seen_in_a_read_status() -> None:

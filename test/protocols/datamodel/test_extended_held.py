@@ -81,6 +81,34 @@ def enabled(position: int = 70, **options: Any) -> Conversation:
     return talk
 
 
+def short(talk: Conversation, number: int, status: int) -> str:
+    """Let a cycle pass whose response holds the status word only."""
+    (_, sent), = talk.until(10.0 + 0.02 * number + 1e-6)
+    assert talk.hears(f'103FFFF0#{status:04X}', 10.002 + 0.02 * number) == []
+    return sent
+
+
+def test_axis_whose_position_is_missing_may_be_anywhere() -> None:
+    talk = standing()
+    assert short(talk, 2, 1) == request(0, 70)
+    refusal = talk.session.users.control_refusal(ControlAction.ENABLE)
+    assert refusal == ('it would jump: position_setpoint does not have the value of '
+                       'actual_position yet, which is not known or which it cannot carry')
+    # moved by hand meanwhile
+    assert cycle(talk, 3, 1, 90) == request(0, 70), 'beside disable'
+    assert talk.session.users.control_refusal(ControlAction.ENABLE).startswith(
+        'it would jump')
+    assert cycle(talk, 4, 1, 90) == request(0, 90)
+    assert talk.session.users.control_refusal(ControlAction.ENABLE) == ''
+
+
+def test_axis_that_is_driven_stays_latched_without_its_position() -> None:
+    talk = enabled()
+    for number in range(3, 9):
+        assert short(talk, number, 3) == request(1, 70)
+    assert talk.commands(0, 7.0, 10.165) is CommandOutcome.ARMED
+
+
 def test_first_position_is_read_before_the_first_cycle() -> None:
     talk = checking()
     assert talk.until(10.08) == []      # however long that takes
