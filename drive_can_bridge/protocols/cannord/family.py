@@ -34,8 +34,9 @@ _PURPOSES = {
 }
 #: keys that decide what the common frames of a broadcast group look like, and how often they come
 _COMMON_OPTIONS = ('swap_setpoints_2_3', 'extra_setpoints', 'parameter_set')
-#: of a setpoint, what makes the same word mean the same
+#: of a setpoint: what makes the same word mean the same, and which words may be sent
 _COMMON_SCALES = ('type', 'scale', 'offset', 'unit')
+_COMMON_WORDS = ('raw_limits', 'neutral_raw')
 _COMMANDS = ('position_command', 'velocity_command', 'effort_command')
 
 
@@ -207,6 +208,10 @@ class Cannord(Family):
                     yield Complaint('cyclic_request', f"'{mine.name}' has another type, scale, "
                                                       f'offset or unit than for {led}, allowed '
                                                       'is the same')
+                elif any(getattr(mine, key) != getattr(other, key) for key in _COMMON_WORDS):
+                    yield Complaint('cyclic_request', f"'{mine.name}' has another minimum, "
+                                                      f'maximum or neutral than for {led}, '
+                                                      'allowed is the same')
         if member.period != leader.period:
             yield Complaint('period', f'{member.period:g} s differs from {leader.period:g} s of '
                                       f'{led}, allowed is the same')

@@ -942,6 +942,17 @@ def test_the_same_word_means_the_same_everywhere() -> None:
     assert found.startswith("cyclic_request: 'frequency_setpoint' has another type, scale")
 
 
+@pytest.mark.parametrize('limit', [{'maximum': 10.0}, {'minimum': -10.0}, {'neutral': 5.0}])
+def test_the_same_words_are_allowed_everywhere(limit: dict[str, float]) -> None:
+    """What the leader may be told, all are told."""
+    careful = drive('cannord', name='turn', station=3, broadcast='group', response=(ACTUAL,),
+                    request=(replace(FREQUENCY, **limit),), table=PARAMETERS)
+    (name, found), = complaints(*members(1), careful)
+    assert name == 'turn'
+    assert found.startswith("cyclic_request: 'frequency_setpoint' has another minimum, maximum or "
+                            'neutral than for drive lift')
+
+
 def test_members_that_have_not_answered_yet_do_not_run_on() -> None:
     """They are polled in turn: in a large group that takes longer than any stop."""
     control = make_control(parameter_set=1, timeout=2.0, members=['a', 'b', 'c'])
