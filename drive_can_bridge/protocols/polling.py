@@ -107,6 +107,8 @@ class WriteSchedule:
         :param raws: what the setpoints are now.
         :param hold: indices of those that are not to be written now.
         """
+        if hold:
+            self._due = [index for index in self._due if index not in hold]
         for index, raw in enumerate(raws):
             if index not in self._due and index not in hold and (
                     raw != self._written[index]

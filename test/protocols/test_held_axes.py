@@ -61,8 +61,8 @@ def test_standard_is_latched_when_it_is_enabled() -> None:
     talk.hears('7F1#01004400ADDEADDE', 10.022)
     assert talk.until(10.042)[0][1] == '3F1#063C004400000000'
     talk.hears('7F1#01004400ADDEADDE', 10.043)
-    assert talk.asks(ControlAction.ENABLE, 10.044) == ['3F1#0634000100000000']
-    assert talk.until(10.0605) == [(10.06, ASK)]
+    assert talk.asks(ControlAction.ENABLE, 10.044) == ['3F1#063C004400000000']
+    assert talk.until(10.0605) == [(10.045, '3F1#0634000100000000'), (10.06, ASK)]
     talk.hears('7F1#03004100ADDEADDE', 10.062)          # it sagged: that moves nothing
     assert talk.control_outcomes() == [('enable', True, 'enabled')]
     assert talk.until(10.0805) == [(10.08, ASK)]

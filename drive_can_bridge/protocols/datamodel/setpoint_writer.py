@@ -14,6 +14,7 @@ from drive_can_bridge.protocols.datamodel.acyclic_side import AcyclicSide
 from drive_can_bridge.protocols.datamodel.channel import Reply, Step, Write
 from drive_can_bridge.protocols.polled_exchange import PolledExchange
 from drive_can_bridge.protocols.polling import WriteSchedule
+from drive_can_bridge.protocols.setpoints_first import SetpointsFirst
 
 Rounds = PolledExchange[Step, Reply]
 
@@ -35,6 +36,8 @@ class SetpointWriter:
         self._slot = side.control_slot
         self._parameters = drive.cyclic_request
         self._schedule = WriteSchedule(len(drive.cyclic_request), drive.options.refresh_interval)
+        self._first = SetpointsFirst(session, self._schedule, [
+            index for index in range(len(drive.cyclic_request)) if index != self._slot])
         self._spacing = stop_spacing(drive.period)
         self._pulse_at = math.inf  # when the control word is due again, whatever it was
 
@@ -54,12 +57,17 @@ class SetpointWriter:
         # started by a repetition
         doubt = (self._exchange.silent or unanswered) and control is not None and not (
             control.at_rest or control.stopping)
-        hold = [self._slot] if doubt else []
+        hold = [self._slot] if doubt or self.holds_word else []
         unknown = self._session.setpoints.unknown
         if unknown:
             hold += [index for index, parameter in enumerate(self._parameters)
                      if parameter.name in unknown]
         self._schedule.look(self._raws(), now, hold=hold)
+
+    @property
+    def holds_word(self) -> bool:
+        """The control word waits for setpoints."""
+        return self._first.look()
 
     def write(self, now: float) -> None:
         """Write one that is due, if there is one, with the value that it has now."""
@@ -77,7 +85,7 @@ class SetpointWriter:
         self._schedule.written(index, raw, now)  # at once: a look meanwhile must not find it due
 
     def write_word(self, now: float) -> None:
-        """Write a control word that is due: it waits neither for a period nor for setpoints."""
+        """Write a control word that is due, or what it waits for, without waiting for a period."""
         self.look(now)
         control, setpoints = self._session.control, self._session.setpoints
         if self._slot is not None and control is not None and (
@@ -114,6 +122,8 @@ class SetpointWriter:
         self._session.told.note_unacknowledged(index, runs=runs)
         control = self._session.control
         if index != self._slot or control is None:
+            if self._first.written(index):
+                self._session.see_to_control_word(now)
             return
         self.word_written_at = now
         if raw == control.word:

@@ -136,9 +136,10 @@ class StandardSession(Session):
         control, by_number = self.control, self._side.control_writer
         if control is None or not self.online or self.stage is not Stage.RUNNING:
             return
-        if by_number is not None:
+        waits = self._writer.holds_word
+        if by_number is not None and not waits:
             by_number.update(now)
-        if self._side.control_slot is not None or by_number is not None and control.stopping:
+        if self._side.control_slot is not None or waits or control.stopping:
             self._writer.write_word(now)    # setpoints stop with it, and not a period later
 
     # -- rounds -----------------------------------------------------------------------------------

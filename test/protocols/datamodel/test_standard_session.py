@@ -665,7 +665,7 @@ def test_enable_with_the_word_among_the_setpoints() -> None:
     talk.asks(ControlAction.ENABLE, 10.01)
     assert talk.control_outcomes() == []
     round_of(talk, 10.02, READY)
-    assert talk.until(10.03) == [(10.025, ENABLE_WORD)], 'not before the next period'
+    assert talk.until(10.03) == [(10.025, SPEED_ZERO), (10.026, ENABLE_WORD)], 'no period later'
     assert talk.control_outcomes() == []
     round_of(talk, 10.04, ENABLED)
     assert talk.control_outcomes() == [('enable', True, 'enabled')]
@@ -675,7 +675,7 @@ def test_a_status_asked_for_before_the_word_left_confirms_nothing() -> None:
     talk = controlled()
     talk.asks(ControlAction.ENABLE, 10.01)
     round_of(talk, 10.02, READY)
-    assert talk.until(10.03) == [(10.025, ENABLE_WORD)]
+    assert talk.until(10.03) == [(10.025, SPEED_ZERO), (10.026, ENABLE_WORD)]
     round_of(talk, 10.04, ENABLED)
     talk.control_outcomes()
     assert talk.until(10.0605) == [(10.06, ASK)]
@@ -704,9 +704,27 @@ def test_enable_with_the_word_by_hand() -> None:
     assert talk.until(10.01) == [(10.003, SPEED_ZERO), (10.004, DISABLE_WORD)]
     talk.asks(ControlAction.ENABLE, 10.01)
     round_of(talk, 10.02, READY)
-    assert ENABLE_WORD in [text for _, text in talk.until(10.03)]
+    assert talk.until(10.03) == [(10.025, SPEED_ZERO), (10.026, ENABLE_WORD)]
     round_of(talk, 10.04, ENABLED)
     assert talk.control_outcomes() == [('enable', True, 'enabled')]
+    assert talk.until(10.0501) == [], 'once: it may be commanded from now on'
+
+
+@pytest.mark.parametrize('by_hand', [False, True])
+def test_enable_waits_for_setpoints_that_the_bus_refuses(by_hand: bool) -> None:
+    """It may have been off for a moment, and have in its registers what somebody put there."""
+    talk = polling(request=(SPEED,) if by_hand else (WORD, SPEED), control=CONTROL)
+    talk.hears(READY, 10.002)
+    talk.until(10.01)
+    talk.refusing = lambda text: text == SPEED_ZERO
+    talk.asks(ControlAction.ENABLE, 10.01)
+    assert SPEED_ZERO not in round_of(talk, 10.02, READY)
+    assert ENABLE_WORD not in [text for _, text in talk.until(10.0405)]
+    talk.hears(READY, 10.042)
+    assert ENABLE_WORD not in [text for _, text in talk.until(10.0605)]
+    talk.refusing = lambda text: False
+    talk.hears(READY, 10.062)
+    assert [text for _, text in talk.until(10.0835) if text != ASK] == [SPEED_ZERO, ENABLE_WORD]
 
 
 def test_a_word_by_hand_that_got_lost_is_written_again() -> None:
