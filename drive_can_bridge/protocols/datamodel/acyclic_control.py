@@ -29,6 +29,8 @@ REPEAT_FIRST = 0.2
 REPEAT_LAST = 2.0
 #: how often at most where each write wears an EEPROM
 EEPROM_REPEATS = 3
+#: how often to a drive at fault: whether it got the word is not to be seen
+FAULT_REPEATS = 3
 #: s until a word that the bus refused is written again
 REFUSED_PAUSE = 0.02
 
@@ -54,6 +56,7 @@ class AcyclicControl:
         self._spacing = stop_spacing(session.configuration.period)
         self._numbers = numbers
         self._written: int | None = None
+        self._ran = False       # the word before was enable
         self._repeat_at = math.inf
         self._repeats = 0
         self._reading = False
@@ -63,6 +66,7 @@ class AcyclicControl:
     def begin(self, now: float) -> None:
         """Handle a drive that was found: it gets its word, and its status is looked at."""
         self._written = None
+        self._ran = False
         self._watching = True
         if self._status is not None:
             self._look_at = now
@@ -84,6 +88,8 @@ class AcyclicControl:
             return
         if word != self._written:
             self._repeats = 0
+            if self._written is not None:
+                self._ran = self._written == self._control.table.enable
         elif self._may_repeat(self._word, now):
             self._repeats += 1
         else:
@@ -126,7 +132,9 @@ class AcyclicControl:
         if self._control.pulsing:
             return True
         if parameter.storage is Storage.RAM:
-            return self._control.unconfirmed
+            # rid of its fault, it would run by itself, had it missed the word
+            return self._control.unconfirmed or (
+                self._ran and self._control.fault and self._repeats < FAULT_REPEATS)
         return self._control.disregard != '' and self._repeats < EEPROM_REPEATS
 
     def _left(self, word: int, sent: bool, now: float, *, runs: bool) -> None:

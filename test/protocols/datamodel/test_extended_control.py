@@ -322,6 +322,14 @@ def test_disable_that_gets_lost_when_a_drive_comes_back_is_written_again() -> No
     assert talk.session.control.disregard == ''
 
 
+def test_disable_is_written_four_times_to_a_drive_at_fault() -> None:
+    """Whether it got the word is not to be seen; rid of its fault, it would run by itself."""
+    talk = beside()
+    enable(talk)
+    sent = cycles(talk, 4, 120, FAULT)
+    assert [text for _, text in sent] == [DISABLE] * 4
+
+
 def test_word_in_an_eeprom_is_written_again_three_times_only() -> None:
     kept = parameter('control_word', 52)     # nobody said that it is RAM
     table = (*(entry for entry in TABLE if entry is not WORD), kept)
