@@ -584,6 +584,26 @@ def test_a_late_answer_of_one_member_does_not_end_the_wait_for_another() -> None
         name for station, name in enumerate(NAMES, 1) if station != last // 2]
 
 
+def test_whoever_of_them_ends_first_takes_the_enable_back() -> None:
+    bus = driven()
+    bus.sessions[2].deactivate(bus.now)
+    assert set(words(bus.live(0.05))) == {'7E04'}
+
+
+def test_member_that_has_ended_misses_nothing() -> None:
+    bus = Bus(*members(2))
+    bus.live(0.1)
+    session = bus.sessions[1]
+    session.deactivate(bus.now)
+    session.give_up(bus.now)
+    missed, rejected = session.statistics.missed, session.statistics.rejected
+    bus.live(0.2)
+    bus.answers = {1: READY}
+    bus.live(0.5)
+    assert session.offline_advice == 'deactivated'
+    assert (session.statistics.missed, session.statistics.rejected) == (missed, rejected)
+
+
 def test_a_stop_that_all_have_heard_waits_for_nobody() -> None:
     bus = driven()
     for session in bus.sessions:

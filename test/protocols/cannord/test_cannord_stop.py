@@ -61,6 +61,15 @@ def test_signal_right_after_a_stall() -> None:
     assert warnings(talk) == []
 
 
+def test_what_is_under_way_during_a_stall_is_not_missed() -> None:
+    talk = running()
+    talk.at(10.06)
+    missed = talk.session.statistics.missed
+    talk.time_lost(15.0)
+    assert exchange(talk, 15.0) == READY_FRAME
+    assert talk.session.statistics.missed == missed
+
+
 def test_signal_right_after_a_stall_to_a_drive_that_does_not_answer() -> None:
     talk = running()
     assert talk.time_lost(15.0) == []

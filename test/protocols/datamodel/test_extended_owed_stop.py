@@ -120,6 +120,15 @@ def test_bus_that_comes_back_stops_the_drive_before_its_maps_are_read() -> None:
     assert warnings(talk) == []
 
 
+def test_stop_that_a_lost_bus_cut_short_is_begun_anew() -> None:
+    talk = running()
+    assert talk.time_lost(12.0) == [SPEED_ZERO]
+    assert talk.until(12.004) == [(12.001, LIMIT_ZERO), (12.002, ASK_SPEED)]
+    assert talk.bus_down(12.05) == []
+    assert talk.bus_up(13.0) == [SPEED_ZERO]
+    assert [text for _, text in talk.until(13.002)] == [LIMIT_ZERO, ASK_SPEED]
+
+
 def test_stop_while_the_maps_are_read_again() -> None:
     talk = running()
     talk.bus_down(10.03)
