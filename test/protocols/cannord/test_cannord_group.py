@@ -867,6 +867,13 @@ def test_silent_member_is_offline_by_its_own_timer() -> None:
     assert StationLost not in {type(event) for event in ears[0].events}
 
 
+def test_a_turn_that_the_bus_refused_is_not_repeated() -> None:
+    bus = three()
+    bus.refusing = lambda text: bus.now < 10.07
+    bus.live(0.02)      # the cycle of 10.06 s, which was the turn of the first one
+    assert [text[:3] for _, text in bus.live(0.05)][:4] == ['400', '004', '400', '006']
+
+
 def test_latency_counts_from_the_frame_of_the_member() -> None:
     bus = Bus(*members(2))
     bus.live(0.2)

@@ -1,6 +1,8 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """A node beside a session, which is told what it has to do about it; node 5, in hex."""
 
+import math
+
 from builders import drive, frame
 import pytest
 
@@ -126,3 +128,14 @@ def test_names_of_objects(name: str, place: tuple[int, int] | None) -> None:
     assert object_of_name(name) == place
     if place is not None:
         assert object_of_name(name_of_object(*place)) == place
+
+
+def test_nothing_is_due_of_a_node_that_is_not_in_use() -> None:
+    node = Exchange(heartbeat_timeout=0.3).supervision
+    node.begin(10.0)
+    node.receive(0x705, b'\x05', 10.1)
+    assert node.next_timer() == 10.4
+    node.stop()
+    assert node.next_timer() == math.inf
+    node.receive(0x705, b'\x05', 10.2)
+    assert node.next_timer() == math.inf
