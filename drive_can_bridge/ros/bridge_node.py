@@ -70,7 +70,8 @@ class BridgeNode(LifecycleNode):
     def __init__(self, executor: Executor, fatal: Callable[[str], None], *,
                  context: Context | None = None, files: Sequence[str] = (),
                  **options: Any) -> None:
-        super().__init__(NODE_NAME, context=context, enable_logger_service=True, **options)
+        super().__init__(NODE_NAME, context=context, enable_logger_service=True,
+                         start_parameter_services=False, **options)  # NodeParameters has them
         self.log = Log(self.get_logger())
         self._spinner = executor
         self._fatal = fatal
