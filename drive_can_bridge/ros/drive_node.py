@@ -238,7 +238,7 @@ class DriveNode:
                 self.times_lost += 1
                 self._log.warning(f'offline: {event.reason}', urgent=True)
             elif not self._may_run:
-                self._log.info('stopped')
+                self._tell_stopped()
         elif isinstance(event, SetpointsExpired):
             self.warn('command timeout',
                       f'no command for {self.session.configuration.command_timeout:g} s: '
@@ -262,6 +262,15 @@ class DriveNode:
                 self._log.warning(event.text, urgent=event.danger)
             else:
                 self._log.info(event.text)
+
+    def _tell_stopped(self) -> None:
+        """Say how the drive is left: it was told to stop, and has answered."""
+        control = self.session.control
+        if control is not None and control.unconfirmed:     # its status may lag, or it runs down
+            self._log.warning(f'told to stop, and answers, but its last status word does not say '
+                              f'so: {control.state}')
+        else:
+            self._log.info('stopped')
 
     def _cannot_publish(self, error: Exception) -> None:
         if self.node.context.ok():
