@@ -37,7 +37,7 @@ class Measured:
 
     def __init__(self) -> None:
         self._spinner = ExecutorThread('services', _complain, rclpy.get_default_context())
-        self.bridge = BridgeNode(self._spinner.executor, _complain)
+        self.bridge = BridgeNode(self._spinner, _complain)
         self._spinner.start()
         if not self.bridge.start():
             raise SystemExit('the bridge did not start')

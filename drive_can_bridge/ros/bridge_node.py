@@ -22,7 +22,6 @@ from typing import Any
 
 from lifecycle_msgs.msg import State
 from rclpy.context import Context
-from rclpy.executors import Executor
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
 from drive_can_bridge.configuration.declare import identity_name
@@ -39,10 +38,10 @@ from drive_can_bridge.process.scheduling import raise_priority
 from drive_can_bridge.protocols.families import FAMILIES, make_sessions
 from drive_can_bridge.ros.diagnostics import Diagnostics
 from drive_can_bridge.ros.drive_node import DriveNode
+from drive_can_bridge.ros.executor_thread import ExecutorThread
 from drive_can_bridge.ros.flight_watch import FlightWatch
 from drive_can_bridge.ros.joints import Joints
 from drive_can_bridge.ros.log import Log
-from drive_can_bridge.ros.mailbox import Mailbox
 from drive_can_bridge.ros.node_parameters import NodeParameters
 from drive_can_bridge.ros.periodic_thread import PeriodicThread
 from drive_can_bridge.ros.service_thread import ServiceThread
@@ -62,23 +61,22 @@ class BridgeNode(LifecycleNode):
     """
     The managed node.
 
-    :param executor: serves this node and all drive nodes.
+    :param spinner: serves this node and all drive nodes.
     :param fatal: takes the reason when the bridge cannot go on; from any thread.
     :param files: the parameter files that were given to this process.
     """
 
-    def __init__(self, executor: Executor, fatal: Callable[[str], None], *,
+    def __init__(self, spinner: ExecutorThread, fatal: Callable[[str], None], *,
                  context: Context | None = None, files: Sequence[str] = (),
                  **options: Any) -> None:
         super().__init__(NODE_NAME, context=context, enable_logger_service=True,
                          start_parameter_services=False, **options)  # NodeParameters has them
         self.log = Log(self.get_logger())
-        self._spinner = executor
+        self._spinner = spinner
         self._fatal = fatal
         # now: later on, somebody may have edited or removed them
         self._unseen = unseen_problems(map(Path, files), self.get_fully_qualified_name())
         self._transition_lock = threading.RLock()
-        self._mailbox = Mailbox(self)
         self._control_thread = ServiceThread('control', self.context, self.log.error,
                                              raise_priority, share=1.0)
         self._parameter_thread = ServiceThread('parameters', self.context, self.log.error)
@@ -99,7 +97,7 @@ class BridgeNode(LifecycleNode):
                                                self._parameter_refusal)
         guard_transitions(self, self.log.warning, self._transition_lock,
                           lambda: 'the bridge is being stopped' if self._ending else '')
-        executor.add_node(self)
+        spinner.executor.add_node(self)
 
     # -- parameters -------------------------------------------------------------------------------
 
@@ -233,7 +231,7 @@ class BridgeNode(LifecycleNode):
 
     def _build(self, configuration: BridgeConfiguration) -> None:
         flight = self._flight = FlightWatch(
-            self, self.log, list(configuration.buses.values()), self._mailbox, self._spinner)
+            self, self.log, list(configuration.buses.values()), self._spinner)
         for bus in configuration.buses.values():
             drives = [drive for drive in configuration.drives.values() if drive.bus == bus.name]
             families = [FAMILIES[drive.protocol] for drive in drives]
@@ -249,7 +247,7 @@ class BridgeNode(LifecycleNode):
             self.exchanges[bus.name] = exchange
             for drive, session, family in zip(drives, sessions, families):
                 node = DriveNode(
-                    self, drive, session, family, exchange, self._mailbox, self._spinner, self.log,
+                    self, drive, session, family, exchange, self._spinner, self.log,
                     self._control_thread, self._parameter_thread,
                     partial(self._node_parameters.announce, identity_name(drive.name)))
                 self.drives[drive.name] = node
@@ -313,7 +311,7 @@ class BridgeNode(LifecycleNode):
         self.drives.clear()
         self._dismiss()
 
-    def _dismiss(self, _: Any = None) -> None:
+    def _dismiss(self) -> None:
         """Take the drives out of the graph, each as soon as its last caller has an answer."""
         staying = []
         for drive in self._leaving:
@@ -323,7 +321,7 @@ class BridgeNode(LifecycleNode):
                 staying.append(drive)
         self._leaving = staying
         if staying:
-            self._mailbox.post(self._dismiss)
+            self._spinner.later(self._dismiss)
 
     # -- from the outside -------------------------------------------------------------------------
 

@@ -8,7 +8,6 @@ from typing import Any, Protocol
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.executors import Executor
 from rclpy.logging import get_logging_directory
 from rclpy.node import Node
 from rclpy.task import Future
@@ -20,8 +19,8 @@ from drive_can_bridge.core.events import Event, MappingDiffered, StationLost
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.ros.diagnostics import Report
 from drive_can_bridge.ros.drive_node import DriveNode
+from drive_can_bridge.ros.executor_thread import ExecutorThread
 from drive_can_bridge.ros.log import Log
-from drive_can_bridge.ros.mailbox import Mailbox
 from drive_can_bridge.trace.flight import FlightRecorder
 from drive_can_bridge.transport.link import steady_now
 
@@ -89,12 +88,11 @@ class FlightWatch:
     :param buses: those of the configuration; without ``trace_seconds`` nothing is recorded.
     """
 
-    def __init__(self, node: Node, log: Log, buses: Sequence[BusConfiguration], mailbox: Mailbox,
-                 executor: Executor) -> None:
+    def __init__(self, node: Node, log: Log, buses: Sequence[BusConfiguration],
+                 thread: ExecutorThread) -> None:
         self._node = node
         self._log = log
-        self._mailbox = mailbox
-        self._executor = executor
+        self._thread = thread
         self._recorder: FlightRecorder | None = None
         self._occasions: Occasions | None = None
         if any(bus.trace_seconds > 0.0 for bus in buses):
@@ -161,9 +159,9 @@ class FlightWatch:
         return response
 
     def _ask(self, recorder: FlightRecorder, bus: str) -> Future:
-        future = Future(executor=self._executor)
-        recorder.save(bus, 'save_trace',
-                      lambda path, refusal: self._mailbox.complete(future, (path, refusal)))
+        future = Future(executor=self._thread.executor)
+        recorder.save(bus, 'save_trace', lambda path, refusal: self._thread.later(
+            future.set_result, (path, refusal)))
         return future
 
 

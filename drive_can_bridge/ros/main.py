@@ -101,7 +101,7 @@ def _run(watcher: SignalWatcher, arguments: Sequence[str]) -> int:
     spinner = ExecutorThread('services', lambda text: bridge.log.error(text),
                              rclpy.get_default_context())
     try:
-        bridge = BridgeNode(spinner.executor, watcher.fatal, files=_parameter_files(arguments))
+        bridge = BridgeNode(spinner, watcher.fatal, files=_parameter_files(arguments))
     except Exception as error:  # noqa: BLE001  names and namespaces that rcl refuses
         print(f'drive_can_bridge: {in_words(error)}', file=sys.stderr)
         return 1
