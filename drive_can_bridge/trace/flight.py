@@ -5,8 +5,8 @@ The flight recorder of a bridge: what came before a failure, on disk before anyb
 A thread of its own waits for a second after the event, so that what followed is in the trace, too,
 and writes in small steps between which it gives way: the exchange goes on undisturbed.
 
-A trace that somebody asks for takes nothing from those of failures: it neither counts against their
-number nor is in their way.
+A trace that somebody asks for takes nothing from those of failures: it does not count among them,
+and is not in their way.
 """
 
 from collections.abc import Callable, Iterable
