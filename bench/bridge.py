@@ -47,7 +47,8 @@ class Measured:
                          'reader': [exchange.link._thread for exchange in exchanges],
                          'services': [self._spinner._thread,
                                       *self.bridge._parameter_thread._threads]}
-        self._joints = self.bridge._joints and self.bridge._joints._errand
+        joints = self.bridge._fleet and self.bridge._fleet.joints
+        self._joints = joints and joints._errand
         self._before: dict[str, Any] = {}
 
     def clear(self) -> bool:
