@@ -19,7 +19,6 @@ from pathlib import Path
 import threading
 from typing import Any
 
-from lifecycle_msgs.msg import State
 from rclpy.context import Context
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
@@ -242,11 +241,6 @@ class BridgeNode(LifecycleNode):
         """Take the node out of the graph, when everything is written that it had to say."""
         self.log.close()
         super().destroy_node()
-
-    @property
-    def is_active(self) -> bool:
-        """In lifecycle state active."""
-        return bool(self._state_machine.current_state[0] == State.PRIMARY_STATE_ACTIVE)
 
     @property
     def configuration(self) -> BridgeConfiguration | None:

@@ -19,13 +19,10 @@ import struct
 import time
 from typing import Any
 
-from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.qos import HistoryPolicy
 from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 from std_msgs.msg import Bool, Float64, Int64
-
-RCLError = rclpy_implementation.RCLError
 
 #: ns by which a command may take longer than the quickest of its topic
 LATENESS_MAX = 250_000_000
@@ -84,7 +81,7 @@ class CommandTopic:
                 continue
             try:
                 message = self._decode(data)
-            except (RCLError, RuntimeError, ValueError, struct.error) as error:
+            except (RuntimeError, ValueError, struct.error) as error:
                 self._unreadable(str(error) or type(error).__name__)
                 continue
             self._use(message, now)

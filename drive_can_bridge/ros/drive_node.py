@@ -11,8 +11,6 @@ from functools import partial
 from typing import Any
 
 from rclpy.clock import Clock
-from rclpy.exceptions import InvalidHandle
-from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.parameter import Parameter as NodeParameter
 from std_msgs.msg import Bool
@@ -24,37 +22,37 @@ from drive_can_bridge.core.events import (
     Event, ForeignMasterSeen, FrameRejected, MappingDiffered, MappingWritten, Noted,
     ProcessDataReceived, RequestCompleted, SetpointsExpired, StationFound, StationLost,
 )
-from drive_can_bridge.core.parameters import Value
 from drive_can_bridge.core.requests import (
     BRIDGE_INACTIVE, Failure, ReadRequest, Request,
 )
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.exchange.exchange import BusExchange
+from drive_can_bridge.exchange.listeners import DriveListener
 from drive_can_bridge.protocols.family import Family
 from drive_can_bridge.ros.commands import CommandIntake
 from drive_can_bridge.ros.control_services import control_services
 from drive_can_bridge.ros.coroutine_services import CoroutineServices, Question
 from drive_can_bridge.ros.event_topic import RequestTopic
 from drive_can_bridge.ros.executor_thread import ExecutorThread
+from drive_can_bridge.ros.gone import GONE
 from drive_can_bridge.ros.identity import IdentityReader
 from drive_can_bridge.ros.log import Log
 from drive_can_bridge.ros.parameter_services import ParameterServices
 from drive_can_bridge.ros.polled_topics import PolledTopics
-from drive_can_bridge.ros.quality import latched_quality, overriding, quality_overrides
+from drive_can_bridge.ros.quality import latched_quality, publisher, quality_overrides
 from drive_can_bridge.ros.samples import SamplePublisher
 from drive_can_bridge.ros.service_thread import ServiceThread
 from drive_can_bridge.ros.stamps import Stamps
 
-RCLError = rclpy_implementation.RCLError
 
 #: takes what became of a request: its outcomes, or :class:`.ControlCompleted`
 Completed = Callable[[Any], None]
 
 
-class DriveNode:
+class DriveNode(DriveListener):
     """
-    One drive in the ROS graph (a ``DriveListener`` of its exchange).
+    One drive in the ROS graph.
 
     :param bridge: the bridge's node; the drive lives in its namespace.
     :param spinner: serves the node, and what it leaves to be done there.
@@ -122,9 +120,7 @@ class DriveNode:
         stamps = Stamps(clock)
         self.samples = SamplePublisher(self.node, drive, session.sample_parameters, stamps.at)
         self._request = RequestTopic(self.node, session.sent, stamps)
-        self._online = self.node.create_publisher(
-            Bool, '~/online', latched_quality(),
-            qos_overriding_options=overriding(self.node, '~/online'))
+        self._online = publisher(self.node, Bool, '~/online', latched_quality())
         self._online.publish(Bool(data=False))
         directory = ParameterDirectory(drive.profile.parameters,
                                        lambda name: family.raw_parameter(drive, name))
@@ -142,10 +138,6 @@ class DriveNode:
     def name(self) -> str:
         """Name of the drive."""
         return self.drive.name
-
-    def values(self) -> dict[str, Value]:
-        """Return the newest value of everything that a sample carries; empty while offline."""
-        return self.samples.latest() if self.session.online else {}
 
     def answer_all(self) -> bool:
         """
@@ -201,14 +193,14 @@ class DriveNode:
         """Publish a sample."""
         try:
             self.samples.publish(event.raws, event.received_at)
-        except (InvalidHandle, RCLError) as error:
+        except GONE as error:
             self._cannot_publish(error)
 
     def request_sent(self, now: float) -> None:
         """Publish what was sent."""
         try:
             self._request.publish(now)
-        except (InvalidHandle, RCLError) as error:
+        except GONE as error:
             self._cannot_publish(error)
 
     def handle_event(self, event: Event) -> None:
@@ -217,7 +209,7 @@ class DriveNode:
             self.witness(event)
         try:
             self._handle_event(event)
-        except (InvalidHandle, RCLError) as error:
+        except GONE as error:
             self._cannot_publish(error)
 
     def _handle_event(self, event: Event) -> None:

@@ -17,7 +17,6 @@ import math
 from typing import Any, Protocol
 
 from rclpy.event_handler import QoSSubscriptionEventType, SubscriptionEventCallbacks
-from rclpy.exceptions import InvalidHandle
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.qos import qos_policy_name_from_kind
@@ -25,10 +24,10 @@ from rclpy.subscription import Subscription
 
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.ros.command_topic import CommandTopic
+from drive_can_bridge.ros.gone import GONE
 from drive_can_bridge.ros.polled_group import PolledGroup
 from drive_can_bridge.ros.quality import command_quality, overriding
 
-RCLError = rclpy_implementation.RCLError
 
 #: s between two looks at who publishes
 COUNT_PERIOD = 0.05
@@ -141,14 +140,14 @@ class PolledTopics:
                 self._look_at = now + EVENT_PERIOD
                 for event in self._events:
                     event.look()
-        except (InvalidHandle, RCLError):  # the node is being destroyed
+        except GONE:  # the node is being destroyed
             pass
 
     def discard(self) -> int:
         """Throw away what is waiting; return how many commands that were."""
         try:
             return sum(topic.discard() for topic in self._topics)
-        except (InvalidHandle, RCLError):  # the node is being destroyed
+        except GONE:  # the node is being destroyed
             return 0
 
     def destroy(self) -> None:

@@ -11,12 +11,9 @@ from collections.abc import Callable
 from threading import RLock
 from typing import Any
 
-from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.lifecycle import LifecycleNode
 
 from drive_can_bridge.core.text import printable
-
-RCLError = rclpy_implementation.RCLError
 
 
 def guard_transitions(node: LifecycleNode, warn: Callable[[str], None], lock: RLock,
@@ -43,7 +40,7 @@ def guard_transitions(node: LifecycleNode, warn: Callable[[str], None], lock: RL
             if not why:
                 try:
                     return change_state(request, response)
-                except (RCLError, RuntimeError) as error:
+                except RuntimeError as error:
                     why = printable(' '.join(str(error).split()))
             warn(f'transition {printable(label) or f"number {number}"} is not possible in state '
                  f'{machine.current_state[1]} ({why})')
