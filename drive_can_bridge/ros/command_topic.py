@@ -49,6 +49,7 @@ class CommandTopic:
     def __init__(self, subscription: Subscription, *, use: Callable[[Any, float], None],
                  late: Callable[[float], None], unreadable: Callable[[str], None],
                  read: Callable[[bytes], Any] | None = None) -> None:
+        self.subscription = subscription
         self.handle: Any = subscription.handle
         self._type: Any = subscription.msg_type
         # more than can wait came meanwhile: that is for the next time

@@ -84,7 +84,6 @@ class PolledTopics:
         self._count_at = -math.inf
         self._events: list[PolledEvent] = []
         self._look_at = -math.inf
-        self._subscriptions: list[Subscription] = []
 
     def subscribe(self, message_type: type, topic: str,
                   take: Callable[[Any, float], None],
@@ -109,7 +108,6 @@ class PolledTopics:
         self._events.append(PolledEvent(
             subscription, QoSSubscriptionEventType.RCL_SUBSCRIPTION_REQUESTED_INCOMPATIBLE_QOS,
             incompatible))
-        self._subscriptions.append(subscription)
 
         def late(seconds: float) -> None:
             self._refuse(f'late {name}', f'command on {name} thrown away: it came {seconds:.2f} s '
@@ -159,10 +157,9 @@ class PolledTopics:
     def unsubscribe(self) -> None:
         """Take the subscriptions out of a node that stays."""
         self.destroy()
-        self._topics.clear()
         self._published.clear()
-        while self._subscriptions:
-            self._node.destroy_subscription(self._subscriptions.pop())
+        while self._topics:
+            self._node.destroy_subscription(self._topics.pop().subscription)
 
 
 def _never(_: Any) -> None:
