@@ -263,7 +263,7 @@ class Diagnostics:
     """
 
     def __init__(self, node: Node, exchanges: list[BusExchange], drives: list[DriveNode],
-                 reported: Callable[[Report, str], None] | None = None) -> None:
+                 reported: Callable[[Report, str], None]) -> None:
         self._node = node
         self._reported = reported
         self._bus_of = {f'bus {exchange.bus.name}': exchange.bus.name for exchange in exchanges}
@@ -287,8 +287,7 @@ class Diagnostics:
             self._publisher.publish(message)
 
     def _status(self, report: Report) -> DiagnosticStatus:
-        if self._reported is not None:
-            self._reported(report, self._bus_of[report.name])
+        self._reported(report, self._bus_of[report.name])
         found = self._statuses.get(report.name)
         if found is None:
             found = self._statuses[report.name] = StatusMessage(

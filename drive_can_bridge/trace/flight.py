@@ -75,7 +75,7 @@ class _Bus:
 
 class FlightRecorder:
     """
-    Records all buses that ask for it, and writes traces.
+    Records all buses that ask for it (there may be none), and writes traces.
 
     :param default_folder: where traces go whose bus names no directory.
     :param say: takes a line for the log.
@@ -94,7 +94,8 @@ class FlightRecorder:
         self._changed = threading.Condition()
         self._closing = False
         self._thread = threading.Thread(target=self._run, name='flight recorder', daemon=True)
-        self._thread.start()
+        if self._buses:
+            self._thread.start()
 
     @property
     def buses(self) -> list[str]:
@@ -147,7 +148,8 @@ class FlightRecorder:
         with self._changed:
             self._closing = True
             self._changed.notify()
-        self._thread.join(_END_TIMEOUT)
+        if self._thread.is_alive():
+            self._thread.join(_END_TIMEOUT)
 
     def _want(self, bus: _Bus, wanted: _Wanted) -> None:
         bus.wanted = wanted
