@@ -37,7 +37,7 @@ class Measured:
 
     def __init__(self) -> None:
         self._spinner = ExecutorThread('services', _complain, rclpy.get_default_context())
-        self.bridge = BridgeNode(self._spinner.executor, _complain)
+        self.bridge = BridgeNode(self._spinner, _complain)
         self._spinner.start()
         if not self.bridge.start():
             raise SystemExit('the bridge did not start')
@@ -47,7 +47,8 @@ class Measured:
                          'reader': [exchange.link._thread for exchange in exchanges],
                          'services': [self._spinner._thread,
                                       *self.bridge._parameter_thread._threads]}
-        self._joints = self.bridge._joints and self.bridge._joints._errand
+        joints = self.bridge._fleet and self.bridge._fleet.joints
+        self._joints = joints and joints._errand
         self._before: dict[str, Any] = {}
 
     def clear(self) -> bool:

@@ -9,6 +9,8 @@ domains of its own, before anything of ROS is imported. The tests of ``ros/`` ha
 all others, because they look at who is in the graph, and a process that was killed stays there for
 a while. The locks end with the process.
 
+*Logs* of ROS go to a directory of the run, not to the user's.
+
 *Profiles.* Whatever is random looks for a short time, unless DRIVE_CAN_TEST_PROFILE is ``long``.
 How long one example takes says how busy the machine is, and is no failure.
 
@@ -97,6 +99,11 @@ WORKERS_PER_CORE = 3
 
 def pytest_configure(config: pytest.Config) -> None:
     """Take a domain; let what is started here begin with the signals of a foreground job."""
+    if not hasattr(config, 'workerinput'):  # whoever only helps inherits it
+        logs = tempfile.TemporaryDirectory(prefix='drive_can_bridge_test_log_',
+                                           ignore_cleanup_errors=True)
+        os.environ['ROS_LOG_DIR'] = logs.name
+        config.add_cleanup(logs.cleanup)
     if config.getoption('dist', 'no') != 'no':
         return  # only starts those who run the tests
     os.environ['ROS_DOMAIN_ID'] = _domain(False)

@@ -35,18 +35,19 @@ INTERNAL: dict[str, set[str]] = {
     'simulation': {'', 'core', 'configuration', 'protocols', 'resources', 'transport'},
     'ros': {
         '', 'core', 'configuration', 'protocols', 'resources', 'trace', 'transport', 'exchange',
-        'process'},
+        'process', 'ros.messages'},
     'monitor': {'', 'core'},
     'view': {'', 'core', 'monitor'},
     # what it asks of drives comes from whoever starts it: it knows no ROS
     'panel': {'', 'core', 'monitor'},
     'security': {'', 'core', 'protocols'},
     'ros.guest': {'', 'core'},
-    'ros.monitor': {'', 'core', 'monitor', 'ros.guest'},
+    'ros.messages': {'', 'core'},
+    'ros.monitor': {'', 'core', 'monitor', 'ros.guest', 'ros.messages'},
     'ros.demo': {'', 'core', 'configuration', 'simulation', 'monitor', 'ros', 'ros.monitor'},
     'demo': {'', 'core', 'configuration', 'process'},
     'client.drive': {'', 'core', 'process'},
-    'ros.client': {'', 'core', 'client.drive', 'ros.guest'},
+    'ros.client': {'', 'core', 'client.drive', 'ros.guest', 'ros.messages'},
     'client': {
         '', 'core', 'configuration', 'protocols', 'transport', 'exchange', 'process',
         'client.drive', 'ros.client'},
@@ -74,6 +75,7 @@ EXTERNAL: dict[str, set[str]] = {
     # yaml: only to tell which nodes a parameter file names when none of them is ours
     'ros': {*ROS_PACKAGES, 'yaml'},
     'ros.guest': ROS_PACKAGES,
+    'ros.messages': ROS_PACKAGES,
     'ros.monitor': ROS_PACKAGES,
     'ros.client': ROS_PACKAGES,
     'ros.demo': ROS_PACKAGES,

@@ -13,11 +13,12 @@ import time
 
 from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration
 from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, DriveCanError
-from drive_can_bridge.core.events import Event, ProcessDataReceived, RequestCompleted
+from drive_can_bridge.core.events import Event, RequestCompleted
 from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.core.requests import Outcome, Request
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.exchange.exchange import BusExchange
+from drive_can_bridge.exchange.listeners import DriveListener
 from drive_can_bridge.protocols.families import FAMILIES
 
 #: s that a bus has to open
@@ -158,23 +159,11 @@ class BusConversation:
         self._fail(kind(f'bus {bus}: {reason}'))
 
 
-class _Ears:
-    """Listens to one session (a ``DriveListener``): only answered requests matter."""
+class _Ears(DriveListener):
+    """Listens to one session: only answered requests matter."""
 
     def __init__(self, conversation: BusConversation) -> None:
         self._conversation = conversation
-
-    def take_commands(self, now: float) -> None:
-        """There are none."""
-
-    def discard_commands(self, why: str) -> None:
-        """There are none."""
-
-    def process_data(self, event: ProcessDataReceived) -> None:
-        """Not asked for."""
-
-    def request_sent(self, now: float) -> None:
-        """Nothing to be told."""
 
     def handle_event(self, event: Event) -> None:
         """Hand on what became of a request."""

@@ -6,9 +6,9 @@ from typing import Protocol
 from drive_can_bridge.core.events import Event, ProcessDataReceived
 
 
-class DriveListener(Protocol):
+class DriveListener:
     """
-    What an exchange tells the owner of a drive.
+    What an exchange tells the owner of a drive, who does nothing about what it leaves out.
 
     Every call comes with the bus lock held, from the reader or timer thread or from the thread
     that called the exchange: it has to be short and must not call back into the exchange.

@@ -22,15 +22,7 @@ END_FIRST = 'end that first'
 
 
 class InUse(DriveCanError):
-    """
-    Another process talks to a drive, or has the serial port open.
-
-    :ivar by_bridge: that process is a bridge, as far as is known.
-    """
-
-    def __init__(self, text: str, *, by_bridge: bool) -> None:
-        super().__init__(text)
-        self.by_bridge = by_bridge
+    """Another process talks to a drive, or has the serial port open."""
 
 
 class Ownership:
@@ -79,8 +71,7 @@ class Ownership:
 
 def _in_words(held: Held, what: str, advice: str) -> InUse:
     process = 'another process' if held.process is None else f'process {held.process}'
-    by_bridge = held.who in ('', BRIDGE)
-    if not by_bridge:
+    if held.who not in ('', BRIDGE):
         process += f' ({held.who.replace("_", " ").replace("drive can", "drive_can")})'
         advice = 'wait until it is done, or end it'
-    return InUse(f'{what} is used by {process}; {advice}', by_bridge=by_bridge)
+    return InUse(f'{what} is used by {process}; {advice}')

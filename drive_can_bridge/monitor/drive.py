@@ -148,7 +148,7 @@ class DriveRecord:
             exchanges=report.count('exchanges'), missed=report.count('missed_exchanges'),
             period_error=_times(report, 'period_error'), latency=_times(report, 'latency'),
             command_age=report.number('command_age_s'), facts=report.facts,
-            sample_age=now - responses.at, sampled=sampled,
+            sampled=sampled,
             asked_for=0.0 if self._sampled_since is None else now - self._sampled_since,
             place=self.place,
             parameters=tuple(self.parameters.values()),

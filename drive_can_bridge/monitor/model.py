@@ -11,13 +11,14 @@ from collections.abc import Iterable, Sequence
 import math
 
 from drive_can_bridge.core.parameters import Value
+from drive_can_bridge.core.text import printable
 from drive_can_bridge.monitor.drive import DriveRecord, PARAMETERS_MAX
 from drive_can_bridge.monitor.history import Rate
 from drive_can_bridge.monitor.reports import Level, read_status, Report, Status
 from drive_can_bridge.monitor.snapshot import (
     BridgeSnapshot, BusSnapshot, LogLine, Place, Snapshot, UNKNOWN,
 )
-from drive_can_bridge.monitor.text import LOG_LIMIT, printable
+from drive_can_bridge.monitor.text import LOG_LIMIT
 from drive_can_bridge.monitor.values import ParameterInfo
 
 #: lines of the log kept

@@ -8,7 +8,8 @@ from itertools import islice
 import math
 import re
 
-from drive_can_bridge.monitor.text import is_ros_name, printable
+from drive_can_bridge.core.text import printable
+from drive_can_bridge.monitor.text import is_ros_name
 
 _SUBJECT = re.compile(r'(?P<bridge>\S+): (?P<kind>bus|drive) (?P<name>\S+)')
 #: keys that one status may have

@@ -79,7 +79,6 @@ class DriveSnapshot:
     :param rate: exchanges per second.
     :param command_age: s; NaN before the first command.
     :param facts: everything that diagnostics say.
-    :param sample_age: s since a sample was received; infinite before the first one.
     :param sampled: a sample was received since it came online.
     :param asked_for: s for which its samples have been asked for without a break; 0: they are not.
     :param parameters: what the drive has; empty until it has told.
@@ -105,7 +104,6 @@ class DriveSnapshot:
     latency: Times = Times()
     command_age: float = math.nan
     facts: Mapping[str, str] = field(default_factory=dict)
-    sample_age: float = math.inf
     sampled: bool = False
     asked_for: float = 0.0
     place: Place = Place()

@@ -3,11 +3,10 @@
 
 from dataclasses import dataclass, field
 import math
-import re
 
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import ParameterType, Value, ValueKind
-from drive_can_bridge.monitor.text import printable
+from drive_can_bridge.core.text import printable
 
 _DECIMALS_MAX = 6
 #: columns for a value of which nothing is known
@@ -16,13 +15,6 @@ _WIDTH = 8
 _WORD_SUFFIX = 'word'
 _BOOLS = {'true': True, '1': True, 'on': True, 'false': False, '0': False, 'off': False}
 _EXAMPLES = {ValueKind.INTEGER: ', such as 12 or 0x0C', ValueKind.DOUBLE: ', such as 12.5'}
-_PAIR = re.compile(r'(\w+)=(?:"([^"]*)"|(\S+))')
-
-
-def facts_from_constraints(text: str) -> dict[str, str]:
-    """Read ``additional_constraints``: ``unit="N m" number=209 type=int16``."""
-    return {match[1]: match[3] if match[2] is None else match[2]
-            for match in _PAIR.finditer(text)}
 
 
 @dataclass(frozen=True, slots=True)

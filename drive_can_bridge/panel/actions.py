@@ -15,9 +15,9 @@ from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
 from drive_can_bridge.core.errors import ValueRefused
+from drive_can_bridge.core.text import printable
 from drive_can_bridge.monitor.snapshot import DriveSnapshot
 from drive_can_bridge.monitor.source import Outcome, Stop
-from drive_can_bridge.monitor.text import printable
 from drive_can_bridge.panel.access import Role
 from drive_can_bridge.panel.backups import Backups
 from drive_can_bridge.panel.feed import Feed, has_control

@@ -14,8 +14,8 @@ from pathlib import Path
 import sys
 import tempfile
 
+from drive_can_bridge.core.text import printable
 from drive_can_bridge.monitor.snapshot import DriveSnapshot
-from drive_can_bridge.monitor.text import printable
 
 #: s that one may take: some protocols read ten parameters a second
 TIMEOUT = 300.0

@@ -15,7 +15,7 @@ import uvicorn
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from drive_can_bridge.core.errors import DriveCanError
-from drive_can_bridge.monitor.text import printable
+from drive_can_bridge.core.text import printable
 
 #: connections at once; a browser takes a handful
 CONNECTIONS_MAX = 200

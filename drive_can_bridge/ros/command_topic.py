@@ -19,13 +19,10 @@ import struct
 import time
 from typing import Any
 
-from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.qos import HistoryPolicy
 from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 from std_msgs.msg import Bool, Float64, Int64
-
-RCLError = rclpy_implementation.RCLError
 
 #: ns by which a command may take longer than the quickest of its topic
 LATENESS_MAX = 250_000_000
@@ -52,6 +49,7 @@ class CommandTopic:
     def __init__(self, subscription: Subscription, *, use: Callable[[Any, float], None],
                  late: Callable[[float], None], unreadable: Callable[[str], None],
                  read: Callable[[bytes], Any] | None = None) -> None:
+        self.subscription = subscription
         self.handle: Any = subscription.handle
         self._type: Any = subscription.msg_type
         # more than can wait came meanwhile: that is for the next time
@@ -84,7 +82,7 @@ class CommandTopic:
                 continue
             try:
                 message = self._decode(data)
-            except (RCLError, RuntimeError, ValueError, struct.error) as error:
+            except (RuntimeError, ValueError, struct.error) as error:
                 self._unreadable(str(error) or type(error).__name__)
                 continue
             self._use(message, now)

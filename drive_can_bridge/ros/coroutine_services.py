@@ -13,13 +13,15 @@ import threading
 from typing import Any, Generic, TypeVar
 
 from rclpy.node import Node
+from rclpy.qos import qos_profile_parameters
+from rclpy.service import Service
 
-from drive_can_bridge.ros.polled_services import PolledServices
-from drive_can_bridge.ros.service_thread import Answer, ServiceThread
+from drive_can_bridge.ros.polled_group import PolledGroup
+from drive_can_bridge.ros.service_thread import Answer, Callback, ServiceThread
 
 AnswerT = TypeVar('AnswerT')
 #: takes request and response, and returns the response
-Callback = Callable[[Any, Any], Coroutine[Any, Any, Any]]
+Serve = Callable[[Any, Any], Coroutine[Any, Any, Any]]
 
 
 class Question(Generic[AnswerT]):
@@ -43,25 +45,34 @@ class CoroutineServices:
     Such services of one node. No two of their coroutines run at the same time.
 
     :param callbacks: by name, with the type of the service.
+    :ivar calls: how many callers wait for their answer.
     """
 
     def __init__(self, node: Node, thread: ServiceThread,
-                 callbacks: Mapping[str, tuple[Any, Callback]]) -> None:
+                 callbacks: Mapping[str, tuple[Any, Serve]]) -> None:
         self._thread = thread
+        self.calls = 0
+        self._counting = threading.Lock()
         self._running = threading.Lock()
-        self._services = PolledServices(node, thread, {
-            name: (kind, partial(self._begin, callback, kind.Response))
-            for name, (kind, callback) in callbacks.items()})
-        #: before the node is destroyed, the latter
-        self.serve, self.destroy = self._services.serve, self._services.destroy
+        self._services: dict[Service, Callback] = {
+            node.create_service(kind, f'~/{name}', _never, callback_group=PolledGroup(),
+                                qos_profile=qos_profile_parameters):
+            partial(self._begin, callback, kind.Response)
+            for name, (kind, callback) in callbacks.items()}
 
-    @property
-    def calls(self) -> int:
-        """How many wait for their answer."""
-        return self._services.calls
+    def serve(self) -> None:
+        """Begin to serve."""
+        for service, callback in self._services.items():
+            self._thread.serve(service, callback, self._ended)
 
-    def _begin(self, callback: Callback, response: Callable[[], Any], request: Any,
+    def destroy(self) -> None:
+        """Let go of the services. Before the node is destroyed."""
+        self._thread.forget(list(self._services))
+
+    def _begin(self, callback: Serve, response: Callable[[], Any], request: Any,
                answer: Answer) -> None:
+        with self._counting:
+            self.calls += 1
         self._go_on(callback(request, response()), answer, None)
 
     def _go_on(self, coroutine: Coroutine[Any, Any, Any], answer: Answer, found: Any) -> None:
@@ -75,5 +86,14 @@ class CoroutineServices:
             answer(end.value)
         except BaseException:
             coroutine.close()
-            self._services.ended()
+            self._ended()
             raise
+
+    def _ended(self) -> None:
+        """Take note that one caller less waits: it was answered, or nothing comes of it."""
+        with self._counting:
+            self.calls -= 1
+
+
+def _never(_: Any, response: Any) -> Any:
+    raise RuntimeError('such services are taken by a thread of their own')

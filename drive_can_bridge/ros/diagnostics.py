@@ -17,8 +17,8 @@ from drive_can_bridge.core.text import printable
 from drive_can_bridge.core.words import value_text
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.ros.drive_node import DriveNode
-from drive_can_bridge.ros.quality import overriding
-from drive_can_bridge.transport.end_point import REFUSED_FRAMES
+from drive_can_bridge.ros.quality import publisher
+from drive_can_bridge.transport.end_point import Counts, REFUSED_FRAMES
 from drive_can_bridge.transport.error_frames import ADVICE_DISTURBED, BUS_OFF, BusError
 from drive_can_bridge.transport.link import steady_now
 
@@ -30,7 +30,7 @@ COMMANDS_RECENT = 1.5
 
 @dataclass
 class Report:
-    """One diagnostic status before it becomes a message; views use it as it is."""
+    """One diagnostic status before it becomes a message."""
 
     name: str
     level: bytes
@@ -43,12 +43,10 @@ class BusReporter:
 
     def __init__(self, exchange: BusExchange) -> None:
         self._exchange = exchange
-        self._bits = 0
-        self._failures = self._refused = 0
-        self._error_frames = 0
-        self._overflowed = 0
+        self._bits = self._failures = 0
+        self._counts = Counts()
         self._reported_at = math.nan
-        self.load_percent = 0.0
+        self._load = 0.0
 
     def report(self, now: float) -> Report:
         """Return the report for the time since the last one."""
@@ -56,18 +54,14 @@ class BusReporter:
         bits = exchange.received_bits + exchange.sent_bits
         elapsed = now - self._reported_at
         if elapsed > 0:
-            self.load_percent = (100.0 * STUFFING * (bits - self._bits)
-                                 / (elapsed * exchange.bus.bitrate))
-        refused, error_frames = link.refused_frames, link.error_frames
-        failures = link.send_failures + refused
-        overflowed = link.overflowed_frames
+            self._load = (100.0 * STUFFING * (bits - self._bits)
+                          / (elapsed * exchange.bus.bitrate))
+        counts = link.counts
+        new = counts.minus(self._counts)
+        failures = link.send_failures + counts.refused
         new_failures = failures - self._failures
-        why = REFUSED_FRAMES if refused > self._refused else link.last_error
-        new_errors = error_frames - self._error_frames
-        new_overflowed = overflowed - self._overflowed
         self._bits, self._reported_at = bits, now
-        self._failures, self._refused, self._error_frames = failures, refused, error_frames
-        self._overflowed = overflowed
+        self._failures, self._counts = failures, counts
         level, message = DiagnosticStatus.OK, f'{exchange.bus.interface} {exchange.bus.channel}'
         state = exchange.bus_state
         if state == 'up' and link.controller or state == 'down' and link.controller == BUS_OFF:
@@ -76,28 +70,29 @@ class BusReporter:
             level = DiagnosticStatus.ERROR
             message = (f'{exchange.bus_state}: {exchange.bus_reason or "not open yet"}; '
                        f'tried again every {exchange.bus.reconnect_period:g} s')
-        elif link.controller or new_errors and link.last_bus_error is not None:
+        elif link.controller or new.error_frames and link.last_bus_error is not None:
             level = DiagnosticStatus.WARN
-            message = _bus_error(link.last_bus_error, link.controller, new_errors)
-        elif new_overflowed > 0:
+            message = _bus_error(link.last_bus_error, link.controller, new.error_frames)
+        elif new.overflowed > 0:
             level = DiagnosticStatus.WARN
-            message = (f'{new_overflowed} received frames lost: this machine is too slow for the '
+            message = (f'{new.overflowed} received frames lost: this machine is too slow for the '
                        f'traffic, see what else it does')
         elif new_failures:
             level = DiagnosticStatus.WARN
+            why = REFUSED_FRAMES if new.refused > 0 else link.last_error
             message = f'{new_failures} frames not sent: {why}'
-        elif self.load_percent > LOAD_WARNING:
+        elif self._load > LOAD_WARNING:
             level = DiagnosticStatus.WARN
-            message = (f'bus load {self.load_percent:.0f} %: raise the period of some drives or '
+            message = (f'bus load {self._load:.0f} %: raise the period of some drives or '
                        f'the bit rate')
         return Report(f'bus {exchange.bus.name}', level, message, {
             'state': state,
-            'load_percent': f'{self.load_percent:.1f}',
-            'frames_sent': str(link.frames_sent - refused),
+            'load_percent': f'{self._load:.1f}',
+            'frames_sent': str(link.frames_sent - counts.refused),
             'frames_received': str(link.frames_received),
             'frames_rejected': str(exchange.frames_rejected),
-            'error_frames': str(error_frames),
-            'bus_off_count': str(link.bus_off_count),
+            'error_frames': str(counts.error_frames),
+            'bus_off_count': str(counts.bus_off),
             'reconnections': str(link.reconnections),
             'send_failures': str(failures),
         })
@@ -268,15 +263,13 @@ class Diagnostics:
     """
 
     def __init__(self, node: Node, exchanges: list[BusExchange], drives: list[DriveNode],
-                 reported: Callable[[Report, str], None] | None = None) -> None:
+                 reported: Callable[[Report, str], None]) -> None:
         self._node = node
         self._reported = reported
         self._bus_of = {f'bus {exchange.bus.name}': exchange.bus.name for exchange in exchanges}
         self._bus_of.update({f'drive {drive.name}': drive.drive.bus for drive in drives})
         self._prefix = node.get_fully_qualified_name().lstrip('/')
-        self._publisher = node.create_publisher(
-            DiagnosticArray, '/diagnostics', QoSProfile(depth=10),
-            qos_overriding_options=overriding(node, '/diagnostics'))
+        self._publisher = publisher(node, DiagnosticArray, '/diagnostics', QoSProfile(depth=10))
         self.buses = [BusReporter(exchange) for exchange in exchanges]
         self.drives = [DriveReporter(drive) for drive in drives]
         self._lock = threading.Lock()  # the last message comes from another thread
@@ -294,8 +287,7 @@ class Diagnostics:
             self._publisher.publish(message)
 
     def _status(self, report: Report) -> DiagnosticStatus:
-        if self._reported is not None:
-            self._reported(report, self._bus_of[report.name])
+        self._reported(report, self._bus_of[report.name])
         found = self._statuses.get(report.name)
         if found is None:
             found = self._statuses[report.name] = StatusMessage(

@@ -8,55 +8,54 @@ services are served in threads of theirs.
 
 from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 from rclpy.clock import Clock
-from rclpy.exceptions import InvalidHandle
-from rclpy.executors import Executor
-from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.parameter import Parameter as NodeParameter
 from std_msgs.msg import Bool
 
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.control import ControlCompleted
+from drive_can_bridge.core.control import ControlCompleted, ControlRequest
 from drive_can_bridge.core.directory import ParameterDirectory
 from drive_can_bridge.core.events import (
     Event, ForeignMasterSeen, FrameRejected, MappingDiffered, MappingWritten, Noted,
     ProcessDataReceived, RequestCompleted, SetpointsExpired, StationFound, StationLost,
 )
-from drive_can_bridge.core.parameters import Value
 from drive_can_bridge.core.requests import (
-    BRIDGE_INACTIVE, Failure, Outcome, ReadRequest, Request,
+    BRIDGE_INACTIVE, Failure, ReadRequest, Request,
 )
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.exchange.exchange import BusExchange
+from drive_can_bridge.exchange.listeners import DriveListener
 from drive_can_bridge.protocols.family import Family
 from drive_can_bridge.ros.commands import CommandIntake
-from drive_can_bridge.ros.control_services import ControlServices
-from drive_can_bridge.ros.coroutine_services import Question
+from drive_can_bridge.ros.control_services import control_services
+from drive_can_bridge.ros.coroutine_services import CoroutineServices, Question
 from drive_can_bridge.ros.event_topic import RequestTopic
+from drive_can_bridge.ros.executor_thread import ExecutorThread
+from drive_can_bridge.ros.gone import GONE
 from drive_can_bridge.ros.identity import IdentityReader
 from drive_can_bridge.ros.log import Log
-from drive_can_bridge.ros.mailbox import Mailbox
 from drive_can_bridge.ros.parameter_services import ParameterServices
 from drive_can_bridge.ros.polled_topics import PolledTopics
-from drive_can_bridge.ros.quality import latched_quality, overriding, quality_overrides
+from drive_can_bridge.ros.quality import latched_quality, publisher, quality_overrides
 from drive_can_bridge.ros.samples import SamplePublisher
 from drive_can_bridge.ros.service_thread import ServiceThread
 from drive_can_bridge.ros.stamps import Stamps
 
-RCLError = rclpy_implementation.RCLError
 
-#: takes what became of a request
-Completed = Callable[[tuple[Outcome, ...]], None]
+#: takes what became of a request: its outcomes, or :class:`.ControlCompleted`
+Completed = Callable[[Any], None]
 
 
-class DriveNode:
+class DriveNode(DriveListener):
     """
-    One drive in the ROS graph (a ``DriveListener`` of its exchange).
+    One drive in the ROS graph.
 
     :param bridge: the bridge's node; the drive lives in its namespace.
+    :param spinner: serves the node, and what it leaves to be done there.
     :param log: of the bridge.
     :param control_thread: serves ``~/enable`` and its like.
     :param parameter_thread: serves the parameter services.
@@ -67,7 +66,7 @@ class DriveNode:
     """
 
     def __init__(self, bridge: Node, drive: DriveConfiguration, session: Session, family: Family,
-                 exchange: BusExchange, mailbox: Mailbox, executor: Executor, log: Log,
+                 exchange: BusExchange, spinner: ExecutorThread, log: Log,
                  control_thread: ServiceThread, parameter_thread: ServiceThread,
                  identified: Callable[[str], None]) -> None:
         self.drive = drive
@@ -75,12 +74,11 @@ class DriveNode:
         self.exchange = exchange
         self.joint_commands: PolledTopics | None = None
         self.witness: Callable[[Event], None] | None = None
-        self._mailbox = mailbox
-        self._executor = executor
+        self._spinner = spinner
         self._log = log.speaker(drive.name)
         self._log.reset()
-        self._requests: dict[int, tuple[Request, Completed]] = {}
-        self._control: ControlServices | None = None
+        self._asked: dict[Request | ControlRequest, Completed] = {}
+        self._services: list[CoroutineServices] = []
         self.requests_refused = 0
         self._identity = IdentityReader(
             drive.profile, submit=self._submit_quietly, online=lambda: session.online,
@@ -111,10 +109,9 @@ class DriveNode:
 
     def serve(self) -> None:
         """Begin to serve: the exchange knows of the drive from now on."""
-        self._executor.add_node(self.node)
-        self._parameters.serve()
-        if self._control is not None:
-            self._control.serve()
+        self._spinner.executor.add_node(self.node)
+        for services in self._services:
+            services.serve()
 
     def _populate(self, clock: Clock, family: Family, control_thread: ServiceThread,
                   parameter_thread: ServiceThread) -> None:
@@ -123,30 +120,24 @@ class DriveNode:
         stamps = Stamps(clock)
         self.samples = SamplePublisher(self.node, drive, session.sample_parameters, stamps.at)
         self._request = RequestTopic(self.node, session.sent, stamps)
-        self._online = self.node.create_publisher(
-            Bool, '~/online', latched_quality(),
-            qos_overriding_options=overriding(self.node, '~/online'))
+        self._online = publisher(self.node, Bool, '~/online', latched_quality())
         self._online.publish(Bool(data=False))
         directory = ParameterDirectory(drive.profile.parameters,
                                        lambda name: family.raw_parameter(drive, name))
-        self._parameters = ParameterServices(
-            self.node, parameter_thread, directory, clock,
-            submit=lambda request: Question(partial(self._submit, request)),
+
+        def submit(request: Any) -> Question[Any]:
+            return Question(partial(self._submit, request))
+        self._services.append(ParameterServices(
+            self.node, parameter_thread, directory, clock, submit=submit,
             write_refusal=session.users.write_refusal, role=session.roles.role,
-            active=lambda: session.active, failed=self._parameter_failed).services
+            active=lambda: session.active, failed=self._parameter_failed).services)
         if session.control is not None:
-            self._control = ControlServices(
-                self.node, control_thread,
-                lambda request: self.exchange.submit(session, request))
+            self._services.append(control_services(self.node, control_thread, submit))
 
     @property
     def name(self) -> str:
         """Name of the drive."""
         return self.drive.name
-
-    def values(self) -> dict[str, Value]:
-        """Return the newest value of everything that a sample carries; empty while offline."""
-        return self.samples.latest() if self.session.online else {}
 
     def answer_all(self) -> bool:
         """
@@ -154,24 +145,24 @@ class DriveNode:
 
         :return: all calls are answered, and the node may go.
         """
-        while self._requests:
-            request, completed = self._requests.popitem()[1]
-            completed((Failure(BRIDGE_INACTIVE),) * len(request))
-        answered = self._control is None or self._control.answer_all()
-        return answered and not self._calls
+        while self._asked:
+            request, completed = self._asked.popitem()
+            completed(ControlCompleted(request, False, BRIDGE_INACTIVE)
+                      if isinstance(request, ControlRequest)
+                      else (Failure(BRIDGE_INACTIVE),) * len(request))
+        return not self.calls
 
     @property
-    def _calls(self) -> int:
-        """How many calls of parameter services wait for their answer."""
-        return self._parameters.calls
+    def calls(self) -> int:
+        """How many callers of its services wait for their answer."""
+        return sum(services.calls for services in self._services)
 
     def destroy(self) -> None:
         """Take the drive out of the graph. The exchange must be closed."""
-        self._executor.remove_node(self.node)
+        self._spinner.executor.remove_node(self.node)
         self.commands.destroy()
-        self._parameters.destroy()
-        if self._control is not None:
-            self._control.destroy()
+        for services in self._services:
+            services.destroy()
         self.node.destroy_node()
 
     # -- log --------------------------------------------------------------------------------------
@@ -202,14 +193,14 @@ class DriveNode:
         """Publish a sample."""
         try:
             self.samples.publish(event.raws, event.received_at)
-        except (InvalidHandle, RCLError) as error:
+        except GONE as error:
             self._cannot_publish(error)
 
     def request_sent(self, now: float) -> None:
         """Publish what was sent."""
         try:
             self._request.publish(now)
-        except (InvalidHandle, RCLError) as error:
+        except GONE as error:
             self._cannot_publish(error)
 
     def handle_event(self, event: Event) -> None:
@@ -218,19 +209,18 @@ class DriveNode:
             self.witness(event)
         try:
             self._handle_event(event)
-        except (InvalidHandle, RCLError) as error:
+        except GONE as error:
             self._cannot_publish(error)
 
     def _handle_event(self, event: Event) -> None:
         if isinstance(event, RequestCompleted):
-            _, completed = self._requests.pop(id(event.request))
-            completed(event.outcomes)
+            self._asked.pop(event.request)(event.outcomes)
         elif isinstance(event, StationFound):
             self._may_run = False
             self._online.publish(Bool(data=True))
             self._log.reset()
             self._log.info('online')
-            self._mailbox.post(self._identity.read)
+            self._spinner.later(self._identity.read)
         elif isinstance(event, StationLost):
             self._online.publish(Bool(data=False))
             self.samples.forget()
@@ -238,7 +228,7 @@ class DriveNode:
                 self.times_lost += 1
                 self._log.warning(f'offline: {event.reason}', urgent=True)
             elif not self._may_run:
-                self._log.info('stopped')
+                self._tell_stopped()
         elif isinstance(event, SetpointsExpired):
             self.warn('command timeout',
                       f'no command for {self.session.configuration.command_timeout:g} s: '
@@ -248,8 +238,9 @@ class DriveNode:
         elif isinstance(event, MappingWritten):
             self._log.warning(f'maps of the drive rewritten: {event.text}')
         elif isinstance(event, ControlCompleted):
-            if self._control is not None:
-                self._control.completed(event)
+            completed = self._asked.pop(event.request, None)
+            if completed is not None:   # asked for at this member of a group
+                completed(event)
         elif isinstance(event, FrameRejected):
             self.rejected_text = event.text
             self.warn('rejected', f'frame rejected: {event.text}')
@@ -263,20 +254,33 @@ class DriveNode:
             else:
                 self._log.info(event.text)
 
+    def _tell_stopped(self) -> None:
+        """Say how the drive is left: it was told to stop, and has answered."""
+        control = self.session.control
+        if control is not None and control.unconfirmed:     # its status may lag, or it runs down
+            self._log.warning(f'told to stop, and answers, but its last status word does not say '
+                              f'so: {control.state}')
+        else:
+            self._log.info('stopped')
+
     def _cannot_publish(self, error: Exception) -> None:
         if self.node.context.ok():
             self.warn('publish', f'cannot publish: {error}')
 
     # -- users ------------------------------------------------------------------------------------
 
-    def _submit(self, request: Request, completed: Completed) -> None:
+    def _submit(self, request: Request | ControlRequest, completed: Completed) -> None:
         """Hand a request to the session; what became of it is told from any thread."""
-        self._requests[id(request)] = request, completed
-        self.exchange.submit(self.session, request)
+        self._asked[request] = completed    # its outcome may come before the next line
+        try:
+            self.exchange.submit(self.session, request)
+        except BaseException:
+            self._asked.pop(request, None)
+            raise
 
     def _submit_quietly(self, request: ReadRequest, completed: Completed) -> None:
         """Submit a request of our own, whose answer is for the executor."""
-        self._submit(request, partial(self._mailbox.post, completed))
+        self._submit(request, partial(self._spinner.later, completed))
 
     def _parameter_failed(self, what: str, reason: str, uncounted: int) -> None:
         text = printable(f'{what}: {reason}')

@@ -7,13 +7,12 @@ from functools import partial
 from builtin_interfaces.msg import Time
 from rcl_interfaces.msg import Parameter as ParameterMessage, ParameterEvent
 from rclpy.node import Node
-from rclpy.publisher import Publisher
 
 from drive_can_bridge.core.last_sent import LastSent
 from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.ros.audience import Audience
 from drive_can_bridge.ros.prepared import NUMBER_CODES, PreparedMessage
-from drive_can_bridge.ros.quality import overriding, state_quality
+from drive_can_bridge.ros.quality import publisher, state_quality
 from drive_can_bridge.ros.stamps import Stamp, Stamps
 from drive_can_bridge.ros.values import converters, parameter_value, VALUE_FIELDS
 
@@ -27,9 +26,7 @@ class EventTopic:
 
     def __init__(self, node: Node, topic: str, parameters: tuple[Parameter, ...],
                  first: int = 0) -> None:
-        self.publisher: Publisher = node.create_publisher(
-            ParameterEvent, topic, state_quality(),
-            qos_overriding_options=overriding(node, topic))
+        self.publisher = publisher(node, ParameterEvent, topic, state_quality())
         self._entries = [
             ParameterMessage(name=parameter.name, value=parameter_value(
                 parameter, parameter.value_from_raw(0))) for parameter in parameters]

@@ -1,8 +1,14 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""An executor in a thread of its own, which no callback can bring down."""
+"""
+An executor in a thread of its own, which no callback can bring down.
+
+A future of rclpy must be completed in its executor's own thread; completing it elsewhere races
+with the executor's wait. Whoever has a result in another thread leaves it here.
+"""
 
 from collections.abc import Callable
 import threading
+from typing import Any
 
 from rclpy.context import Context
 from rclpy.exceptions import InvalidHandle
@@ -25,17 +31,25 @@ class ExecutorThread:
         self.executor = SingleThreadedExecutor(context=context)
         self._report = report
         self._stopping = threading.Event()
+        self._ending = threading.Lock()
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
 
     def start(self) -> None:
         """Start to serve."""
         self._thread.start()
 
+    def later(self, job: Callable[..., object], *arguments: Any) -> None:
+        """Have something done in this thread soon. From any thread; once it stops, nothing is."""
+        with self._ending:
+            if not self._stopping.is_set():
+                self.executor.create_task(job, *arguments)
+
     def stop(self) -> None:
         """Stop to serve and wait for the callback that is running."""
-        self._stopping.set()
         # an executor that is merely woken goes back to waiting for something to do
-        self.executor.create_task(_nothing)
+        self.later(self._stopping.set)
+        with self._ending:
+            self._stopping.set()
         if self._thread.is_alive():
             self._thread.join(timeout=5.0)
         self.executor.shutdown(timeout_sec=1.0)
@@ -53,7 +67,3 @@ class ExecutorThread:
                     return
                 self._report(f'internal error in a callback: {type(error).__name__}: {error}')
                 self._stopping.wait(ERROR_PAUSE)
-
-
-def _nothing() -> None:
-    """Be the task that ends the executor's wait."""

@@ -8,7 +8,6 @@ from typing import Any, Protocol
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.executors import Executor
 from rclpy.logging import get_logging_directory
 from rclpy.node import Node
 from rclpy.task import Future
@@ -20,8 +19,8 @@ from drive_can_bridge.core.events import Event, MappingDiffered, StationLost
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.ros.diagnostics import Report
 from drive_can_bridge.ros.drive_node import DriveNode
+from drive_can_bridge.ros.executor_thread import ExecutorThread
 from drive_can_bridge.ros.log import Log
-from drive_can_bridge.ros.mailbox import Mailbox
 from drive_can_bridge.trace.flight import FlightRecorder
 from drive_can_bridge.transport.link import steady_now
 
@@ -89,81 +88,63 @@ class FlightWatch:
     :param buses: those of the configuration; without ``trace_seconds`` nothing is recorded.
     """
 
-    def __init__(self, node: Node, log: Log, buses: Sequence[BusConfiguration], mailbox: Mailbox,
-                 executor: Executor) -> None:
+    def __init__(self, node: Node, log: Log, buses: Sequence[BusConfiguration],
+                 thread: ExecutorThread) -> None:
         self._node = node
         self._log = log
-        self._mailbox = mailbox
-        self._executor = executor
-        self._recorder: FlightRecorder | None = None
-        self._occasions: Occasions | None = None
-        if any(bus.trace_seconds > 0.0 for bus in buses):
-            self._recorder = FlightRecorder(
-                buses, Path(str(get_logging_directory())) / 'drive_can_bridge',
-                log.warning, log.error)
-            self._occasions = Occasions(self._recorder.trigger)
+        self._thread = thread
+        wanted = any(bus.trace_seconds > 0.0 for bus in buses)  # else there may be no such place
+        folder = Path(str(get_logging_directory())) / 'drive_can_bridge' if wanted else Path()
+        self._recorder = FlightRecorder(buses, folder, log.warning, log.error)
+        occasions = self._occasions = Occasions(self._recorder.trigger)
+        #: what else is worth a trace: a bus that is gone, and a diagnostic status
+        self.bus_lost, self.reported = occasions.bus_lost, occasions.reported
         self._service = node.create_service(TriggerService, '~/save_trace', self._save,
                                             callback_group=ReentrantCallbackGroup())
 
     def note_of(self, bus: str) -> Callable[..., object] | None:
         """Return what takes every frame of a bus; None: nobody does."""
-        ring = None if self._recorder is None else self._recorder.ring(bus)
+        ring = self._recorder.ring(bus)
         return None if ring is None else ring.note
 
     def attach(self, exchange: BusExchange) -> None:
         """Take the error frames of a bus, too. Before it is opened."""
-        ring = None if self._recorder is None else self._recorder.ring(exchange.bus.name)
+        ring = self._recorder.ring(exchange.bus.name)
         if ring is not None:
             exchange.link.error_witness = lambda classes, data: ring.note_error(
                 classes, data, steady_now())
 
     def watch(self, drives: Sequence[DriveNode]) -> None:
         """Begin to look at the drives."""
-        occasions, recorder = self._occasions, self._recorder
-        if occasions is None or recorder is None:
-            return
         for drive in drives:
-            if drive.drive.bus in recorder.buses:
-                drive.witness = partial(_tell, occasions, drive)
+            if drive.drive.bus in self._recorder.buses:
+                drive.witness = partial(_tell, self._occasions, drive)
 
     def close(self) -> None:
         """Write what is still to be written. The exchanges must be closed."""
-        if self._recorder is not None:
-            self._recorder.close()
+        self._recorder.close()
         self._node.destroy_service(self._service)
-
-    # -- what is worth a trace --------------------------------------------------------------------
-
-    def bus_lost(self, bus: str) -> None:
-        """Take note that a bus is gone."""
-        if self._occasions is not None:
-            self._occasions.bus_lost(bus)
-
-    def reported(self, report: Report, bus: str) -> None:
-        """Take note of a diagnostic status."""
-        if self._occasions is not None:
-            self._occasions.reported(report, bus)
 
     # -- ~/save_trace -----------------------------------------------------------------------------
 
     async def _save(self, _: Any, response: Any) -> Any:
-        recorder = self._recorder
-        if recorder is None:
+        buses = self._recorder.buses
+        if not buses:
             response.success, response.message = False, NOT_RECORDING
             return response
         paths: list[str] = []
         refusals: list[str] = []
-        for future in [self._ask(recorder, bus) for bus in recorder.buses]:
+        for future in [self._ask(bus) for bus in buses]:
             path, refusal = await future
             (paths if path else refusals).append(path or refusal)
         response.success = bool(paths) and not refusals
         response.message = '\n'.join([*paths, *refusals])
         return response
 
-    def _ask(self, recorder: FlightRecorder, bus: str) -> Future:
-        future = Future(executor=self._executor)
-        recorder.save(bus, 'save_trace',
-                      lambda path, refusal: self._mailbox.complete(future, (path, refusal)))
+    def _ask(self, bus: str) -> Future:
+        future = Future(executor=self._thread.executor)
+        self._recorder.save(bus, 'save_trace', lambda path, refusal: self._thread.later(
+            future.set_result, (path, refusal)))
         return future
 
 

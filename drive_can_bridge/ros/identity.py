@@ -42,7 +42,7 @@ class IdentityReader:
         self._known: list[str] = []
         self._failures = 0
 
-    def read(self, _: object = None) -> None:
+    def read(self) -> None:
         """Ask the drive. Whatever was known is not: it may be another one now."""
         self._attempt += 1
         self._known.clear()

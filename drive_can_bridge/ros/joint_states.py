@@ -16,20 +16,18 @@ from itertools import accumulate
 import math
 from typing import Any
 
-from rclpy.exceptions import InvalidHandle
-from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
 from drive_can_bridge.core.configuration import JointConfiguration
 from drive_can_bridge.ros.audience import Audience
 from drive_can_bridge.ros.drive_node import DriveNode
+from drive_can_bridge.ros.gone import GONE
 from drive_can_bridge.ros.joint_reader import QUANTITIES
 from drive_can_bridge.ros.prepared import PreparedMessage
-from drive_can_bridge.ros.quality import overriding, state_quality
+from drive_can_bridge.ros.quality import publisher, state_quality
 from drive_can_bridge.ros.stamps import Stamps
 
-RCLError = rclpy_implementation.RCLError
 
 TOPIC = '~/joint_states'
 
@@ -87,8 +85,7 @@ class JointStates:
         self._node = node
         self._warn = warn
         self._stamps = Stamps(node.get_clock())
-        self.publisher = node.create_publisher(
-            JointState, TOPIC, state_quality(), qos_overriding_options=overriding(node, TOPIC))
+        self.publisher = publisher(node, JointState, TOPIC, state_quality())
         self._present: list[_Joint] = []
         self._cells: list[_Cell] = []
         self._message = JointState()
@@ -100,7 +97,7 @@ class JointStates:
         try:
             if self._audience.listens(now):
                 self._publish()
-        except (InvalidHandle, RCLError) as error:
+        except GONE as error:
             if self._node.context.ok():
                 self._warn('joint states', f'joint_states cannot be published: {error}')
 

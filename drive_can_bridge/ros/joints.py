@@ -51,12 +51,13 @@ class Joints:
                       if drive.drive.joint is not None}
             if not joints:
                 continue
-            first = not self._taken     # the others hear the same, and need not tell it again
-            taken = PolledTopics(
-                node, warn, _refusing(joints, warn if first else None))
+            if self._taken:     # the others hear the same, and need not tell it again
+                taker = _Taker(joints, known, _nothing, _nothing)
+            else:
+                taker = _Taker(joints, known, warn, log.info)
+            taken = PolledTopics(node, warn, taker.refuse)
             self._taken.append(taken)
-            taken.subscribe(JointState, COMMANDS, _Taker(
-                joints, known, warn if first else None, log.info), JointReader())
+            taken.subscribe(JointState, COMMANDS, taker, JointReader())
             for drive in here:
                 drive.joint_commands = taken
         if configuration.joint_state_rate > 0.0:
@@ -82,15 +83,8 @@ class Joints:
             self._states = None
 
 
-def _refusing(joints: Mapping[str, CommandIntake], warn: Warn | None,
-              ) -> Callable[[str, str], None]:
-    """Return what counts a message that is thrown away, for all that it might have moved."""
-    def refuse(topic: str, text: str) -> None:
-        for intake in joints.values():
-            intake.count_refused()
-        if warn is not None:
-            warn(topic, text)
-    return refuse
+def _nothing(*_: object, **__: object) -> None:
+    """Leave it to somebody else to tell."""
 
 
 class _Taker:
@@ -99,11 +93,12 @@ class _Taker:
 
     :param joints: who takes what concerns a joint, by its name.
     :param known: the names of all joints of the bridge.
-    :param warn: None: somebody else tells what is wrong with a message.
+    :param warn: takes what is wrong with a message.
+    :param inform: takes what nobody has to do anything about.
     """
 
     def __init__(self, joints: Mapping[str, CommandIntake], known: Collection[str],
-                 warn: Warn | None, inform: Callable[[str], None]) -> None:
+                 warn: Warn, inform: Callable[[str], None]) -> None:
         self._joints = joints
         self._known = known
         self._warn = warn
@@ -120,19 +115,24 @@ class _Taker:
         if wrong:
             for name in self._joints.keys() & set(names):
                 self._joints[name].count_refused()
-            if self._warn is not None:
-                self._warn('joint commands', f'joint_commands refused: {wrong}')
+            self._warn('joint commands', f'joint_commands refused: {wrong}')
             return
         if names != self._names:
             self._names = names
             self._parts = [(entry, self._joints[name].take_quantity)
                            for entry, name in enumerate(names) if name in self._joints]
             for name in names:
-                if name not in self._known and self._warn is not None:
+                if name not in self._known:
                     self._tell_stranger(name)
         for quantity, values in columns:
             for entry, take in self._parts:
                 take(quantity, values[entry], now)
+
+    def refuse(self, topic: str, text: str) -> None:
+        """Count and tell a message that is thrown away, for all that it might have moved."""
+        for intake in self._joints.values():
+            intake.count_refused()
+        self._warn(topic, text)
 
     def _problem(self, names: list[str], columns: Sequence[Column]) -> str:
         for quantity, values in columns:

@@ -101,7 +101,7 @@ def _run(watcher: SignalWatcher, arguments: Sequence[str]) -> int:
     spinner = ExecutorThread('services', lambda text: bridge.log.error(text),
                              rclpy.get_default_context())
     try:
-        bridge = BridgeNode(spinner.executor, watcher.fatal, files=_parameter_files(arguments))
+        bridge = BridgeNode(spinner, watcher.fatal, files=_parameter_files(arguments))
     except Exception as error:  # noqa: BLE001  names and namespaces that rcl refuses
         print(f'drive_can_bridge: {in_words(error)}', file=sys.stderr)
         return 1
@@ -160,9 +160,7 @@ def _parse_error(error: Exception) -> str:
     """Return what rcl says without the file positions of its C sources."""
     from drive_can_bridge.transport.failures import in_words
 
-    text = in_words(error)
-    for noise in ('failed to initialize rcl: ',):
-        text = text.replace(noise, '')
+    text = in_words(error).replace('failed to initialize rcl: ', '')
     if text.startswith('['):  # a bare list of what it does not know
         return f'unknown ROS arguments: {text}'
     return text.split(', at /')[0]

@@ -10,12 +10,18 @@ while the bridge runs; all others are read-only and say so.
 from collections.abc import Callable
 from typing import Any
 
-from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rcl_interfaces.msg import (
+    Parameter as ParameterMessage, ParameterDescriptor, SetParametersResult,
+)
+from rclpy.exceptions import ParameterNotDeclaredException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.parameter_service import ParameterService
 
 from drive_can_bridge.configuration.load import check_dynamic, declared_parameters
 from drive_can_bridge.core.configuration import BridgeConfiguration
+from drive_can_bridge.core.directory import NAME_SHOWN
+from drive_can_bridge.core.text import printable
 
 _OURS = ('drives.', 'buses.')
 _OURS_ALONE = ('diagnostics_period', 'autostart')
@@ -23,7 +29,7 @@ _OURS_ALONE = ('diagnostics_period', 'autostart')
 
 class NodeParameters:
     """
-    Declares, checks and passes on.
+    Declares, checks and passes on. The node must have no parameter services of its own.
 
     :param changed: takes (name, value) of each parameter that was changed.
     :param refusal: says why a value that is allowed in itself cannot be set now; '' if it can.
@@ -38,6 +44,7 @@ class NodeParameters:
         self._announcing = False
         node.add_on_set_parameters_callback(self._check)
         node.add_post_set_parameters_callback(self._apply)
+        self._services = _Services(node)
 
     @property
     def overrides(self) -> dict[str, Any]:
@@ -82,6 +89,8 @@ class NodeParameters:
         if self._announcing:
             return SetParametersResult(successful=True)
         for parameter in parameters:
+            if not parameter.name:  # rclpy would add one
+                return SetParametersResult(successful=False, reason='a parameter has a name')
             if parameter.name.startswith(_OURS) or parameter.name in _OURS_ALONE:
                 problem = (check_dynamic(parameter.name, parameter.value)
                            or self._refusal(parameter.name, parameter.value))
@@ -92,3 +101,34 @@ class NodeParameters:
     def _apply(self, parameters: list[Parameter]) -> None:
         for parameter in parameters:
             self._changed(parameter.name, parameter.value)
+
+
+class _Services(ParameterService):
+    """
+    The parameter services of rclpy, which answer whatever the type of a value is said to be.
+
+    There, a type that does not exist ends the callback: whoever asks waits for ever.
+    """
+
+    def _set_parameters_callback(self, request: Any, response: Any) -> Any:
+        response.results = [self._set([message]) for message in request.parameters]
+        return response
+
+    def _set_parameters_atomically_callback(self, request: Any, response: Any) -> Any:
+        response.result = self._set(request.parameters)
+        return response
+
+    def _set(self, messages: list[ParameterMessage]) -> SetParametersResult:
+        parameters = []
+        for message in messages:
+            try:
+                parameters.append(Parameter.from_parameter_msg(message))
+            except ValueError:
+                reason = f'type {message.value.type} does not exist'
+                if len(messages) > 1:
+                    reason = f'{printable(message.name, NAME_SHOWN)}: {reason}'
+                return SetParametersResult(successful=False, reason=reason)
+        try:
+            return self._get_node().set_parameters_atomically(parameters)
+        except ParameterNotDeclaredException as error:
+            return SetParametersResult(successful=False, reason=printable(str(error)))

@@ -32,10 +32,9 @@ from drive_can_bridge.core.requests import (
 from drive_can_bridge.core.roles import Role
 from drive_can_bridge.core.text import printable, TEXT_MAX
 from drive_can_bridge.ros.coroutine_services import CoroutineServices, Question
+from drive_can_bridge.ros.messages import value_of
 from drive_can_bridge.ros.service_thread import ServiceThread
-from drive_can_bridge.ros.values import (
-    descriptor, PARAMETER_TYPES, parameter_value, value_of,
-)
+from drive_can_bridge.ros.values import descriptor, PARAMETER_TYPES, parameter_value
 
 #: why a read may fail that says nothing about the parameter
 _NOT_ITS_FAULT = frozenset([BRIDGE_INACTIVE, BUS_DOWN, BUSY, NO_ANSWER_OFFLINE])

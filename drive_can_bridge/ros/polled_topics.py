@@ -17,7 +17,6 @@ import math
 from typing import Any, Protocol
 
 from rclpy.event_handler import QoSSubscriptionEventType, SubscriptionEventCallbacks
-from rclpy.exceptions import InvalidHandle
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.qos import qos_policy_name_from_kind
@@ -25,10 +24,10 @@ from rclpy.subscription import Subscription
 
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.ros.command_topic import CommandTopic
+from drive_can_bridge.ros.gone import GONE
 from drive_can_bridge.ros.polled_group import PolledGroup
 from drive_can_bridge.ros.quality import command_quality, overriding
 
-RCLError = rclpy_implementation.RCLError
 
 #: s between two looks at who publishes
 COUNT_PERIOD = 0.05
@@ -85,7 +84,6 @@ class PolledTopics:
         self._count_at = -math.inf
         self._events: list[PolledEvent] = []
         self._look_at = -math.inf
-        self._subscriptions: list[Subscription] = []
 
     def subscribe(self, message_type: type, topic: str,
                   take: Callable[[Any, float], None],
@@ -110,7 +108,6 @@ class PolledTopics:
         self._events.append(PolledEvent(
             subscription, QoSSubscriptionEventType.RCL_SUBSCRIPTION_REQUESTED_INCOMPATIBLE_QOS,
             incompatible))
-        self._subscriptions.append(subscription)
 
         def late(seconds: float) -> None:
             self._refuse(f'late {name}', f'command on {name} thrown away: it came {seconds:.2f} s '
@@ -141,14 +138,14 @@ class PolledTopics:
                 self._look_at = now + EVENT_PERIOD
                 for event in self._events:
                     event.look()
-        except (InvalidHandle, RCLError):  # the node is being destroyed
+        except GONE:  # the node is being destroyed
             pass
 
     def discard(self) -> int:
         """Throw away what is waiting; return how many commands that were."""
         try:
             return sum(topic.discard() for topic in self._topics)
-        except (InvalidHandle, RCLError):  # the node is being destroyed
+        except GONE:  # the node is being destroyed
             return 0
 
     def destroy(self) -> None:
@@ -160,10 +157,9 @@ class PolledTopics:
     def unsubscribe(self) -> None:
         """Take the subscriptions out of a node that stays."""
         self.destroy()
-        self._topics.clear()
         self._published.clear()
-        while self._subscriptions:
-            self._node.destroy_subscription(self._subscriptions.pop())
+        while self._topics:
+            self._node.destroy_subscription(self._topics.pop().subscription)
 
 
 def _never(_: Any) -> None:

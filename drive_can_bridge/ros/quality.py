@@ -1,8 +1,11 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Quality of service of each kind of topic, and the standard way to override it."""
 
+from typing import Any
+
 from rclpy.node import Node
 from rclpy.parameter import Parameter as NodeParameter
+from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSPolicyKind, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
@@ -31,6 +34,12 @@ def command_quality() -> QoSProfile:
     a good one, sent just before it, out of the queue between two cycles.
     """
     return QoSProfile(depth=8, reliability=ReliabilityPolicy.BEST_EFFORT)
+
+
+def publisher(node: Node, kind: Any, topic: str, quality: QoSProfile) -> Publisher:
+    """Return a publisher whose quality of service may be overridden."""
+    return node.create_publisher(kind, topic, quality,
+                                 qos_overriding_options=overriding(node, topic))
 
 
 def overriding(node: Node, topic: str) -> QoSOverridingOptions | None:

@@ -13,7 +13,6 @@ from functools import partial
 
 from builtin_interfaces.msg import Time
 from rclpy.node import Node
-from rclpy.publisher import Publisher
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 
@@ -22,7 +21,7 @@ from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.ros.audience import COUNT_PERIOD
 from drive_can_bridge.ros.event_topic import EventTopic
 from drive_can_bridge.ros.prepared import NUMBER_CODES, PreparedMessage
-from drive_can_bridge.ros.quality import latched_quality, overriding, state_quality
+from drive_can_bridge.ros.quality import latched_quality, publisher, state_quality
 from drive_can_bridge.ros.stamps import Stamp
 from drive_can_bridge.ros.values import converters, TOPIC_TYPES
 
@@ -31,11 +30,8 @@ class ValueTopic:
     """``~/<parameter>``: one value once per exchange."""
 
     def __init__(self, node: Node, parameter: Parameter, slot: int) -> None:
-        topic = f'~/{parameter.name}'
         message_type = TOPIC_TYPES[parameter.kind]
-        self.publisher: Publisher = node.create_publisher(
-            message_type, topic, state_quality(),
-            qos_overriding_options=overriding(node, topic))
+        self.publisher = publisher(node, message_type, f'~/{parameter.name}', state_quality())
         self.slot = slot
         self._message = message_type()
         code = NUMBER_CODES.get(parameter.kind)
@@ -60,9 +56,7 @@ class JointTopic:
 
     def __init__(self, node: Node, joint: JointConfiguration,
                  parameters: tuple[Parameter, ...]) -> None:
-        self.publisher: Publisher = node.create_publisher(
-            JointState, '~/joint_state', state_quality(),
-            qos_overriding_options=overriding(node, '~/joint_state'))
+        self.publisher = publisher(node, JointState, '~/joint_state', state_quality())
         slots = {parameter.name: slot for slot, parameter in enumerate(parameters)}
         self._message = JointState(name=[joint.name])
         self._quantities = [
@@ -100,12 +94,9 @@ class BitTopics:
     def __init__(self, node: Node, parameter: Parameter, slot: int) -> None:
         self.slot = slot
         self._last: int | None = None
-        self._bits = []
-        for name, bit in parameter.bits:
-            topic = f'~/{parameter.name}/{name}'
-            publisher = node.create_publisher(
-                Bool, topic, latched_quality(), qos_overriding_options=overriding(node, topic))
-            self._bits.append((1 << bit, publisher))
+        self._bits = [(1 << bit, publisher(node, Bool, f'~/{parameter.name}/{name}',
+                                           latched_quality()))
+                      for name, bit in parameter.bits]
 
     def update(self, raw: int) -> None:
         """Publish the bits that differ from the last sample; all of them the first time."""
@@ -113,9 +104,9 @@ class BitTopics:
         if raw == last:
             return
         self._last = raw
-        for mask, publisher in self._bits:
+        for mask, topic in self._bits:
             if last is None or (raw ^ last) & mask:
-                publisher.publish(Bool(data=bool(raw & mask)))
+                topic.publish(Bool(data=bool(raw & mask)))
 
     def forget(self) -> None:
         """Publish all bits with the next sample: the drive was away."""
@@ -136,7 +127,6 @@ class SamplePublisher:
 
     def __init__(self, node: Node, drive: DriveConfiguration, parameters: tuple[Parameter, ...],
                  stamp: Callable[[float], Stamp]) -> None:
-        self._parameters = parameters
         self._stamp = stamp
         self._converters = converters(parameters)
         self._values = [ValueTopic(node, parameter, slot)
@@ -172,12 +162,6 @@ class SamplePublisher:
         for bits in self._bits:
             if bits.slot < len(raws):
                 bits.update(raws[bits.slot])
-
-    def latest(self) -> dict[str, Value]:
-        """Return the values of the last sample, by parameter name (for views)."""
-        last = self.last
-        return {parameter.name: parameter.value_from_raw(raw)
-                for parameter, raw in zip(self._parameters, last[0] if last else ())}
 
     def forget(self) -> None:
         """Take note that the drive is gone: nothing known of it is current."""

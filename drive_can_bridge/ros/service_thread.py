@@ -22,9 +22,9 @@ from rclpy.exceptions import InvalidHandle
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.service import Service
 
+from drive_can_bridge.ros.gone import GONE
 from drive_can_bridge.ros.pace import Pace
 
-RCLError = rclpy_implementation.RCLError
 
 #: s between two failures: one that comes at once again must not take the machine
 ERROR_PAUSE = 0.05
@@ -110,7 +110,7 @@ class ServiceThread:
         try:
             with self._guard:
                 self._guard.trigger_guard_condition()
-        except (InvalidHandle, RCLError):  # stopped
+        except GONE:  # stopped
             pass
 
     # -- the thread that takes --------------------------------------------------------------------
@@ -176,7 +176,7 @@ class ServiceThread:
     def _send(service: Service, header: Any, answered: Callable[[], None], message: Any) -> None:
         try:
             service.send_response(message, header)
-        except (InvalidHandle, RCLError):   # service or context are gone
+        except GONE:   # service or context are gone
             pass
         finally:
             answered()

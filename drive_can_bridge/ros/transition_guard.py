@@ -3,19 +3,17 @@
 Answer an illegal lifecycle transition instead of ending on it.
 
 rclpy lets the error of an illegal transition escape from the service's callback, and so from the
-executor: any client could end the process. Here it becomes a failure and a warning.
+executor: any client could end the process. Here it becomes a failure and a warning, before rcl is
+asked, which would have a warning of its own.
 """
 
 from collections.abc import Callable
 from threading import RLock
 from typing import Any
 
-from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.lifecycle import LifecycleNode
 
 from drive_can_bridge.core.text import printable
-
-RCLError = rclpy_implementation.RCLError
 
 
 def guard_transitions(node: LifecycleNode, warn: Callable[[str], None], lock: RLock,
@@ -29,21 +27,24 @@ def guard_transitions(node: LifecycleNode, warn: Callable[[str], None], lock: RL
     """
     service = node._service_change_state
     change_state = service.callback
+    machine = node._state_machine
 
     def guarded(request: Any, response: Any) -> Any:
+        number, label = request.transition.id, request.transition.label
         with lock:
-            try:
-                if refusal():
-                    raise RuntimeError(refusal())
-                if request.transition.label:  # an unknown one is answered without a word
-                    node._state_machine.get_transition_by_label(request.transition.label)
-                return change_state(request, response)
-            except (RCLError, RuntimeError) as error:
-                label = printable(request.transition.label or f'number {request.transition.id}')
-                state = node._state_machine.current_state[1]
-                warn(f'transition {label} is not possible in state {state}'
-                     f' ({printable(" ".join(str(error).split()))})')
-                response.success = False
-                return response
+            # of a request with both, rclpy takes the label
+            possible = {known: name for known, name, *_ in machine.available_transitions}
+            why = refusal()
+            if not why and (label not in possible.values() if label else number not in possible):
+                why = f'possible are {", ".join(possible.values()) or "none"}'
+            if not why:
+                try:
+                    return change_state(request, response)
+                except RuntimeError as error:
+                    why = printable(' '.join(str(error).split()))
+            warn(f'transition {printable(label) or f"number {number}"} is not possible in state '
+                 f'{machine.current_state[1]} ({why})')
+            response.success = False
+            return response
 
     service.callback = guarded

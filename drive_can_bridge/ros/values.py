@@ -29,17 +29,6 @@ VALUE_FIELDS: dict[ValueKind, str] = {
 }
 #: largest end of an integer range: Qt's sliders have 32 bits, and an OverflowError beyond
 SLIDER_MAX = 2 ** 31 - 1
-_FIELDS_BY_TYPE = {
-    ParameterType.PARAMETER_BOOL: 'bool_value',
-    ParameterType.PARAMETER_INTEGER: 'integer_value',
-    ParameterType.PARAMETER_DOUBLE: 'double_value',
-    ParameterType.PARAMETER_STRING: 'string_value',
-    ParameterType.PARAMETER_BYTE_ARRAY: 'byte_array_value',
-    ParameterType.PARAMETER_BOOL_ARRAY: 'bool_array_value',
-    ParameterType.PARAMETER_INTEGER_ARRAY: 'integer_array_value',
-    ParameterType.PARAMETER_DOUBLE_ARRAY: 'double_array_value',
-    ParameterType.PARAMETER_STRING_ARRAY: 'string_array_value',
-}
 
 
 def parameter_value(parameter: Parameter, value: Value) -> ParameterValue:
@@ -58,15 +47,6 @@ def _scaler(scale: float, offset: float) -> Callable[[int], float]:
     if offset:
         return lambda raw: raw * scale + offset
     return lambda raw: raw * scale
-
-
-def value_of(message: ParameterValue) -> object:
-    """Return the Python value of a ParameterValue; None for NOT_SET."""
-    field = _FIELDS_BY_TYPE.get(message.type)
-    if field is None:
-        return None
-    value = getattr(message, field)
-    return value if isinstance(value, (bool, int, float, str)) else list(value)
 
 
 def constraints(parameter: Parameter, role: Role | None, error: str = '') -> str:

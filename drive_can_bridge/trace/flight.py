@@ -4,11 +4,15 @@ The flight recorder of a bridge: what came before a failure, on disk before anyb
 
 A thread of its own waits for a second after the event, so that what followed is in the trace, too,
 and writes in small steps between which it gives way: the exchange goes on undisturbed.
+
+A trace that somebody asks for takes nothing from those of failures: it does not count among them,
+and is not in their way.
 """
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 import itertools
+import math
 import os
 from pathlib import Path
 import re
@@ -22,7 +26,7 @@ from drive_can_bridge.trace.ring import Ring
 
 #: s after an event that belong into its trace
 AFTERMATH = 1.0
-#: least s between two traces of a bus
+#: least s between two traces of a bus, and from any of them to one that somebody asks for
 SPACING = 10.0
 #: traces of a run that are never replaced by later ones: how it all began
 FIRST_KEPT = 5
@@ -34,16 +38,24 @@ _PAUSE = 0.0005
 #: s that the end of the bridge waits for a trace that is being written
 _END_TIMEOUT = 3.0
 
+#: rank of what is no failure: somebody asks
+_ASKED = -1
 #: takes the path of a trace, or '' and why there is none
 Done = Callable[[str, str], None]
 
 
 @dataclass
 class _Wanted:
-    """A trace that is to be written."""
+    """
+    A trace that is to be written.
+
+    :ivar since: the moment before which the recorded seconds are in it; ``at`` that after which
+        the aftermath is.
+    """
 
     reason: str
     rank: int
+    since: float
     at: float
     done: list[Done] = field(default_factory=list)
 
@@ -57,12 +69,13 @@ class _Bus:
     folder: Path
     wanted: _Wanted | None = None
     last: float = -SPACING
+    failed: float = -SPACING    # the last that nobody asked for
     last_path: str = ''
 
 
 class FlightRecorder:
     """
-    Records all buses that ask for it, and writes traces.
+    Records all buses that ask for it (there may be none), and writes traces.
 
     :param default_folder: where traces go whose bus names no directory.
     :param say: takes a line for the log.
@@ -81,7 +94,8 @@ class FlightRecorder:
         self._changed = threading.Condition()
         self._closing = False
         self._thread = threading.Thread(target=self._run, name='flight recorder', daemon=True)
-        self._thread.start()
+        if self._buses:
+            self._thread.start()
 
     @property
     def buses(self) -> list[str]:
@@ -104,12 +118,15 @@ class FlightRecorder:
         if found is None:
             return
         with self._changed:
-            now = time.monotonic()
-            if found.wanted is not None:
-                if rank > found.wanted.rank:
-                    found.wanted.reason, found.wanted.rank = reason, rank
-            elif now - found.last >= SPACING:
-                self._want(found, _Wanted(reason, rank, now))
+            now, wanted = time.monotonic(), found.wanted
+            if wanted is None:
+                if now - found.failed >= SPACING:
+                    found.failed = now
+                    self._want(found, _Wanted(reason, rank, now, now))
+            elif rank > wanted.rank:
+                if wanted.rank == _ASKED:   # from now on it is that of a failure
+                    found.failed = wanted.at = now
+                wanted.reason, wanted.rank = reason, rank
 
     def save(self, bus: str, reason: str, done: Done) -> None:
         """Write a trace because somebody asks for it; ``done`` is told the path, or why not."""
@@ -120,7 +137,7 @@ class FlightRecorder:
                 found.wanted.done.append(done)
                 return
             if now - found.last >= SPACING:
-                self._want(found, _Wanted(reason, 0, now, [done]))
+                self._want(found, _Wanted(reason, _ASKED, now, now, [done]))
                 return
             ago, path = now - found.last, found.last_path
         done('', f'bus {bus}: one trace in {SPACING:g} s at most; the last, {ago:.0f} s ago, is '
@@ -131,7 +148,8 @@ class FlightRecorder:
         with self._changed:
             self._closing = True
             self._changed.notify()
-        self._thread.join(_END_TIMEOUT)
+        if self._thread.is_alive():
+            self._thread.join(_END_TIMEOUT)
 
     def _want(self, bus: _Bus, wanted: _Wanted) -> None:
         bus.wanted = wanted
@@ -143,26 +161,31 @@ class FlightRecorder:
     def _run(self) -> None:
         while True:
             with self._changed:
-                bus = self._next()
-                if bus is None:
+                due = self._due()
+                if due is None:
+                    waiting = [bus.wanted.at for bus in self._buses.values() if bus.wanted]
                     if self._closing:
                         return
-                    self._changed.wait()
+                    self._changed.wait(min(waiting) + AFTERMATH - time.monotonic()
+                                       if waiting else None)
                     continue
-                wanted = bus.wanted
-                if wanted is None:
-                    continue
-                pause = wanted.at + AFTERMATH - time.monotonic()
-                if pause > 0.0 and not self._closing:
-                    self._changed.wait(pause)
-                    continue
-                bus.wanted = None
-            self._write(bus, wanted)
+            self._write(*due)
 
-    def _next(self) -> _Bus | None:
-        """Return the bus whose trace is due first."""
-        waiting = [bus for bus in self._buses.values() if bus.wanted is not None]
-        return min(waiting, key=lambda bus: bus.last, default=None)
+    def _due(self, *, asked: bool = True) -> tuple[_Bus, _Wanted] | None:
+        """
+        Return the bus whose trace is to be written now, failures first. The lock must be held.
+
+        :param asked: what somebody asked for is among it.
+        """
+        latest = math.inf if self._closing else time.monotonic() - AFTERMATH
+        due = [(bus, bus.wanted) for bus in self._buses.values()
+               if bus.wanted is not None and bus.wanted.at <= latest
+               and (asked or bus.wanted.rank > _ASKED)]
+        if not due:
+            return None
+        found = min(due, key=lambda each: (each[1].rank == _ASKED, each[1].at))
+        found[0].wanted = None
+        return found
 
     def _write(self, bus: _Bus, wanted: _Wanted) -> None:
         name = bus.configuration.name
@@ -180,7 +203,7 @@ class FlightRecorder:
             answer = '', text
         else:
             if not count:
-                bus.last = -SPACING
+                bus.last = bus.failed = -SPACING
                 answer = '', (f'bus {name}: not a single frame in the last '
                               f'{bus.configuration.trace_seconds:g} s')
             else:
@@ -194,7 +217,7 @@ class FlightRecorder:
     def _fill(self, path: Path, bus: _Bus, wanted: _Wanted, offset: float) -> int:
         """Write a file that has its name only when it is complete."""
         unfinished = path.with_suffix('.part')
-        since = wanted.at - bus.configuration.trace_seconds
+        since = wanted.since - bus.configuration.trace_seconds
         entries = bus.ring.entries(since, label(bus.configuration), offset)
         count = 0
         try:
@@ -208,6 +231,8 @@ class FlightRecorder:
                     count += len(lines)
                     if not self._closing:
                         time.sleep(_PAUSE)
+                    if wanted.rank == _ASKED:
+                        self._write_failures()
             if count:
                 os.replace(unfinished, path)
             else:
@@ -216,6 +241,15 @@ class FlightRecorder:
             unfinished.unlink(missing_ok=True)
             raise
         return count
+
+    def _write_failures(self) -> None:
+        """Write what is due of failures; what somebody asked for, and is being written, waits."""
+        while True:
+            with self._changed:
+                due = self._due(asked=False)
+            if due is None:
+                return
+            self._write(*due)
 
     def _remove_old(self, bus: _Bus, path: Path) -> None:
         """Keep the first traces of this run, and of the others the newest."""

@@ -3,6 +3,8 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from operator import add, sub
+from typing import NamedTuple
 
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.transport.error_frames import BusError, ERROR_ACTIVE
@@ -10,6 +12,30 @@ from drive_can_bridge.transport.error_frames import BusError, ERROR_ACTIVE
 
 #: what is told of an adapter that does not take what it was handed
 REFUSED_FRAMES = 'the adapter refuses frames'
+
+
+class Counts(NamedTuple):
+    """
+    What went wrong on a bus, as far as its adapter tells. Can be added and subtracted.
+
+    :param error_frames: seen.
+    :param bus_off: how often the controller went bus-off.
+    :param overflowed: received frames that were lost because nobody fetched them in time.
+    :param refused: frames that the adapter refused after it had been handed them.
+    """
+
+    error_frames: int = 0
+    bus_off: int = 0
+    overflowed: int = 0
+    refused: int = 0
+
+    def plus(self, other: 'Counts') -> 'Counts':
+        """Return the sums."""
+        return Counts(*map(add, self, other))
+
+    def minus(self, other: 'Counts') -> 'Counts':
+        """Return the differences."""
+        return Counts(*map(sub, self, other))
 
 
 class EndPoint(ABC):
@@ -63,11 +89,6 @@ class EndPoint(ABC):
         return None
 
     @property
-    def refused_frames(self) -> int:
-        """Frames that the adapter refused after it had been handed them, where it tells."""
-        return 0
-
-    @property
-    def overflowed_frames(self) -> int:
-        """Received frames that were lost because nobody took them in time, where it is known."""
-        return 0
+    def counts(self) -> Counts:
+        """What has been counted since it was opened."""
+        return Counts(self.error_frames, self.bus_off_count)

@@ -24,7 +24,7 @@ from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, TransportError
 from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.transport.clock import steady_now as steady_now
-from drive_can_bridge.transport.end_point import EndPoint
+from drive_can_bridge.transport.end_point import Counts, EndPoint
 from drive_can_bridge.transport.error_frames import ADVICE_ALONE, BUS_OFF, BusError
 from drive_can_bridge.transport.failures import in_words
 from drive_can_bridge.transport.port import open_port
@@ -97,10 +97,7 @@ class Link:
         self.frames_received = 0
         self.send_failures = 0
         self.reconnections = 0
-        self._closed_error_frames = 0
-        self._closed_bus_off_count = 0
-        self._closed_overflowed_frames = 0
-        self._closed_refused_frames = 0
+        self._closed_counts = Counts()
         self._closed_controller = ''
         self._closed_bus_error: BusError | None = None
         self.last_error = ''
@@ -175,25 +172,10 @@ class Link:
         return port.controller if port is not None else self._closed_controller
 
     @property
-    def overflowed_frames(self) -> int:
-        """Received frames that were lost because they were not fetched in time."""
+    def counts(self) -> Counts:
+        """What has been counted since the start."""
         port = self._port
-        return self._closed_overflowed_frames + (port.overflowed_frames if port else 0)
-
-    @property
-    def refused_frames(self) -> int:
-        """Frames that were counted as sent, and that the adapter has refused since."""
-        return self._closed_refused_frames + (self._port.refused_frames if self._port else 0)
-
-    @property
-    def error_frames(self) -> int:
-        """Error frames seen since the start."""
-        return self._closed_error_frames + (self._port.error_frames if self._port else 0)
-
-    @property
-    def bus_off_count(self) -> int:
-        """How often the controller went bus-off, as far as the adapter reports it."""
-        return self._closed_bus_off_count + (self._port.bus_off_count if self._port else 0)
+        return self._closed_counts if port is None else self._closed_counts.plus(port.counts)
 
     # -- the reader thread ------------------------------------------------------------------------
 
@@ -287,10 +269,7 @@ class Link:
         port, self._port = self._port, None
         if port is not None:
             self._closed_bus_error = port.last_error
-            self._closed_error_frames += port.error_frames
-            self._closed_bus_off_count += port.bus_off_count
-            self._closed_overflowed_frames += port.overflowed_frames
-            self._closed_refused_frames += port.refused_frames
+            self._closed_counts = self._closed_counts.plus(port.counts)
             # a controller that is being tried again is in no other state that anybody knows
             self._closed_controller = BUS_OFF if port.controller == BUS_OFF else ''
             port.close()

@@ -22,7 +22,7 @@ from drive_can_bridge.core.frame import (
 )
 from drive_can_bridge.transport.adapter_answers import AdapterAnswers
 from drive_can_bridge.transport.clock import steady_now
-from drive_can_bridge.transport.end_point import EndPoint, REFUSED_FRAMES
+from drive_can_bridge.transport.end_point import Counts, EndPoint, REFUSED_FRAMES
 from drive_can_bridge.transport.error_frames import (
     ADVICE_ALONE, ADVICE_DISTURBED, BUS_OFF, BusError, decode_error_frame,
 )
@@ -154,14 +154,11 @@ class Port(EndPoint):
         return None if self._socket is None else self._socket.has_room(0.0)
 
     @property
-    def refused_frames(self) -> int:
-        """Frames that the adapter refused after it had been handed them, where it tells."""
-        return 0 if self._answers is None else self._answers.refused
-
-    @property
-    def overflowed_frames(self) -> int:
-        """Received frames that were lost because nobody took them in time, where it is known."""
-        return 0 if self._socket is None else self._socket.overflowed_frames
+    def counts(self) -> Counts:
+        """What has been counted since it was opened."""
+        return Counts(self.error_frames, self.bus_off_count,
+                      0 if self._socket is None else self._socket.overflowed_frames,
+                      0 if self._answers is None else self._answers.refused)
 
     def close(self) -> None:
         """

@@ -42,7 +42,6 @@ def test_samples_are_written_by_descriptors() -> None:
     assert [shown.name for shown in conveyor.setpoints] == ['speed_setpoint', 'torque_limit']
     assert len(conveyor.values[0].points) == 120
     assert conveyor.values[0].points[-1][0] == 0.0
-    assert conveyor.sample_age == 0.0
     assert conveyor.readings['ramp_time'].text == '1.50'
     assert conveyor.readings['motor_current'].text == ''
 

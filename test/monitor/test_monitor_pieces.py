@@ -7,11 +7,11 @@ from monitor_builders import info, seen, three_drives
 import pytest
 
 from drive_can_bridge.core.parameters import Value, ValueKind
+from drive_can_bridge.core.text import printable
 from drive_can_bridge.monitor.hints import hints
 from drive_can_bridge.monitor.history import columns, History, Rate
 from drive_can_bridge.monitor.plan import SamplingPlan
-from drive_can_bridge.monitor.text import printable
-from drive_can_bridge.monitor.values import facts_from_constraints, ParameterInfo
+from drive_can_bridge.monitor.values import ParameterInfo
 
 
 # -- values ---------------------------------------------------------------------------------------
@@ -41,15 +41,6 @@ def test_values_have_the_digits_of_their_steps(told: ParameterInfo, value: Value
     (ParameterInfo('what', ValueKind.DOUBLE), 8)])
 def test_there_is_room_for_the_longest_value(told: ParameterInfo, width: int) -> None:
     assert told.width == width
-
-
-def test_constraints_are_read() -> None:
-    facts = facts_from_constraints('unit="N m" number=209 index=0x2004 subindex=0x10 type=int16 '
-                                   'scale=0.1 offset=0 access=ro storage=ram protected=false')
-    assert facts['unit'] == 'N m'
-    assert facts['type'] == 'int16'
-    assert facts['protected'] == 'false'
-    assert facts_from_constraints('free text, as others write it') == {}
 
 
 @pytest.mark.parametrize(('facts', 'address'), [

@@ -92,7 +92,7 @@ class Bridge:
         rclpy.init(args=['--ros-args', '--params-file', str(self.file), *arguments],
                    context=self.context, signal_handler_options=SignalHandlerOptions.NO)
         self.spinner = ExecutorThread('services', self.errors.append, self.context)
-        self.node = BridgeNode(self.spinner.executor, self.fatal.append, context=self.context)
+        self.node = BridgeNode(self.spinner, self.fatal.append, context=self.context)
 
     def begin(self) -> None:
         """Start the simulation and the bridge."""

@@ -327,15 +327,15 @@ def facts(status: Any) -> dict[str, str]:
 
 
 def to_messages(values: dict[str, Any]) -> list[Parameter]:
-    """Return parameter messages; a value that is a message stays one."""
+    """Return parameter messages."""
     return [Parameter(name=name.replace('__', '.'), value=to_value(value))
             for name, value in values.items()]
 
 
 def to_value(value: Any) -> ParameterValue:
-    """Return a typed parameter value; None is NOT_SET."""
-    if value is None:
-        return ParameterValue()
+    """Return a typed parameter value; None is NOT_SET, a message stays one."""
+    if value is None or isinstance(value, ParameterValue):
+        return value or ParameterValue()
     kind = {bool: ParameterType.PARAMETER_BOOL, int: ParameterType.PARAMETER_INTEGER,
             float: ParameterType.PARAMETER_DOUBLE, str: ParameterType.PARAMETER_STRING,
             list: ParameterType.PARAMETER_STRING_ARRAY}[type(value)]

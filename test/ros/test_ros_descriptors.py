@@ -9,10 +9,12 @@ from builders import EEPROM, parameter, RAM, RO, WO
 from clients import Client
 from families import Facts, FAMILIES
 import pytest
+from rcl_interfaces.msg import ParameterDescriptor
 from rcl_interfaces.srv import DescribeParameters
 
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.core.roles import Role
+from drive_can_bridge.ros.messages import facts_of
 from drive_can_bridge.ros.values import constraints
 
 
@@ -69,3 +71,15 @@ def test_of_every_family(bridge: StartBridge, client: Client, facts: Facts,
     assert found['p110'] == {**found['gain'], 'type': 'uint16'}
     if 'ratio' in found:
         assert (found['ratio']['index'], found['ratio']['subindex']) == ('0x2007', '0x03')
+
+
+def test_constraints_are_read() -> None:
+    facts = facts_of(ParameterDescriptor(additional_constraints=(
+        'unit="N m" number=209 index=0x2004 subindex=0x10 type=int16 scale=0.1 offset=0 '
+        r'access=ro storage=ram protected=false error="of \"4\""')))
+    assert facts['unit'] == 'N m'
+    assert facts['type'] == 'int16'
+    assert facts['protected'] == 'false'
+    assert facts['error'] == 'of "4"'
+    for text in ('free text, as others write it', 'unit="', 'x' * 10_000_000):
+        assert facts_of(ParameterDescriptor(additional_constraints=text)) == {}

@@ -15,6 +15,7 @@ from drive_can_bridge.core.errors import BusUnavailable
 from drive_can_bridge.ros.diagnostics import BusReporter, DriveReporter
 from drive_can_bridge.transport import link
 from drive_can_bridge.transport.clock import steady_now
+from drive_can_bridge.transport.end_point import Counts
 
 BUS, DRIVE = 'drive_can_bridge: bus main', 'drive_can_bridge: drive conveyor'
 BUS_KEYS = {
@@ -148,7 +149,7 @@ def test_frames_that_the_adapter_refused_afterwards_were_not_sent(
     one.online()
     bus, _ = reporters(one)
     link = one.node.exchanges['main'].link
-    monkeypatch.setattr(type(link), 'refused_frames', 3)
+    monkeypatch.setattr(type(link), 'counts', Counts(refused=3))
     link.frames_sent, link.send_failures = 1000, 1
     report = bus.report(steady_now())
     assert (report.level, report.message) == (

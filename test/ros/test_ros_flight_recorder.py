@@ -143,6 +143,16 @@ def test_save_trace(bridge: StartBridge, client: Client, tmp_path: Path) -> None
     assert not again.success and again.message.endswith(f'is {path}')
 
 
+def test_whoever_calls_takes_no_trace_from_a_failure(bridge: StartBridge, client: Client,
+                                                     tmp_path: Path) -> None:
+    one = bridge(recording(tmp_path, lift=LIFT))
+    one.online()
+    assert client.call('/drive_can_bridge/save_trace', Trigger).success
+    one.played['lift'].fault('trip')
+    # sooner than the next one that somebody asks for
+    wait_until(lambda: [path for path in traces(tmp_path) if 'lift_fault' in path.name], 8.0)
+
+
 def test_nothing_is_recorded_unless_asked_for(bridge: StartBridge, client: Client) -> None:
     one = bridge()
     one.online()

@@ -141,7 +141,7 @@ def test_a_failing_part_leaves_nothing_behind(bridge: StartBridge, client: Clien
 
     def fail(*_: Any) -> None:
         raise RuntimeError('no more services')
-    monkeypatch.setattr(drive_node.ControlServices, '__init__', fail)
+    monkeypatch.setattr(drive_node, 'control_services', fail)
     assert not client.transition(CONFIGURE)
     client.wait_logged('configure failed: RuntimeError: no more services', ERROR)
     assert client.state() == 'unconfigured'
@@ -197,7 +197,7 @@ def test_callers_are_answered_before_a_drive_goes(bridge: StartBridge, client: C
     one.played['conveyor'].fault('silent')
     futures = [client.ask('/conveyor/get_parameters', GetParameters,
                           GetParameters.Request(names=['ramp_time'])) for _ in range(10)]
-    wait_until(lambda: one.node.drives['conveyor']._calls == 10)
+    wait_until(lambda: one.node.drives['conveyor'].calls == 10)
     for step in steps:
         assert client.transition(step)
     wait_until(lambda: all(future.done() for future in futures))

@@ -1,10 +1,13 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The log's own thread: nobody waits for it, and nothing is left out in silence."""
 
+from pathlib import Path
+import tempfile
 import threading
 from typing import Any
 
 import pytest
+from rclpy.logging import get_logging_directory
 from waiting import wait_for
 
 from drive_can_bridge.ros import log_limit
@@ -89,3 +92,7 @@ def test_the_end_writes_what_is_held_behind_what_waits() -> None:
     log.close()
     assert logger.lines == [('info', 'lift: online')] * 5 + [
         ('info', 'lift: online (2 more times in 1 s)')]
+
+
+def test_tests_leave_the_logs_of_the_user_alone() -> None:
+    assert Path(tempfile.gettempdir()) in Path(str(get_logging_directory())).parents

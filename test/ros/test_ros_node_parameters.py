@@ -7,7 +7,10 @@ import subprocess
 from bridges import CONVEYOR, LIFT, parameters, StartBridge
 from clients import Client, wait_until
 import pytest
-from rcl_interfaces.srv import DescribeParameters, ListParameters
+from rcl_interfaces.msg import ParameterType, ParameterValue
+from rcl_interfaces.srv import (
+    DescribeParameters, GetParameters, GetParameterTypes, ListParameters,
+)
 
 from drive_can_bridge.resources import profiles_directory
 
@@ -91,6 +94,51 @@ def test_bad_values_are_refused_in_words(shared_bridge: StartBridge, client: Cli
     assert not success and words in reason, reason
     assert client.get(BRIDGE, name) == before
     one.online()
+
+
+RUBBISH = ['', ' ', '.', 'drives..', '\n', '\x1b[31m', 'é', '/', 'drives.conveyor', 'x' * 100_000]
+
+
+@pytest.mark.parametrize('kind', [10, 11, 127, 255])
+def test_types_that_do_not_exist_are_refused_in_words(
+        shared_bridge: StartBridge, client: Client, kind: int) -> None:
+    shared_bridge()
+    before = client.get(BRIDGE, 'drives.conveyor.command_timeout', 'diagnostics_period')
+    strange = ParameterValue(type=kind)
+    words = f'type {kind} does not exist'
+    assert client.set(BRIDGE, drives__conveyor__command_timeout=strange, nothing=strange,
+                      diagnostics_period=0.2) == [(False, words), (False, words), (True, '')]
+    assert client.set_atomically(BRIDGE, diagnostics_period=0.3,
+                                 drives__conveyor__command_timeout=strange) == (
+        False, f'drives.conveyor.command_timeout: {words}')
+    assert client.get(BRIDGE, 'drives.conveyor.command_timeout', 'diagnostics_period') == [
+        before[0], 0.2]
+
+
+def test_every_type_is_answered(shared_bridge: StartBridge, client: Client) -> None:
+    shared_bridge()
+    for kind in range(256):
+        [(done, reason)] = client.set(
+            BRIDGE, drives__conveyor__rearm=ParameterValue(type=kind, string_value='neutral'))
+        assert done == (kind == ParameterType.PARAMETER_STRING), kind
+        assert bool(reason) != done
+
+
+@pytest.mark.parametrize('name', RUBBISH)
+def test_rubbish_is_answered(shared_bridge: StartBridge, client: Client, name: str) -> None:
+    shared_bridge()
+    [(done, reason)] = client.set(BRIDGE, **{name: 1.0})
+    assert not done and reason
+    done, reason = client.set_atomically(BRIDGE, **{name: 1.0})
+    assert not done and reason
+    for service, kind in (('get_parameters', GetParameters),
+                          ('get_parameter_types', GetParameterTypes),
+                          ('describe_parameters', DescribeParameters)):
+        client.call(f'{BRIDGE}/{service}', kind, kind.Request(names=[name, name]))
+    for depth in (0, 1, 2**64 - 1):
+        client.call(f'{BRIDGE}/list_parameters', ListParameters,
+                    ListParameters.Request(prefixes=[name], depth=depth))
+    assert client.set_atomically(BRIDGE)[0] in (True, False)
 
 
 def test_dynamic_ones_take_effect(bridge: StartBridge, client: Client) -> None:

@@ -4,7 +4,7 @@
 from typing import Any
 
 from bridges import Bridge, LIFT, parameters, Recorder, StartBridge
-from clients import Client, ERROR, wait_until
+from clients import Client, ERROR, wait_until, WARN
 import pytest
 from std_msgs.msg import Bool, Float64
 from std_srvs.srv import SetBool
@@ -73,6 +73,17 @@ def test_a_dead_timer_thread_ends_the_bridge_safely(bridge: StartBridge, client:
         one.node.stop()
         wait_until(lambda: last_cycles(recorder) == [(0, 0, 0, 0)] * 3)
     client.wait_logged('internal error: RuntimeError: a defect', ERROR)
+
+
+def test_a_drive_that_says_enabled_to_the_end_is_not_called_stopped(
+        bridge: StartBridge, client: Client) -> None:
+    one = run(bridge, client)
+    client.listen()
+    one.played['lift'].fault('stuck=control_word')
+    one.node.stop()
+    client.wait_logged('lift: told to stop, and answers, but its last status word does not say '
+                       'so: enabled', WARN)
+    assert 'lift: stopped' not in client.logged(0)
 
 
 def test_stopping_twice_is_harmless(bridge: StartBridge, client: Client) -> None:

@@ -11,4 +11,3 @@ def test_nothing_is_activated(bridge: StartBridge, client: Client) -> None:
         assert one.node.start(lambda: True)
         assert client.state() == 'inactive'
         assert recorder.requests() == []
-    assert not one.node.is_active

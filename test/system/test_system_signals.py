@@ -82,8 +82,10 @@ def test_while_unconfigured(processes: Processes, client: Client, namespace: str
     bridge = processes.bridge(bridge_file(tmp_path, autostart=False), namespace)
     node = f'/{namespace}/drive_can_bridge'
     assert client.ask('transition', node=node, number=3) is False  # activate: not possible
-    bridge.error('transition .*is not possible in state unconfigured')
+    bridge.error('transition number 3 is not possible in state unconfigured '
+                 r'\(possible are configure, shutdown\)')
     assert bridge.end(number) == 0
+    assert len([line for line in bridge.errors if 'ransition' in line]) == 1    # rcl's own, too
     assert not [line for line in bridge.errors if 'bus main' in line]
 
 

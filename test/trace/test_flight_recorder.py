@@ -142,14 +142,89 @@ def test_a_trace_has_what_came_before_and_after(quick: None, tmp_path: Path) -> 
 def test_one_trace_in_ten_seconds(quick: None, tmp_path: Path) -> None:
     with recording(tmp_path) as made:
         made.hear()
+        made.recorder.trigger('main', 'lift fault')
+        wait_for(lambda: made.said, 'a trace')
+        made.recorder.trigger('main', 'again')
+        path, refusal = made.save()
+        assert not path and refusal.endswith(f', is {made.traces[0]}')
+        assert len(made.traces) == 1
+
+
+def test_one_trace_in_ten_seconds_for_whoever_asks(quick: None, tmp_path: Path) -> None:
+    with recording(tmp_path) as made:
+        made.hear()
         path, refusal = made.save()
         assert path == str(made.traces[0]) and not refusal
-        made.recorder.trigger('main', 'again')
         path, refusal = made.save()
         assert not path
         assert refusal == (f'bus main: one trace in 10 s at most; the last, 0 s ago, is '
                            f'{made.traces[0]}')
         assert len(made.traces) == 1
+
+
+def test_a_failure_has_its_trace_whoever_has_asked_for_one(quick: None, tmp_path: Path) -> None:
+    with recording(tmp_path) as made:
+        made.hear('111#')
+        assert made.save()[0]
+        made.hear('222#')
+        made.recorder.trigger('main', 'lift fault')
+        wait_for(lambda: len(made.traces) == 2, 'the trace of the failure')
+        assert made.traces[1].name.endswith('_lift_fault.log')
+        assert [record.identifier for record in read_records(made.traces[1], pytest.fail)] == [
+            0x111, 0x222]
+        made.recorder.trigger('main', 'again')
+        path, refusal = made.save()
+        assert not path and refusal.endswith(f' is {made.traces[1]}')
+        assert len(made.traces) == 2
+
+
+def test_a_failure_takes_over_a_trace_that_is_asked_for(tmp_path: Path) -> None:
+    answers: queue.Queue[tuple[str, str]] = queue.Queue()
+    with recording(tmp_path, trace_seconds=0.5) as made:
+        made.hear('111#')
+        asked = time.monotonic()
+        made.recorder.save('main', 'asked', lambda *answer: answers.put(answer))
+        while time.monotonic() < asked + 0.6 * flight.AFTERMATH:
+            time.sleep(0.01)
+        made.recorder.trigger('main', 'lift fault')
+        failed = time.monotonic()
+        while answers.empty():
+            made.hear('222#')
+            time.sleep(0.01)
+        path, _ = answers.get()
+        assert path.endswith('_lift_fault.log')
+        records = list(read_records(Path(path), pytest.fail))
+        wall = time.time() - time.monotonic()
+        # what the caller wanted is in it, and the second that follows the failure
+        assert records[0].identifier == 0x111
+        assert records[-1].time - wall > failed + 0.9 * flight.AFTERMATH
+        assert len(made.traces) == 1
+
+
+def test_a_failure_does_not_wait_for_a_trace_that_somebody_asked_for(
+        quick: None, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(flight, '_STEP', 1)
+    monkeypatch.setattr(flight, '_PAUSE', 0.01)
+    buses = [BusConfiguration(name, 'virtual', name, trace_seconds=10.0)
+             for name in ('main', 'other')]
+    told: list[str] = []
+    recorder = FlightRecorder(buses, tmp_path, told.append, told.append)
+    try:
+        for name, count in (('main', 200), ('other', 2)):
+            kept = recorder.ring(name)
+            assert kept is not None
+            for _ in range(count):
+                kept.note(REQUEST, time.monotonic(), True)
+        recorder.save('main', 'asked', lambda *_: None)
+        wait_for(lambda: list(tmp_path.glob('*.part')), 'the beginning of a trace')
+        recorder.trigger('other', 'lift fault')
+        recorder.trigger('main', 'lift fault')
+        wait_for(lambda: len(told) == 3, 'three traces')
+    finally:
+        recorder.close()
+    assert [text.split(',')[0] for text in told] == [
+        'bus other: trace of lift fault', 'bus main: trace of lift fault',
+        'bus main: trace of asked']
 
 
 def test_the_gravest_reason_names_the_trace(quick: None, tmp_path: Path) -> None:

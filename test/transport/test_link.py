@@ -16,6 +16,7 @@ from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, TransportError
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.transport import link as link_module
+from drive_can_bridge.transport.end_point import Counts
 from drive_can_bridge.transport.error_frames import BusError
 from drive_can_bridge.transport.link import Link
 
@@ -41,8 +42,8 @@ class FakePort:
         self.looks = 0
         self.closed = False
         self.age = 0.0
-        self.error_frames = self.bus_off_count = self.overflowed_frames = 0
-        self.rejected_frames = self.refused_frames = 0
+        self.counts = Counts()
+        self.rejected_frames = 0
         self.last_error: BusError | None = None
         self.controller = ''
 
@@ -201,7 +202,7 @@ class DeadPort(FakePort):
     def __init__(self) -> None:
         super().__init__()
         self.coming.append(BusUnavailable('receive: gone'))
-        self.bus_off_count = 1
+        self.counts = Counts(bus_off=1)
 
 
 def test_adapter_that_opens_and_fails_when_it_is_read(make: Callable[..., Bench]) -> None:
@@ -221,7 +222,7 @@ def test_adapter_that_opens_and_fails_when_it_is_read(make: Callable[..., Bench]
     assert bench.link.reconnections == 1
     dead = [port for port in bench.ports if isinstance(port, DeadPort)]
     assert all(port.closed and port.timeouts == [] for port in dead)
-    assert bench.link.bus_off_count == len(dead)
+    assert bench.link.counts.bus_off == len(dead)
 
 
 def test_frame_that_is_there_before_the_bus_counts_as_open(make: Callable[..., Bench],
@@ -399,7 +400,7 @@ def test_figures_outlive_a_port(make: Callable[..., Bench]) -> None:
     bench = make()
     bench.opened()
     first = bench.port
-    first.error_frames, first.overflowed_frames, first.bus_off_count = 5, 7, 1
+    first.counts = Counts(error_frames=5, overflowed=7, bus_off=1)
     first.last_error = BusError('bus-off', 'bus-off', 'check the cable')
     first.controller = 'bus-off'
     assert bench.link.controller == 'bus-off'
@@ -415,11 +416,10 @@ def test_figures_outlive_a_port(make: Callable[..., Bench]) -> None:
     for times in (2, 3):        # of the port that is open, and of all before it
         bench.opened(times)
         second = bench.port
-        second.error_frames, second.overflowed_frames, second.bus_off_count = 1, 2, 3
-        second.refused_frames = 4
-        assert bench.link.refused_frames == 4 * (times - 1)
-        assert (bench.link.error_frames, bench.link.overflowed_frames,
-                bench.link.bus_off_count) == (4 + times, 5 + 2 * times, 3 * times - 2)
+        second.counts = Counts(error_frames=1, overflowed=2, bus_off=3, refused=4)
+        assert bench.link.counts == Counts(
+            error_frames=4 + times, overflowed=5 + 2 * times, bus_off=3 * times - 2,
+            refused=4 * (times - 1))
         second.coming.append(BusUnavailable('unplugged'))
 
 

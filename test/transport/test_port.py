@@ -223,7 +223,7 @@ def test_socket_without_room_gets_nothing(bus: FakeBus) -> None:
     assert bus.sent == []
     assert socket.waited[-1] == 0.0125
     socket.overflowed_frames = 7
-    assert port.overflowed_frames == 7
+    assert port.counts.overflowed == 7
 
 
 def test_controller_that_is_bus_off_is_not_opened(tmp_path: Path,
@@ -363,12 +363,12 @@ STOP = Frame(0x003FFFF0, bytes(8), True)
 def test_frame_that_an_adapter_refuses_is_counted(adapter: Adapter) -> None:
     os.write(adapter.terminal.master, b'\a')    # of a command, before there was a frame
     adapter.receive()
-    assert adapter.port.refused_frames == 0
+    assert adapter.port.counts.refused == 0
     for taken in (b'\a', b'z\r', b'\a', b'\r', b'\a'):
         adapter.port.send(STOP, 0.1)
         adapter.answer(taken)
         adapter.receive()
-    assert adapter.port.refused_frames == 3
+    assert adapter.port.counts.refused == 3
 
 
 def test_adapter_that_refuses_everything_is_lost(adapter: Adapter) -> None:
@@ -377,7 +377,7 @@ def test_adapter_that_refuses_everything_is_lost(adapter: Adapter) -> None:
             adapter.port.send(STOP, 0.1)
             adapter.answer(b'\a')
             adapter.receive()
-    assert 4 <= adapter.port.refused_frames < 20
+    assert 4 <= adapter.port.counts.refused < 20
 
 
 def test_adapter_that_refuses_some_is_not_lost(adapter: Adapter) -> None:
@@ -386,7 +386,7 @@ def test_adapter_that_refuses_some_is_not_lost(adapter: Adapter) -> None:
             adapter.port.send(STOP, 0.1)
             adapter.answer(taken)
             adapter.receive()
-    assert adapter.port.refused_frames == 30
+    assert adapter.port.counts.refused == 30
 
 
 def test_absent_adapter(tmp_path: Path) -> None:

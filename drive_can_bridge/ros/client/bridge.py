@@ -14,9 +14,10 @@ from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.profile import RestoreStep, RestoreTable
 from drive_can_bridge.core.roles import Role
-from drive_can_bridge.ros.client.descriptors import parameter_of, plain, role_of
+from drive_can_bridge.ros.client.descriptors import parameter_of, role_of
 from drive_can_bridge.ros.client.drive import BridgedDrive
 from drive_can_bridge.ros.client.graph import Graph, NoAnswer
+from drive_can_bridge.ros.messages import plain
 
 #: s without anything new in the graph until nobody is there; where one is known to be there
 _SEARCH, _EXPECTED = 4.0, 6.0

@@ -12,9 +12,10 @@ from drive_can_bridge.core.directory import ParameterDirectory
 from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.roles import Role
 from drive_can_bridge.ros.client.descriptors import (
-    facts_of, message_of, parameter_of, plain, raw_of, role_of,
+    message_of, parameter_of, raw_of, role_of,
 )
 from drive_can_bridge.ros.client.graph import Graph
+from drive_can_bridge.ros.messages import drive_value, facts_of
 
 #: parameters that are read with one call
 BLOCK = 16
@@ -77,7 +78,7 @@ class BridgedDrive(Drive):
         names = [name for name, _ in asked]
         answer = self._graph.call(self._node, 'get_parameters',
                                   GetParameters.Request(names=names))
-        values = dict(zip(names, map(plain, answer.values)))
+        values = dict(zip(names, map(drive_value, answer.values)))
         missing = [name for name in names if values.get(name) is None]
         reasons = dict(zip(missing, self._reasons(missing)))
         made = []

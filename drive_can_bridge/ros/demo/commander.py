@@ -14,7 +14,6 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 import rclpy
 from rclpy.executors import ExternalShutdownException
-from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
@@ -24,11 +23,11 @@ from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter, Value, ValueKind
 from drive_can_bridge.monitor.reports import read_status, Report
+from drive_can_bridge.ros.gone import RCLError
 from drive_can_bridge.ros.monitor.messages import statuses
 from drive_can_bridge.ros.values import TOPIC_TYPES
 from drive_can_bridge.simulation.names import quantity_of
 
-RCLError = rclpy_implementation.RCLError
 
 NODE_NAME = '_demo_commander'
 #: s between two commands to a drive

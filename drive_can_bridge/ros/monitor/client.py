@@ -17,17 +17,19 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from std_msgs.msg import Bool
 
+from drive_can_bridge.core.text import printable
 from drive_can_bridge.monitor.model import Model
 from drive_can_bridge.monitor.plan import BUDGET, SamplingPlan
 from drive_can_bridge.monitor.snapshot import Place
-from drive_can_bridge.monitor.text import is_ros_name, printable
+from drive_can_bridge.monitor.text import is_ros_name
 from drive_can_bridge.monitor.values import ParameterInfo
 from drive_can_bridge.ros.guest import Guest
+from drive_can_bridge.ros.messages import drive_value, plain
 from drive_can_bridge.ros.monitor.inbox import (
     Call, Inbox, latched_quality, log_quality, newest_quality,
 )
 from drive_can_bridge.ros.monitor.messages import (
-    drive_value, log_level, parameter_info, plain_value, stamp_of, statuses, values,
+    log_level, parameter_info, stamp_of, statuses, values,
 )
 
 #: s between two looks at the graph, which are not cheap
@@ -248,10 +250,10 @@ def _close_all(inboxes: tuple[Inbox, ...]) -> None:
 
 
 def _text(value: Any) -> str:
-    plain = plain_value(value)
-    return '' if plain is None else printable(str(plain))
+    found = plain(value)
+    return '' if found is None else printable(str(found))
 
 
 def _number(value: Any) -> float:
-    plain = plain_value(value)
-    return float(plain) if isinstance(plain, (int, float)) else math.nan
+    found = drive_value(value)
+    return math.nan if found is None else float(found)

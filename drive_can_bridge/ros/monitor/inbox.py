@@ -104,14 +104,16 @@ class Service:
         """Somebody waits for an answer."""
         return bool(self._waiting or self._unsent)
 
-    def send(self, request: Any, done: Callable[[Any], None], now: float) -> None:
+    def send(self, request: Any, done: Callable[[Any], None], now: float,
+             patience: float = OFFER_TIMEOUT) -> None:
         """
         Ask, as soon as somebody offers it.
 
         :param done: takes the response, or None: nobody answered in time.
+        :param patience: s that it may take until it is offered.
         """
         if not self.ready:
-            self._unsent.append((now + OFFER_TIMEOUT, request, done))
+            self._unsent.append((now + patience, request, done))
             return
         handle = self._client.handle
         with handle:
@@ -157,23 +159,17 @@ class Call:
     def __init__(self, node: Node, service_type: Any, name: str, request: Any,
                  done: Callable[[Any], None], now: float, timeout: float = CALL_TIMEOUT) -> None:
         self._service = Service(node, service_type, name, timeout)
-        self._request = request
         self._done = done
-        self._deadline = now + timeout
-        self._sent = False
         self._answers: list[Any] = []
+        self._service.send(request, self._answers.append, now, timeout)
 
     def look(self, now: float) -> bool:
         """Do what can be done now; return whether the call is over."""
-        service = self._service
-        if not self._sent and service.ready:
-            service.send(self._request, self._answers.append, now)
-            self._sent = True
-        service.look(now)
-        if not self._answers and now < self._deadline:
+        self._service.look(now)
+        if not self._answers:
             return False
-        service.close()
-        self._done(self._answers[0] if self._answers else None)
+        self._service.close()
+        self._done(self._answers[0])
         return True
 
     def close(self) -> None:

@@ -4,22 +4,16 @@
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from rcl_interfaces.msg import Log, Parameter, ParameterDescriptor, ParameterEvent, ParameterType
-from rcl_interfaces.msg import ParameterValue
+from rcl_interfaces.msg import Log, ParameterDescriptor, ParameterEvent, ParameterType
 
 from drive_can_bridge.core.parameters import Value, ValueKind
+from drive_can_bridge.core.text import printable
 from drive_can_bridge.monitor.reports import Status
-from drive_can_bridge.monitor.text import printable
-from drive_can_bridge.monitor.values import facts_from_constraints, ParameterInfo
+from drive_can_bridge.monitor.values import ParameterInfo
+from drive_can_bridge.ros.messages import drive_value, facts_of, limits_of
 
-_FIELDS = {ParameterType.PARAMETER_BOOL: 'bool_value',
-           ParameterType.PARAMETER_INTEGER: 'integer_value',
-           ParameterType.PARAMETER_DOUBLE: 'double_value',
-           ParameterType.PARAMETER_STRING: 'string_value'}
 _KINDS = {ParameterType.PARAMETER_BOOL: ValueKind.BOOL,
           ParameterType.PARAMETER_INTEGER: ValueKind.INTEGER}
-_TYPES = {bool: ParameterType.PARAMETER_BOOL, int: ParameterType.PARAMETER_INTEGER,
-          float: ParameterType.PARAMETER_DOUBLE}
 _LEVELS = {getattr(Log, name): name
            for name in ('DEBUG', 'INFO', 'WARN', 'ERROR', 'FATAL')}
 
@@ -36,28 +30,10 @@ def statuses(message: DiagnosticArray) -> list[Status]:
             for status in message.status]
 
 
-def plain_value(message: ParameterValue) -> Any:
-    """Return the number, bool or text of a parameter value; None for anything else."""
-    field = _FIELDS.get(message.type)
-    return None if field is None else getattr(message, field)
-
-
-def drive_value(message: ParameterValue) -> Value | None:
-    """Return the value of a drive's parameter, which is no text; None where it has none."""
-    value = plain_value(message)
-    return None if isinstance(value, str) else value
-
-
 def values(message: ParameterEvent) -> list[tuple[str, Value]]:
     """Return names and values of a sample."""
     pairs = ((entry.name, drive_value(entry.value)) for entry in message.changed_parameters)
     return [(name, value) for name, value in pairs if value is not None]
-
-
-def parameter_message(name: str, value: Value) -> Parameter:
-    """Make the message that sets a parameter."""
-    kind = _TYPES[type(value)]
-    return Parameter(name=name, value=ParameterValue(type=kind, **{_FIELDS[kind]: value}))
 
 
 def log_level(message: Log) -> str:
@@ -67,10 +43,6 @@ def log_level(message: Log) -> str:
 
 def parameter_info(message: ParameterDescriptor) -> ParameterInfo:
     """Return what a descriptor says."""
-    ranges = [*message.floating_point_range, *message.integer_range]
     return ParameterInfo(
         printable(message.name), _KINDS.get(message.type, ValueKind.DOUBLE), message.read_only,
-        printable(message.description),
-        float(ranges[0].from_value) if ranges else None,
-        float(ranges[0].to_value) if ranges else None,
-        facts_from_constraints(printable(message.additional_constraints, limit=1000)))
+        printable(message.description), *limits_of(message), facts_of(message))

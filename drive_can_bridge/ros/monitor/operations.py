@@ -9,10 +9,11 @@ from rclpy.node import Node
 from std_srvs.srv import SetBool, Trigger
 
 from drive_can_bridge.core.parameters import Value
+from drive_can_bridge.core.text import printable
 from drive_can_bridge.monitor.source import Outcome, Stop
-from drive_can_bridge.monitor.text import is_ros_name, printable
+from drive_can_bridge.monitor.text import is_ros_name
+from drive_can_bridge.ros.messages import drive_value, parameter_message
 from drive_can_bridge.ros.monitor.inbox import Call, Service
-from drive_can_bridge.ros.monitor.messages import drive_value, parameter_message
 
 #: s for a stop, which answers when the drive's status says so, and for a read or write
 STOP_TIMEOUT = 10.0

@@ -1,0 +1,189 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""What a bridge has from configure to cleanup: buses, drives, and what tells of them."""
+
+from collections.abc import Callable, Iterable
+from contextlib import ExitStack
+from functools import partial
+from typing import Any
+
+from rclpy.node import Node
+
+from drive_can_bridge.configuration.declare import identity_name
+from drive_can_bridge.core.configuration import (
+    BridgeConfiguration, BusConfiguration, DriveConfiguration,
+)
+from drive_can_bridge.core.errors import ConfigurationError
+from drive_can_bridge.core.words import counted
+from drive_can_bridge.exchange.exchange import BusExchange
+from drive_can_bridge.exchange.one_master import BRIDGE, InUse, Ownership
+from drive_can_bridge.exchange.stop import stop_all
+from drive_can_bridge.process.scheduling import raise_priority
+from drive_can_bridge.protocols.families import FAMILIES, make_sessions
+from drive_can_bridge.ros.diagnostics import Diagnostics
+from drive_can_bridge.ros.drive_node import DriveNode
+from drive_can_bridge.ros.executor_thread import ExecutorThread
+from drive_can_bridge.ros.flight_watch import FlightWatch
+from drive_can_bridge.ros.joints import Joints
+from drive_can_bridge.ros.log import Log
+from drive_can_bridge.ros.periodic_thread import PeriodicThread
+from drive_can_bridge.ros.service_thread import ServiceThread
+from drive_can_bridge.transport.link import steady_now
+
+#: s that is waited for the first attempt to open the buses, to report what can never work
+FIRST_ATTEMPT_TIMEOUT = 3.0
+
+
+class Fleet:
+    """
+    The buses of a configuration, and their drives (a ``BusListener`` of each exchange).
+
+    :param spinner: serves the drive nodes.
+    :param control_thread: serves what stops drives.
+    :param parameter_thread: serves their parameters.
+    :param announce: changes a read-only parameter of the bridge.
+    :param dismiss: takes drives out of the graph; their exchanges are closed.
+    :param fatal: takes the reason when the bridge cannot go on; from any thread.
+    :ivar drives: by name, in the order of the configuration.
+    :raises ConfigurationError: somebody else has a drive.
+    """
+
+    def __init__(self, node: Node, log: Log, configuration: BridgeConfiguration,
+                 spinner: ExecutorThread, control_thread: ServiceThread,
+                 parameter_thread: ServiceThread, *, announce: Callable[[str, str], None],
+                 dismiss: Callable[[Iterable[DriveNode]], None],
+                 fatal: Callable[[str], None]) -> None:
+        self.configuration = configuration
+        self.exchanges: dict[str, BusExchange] = {}
+        self.drives: dict[str, DriveNode] = {}
+        self.joints: Joints | None = None
+        self._log = log
+        self._fatal = fatal
+        self._priority = ''
+        #: what is wrong with buses, as long as they are opened for the first time
+        self._misconfigured: list[str] | None = []
+        with ExitStack() as closing:    # the last first
+            closing.callback(self.exchanges.clear)
+            closing.callback(self._own().release)
+            closing.callback(dismiss, self.drives.values())
+            self._flight = FlightWatch(node, log, list(configuration.buses.values()), spinner)
+            closing.callback(self._flight.close)
+            for bus in configuration.buses.values():
+                self._build(bus, lambda drive, session, exchange: DriveNode(
+                    node, drive, session, FAMILIES[drive.protocol], exchange, spinner, log,
+                    control_thread, parameter_thread,
+                    partial(announce, identity_name(drive.name))))
+            if any(drive.joint is not None for drive in configuration.drives.values()):
+                self.joints = Joints(node, log, configuration, self.drives)
+                closing.callback(self.joints.destroy)
+            for exchange in self.exchanges.values():
+                closing.callback(exchange.close)
+            self.diagnostics = Diagnostics(node, list(self.exchanges.values()),
+                                           list(self.drives.values()), self._flight.reported)
+            closing.callback(self.diagnostics.destroy)
+            self._reporting = PeriodicThread(
+                'diagnostics', configuration.diagnostics_period, self.diagnostics.publish,
+                lambda text: log.error(f'diagnostics: {text}'))
+            closing.callback(self._reporting.stop)
+            self._closing = closing.pop_all()
+
+    def _drives_of(self, bus: BusConfiguration) -> list[DriveConfiguration]:
+        return [drive for drive in self.configuration.drives.values() if drive.bus == bus.name]
+
+    def _own(self) -> Ownership:
+        try:
+            return Ownership([(bus, self._drives_of(bus))
+                              for bus in self.configuration.buses.values()],
+                             BRIDGE, 'a drive has one master: end it first')
+        except InUse as error:
+            raise ConfigurationError([str(error)]) from None
+
+    def _build(self, bus: BusConfiguration, make_node: Callable[..., DriveNode]) -> None:
+        drives = self._drives_of(bus)
+        sessions = make_sessions(drives)
+        claims = [FAMILIES[drive.protocol].claims(drive) for drive in drives]
+        exchange = self.exchanges[bus.name] = BusExchange(
+            bus, sessions,
+            [[claim.route for claim in entries if claim.heard] for entries in claims], self,
+            counted=[claim.route for entries in claims for claim in entries if not claim.heard],
+            prepare_thread=self._prepare_thread, note=self._flight.note_of(bus.name))
+        self._flight.attach(exchange)
+        for drive, session in zip(drives, sessions):
+            node = self.drives[drive.name] = make_node(drive, session, exchange)
+            exchange.attach(session, node)
+            node.serve()
+
+    def open(self) -> None:
+        """
+        Open the buses, and begin to tell of them; nothing is sent.
+
+        :raises ConfigurationError: what can never be opened.
+        """
+        for exchange in self.exchanges.values():
+            exchange.open()
+        deadline = steady_now() + FIRST_ATTEMPT_TIMEOUT
+        for exchange in self.exchanges.values():
+            exchange.link.wait_first_attempt(max(0.0, deadline - steady_now()))
+        if self._misconfigured:
+            raise ConfigurationError(self._misconfigured)
+        self._misconfigured = None
+        self._log.info(self._priority)
+        self._flight.watch(list(self.drives.values()))
+        self._reporting.start()
+        if self.joints is not None:
+            self.joints.start()
+
+    def activate(self) -> None:
+        """Begin the exchange with every drive."""
+        for exchange in self.exchanges.values():
+            exchange.activate()
+        self._log.info(f'active: {counted(len(self.drives), "drive", "drives")} on '
+                       f'{counted(len(self.exchanges), "bus", "buses")}')
+
+    def stop(self) -> None:
+        """Stop the drives safely, if they run."""
+        for bus, reason in stop_all(self.exchanges.values()).items():
+            self._log.error(f'bus {bus}: the stop frames could not all be sent: {reason}')
+
+    def close(self) -> None:
+        """Close the buses, let the drives go, let others have them."""
+        self._closing.close()
+
+    def parameter_changed(self, name: str, value: Any) -> None:
+        """Take a parameter of the bridge that was changed while it runs."""
+        drive, key = self.drive_of(name), name.rpartition('.')[2]
+        if name == 'diagnostics_period':
+            self._reporting.set_period(float(value))
+        elif drive is not None and key == 'rearm':
+            drive.exchange.reconfigure(drive.session, rearm_immediate=value == 'immediate')
+        elif drive is not None and key in ('command_timeout', 'parameter_timeout'):
+            drive.exchange.reconfigure(drive.session, **{key: float(value)})
+
+    def drive_of(self, name: str) -> DriveNode | None:
+        """Return the drive that a parameter of the bridge is about."""
+        return self.drives.get(name.rpartition('.')[0].removeprefix('drives.'))
+
+    # -- from the exchanges (BusListener) ---------------------------------------------------------
+
+    def _prepare_thread(self) -> None:
+        """Make a thread of an exchange punctual."""
+        self._priority = raise_priority()
+
+    def bus_opened(self, bus: str) -> None:
+        """Log it."""
+        self._log.speaker(f'bus {bus}').info('open')
+
+    def bus_lost(self, bus: str, reason: str) -> None:
+        """Log it."""
+        if bus in self.exchanges:   # else it was given up while it was still being opened
+            again = self.configuration.buses[bus].reconnect_period
+            self._log.speaker(f'bus {bus}').error(f'{reason}; tried again every {again:g} s')
+        self._flight.bus_lost(bus)
+
+    def fatal(self, bus: str, reason: str, *, misconfigured: bool) -> None:
+        """Take note that an exchange cannot go on."""
+        text = f'buses.{bus}: {reason}'
+        if misconfigured and self._misconfigured is not None:
+            self._misconfigured.append(text)
+        else:
+            self._log.fatal(text)
+            self._fatal(text)

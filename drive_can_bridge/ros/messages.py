@@ -1,0 +1,55 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""What is in the messages of parameters: for the bridge, and for whoever asks it."""
+
+import shlex
+
+from rcl_interfaces.msg import Parameter as ParameterMessage, ParameterDescriptor, ParameterValue
+from rclpy.parameter import Parameter, parameter_value_to_python
+
+from drive_can_bridge.core.parameters import Value
+from drive_can_bridge.core.text import printable
+
+#: characters of ``additional_constraints`` that are looked at
+_CONSTRAINTS_MAX = 2000
+
+
+def value_of(message: ParameterValue) -> object:
+    """Return what is in a value; None for NOT_SET, and for a type that does not exist."""
+    try:
+        return parameter_value_to_python(message)
+    except RuntimeError:
+        return None
+
+
+def plain(message: ParameterValue) -> Value | str | None:
+    """Return the number, bool or text in a value; None for anything else."""
+    value = value_of(message)
+    return value if isinstance(value, (bool, int, float, str)) else None
+
+
+def drive_value(message: ParameterValue) -> Value | None:
+    """Return the value of a drive's parameter, which is no text; None where it has none."""
+    value = plain(message)
+    return None if isinstance(value, str) else value
+
+
+def parameter_message(name: str, value: Value) -> ParameterMessage:
+    """Return what sets a parameter to a value of its type."""
+    return Parameter(name, value=value).to_parameter_msg()
+
+
+def facts_of(message: ParameterDescriptor) -> dict[str, str]:
+    """Return the ``key=value`` pairs of a descriptor; none of one that is not understood."""
+    try:
+        words = shlex.split(message.additional_constraints[:_CONSTRAINTS_MAX])
+    except ValueError:
+        return {}
+    pairs = (word.partition('=') for word in words)
+    return {printable(key): printable(value) for key, separator, value in pairs if separator}
+
+
+def limits_of(message: ParameterDescriptor) -> tuple[float | None, float | None]:
+    """Return the smallest and the largest value of a descriptor; None: not told."""
+    for limits in (*message.floating_point_range, *message.integer_range):
+        return float(limits.from_value), float(limits.to_value)
+    return None, None
