@@ -236,6 +236,8 @@ class PkwSession(Session):
             self._write_expired(now)
         self._channel.advance(now)
         if now >= self._round_due:
+            if self.control is not None and self.control.stopping:
+                self.see_to_control_word(now)   # before setpoints, should it be due again
             self._write_expired(now)
             if self.online:
                 self._writers.write_setpoints(now)
