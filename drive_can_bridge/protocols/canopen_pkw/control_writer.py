@@ -107,8 +107,7 @@ class ControlWriter:
             timeout = min(STOP_PATIENCE, self._session.retry.timeout) if again else None
             reply = yield from tell(
                 self._session.told, CONTROL_WORD,
-                Write(self._span.address, self._placement.words(self._parameter, word),
-                      blind=stopping, timeout=timeout),
+                Write.of(self._placement, self._parameter, word, blind=stopping, timeout=timeout),
                 runs=word != self._disable)
             if isinstance(reply, Silence):
                 unanswered += stopping

@@ -28,9 +28,10 @@ import math
 from typing import Any, NamedTuple, Union
 
 from drive_can_bridge.core.outbox import Left
+from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.retry import RetryPolicy
 from drive_can_bridge.protocols.canopen_pkw import pkw, refusals
-from drive_can_bridge.protocols.canopen_pkw.addresses import Span
+from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Function, Message
 from drive_can_bridge.protocols.channel import Channel
 from drive_can_bridge.protocols.courier import Courier
@@ -68,6 +69,11 @@ class Write:
     words: tuple[int, ...]
     blind: bool = False
     timeout: float | None = None
+
+    @classmethod
+    def of(cls, placement: Placement, parameter: Parameter, raw: int, **how: Any) -> 'Write':
+        """Return what gives a parameter this raw integer."""
+        return cls(placement.span(parameter).address, placement.words(parameter, raw), **how)
 
     @property
     def span(self) -> Span:

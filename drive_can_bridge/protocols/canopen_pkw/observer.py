@@ -15,7 +15,6 @@ from drive_can_bridge.protocols.canopen.addressing import name_of_object
 from drive_can_bridge.protocols.canopen.observer import node_handlers
 from drive_can_bridge.protocols.canopen_pkw import addresses, pkw, refusals
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
-from drive_can_bridge.protocols.canopen_pkw.identifiers import Identifiers
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Function, Layout, Message
 from drive_can_bridge.protocols.observer import (
     Direction, DriveObserver, Emit, Handler, Kind, raws_of, Verdict,
@@ -43,11 +42,10 @@ class PkwObserver(DriveObserver):
         options = drive.options
         self._decode = partial(pkw.decode, layout=Layout(options.layout))
         self._abort_order: str = options.abort_code_order
-        identifiers = Identifiers.of(drive)
         self._handlers: dict[int, Handler] = {
             **node_handlers(self, drive.station, self._booted),
-            identifiers.request: self._take_request,
-            identifiers.response: self._take_response,
+            options.request_cob_id: self._take_request,
+            options.response_cob_id: self._take_response,
         }
         placement = self._placement = Placement.of(drive)
         self._spans = {placement.span(parameter): parameter

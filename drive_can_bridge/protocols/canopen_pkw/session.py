@@ -32,10 +32,8 @@ from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.session import LOOKING, Session, Stage
 from drive_can_bridge.core.users import DRIVE_OFFLINE, Users
-from drive_can_bridge.protocols.access import ChannelServer
 from drive_can_bridge.protocols.canopen.supervision import Supervision
 from drive_can_bridge.protocols.canopen_pkw import addresses, pkw, procedures
-from drive_can_bridge.protocols.canopen_pkw.identifiers import Identifiers
 from drive_can_bridge.protocols.canopen_pkw.mailbox import MailboxChannel, MailboxCourier
 from drive_can_bridge.protocols.canopen_pkw.pkw import Layout, Message
 from drive_can_bridge.protocols.canopen_pkw.round import Rounds
@@ -64,7 +62,6 @@ class PkwSession(Session):
             drive, controlled=control is not None, cells=addresses.keys,
             refusal=lambda parameter: addresses.half_refusal(parameter, drive.profile)))
         options, placement = drive.options, addresses.Placement.of(drive)
-        self._identifiers = Identifiers.of(drive)
         self._layout = Layout(options.layout)
         self._supervision = Supervision(self)
         self._node = self._supervision.node
@@ -79,7 +76,7 @@ class PkwSession(Session):
             answered=self._rounds.ended, missed=self._missed,
             present=lambda: not self._node.heartbeat_lost)
         self.users = Users(
-            self, ChannelServer(self._channel, procedures.RegisterAccess(self.retry, placement)),
+            self, procedures.RegisterAccess(self._channel, self.retry, placement),
             blocked=self._supervision.refusal, control_refusal=self._writers.control_refusal)
         self.look_after(channel=self._channel)
 
@@ -199,7 +196,7 @@ class PkwSession(Session):
 
     def _send(self, message: Message, left: Left) -> None:
         request = pkw.encode(message, self._layout)
-        self.outbox.put(Frame(self._identifiers.request, request, False), left)
+        self.outbox.put(Frame(self.configuration.options.request_cob_id, request, False), left)
 
     def frames_left(self, now: float, refused: Collection[int] = ()) -> None:
         super().frames_left(now, refused)
@@ -210,15 +207,16 @@ class PkwSession(Session):
         identifier, data, extended = frame
         if extended:
             return
+        options = self.configuration.options
         try:
-            if identifier == self._identifiers.response:
+            if identifier == options.response_cob_id:
                 self._exchange.received_at = now - age
                 message = pkw.decode(data, self._layout)
                 if not self._channel.receive(message, now):
                     self.report.reject(f'PKW response that nobody asked for: {message}')
             elif self._supervision.receive(identifier, data, now):
                 self._end_futile_stop(now)
-            elif identifier == self._identifiers.request:
+            elif identifier == options.request_cob_id:
                 self.report.note(ForeignMasterSeen(
                     f'another master sends PKW requests to node {self.configuration.station}: '
                     f'{frame}'))

@@ -17,7 +17,6 @@ from drive_can_bridge.core.process_image import control_word, status_word
 from drive_can_bridge.core.roles import Cells
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.users import Users
-from drive_can_bridge.protocols.access import ChannelServer
 from drive_can_bridge.protocols.datamodel import procedures
 from drive_can_bridge.protocols.datamodel.acyclic_control import AcyclicControl
 from drive_can_bridge.protocols.datamodel.channel import (
@@ -61,8 +60,9 @@ class AcyclicSide:
             encode_read=encode_read, encode_write=encode_write, send=session.outbox.put,
             wrote=lambda write: sent.note(write.chunk, write.words), retry=session.retry,
             eeprom_gap=options.eeprom_write_gap, quarantine=quarantine))
-        session.users = Users(session, ChannelServer(self.channel, procedures.ParameterAccess(
-            session.retry, self.numbers, verify=drive.verify_writes, together=together)))
+        session.users = Users(session, procedures.ParameterAccess(
+            self.channel, session.retry, self.numbers, verify=drive.verify_writes,
+            together=together))
         word = control_word(drive, controlled=session.control is not None)
         status = status_word(drive)
         self.control_slot = _slot(drive.cyclic_request, word)
