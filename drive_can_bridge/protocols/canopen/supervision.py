@@ -9,12 +9,12 @@ import math
 from typing import Protocol
 
 from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.events import Noted
 from drive_can_bridge.core.outbox import Outbox
 from drive_can_bridge.core.reporter import Reporter
 from drive_can_bridge.core.users import DRIVE_OFFLINE
 from drive_can_bridge.protocols.canopen import network
 from drive_can_bridge.protocols.canopen.node import Change, Node
-from drive_can_bridge.protocols.canopen.node_report import NodeReport
 
 
 class NodeUser(Protocol):
@@ -48,14 +48,12 @@ class Supervision:
     The node of one session.
 
     :ivar node: what is known of it.
-    :ivar report: what people are told of it.
     """
 
     def __init__(self, session: NodeUser) -> None:
         drive = session.configuration
         self.node = Node(drive.station, nmt_start=drive.options.nmt_start,
                          heartbeat_timeout=drive.options.heartbeat_timeout)
-        self.report = NodeReport(self.node, session.report)
         self._session = session
         self._in_use = False
 
@@ -86,7 +84,9 @@ class Supervision:
         if base == network.HEARTBEAT_BASE:
             self._take_heartbeat(network.decode_heartbeat(data), now)
         elif base == network.EMERGENCY_BASE:
-            self.report.emergency(data)
+            text = self.node.receive_emergency(network.decode_emergency(data))
+            if text:
+                self._session.report.note(Noted(text, warning=self.node.emergency is not None))
         else:
             return False
         return True
@@ -98,7 +98,7 @@ class Supervision:
             return
         self._send()    # before a stop: the node hears that only when it was started
         if change is Change.RESTARTED:
-            self.report.restarted()
+            session.report.note(Noted('boot-up: the device has started'))
             session.node_closed('the device restarted', now, restarted=True)
             session.report.advice = 'the device restarted: waiting for it to answer'
         elif change is Change.NOT_OPERATIONAL:

@@ -258,9 +258,9 @@ class PkwSession(Session):
 
     @property
     def warning(self) -> str:
-        node = self._supervision.report
         return '; '.join(filter(None, (
-            node.ailing, *self._rounds.warnings(), *self._writers.warnings(), node.missing)))
+            self._node.ailing, *self._rounds.warnings(), *self._writers.warnings(),
+            self._node.missing)))
 
     def facts(self) -> dict[str, str]:
-        return self._supervision.report.facts()
+        return self._node.facts()

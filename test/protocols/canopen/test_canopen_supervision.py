@@ -105,8 +105,8 @@ def test_a_node_that_is_not_used_is_only_listened_to() -> None:
         assert exchange.hears(text, 10.1) == []
     assert exchange.at(20.0) == []
     assert exchange.supervision.refusal(10.2) == ''
-    assert exchange.supervision.report.facts()['nmt_state'] == 'pre-operational'
-    assert exchange.supervision.report.ailing
+    assert exchange.supervision.node.facts()['nmt_state'] == 'pre-operational'
+    assert exchange.supervision.node.ailing
 
 
 def test_frames_of_others_and_malformed_ones() -> None:
@@ -126,3 +126,37 @@ def test_names_of_objects(name: str, place: tuple[int, int] | None) -> None:
     assert object_of_name(name) == place
     if place is not None:
         assert object_of_name(name_of_object(*place)) == place
+
+
+# -- what people are told -------------------------------------------------------------------------
+
+#: CiA 301: error code 2310h, error register 03h
+OVERCURRENT = '085#1023030000000000'
+NO_ERROR = '085#0000000000000000'
+
+
+def test_emergency_and_its_end() -> None:
+    exchange = begun()
+    node = exchange.supervision.node
+    assert (node.ailing, node.facts()['emergency']) == ('', 'none')
+    exchange.hears(OVERCURRENT, 10.1)
+    text = node.facts()['emergency']
+    assert '2310h' in text
+    assert node.ailing == f'emergency {text}: remove its cause'
+    exchange.hears(OVERCURRENT, 10.2)      # nothing new
+    exchange.hears(NO_ERROR, 10.3)
+    assert node.ailing == ''
+    assert exchange.report.take() == [
+        Noted(f'emergency {text}', warning=True),
+        Noted('emergency over: the node reports no error any more')]
+
+
+def test_state_and_missing_heartbeat() -> None:
+    exchange = begun(heartbeat_timeout=0.1)
+    node = exchange.supervision.node
+    assert node.facts()['nmt_state'] == 'unknown'
+    assert node.missing.startswith('no heartbeat although heartbeat_timeout is set')
+    exchange.hears('705#05', 10.05)
+    assert node.facts()['nmt_state'] == 'operational'
+    assert node.missing == ''
+    assert begun().supervision.node.missing == '', 'none is wanted'
