@@ -197,14 +197,10 @@ class Channel(Generic[StepT, ReplyT]):
         reply = self._courier.receive(answer, now)
         if isinstance(reply, bool):
             return reply
-        self.ended(reply, now)
-        return True
-
-    def ended(self, reply: ReplyT, now: float) -> None:
-        """Take the reply that ended the exchange under way (the courier has matched it)."""
         self.now = now
         self._end(reply)
         self.advance(now)
+        return True
 
     def disturbed(self, now: float) -> None:
         """Take note of an answer that nobody asked for: more may follow."""
