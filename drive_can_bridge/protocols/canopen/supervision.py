@@ -12,7 +12,8 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.events import Noted
 from drive_can_bridge.core.outbox import Outbox
 from drive_can_bridge.core.reporter import Reporter
-from drive_can_bridge.core.users import DRIVE_OFFLINE
+from drive_can_bridge.core.requests import NO_ANSWER
+from drive_can_bridge.core.users import DRIVE_OFFLINE, Users
 from drive_can_bridge.protocols.canopen import network
 from drive_can_bridge.protocols.canopen.node import Change, Node
 
@@ -23,7 +24,11 @@ class NodeUser(Protocol):
     configuration: DriveConfiguration
     outbox: Outbox
     report: Reporter
+    users: Users
     online: bool
+
+    def lose(self, reason: str, now: float) -> None:
+        """Make the drive offline, if it is not."""
 
     def node_free(self, free_at: float, now: float, *, anew: bool) -> None:
         """
@@ -32,15 +37,11 @@ class NodeUser(Protocol):
         :param anew: the exchange begins then; otherwise it keeps its beat.
         """
 
-    def node_closed(self, reason: str, now: float, *, restarted: bool) -> None:
-        """
-        Handle a node that takes no PDOs: none that was sent is answered any more.
+    def node_closed(self, now: float) -> None:
+        """Handle a node that takes no PDOs: none that was sent is answered any more."""
 
-        :param restarted: nothing at all is; and the node knows nothing of what it was told.
-        """
-
-    def node_silent(self, reason: str, now: float) -> None:
-        """Handle a node whose heartbeats have ceased."""
+    def node_silent(self, now: float) -> None:
+        """Handle a drive that was online and is silent: it may be listening."""
 
 
 class Supervision:
@@ -91,6 +92,19 @@ class Supervision:
             return False
         return True
 
+    def silent(self, reason: str, now: float) -> None:
+        """Handle a drive that does not answer, or whose heartbeats have ceased."""
+        was_online = self._session.online
+        self._session.lose(reason, now)
+        self.node.offline(now)
+        if was_online:
+            self._session.node_silent(now)
+
+    def _close(self, reason: str, what: str, now: float) -> None:
+        self._session.lose(reason, now)
+        self._session.users.fail_all(f'{what}: {reason}')
+        self._session.node_closed(now)
+
     def _take_heartbeat(self, state: network.NmtState, now: float) -> None:
         session = self._session
         change = self.node.receive_heartbeat(state, now, self._in_use)
@@ -99,10 +113,10 @@ class Supervision:
         self._send()    # before a stop: the node hears that only when it was started
         if change is Change.RESTARTED:
             session.report.note(Noted('boot-up: the device has started'))
-            session.node_closed('the device restarted', now, restarted=True)
+            self._close('the device restarted', NO_ANSWER, now)
             session.report.advice = 'the device restarted: waiting for it to answer'
         elif change is Change.NOT_OPERATIONAL:
-            session.node_closed(self.node.refusal(now), now, restarted=False)
+            self._close(self.node.refusal(now), DRIVE_OFFLINE, now)
         self._follow(now, fresh=change is not Change.NONE)
 
     def _follow(self, now: float, *, fresh: bool = True) -> None:
@@ -129,8 +143,7 @@ class Supervision:
             change = self.node.handle_timer(now)
             self._send()
             if change is Change.HEARTBEAT_LOST:
-                self._session.node_silent(f'no heartbeat for {self.node.heartbeat_timeout:g} s',
-                                          now)
+                self.silent(f'no heartbeat for {self.node.heartbeat_timeout:g} s', now)
 
     def next_timer(self) -> float:
         """Return when ``handle_timer`` has something to do."""

@@ -31,7 +31,7 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.session import LOOKING, Session, Stage
-from drive_can_bridge.core.users import DRIVE_OFFLINE, Users
+from drive_can_bridge.core.users import Users
 from drive_can_bridge.protocols.canopen.supervision import Supervision
 from drive_can_bridge.protocols.canopen_pkw import addresses, pkw, procedures
 from drive_can_bridge.protocols.canopen_pkw.mailbox import MailboxChannel, MailboxCourier
@@ -129,7 +129,7 @@ class PkwSession(Session):
 
     def _missed(self, reason: str, now: float) -> None:
         if reason and self.online:
-            self.node_silent(reason, now)
+            self._supervision.silent(reason, now)
         elif reason and not self._node.heartbeat_lost:
             self.report.advice = SILENT
 
@@ -145,14 +145,6 @@ class PkwSession(Session):
     def withdrawn(self, now: float) -> None:
         """Leave it to the stop to write ``disable``."""
 
-    def _stop_if_owed(self, now: float) -> None:
-        if self.told.owed:
-            self._stop_silent(now)
-
-    def _stop_silent(self, now: float) -> None:
-        self._writers.stop(
-            STOP_TIME_SILENT, now, in_the_end=self.configuration.parameter_timeout)
-
     # -- the node ---------------------------------------------------------------------------------
 
     def node_free(self, free_at: float, now: float, *, anew: bool) -> None:
@@ -161,21 +153,20 @@ class PkwSession(Session):
             self._exchange.timer.start(max(now, free_at))
         self._channel.advance(now)
 
-    def node_silent(self, reason: str, now: float) -> None:
-        """Handle a drive that is silent, but may be listening: it has to stand still."""
-        was_online = self.online
-        self.lose(reason, now)
-        self._node.offline(now)
-        if was_online:
-            self._stop_silent(now)
+    def node_silent(self, now: float) -> None:
+        self._writers.stop(
+            STOP_TIME_SILENT, now, in_the_end=self.configuration.parameter_timeout)
 
-    def node_closed(self, reason: str, now: float, *, restarted: bool) -> None:
-        self.lose(reason, now)
-        self.users.fail_all(f'{"no answer" if restarted else DRIVE_OFFLINE}: {reason}')
+    def node_closed(self, now: float) -> None:
         # a stop takes its course: however often a node starts anew, they do not pile up
         if self._channel.is_idle(Lane.STOP):
             self._channel.clear()
             self._stop_if_owed(now)
+
+    def _stop_if_owed(self, now: float) -> None:
+        """Have a drive stand still of which nobody knows whether it listens."""
+        if self.told.owed:
+            self.node_silent(now)
 
     def _end_futile_stop(self, now: float) -> None:
         """End a stop that was for safety only, of a node that takes no PDOs any more."""

@@ -23,17 +23,26 @@ class Exchange:
         self.outbox = Outbox()
         self.report = Reporter(DriveStatistics(), '')
         self.online = False
+        self.users = self
+        self.reason = self.failed = ''
         self.told: list[object] = []
         self.supervision = Supervision(self)
 
     def node_free(self, free_at: float, now: float, *, anew: bool) -> None:
         self._write_down('free', free_at, anew)
 
-    def node_closed(self, reason: str, now: float, *, restarted: bool) -> None:
-        self._write_down('closed', reason, restarted)
+    def lose(self, reason: str, now: float) -> None:
+        self.reason = reason
 
-    def node_silent(self, reason: str, now: float) -> None:
-        self._write_down('silent', reason)
+    def fail_all(self, reason: str) -> None:
+        self.failed = reason
+
+    def node_closed(self, now: float) -> None:
+        assert self.failed.endswith(f': {self.reason}')
+        self._write_down('closed', self.reason, self.failed.startswith('no answer: '))
+
+    def node_silent(self, now: float) -> None:
+        self._write_down('silent', self.reason)
 
     def _write_down(self, *what: object) -> None:
         self.told += [*map(str, self.outbox.take()), what]
