@@ -175,10 +175,6 @@ class PkwSession(Session):
 
     # -- what the device is told ------------------------------------------------------------------
 
-    def _write_expired(self, now: float) -> None:
-        if self.gate.expire(now):
-            self._writers.write_setpoints(now)
-
     def see_to_control_word(self, now: float) -> None:
         if self.online:
             self._writers.write_control(now, known=self._rounds.status_known)
@@ -222,12 +218,12 @@ class PkwSession(Session):
             if self.control is not None and now >= self.control.next_timer():
                 self.control.handle_timer(now)
                 self.control_changed(now)
-            self._write_expired(now)
+            if self.gate.expire(now):
+                self._writers.write_setpoints(now)
         self._channel.advance(now)
         if now >= self._round_due:
             if self.control is not None and self.control.stopping:
                 self.see_to_control_word(now)   # before setpoints, should it be due again
-            self._write_expired(now)
             if self.online:
                 self._writers.write_setpoints(now)
                 self.see_to_control_word(now)

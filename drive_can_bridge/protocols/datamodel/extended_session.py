@@ -10,7 +10,8 @@ The conversation with one DataModel drive that uses 29-bit identifiers.
       └──deactivate / bus down──┘    └─────────3 neutral cycles, then silence──────┘
 
 Whatever was told to run is told to stop: by neutral cycles where the request map is known to
-agree, otherwise by acyclic writes (:mod:`.stop_writes`), whatever the session is about to do next.
+agree, otherwise by acyclic writes (:mod:`.acyclic_side`), whatever the session is about to do
+next.
 
 A drive reads cyclic words by *its own* maps. So the maps are read before the first cyclic frame,
 every second while cycling, and again after each loss; a drive that does not answer gets no cyclic
