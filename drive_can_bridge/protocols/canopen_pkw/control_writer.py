@@ -105,14 +105,18 @@ class ControlWriter:
             # the last has the time that any request has: a slow device is no silent one
             again = stopping and unanswered < STOPS_IN_A_ROW - 1
             timeout = min(STOP_PATIENCE, self._session.retry.timeout) if again else None
+            before = self._settled
+            if word != before:
+                self._settled = None    # from now on nobody knows: a stop does not rely on it
             reply = yield from tell(
                 self._session.told, CONTROL_WORD,
                 Write.of(self._placement, self._parameter, word, blind=stopping, timeout=timeout),
                 runs=word != self._disable)
             if isinstance(reply, Silence):
                 unanswered += stopping
+                self._settled = None if reply.sent else before
                 if reply.sent:
-                    self._settled, self._doubtful = None, word
+                    self._doubtful = word
                 if word == self._control.word and not again:
                     return
                 continue

@@ -284,6 +284,17 @@ def test_refused_enable_is_written_with_the_next_round() -> None:
     assert talk.control_outcomes() == [('enable', True, 'enabled')]
 
 
+def test_enable_that_is_due_again_goes_behind_setpoints() -> None:
+    talk = online(request=(SPEED,), control=CONTROL, refresh_interval=0.035)
+    assert talk.until(10.0701) == [(10.07, READ_0)]
+    assert talk.hears(ANSWER_0, 10.071) == []
+    refuse(talk)
+    assert talk.asks(ControlAction.ENABLE, 10.075) == []
+    accept(talk)
+    assert talk.until(10.0901) == [(10.09, STILL_1)]
+    assert talk.hears('485#C60200AA00000000', 10.091) == [ENABLE_0]
+
+
 def test_refused_neutral_at_a_command_time_out_is_written_although_nothing_refreshes() -> None:
     talk = online(request=(SPEED,), command_timeout=0.05, refresh_interval=0.0)
     talk.commands(0, 0.0, 10.06)
@@ -426,6 +437,24 @@ def test_enable_that_is_not_answered_is_not_repeated_when_others_would_be() -> N
     assert talk.asks(ControlAction.ENABLE, 10.075) == [ENABLE_0]
     assert talk.until(10.574) == []
     assert talk.until(10.6) == [(10.575, IDLE)]
+
+
+def test_stop_does_not_wait_for_the_answer_to_an_enable() -> None:
+    """Nor does it rely on the disable that the drive had before; and it has all its attempts."""
+    talk = ready()
+    assert talk.asks(ControlAction.ENABLE, 10.075) == [ENABLE_0]
+    assert talk.asks(ControlAction.DISABLE, 10.08) == []
+    assert talk.until(10.72) == [(10.13, DISABLE_1), (10.18, DISABLE_0), (10.23, DISABLE_1)]
+    assert talk.hears(DISABLED_1, 10.721) == [READ_0], 'of the round that was due at 10.09'
+
+
+def test_enable_that_the_bus_refused_leaves_the_drive_with_what_it_had() -> None:
+    talk = ready()
+    refuse(talk)
+    assert talk.asks(ControlAction.ENABLE, 10.075) == []
+    accept(talk)
+    assert talk.asks(ControlAction.DISABLE, 10.08) == [], 'it was never told anything else'
+    assert talk.until(10.0901) == [(10.09, READ_0)]
 
 
 def test_short_time_outs_make_short_attempts() -> None:
