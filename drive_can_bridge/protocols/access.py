@@ -15,6 +15,7 @@ from typing import Generic, Union
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.requests import (
     Failure, NO_ANSWER_OFFLINE, NOT_SENT, Outcome, Outcomes, ReadRequest, ReadValue, Request,
+    WriteRequest,
 )
 from drive_can_bridge.core.retry import RetryPolicy
 from drive_can_bridge.core.words import value_text
@@ -35,23 +36,35 @@ def read_back(parameter: Parameter, found: int, wanted: int) -> Failure:
 
 class Access(ABC, Generic[SpanT, StepT, ReplyT]):
     """
-    The parameters of one drive.
+    The parameters of one drive: serves the requests of users in their lane of its channel.
+
+    A family says how one frame is read (:meth:`read`), how one is written (:meth:`write`), and
+    what fits into it (:meth:`misfit`).
 
     :param retry: what is said when nobody answers.
-    :param placement: where they stand.
+    :param placement: where the parameters stand.
     """
 
-    def __init__(self, retry: RetryPolicy, placement: ParameterPlacement[SpanT]) -> None:
+    def __init__(self, channel: Channel[StepT, ReplyT], retry: RetryPolicy,
+                 placement: ParameterPlacement[SpanT]) -> None:
+        self.channel = channel
         self.retry = retry
         self.placement = placement
 
-    def serve(self, request: Request) -> Generator[StepT, ReplyT, Outcomes]:
-        """Return the procedure that serves a request of a user."""
-        if isinstance(request, ReadRequest):
-            return self._read_all(request.parameters)
-        if request.atomic and len(request) > 1:
-            return self.write_together(request.items)
-        return self._write_all(request.items)
+    @property
+    def waiting(self) -> int:
+        """How many requests wait behind the one being served."""
+        return self.channel.waiting_users
+
+    def serve(self, request: Request, done: Callable[[Outcomes], None], now: float,
+              lane: Lane = Lane.USERS) -> None:
+        """Queue a request; ``done`` gets an outcome for each name."""
+        self.channel.run(self._read_all(request.parameters) if isinstance(request, ReadRequest)
+                         else self._write_all(request), done, now, lane)
+
+    def cancel(self) -> None:
+        """Forget all of them; nobody is told."""
+        self.channel.cancel(Lane.USERS)
 
     # -- what a family knows ----------------------------------------------------------------------
 
@@ -60,12 +73,12 @@ class Access(ABC, Generic[SpanT, StepT, ReplyT]):
         """Read what one frame can bring."""
 
     @abstractmethod
-    def write(self, parameter: Parameter, raw: int) -> Generator[StepT, ReplyT, Outcome]:
-        """Write one parameter, and see that the drive has it."""
+    def write(self, items: Sequence[Item]) -> Generator[StepT, ReplyT, Outcomes]:
+        """Write what fits one frame, and see that the drive has it."""
 
     @abstractmethod
-    def write_together(self, items: Sequence[Item]) -> Generator[StepT, ReplyT, Outcomes]:
-        """Write several parameters in one frame, or nothing (``set_parameters_atomically``)."""
+    def misfit(self, items: Sequence[Item]) -> str:
+        """Say why several parameters do not fit one frame; '' if they do."""
 
     def aside(self, parameter: Parameter, *, write: bool) -> Outcome | None:
         """Return the outcome for a parameter that no frame can reach; None: one can."""
@@ -106,38 +119,25 @@ class Access(ABC, Generic[SpanT, StepT, ReplyT]):
 
         return tuple(map(outcome, parameters, spans))
 
-    def _write_all(self, items: Sequence[Item]) -> Generator[StepT, ReplyT, Outcomes]:
-        """Write parameters one after the other; after one that an absent drive missed, none."""
+    def _write_all(self, request: WriteRequest) -> Generator[StepT, ReplyT, Outcomes]:
+        """
+        Write parameters one after the other; after one that an absent drive missed, none.
+
+        Or all in one frame, or none (``set_parameters_atomically``).
+        """
+        items = request.items
+        if request.atomic and len(items) > 1:
+            misfit = self.misfit(items)
+            together = () if misfit else (yield from self.write(items))
+            return together or (Failure(misfit),) * len(items)
         outcomes: list[Outcome] = []
         gone: Failure | None = None
         for parameter, raw in items:
             outcome = self.aside(parameter, write=True) or gone
             if outcome is None:
-                outcome = yield from self.write(parameter, raw)
+                outcome, = yield from self.write([(parameter, raw)])
                 if isinstance(outcome, Failure) and outcome.reason in (
                         NO_ANSWER_OFFLINE, NOT_SENT):
                     gone = outcome
             outcomes.append(outcome)
         return tuple(outcomes)
-
-
-class ChannelServer(Generic[SpanT, StepT, ReplyT]):
-    """Serves the requests of users in their lane of a drive's acyclic channel."""
-
-    def __init__(self, channel: Channel[StepT, ReplyT],
-                 access: Access[SpanT, StepT, ReplyT]) -> None:
-        self._channel = channel
-        self._access = access
-
-    @property
-    def waiting(self) -> int:
-        """How many requests wait behind the one being served."""
-        return self._channel.waiting_users
-
-    def serve(self, request: Request, done: Callable[[Outcomes], None], now: float) -> None:
-        """Queue a request; ``done`` gets an outcome for each name."""
-        self._channel.run(self._access.serve(request), done, now, Lane.USERS)
-
-    def cancel(self) -> None:
-        """Forget all of them; nobody is told."""
-        self._channel.cancel(Lane.USERS)

@@ -10,9 +10,9 @@ the sequence it is. What the steps are, and how one of them is done, is the fami
 *Order.* Every lane (:class:`Lane`) runs its procedures one after the other. A stop comes first,
 whatever holds the others back; then the control word, then setpoints. Our own procedures and those
 of users take turns after every step, and after every attempt at one, so that neither a flood of
-users nor a parameter that nobody answers keeps the other waiting for more than one. Where our own
-are rounds that must not be torn (``own_to_end``), they run to their end, users get one step in
-between and whatever time is left.
+users nor a parameter that nobody answers keeps the other waiting for more than one. Where answers
+do not say what they answer (``anonymous``), our own are rounds that must not be torn: they run to
+their end, users get one step in between and whatever time is left.
 
 *Repetitions.* A step that nobody answered is done again as often as its courier says. Between its
 attempts others may have their turn.
@@ -20,7 +20,7 @@ attempts others may have their turn.
 *Quarantine* (:mod:`.quarantine`). After a step that nobody answered, nothing is asked that the
 late answer could be mistaken for, for as long as such an answer may come. The attempts at one step
 do not wait for each other where answers say what they answer: the late one is as good. Where they
-do not (``anonymous``), nothing at all is asked, and whatever arrives meanwhile begins the silence
+do not, nothing at all is asked, and whatever arrives meanwhile begins the silence
 anew.
 """
 
@@ -104,15 +104,13 @@ class Channel(Generic[StepT, ReplyT]):
     """
     Runs procedures through a courier.
 
-    :param own_to_end: our own procedures do not take turns with users after every step.
     :ivar now: ``now`` of the call being served, for whoever is called back.
     """
 
-    def __init__(self, courier: Courier[StepT, ReplyT], *, own_to_end: bool = False) -> None:
+    def __init__(self, courier: Courier[StepT, ReplyT]) -> None:
         self.now = -math.inf
         self._courier = courier
         courier.wake = self.wake
-        self._own_to_end = own_to_end
         self._queues: dict[Lane, _Queue[StepT, ReplyT]] = {
             lane: _Queue(lane, courier.attempts) for lane in Lane}
         stop, control, setpoints, own, users = self._queues.values()
@@ -199,14 +197,10 @@ class Channel(Generic[StepT, ReplyT]):
         reply = self._courier.receive(answer, now)
         if isinstance(reply, bool):
             return reply
-        self.ended(reply, now)
-        return True
-
-    def ended(self, reply: ReplyT, now: float) -> None:
-        """Take the reply that ended the exchange under way (the courier has matched it)."""
         self.now = now
         self._end(reply)
         self.advance(now)
+        return True
 
     def disturbed(self, now: float) -> None:
         """Take note of an answer that nobody asked for: more may follow."""
@@ -377,5 +371,6 @@ class Channel(Generic[StepT, ReplyT]):
             queue.resume(reply)
         if queue.lane is Lane.USERS:
             self._users_next = False
-        elif queue.lane is Lane.OWN and (not self._own_to_end or queue.step is None):
+        elif queue.lane is Lane.OWN and (
+                queue.step is None or not courier.anonymous):
             self._users_next = True

@@ -55,6 +55,8 @@ class Courier(ABC, Generic[StepT, ReplyT]):
 
     def expect(self, step: StepT, until: float) -> None:
         """Take note that an exchange has begun, and how long its answer is waited for."""
+        if self.busy:
+            raise RuntimeError('an exchange is under way')
         self.step, self.busy, self.deadline, self._reply = step, True, until, False
 
     def receive(self, answer: Any, now: float) -> ReplyT | bool:

@@ -11,8 +11,7 @@ of the sessions, so that both can be compared: what waits for answers are the wa
 :mod:`.watches`, of which an observer has those that its family needs.
 """
 
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 import math
@@ -23,6 +22,7 @@ from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.statistics import Statistic
 
 T = TypeVar('T')
+KeyT = TypeVar('KeyT')
 Handler = Callable[[bytes, float], None]
 
 
@@ -122,25 +122,29 @@ class Watch(Protocol):
         """Give up what was not answered until ``now``; return when to look again."""
 
 
-class DriveObserver(ABC):
+class DriveObserver:
     """
     Watches one drive.
 
+    :param extended: its identifiers have 29 bits.
     :ivar emit: takes every telegram.
+    :ivar handlers: what takes frames, by their identifier.
     :ivar watches: what waits for answers; the first are given up first.
     :ivar deadline: when :meth:`expire` has something to do; infinity: never.
     """
 
-    def __init__(self, name: str, emit: Emit) -> None:
+    def __init__(self, name: str, emit: Emit, *, extended: bool = False) -> None:
         self.name = name
+        self.handlers: dict[int, Handler] = {}
         self.observed = Observed()
         self.watches: list[Watch] = []
         self.deadline = math.inf
         self.emit = emit
+        self._extended = extended
 
-    @abstractmethod
     def handler(self, identifier: int, extended: bool) -> Handler | None:
         """Return what takes the data and time of frames with this identifier; None: not ours."""
+        return self.handlers.get(identifier) if extended == self._extended else None
 
     def expire(self, now: float) -> None:
         """Give up what was not answered until ``now``."""
@@ -177,13 +181,6 @@ class DriveObserver(ABC):
             self.tell(now, direction, kind, title, verdict=Verdict.MALFORMED, remark=str(error))
             return None
 
-    def count_request(self, *, cyclic: bool) -> Kind:
-        """Return the kind of a request about parameters; those of the exchange do not count."""
-        if cyclic:
-            return Kind.CYCLIC
-        self.observed.requests += 1
-        return Kind.PARAMETER
-
     def tell_unanswered(self, due: float, kind: Kind, title: str,
                         parameters: Sequence[Parameter]) -> None:
         """Tell that a request of this kind was not answered."""
@@ -195,3 +192,10 @@ class DriveObserver(ABC):
 def raws_of(parameters: Sequence[Parameter], words: Sequence[int]) -> list[int]:
     """Return the raw integers that words on the wire are."""
     return [parameter.raw_from_word(word) for parameter, word in zip(parameters, words)]
+
+
+def listed_by(parameters: Iterable[Parameter], place: Callable[[Parameter], KeyT | None],
+              ) -> dict[KeyT, Parameter]:
+    """Return parameters by where they stand; of two in one place, the first one listed."""
+    return {key: parameter for parameter in reversed(list(parameters))
+            if (key := place(parameter)) is not None}

@@ -1,13 +1,11 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""What observers watch: cycles, questions, rounds of reads, the pace of EEPROM writes."""
+"""What observers watch: cycles, questions, the pace of EEPROM writes."""
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable
 import math
 from typing import Generic, TypeVar
 
-from drive_can_bridge.protocols.observer import (
-    Direction, DriveObserver, Kind, Observed, Verdict,
-)
+from drive_can_bridge.protocols.observer import Direction, DriveObserver, Kind, Verdict
 
 #: s for which an answer that did not come in time is still known to be one
 LATE_TIME = 10.0
@@ -179,69 +177,3 @@ class WriteGap:
             return ''
         return (f'EEPROM write {1e3 * distance:.1f} ms after the last, the drive wants '
                 f'{1e3 * self._gap:g} ms')
-
-
-class RoundWatch(Generic[Key]):
-    """
-    Finds the rounds of a polled drive among its reads.
-
-    :param plan: the reads of a round, in their order.
-    :ivar prelude: when something was sent that the next read had to wait for; NaN: nothing was.
-    """
-
-    def __init__(self, plan: Sequence[Key], observed: Observed) -> None:
-        self.plan = list(plan)
-        self.prelude = math.nan
-        self._observed = observed
-        self._next: int | None = None       # read of the round that comes next; None: no round
-        self._began = math.nan
-        self._incomplete = False
-
-    def asked(self, key: Key, now: float) -> bool:
-        """Take a read; tell whether it belongs to a round."""
-        began, self.prelude = self.prelude, math.nan
-        if not self.plan:
-            return False
-        if self._next is not None and key == self.plan[self._next]:
-            return True
-        if key != self.plan[0]:
-            return False
-        if began != began:      # NaN
-            began = now
-        if self._began == self._began:
-            self._observed.period.add(began - self._began)
-        self._began = began
-        self._next = 0
-        self._incomplete = False
-        return True
-
-    def answered(self, key: Key, now: float) -> None:
-        """Take the answer to a read."""
-        if self._next is None or key != self.plan[self._next]:
-            return
-        self._next += 1
-        if self._next == len(self.plan):
-            self._next = None
-            if not self._incomplete:
-                self._observed.exchanges += 1
-                self._observed.latency.add(now - self._began)
-
-    def refused(self, key: Key, parts: Sequence[Key], now: float) -> None:
-        """
-        Take a refusal: the round goes on without; it brings no complete sample.
-
-        :param parts: what is read instead, from now on.
-        """
-        if self._next is None or key != self.plan[self._next]:
-            return
-        if parts:
-            self.plan[self._next:self._next + 1] = parts
-            return
-        self._incomplete = True
-        self.answered(key, now)
-
-    def failed(self, key: Key) -> None:
-        """Take note that a read was not answered: the round is missed."""
-        if self._next is not None and key == self.plan[self._next]:
-            self._next = None
-            self._observed.missed += 1

@@ -14,7 +14,6 @@ from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.protocols.canopen import abort_codes, network
 from drive_can_bridge.protocols.canopen.network import NmtState
 from drive_can_bridge.protocols.canopen_pkw import pkw, refusals
-from drive_can_bridge.protocols.canopen_pkw.identifiers import Identifiers
 from drive_can_bridge.simulation.canopen.node import CanopenNode, Contents
 from drive_can_bridge.simulation.canopen_pkw_registers import RegisterTable
 from drive_can_bridge.simulation.drive import Ignored, SimulatedDrive
@@ -34,7 +33,7 @@ class SimulatedPkwDrive(SimulatedDrive):
     table: RegisterTable
 
     def set_up(self) -> None:
-        options = self.configuration.options
+        options = self._options = self.configuration.options
         self._layout = pkw.Layout(options.layout)
         self.table = RegisterTable(self.configuration, self.registers)
         self._abort_code_order: str = options.abort_code_order
@@ -43,8 +42,9 @@ class SimulatedPkwDrive(SimulatedDrive):
         self.power_lost(forget=False)
 
     def find_routes(self) -> list[Route]:
-        self._identifiers = Identifiers.of(self.configuration)
-        return CanopenNode.routes(self.configuration.station, *self._identifiers)
+        options = self.configuration.options
+        return CanopenNode.routes(
+            self.configuration.station, options.request_cob_id, options.response_cob_id)
 
     def choose_plant(self) -> PlantFactory:
         """Return a starter for the profile of an LTMR, a motor for any other one."""
@@ -56,7 +56,7 @@ class SimulatedPkwDrive(SimulatedDrive):
 
     def receive(self, frame: Frame, now: float) -> bool:
         identifier, data, extended = frame
-        if identifier != self._identifiers.request or extended:
+        if identifier != self._options.request_cob_id or extended:
             return False
         if self.node.state is not NmtState.OPERATIONAL:
             raise Ignored('request while the node is not operational')
@@ -71,8 +71,8 @@ class SimulatedPkwDrive(SimulatedDrive):
         self._request = request
         self.requests += 1
         self._response = self._response_to(request)
-        self.answer(Frame(self._identifiers.response, pkw.encode(self._response, self._layout),
-                          False), now)
+        self.answer(Frame(self._options.response_cob_id,
+                          pkw.encode(self._response, self._layout), False), now)
         return True
 
     def _response_to(self, request: pkw.Message) -> pkw.Message:
@@ -99,7 +99,7 @@ class SimulatedPkwDrive(SimulatedDrive):
         for data.
         """
         unasked: list[list[Frame]] = [[], []]
-        if answer.identifier == self._identifiers.response:
+        if answer.identifier == self._options.response_cob_id:
             message = pkw.decode(answer.data, self._layout)._replace(words=JUNK)
             unasked = [[answer._replace(data=pkw.encode(changed, self._layout))] for changed in (
                 message._replace(toggle=not message.toggle),
@@ -116,8 +116,8 @@ class SimulatedPkwDrive(SimulatedDrive):
         objects: Contents = {(0x1008, 0): DEVICE_NAME, (0x3000, 0): bytes((4,))}
         for number in range(1, 5):
             objects[0x3000, number] = mailbox[4 * number - 4:4 * number]
-        for base, identifier, first in ((0x1400, self._identifiers.request, 1),
-                                        (0x1800, self._identifiers.response, 3)):
+        for base, identifier, first in ((0x1400, self._options.request_cob_id, 1),
+                                        (0x1800, self._options.response_cob_id, 3)):
             # identifier, sent on change; then the two halves of the mailbox
             for place, contents in ((base + 3, (identifier.to_bytes(4, 'little'), b'\xFF')), (
                     base + 0x203, [(0x30000020 | half << 8).to_bytes(4, 'little')

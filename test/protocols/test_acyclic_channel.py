@@ -36,6 +36,10 @@ class Postman(Courier[str, 'str | None']):
         self.forget()
         return None
 
+    def receive(self, answer: str, now: float) -> str:
+        self.forget()
+        return answer
+
     def forget(self) -> None:
         self.busy, self.deadline = False, math.inf
 
@@ -72,8 +76,7 @@ class Line:
         return sent
 
     def answer(self, reply: str, now: float) -> list[str]:
-        self.postman.forget()
-        self.channel.ended(reply, now)
+        self.channel.receive(reply, now)
         return self.sent()
 
     def at(self, now: float) -> list[str]:

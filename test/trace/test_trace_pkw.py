@@ -102,6 +102,37 @@ def test_a_shared_read_that_is_refused_is_split_from_then_on() -> None:
     assert witness.observed('pump').missed == 0
 
 
+def test_a_shared_read_that_is_answered_completes_a_round() -> None:
+    both = (STATUS, parameter('second', 456))
+    witness = Witness(drive('canopen_pkw', name='pump', station=5, table=both, request=(),
+                            response=both))
+    witness.hears('505#C701002600000000', 0.0)
+    witness.hears('485#C701002683200000', 0.004)
+    assert witness.observed('pump').exchanges == 1
+
+
+def test_a_refusal_spoils_the_round_however_it_goes_on() -> None:
+    apart = (STATUS, parameter('other', 500))
+    witness = Witness(drive('canopen_pkw', name='pump', station=5, table=apart, request=(),
+                            response=apart))
+    witness.hears('505#C701002500000000', 0.0)
+    witness.hears('485#C701004E00000206', 0.004)
+    witness.hears('505#F40100A500000000', 0.005)
+    witness.hears('485#F40100A500000000', 0.009)
+    assert (witness.observed('pump').exchanges, witness.observed('pump').missed) == (0, 0)
+
+
+def test_a_write_without_an_answer_is_no_missed_round() -> None:
+    witness = Witness(starter())
+    witness.hears('505#C701002500000000', 0.0)
+    witness.hears('505#C70100AA01000000', 0.1)
+    assert len(witness.waits(0.59)) == 1
+    assert witness.observed('pump').missed == 1
+    witness.hears('505#C701002500000000', 0.595)
+    assert [line[-9:] for line in witness.waits(0.61)] == ['no answer']
+    assert witness.observed('pump').missed == 1, 'of the read alone'
+
+
 def test_the_node() -> None:
     witness = Witness(starter())
     assert witness.hears('000#0105', 0.0) == ['0.000000 +0.000 main pump > NMT: start node 5']

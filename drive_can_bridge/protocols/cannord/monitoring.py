@@ -22,7 +22,6 @@ from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.core.requests import (
     Failure, Outcomes, ReadRequest, ReadValue, Request, WriteRequest, Written,
 )
-from drive_can_bridge.protocols.cannord.channel import TaskChannel
 from drive_can_bridge.protocols.cannord.procedures import TaskAccess
 from drive_can_bridge.protocols.channel import Lane
 
@@ -65,21 +64,20 @@ class TimeoutWatch:
     :ivar warning: why it does not fit; '' if it does, or nobody knows.
     """
 
-    def __init__(self, drive: DriveConfiguration, channel: TaskChannel, access: TaskAccess,
+    def __init__(self, drive: DriveConfiguration, access: TaskAccess,
                  emit: Callable[[Noted], None]) -> None:
         self.warning = ''
         self._parameter = timeout_parameter(drive.profile)
         self._period = drive.period
-        self._channel = channel
         self._access = access
         self._emit = emit
         self._ask_at = -math.inf
 
     def look(self, now: float) -> None:
         """Read it, unless that is under way, or nobody answered lately."""
-        if self._parameter is not None and now >= self._ask_at and self._channel.is_idle(Lane.OWN):
-            self._channel.run(
-                self._access.serve(ReadRequest((self._parameter,))), self._take, now)
+        if self._parameter is not None and now >= self._ask_at and (
+                self._access.channel.is_idle(Lane.OWN)):
+            self._access.serve(ReadRequest((self._parameter,)), self._take, now, Lane.OWN)
 
     def request_answered(self, request: Request, outcomes: Outcomes) -> None:
         """Look again when somebody has written it."""
@@ -87,7 +85,7 @@ class TimeoutWatch:
                 parameter.number == TIMEOUT_NUMBER and isinstance(outcome, Written)
                 for (parameter, _), outcome in zip(request.items, outcomes)):
             self._ask_at = -math.inf    # now it is known to answer
-            self.look(self._channel.now)
+            self.look(self._access.channel.now)
 
     def _take(self, outcomes: Outcomes) -> None:
         outcome, = outcomes
@@ -99,6 +97,6 @@ class TimeoutWatch:
             if self.warning:
                 self._emit(Noted(self.warning, warning=True))
         elif isinstance(outcome, Failure):
-            self._ask_at = self._channel.now + UNKNOWN_PAUSE
+            self._ask_at = self._access.channel.now + UNKNOWN_PAUSE
             self._emit(Noted(f'telegram time-out ({self._parameter.address}) unknown: '
                              f'{outcome.reason}'))

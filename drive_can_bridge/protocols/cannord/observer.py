@@ -24,7 +24,7 @@ from drive_can_bridge.protocols.cannord.states import (
     CONTROL_PARAMETER, is_faulted, state_of, STATUS_PARAMETER,
 )
 from drive_can_bridge.protocols.observer import (
-    Direction, DriveObserver, Emit, Handler, Kind, raws_of, Verdict,
+    Direction, DriveObserver, Emit, Kind, listed_by, raws_of, Verdict,
 )
 from drive_can_bridge.protocols.watches import CYCLES_WAITED, CyclicWatch, Questions
 
@@ -46,12 +46,12 @@ class CannordObserver(DriveObserver):
     """
 
     def __init__(self, drive: DriveConfiguration, emit: Emit, *, leads: bool = False) -> None:
-        super().__init__(drive.name, emit)
         options = drive.options
-        self._extended: bool = options.extended_identifiers
-        objects = {kind: identifier(kind, drive.station, extended=self._extended)
+        extended: bool = options.extended_identifiers
+        super().__init__(drive.name, emit, extended=extended)
+        objects = {kind: identifier(kind, drive.station, extended=extended)
                    for kind in MessageObject}
-        self._handlers: dict[int, Handler] = {
+        self.handlers |= {
             objects[MessageObject.PROCESS_REQUEST]: self._take_request,
             objects[MessageObject.PROCESS_RESPONSE]: self._take_response,
             objects[MessageObject.PARAMETER_TASK]: self._take_task,
@@ -60,7 +60,7 @@ class CannordObserver(DriveObserver):
         broadcast = broadcast_identifier(drive)
         self._paced_by_broadcast = leads and broadcast is not None
         if leads and broadcast is not None:
-            self._handlers[broadcast] = self._take_broadcast
+            self.handlers[broadcast] = self._take_broadcast
         self._decode_main = partial(decode_main, swap=options.swap_setpoints_2_3)
         self._layout = ParameterLayout(options.value_order, options.index_byte)
         #: of main frames, and of extra ones
@@ -69,17 +69,13 @@ class CannordObserver(DriveObserver):
             for direction, word, values in (
                 (_REQUEST, CONTROL_PARAMETER, drive.cyclic_request),
                 (_RESPONSE, STATUS_PARAMETER, drive.cyclic_response))}
-        self._listed = {(parameter.number, parameter.subindex): parameter
-                        for parameter in reversed(list(drive.profile.parameters.values()))
-                        if parameter.number is not None}
+        self._listed = listed_by(drive.profile.parameters.values(),
+                                 lambda parameter: (parameter.number, parameter.subindex))
         # a member of a group is asked once in a while, and has one period to answer
         self._cycle = CyclicWatch(
             self, drive.period * (CYCLES_WAITED if broadcast is None else 1.0))
         self._questions: Questions[TaskKey, Task] = Questions(
             self, drive.parameter_timeout, self._unanswered)
-
-    def handler(self, identifier: int, extended: bool) -> Handler | None:
-        return self._handlers.get(identifier) if extended == self._extended else None
 
     # -- process data -----------------------------------------------------------------------------
 

@@ -14,7 +14,7 @@ from drive_can_bridge.core.requests import (
 from drive_can_bridge.core.retry import RetryPolicy
 from drive_can_bridge.core.roles import Cells
 from drive_can_bridge.protocols.access import Access, Found, Item, read_back
-from drive_can_bridge.protocols.cannord.channel import Ask, Reply
+from drive_can_bridge.protocols.cannord.channel import Ask, Reply, TaskChannel
 from drive_can_bridge.protocols.cannord.parameter_frame import (
     DOUBLE_RESPONSES, error_text, ParameterFrame, Response, Task, WRITE_TASKS,
 )
@@ -45,9 +45,9 @@ class TaskAccess(Access[Parameter, Ask, Reply]):
     :param persist: write to EEPROM where the profile does not say where.
     """
 
-    def __init__(self, retry: RetryPolicy, *, last_value: Callable[[str], int | None],
-                 persist: bool) -> None:
-        super().__init__(retry, OneByOne())
+    def __init__(self, channel: TaskChannel, retry: RetryPolicy, *,
+                 last_value: Callable[[str], int | None], persist: bool) -> None:
+        super().__init__(channel, retry, OneByOne())
         self._last_value = last_value
         self._persist = persist
 
@@ -60,7 +60,25 @@ class TaskAccess(Access[Parameter, Ask, Reply]):
             return Failure(_width_text(span, double=double))
         return (answer.answered,)
 
-    def write(self, parameter: Parameter, raw: int) -> Generator[Ask, Reply, Outcome]:
+    def write(self, items: Sequence[Item]) -> Generator[Ask, Reply, Outcomes]:
+        (parameter, raw), = items
+        return ((yield from self._write(parameter, raw)),)
+
+    def misfit(self, items: Sequence[Item]) -> str:
+        return NOT_ATOMIC
+
+    def aside(self, parameter: Parameter, *, write: bool) -> Outcome | None:
+        if parameter.number is not None:
+            return None
+        if write:
+            return Failure(PROCESS_DATA_ONLY)
+        raw = self._last_value(parameter.name)
+        return ReadValue(raw) if raw is not None else Failure(
+            f'{PROCESS_DATA_ONLY}, and none with it was received')
+
+    # -- parts ------------------------------------------------------------------------------------
+
+    def _write(self, parameter: Parameter, raw: int) -> Generator[Ask, Reply, Outcome]:
         """
         Write one parameter; the response acknowledges it.
 
@@ -77,44 +95,29 @@ class TaskAccess(Access[Parameter, Ask, Reply]):
         array = parameter.subindex is not None
         persistent = (self._persist if parameter.storage is None
                       else parameter.storage is Storage.EEPROM)
-        reply = yield Ask(WRITE_TASKS[array, double, persistent], parameter.number or 0,
-                          parameter.subindex or 0, raw)
+        answer = yield from self._carry_out(
+            parameter, WRITE_TASKS[array, double, persistent], raw, attempts=1)
+        return answer if isinstance(answer, Failure) else Written()
+
+    def _ask(self, parameter: Parameter) -> Generator[Ask, Reply, ParameterFrame | Failure]:
+        """Read one parameter."""
+        return self._carry_out(
+            parameter, Task.READ if parameter.subindex is None else Task.READ_ARRAY)
+
+    def _carry_out(self, parameter: Parameter, task: Task, value: int = 0,
+                   attempts: int | None = None,
+                   ) -> Generator[Ask, Reply, ParameterFrame | Failure]:
+        """Have a task done; return the response, or why there is none that does."""
+        reply = yield Ask(task, parameter.number or 0, parameter.subindex or 0, value)
         if reply.response is not None:
             if reply.response.identifier != Response.REFUSED:
-                return Written()
-            refusal = yield from _refusal(parameter, reply.response)
-            return refusal
+                return reply.response
+            return (yield from _refusal(parameter, reply.response))
         if not reply.sent:
             return Failure(NOT_SENT)
         if reply.contrary is not None:
-            found = parameter.raw_from_word(reply.contrary.answered)
-            return read_back(parameter, found, raw)
-        return self.retry.unanswered(1)
-
-    def write_together(self, items: Sequence[Item]) -> Generator[Ask, Reply, Outcomes]:
-        yield from ()
-        return (Failure(NOT_ATOMIC),) * len(items)
-
-    def aside(self, parameter: Parameter, *, write: bool) -> Outcome | None:
-        if parameter.number is not None:
-            return None
-        if write:
-            return Failure(PROCESS_DATA_ONLY)
-        raw = self._last_value(parameter.name)
-        return ReadValue(raw) if raw is not None else Failure(
-            f'{PROCESS_DATA_ONLY}, and none with it was received')
-
-    # -- parts ------------------------------------------------------------------------------------
-
-    def _ask(self, parameter: Parameter) -> Generator[Ask, Reply, ParameterFrame | Failure]:
-        task = Task.READ if parameter.subindex is None else Task.READ_ARRAY
-        reply = yield Ask(task, parameter.number or 0, parameter.subindex or 0)
-        if reply.response is None:
-            return self.retry.unanswered()
-        if reply.response.identifier == Response.REFUSED:
-            refusal = yield from _refusal(parameter, reply.response)
-            return refusal
-        return reply.response
+            return read_back(parameter, parameter.raw_from_word(reply.contrary.answered), value)
+        return self.retry.unanswered(attempts)
 
 
 def _refusal(parameter: Parameter, response: ParameterFrame) -> Generator[Ask, Reply, Failure]:

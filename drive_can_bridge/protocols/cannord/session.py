@@ -30,7 +30,6 @@ from drive_can_bridge.core.process_image import ProcessImage
 from drive_can_bridge.core.roles import publish_it, Roles
 from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.users import Users
-from drive_can_bridge.protocols.access import ChannelServer
 from drive_can_bridge.protocols.cannord import procedures
 from drive_can_bridge.protocols.cannord.channel import TaskChannel, TaskCourier
 from drive_can_bridge.protocols.cannord.control import make_control
@@ -92,14 +91,15 @@ class CannordSession(Session):
             lambda payload, left: self.outbox.put(
                 Frame(self._task_identifier, payload, self._extended), left), self.retry))
         access = procedures.TaskAccess(
-            self.retry, last_value=self._samples.last, persist=options.persist_writes)
+            self._channel, self.retry, last_value=self._samples.last,
+            persist=options.persist_writes)
         # what only a master sends
         self._masters = {self.request_identifier, self._task_identifier,
                          group and group.broadcast}
-        self._timeout = TimeoutWatch(drive, self._channel, access, self.report.note)
+        self._timeout = TimeoutWatch(drive, access, self.report.note)
         self.users = Users(
-            self, ChannelServer(self._channel, access),
-            control_refusal=self._control_refusal, answered=self._timeout.request_answered,
+            self, access, control_refusal=self._control_refusal,
+            answered=self._timeout.request_answered,
             control=None if led_by is None else partial(led_by.stop_for, self))
         self.exchange = CyclicExchange(
             self, self._encode, self._send_cycle, slot=0, silence='no answer to process data',

@@ -184,9 +184,23 @@ class Node:
         return f'node is {self.state.text}'
 
     @property
-    def state_text(self) -> str:
-        """The NMT state in words; ``unknown`` for a node that never said anything of it."""
-        return 'unknown' if self.state is None else self.state.text
+    def ailing(self) -> str:
+        """What the node says of its errors, and what to do; '' if nothing."""
+        emergency = self.emergency
+        return '' if emergency is None else f'emergency {emergency.text}: remove its cause'
+
+    @property
+    def missing(self) -> str:
+        """What the node should say, but does not; '' if nothing."""
+        if self.heartbeat_timeout <= 0.0 or self.heard_heartbeat:
+            return ''
+        return ('no heartbeat although heartbeat_timeout is set: configure the '
+                "device's heartbeat producer (1017h)")
+
+    def facts(self) -> dict[str, str]:
+        """Return its state and its errors in words, for diagnostics."""
+        return {'nmt_state': 'unknown' if self.state is None else self.state.text,
+                'emergency': 'none' if self.emergency is None else self.emergency.text}
 
     # -- inside -----------------------------------------------------------------------------------
 

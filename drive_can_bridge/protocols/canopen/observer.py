@@ -52,9 +52,7 @@ class NmtObserver(DriveObserver):
     def __init__(self, nodes: dict[int, str], emit: Emit) -> None:
         super().__init__('', emit)
         self._nodes = nodes
-
-    def handler(self, identifier: int, extended: bool) -> Handler | None:
-        return self._take if not extended and identifier == network.NMT_IDENTIFIER else None
+        self.handlers[network.NMT_IDENTIFIER] = self._take
 
     def _take(self, data: bytes, now: float) -> None:
         decoded = self.decoded(network.decode_nmt, data, now, _REQUEST, _NETWORK, 'NMT')

@@ -9,12 +9,13 @@ import math
 from typing import Protocol
 
 from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.events import Noted
 from drive_can_bridge.core.outbox import Outbox
 from drive_can_bridge.core.reporter import Reporter
-from drive_can_bridge.core.users import DRIVE_OFFLINE
+from drive_can_bridge.core.requests import NO_ANSWER
+from drive_can_bridge.core.users import DRIVE_OFFLINE, Users
 from drive_can_bridge.protocols.canopen import network
 from drive_can_bridge.protocols.canopen.node import Change, Node
-from drive_can_bridge.protocols.canopen.node_report import NodeReport
 
 
 class NodeUser(Protocol):
@@ -23,7 +24,11 @@ class NodeUser(Protocol):
     configuration: DriveConfiguration
     outbox: Outbox
     report: Reporter
+    users: Users
     online: bool
+
+    def lose(self, reason: str, now: float) -> None:
+        """Make the drive offline, if it is not."""
 
     def node_free(self, free_at: float, now: float, *, anew: bool) -> None:
         """
@@ -32,15 +37,11 @@ class NodeUser(Protocol):
         :param anew: the exchange begins then; otherwise it keeps its beat.
         """
 
-    def node_closed(self, reason: str, now: float, *, restarted: bool) -> None:
-        """
-        Handle a node that takes no PDOs: none that was sent is answered any more.
+    def node_closed(self, now: float) -> None:
+        """Handle a node that takes no PDOs: none that was sent is answered any more."""
 
-        :param restarted: nothing at all is; and the node knows nothing of what it was told.
-        """
-
-    def node_silent(self, reason: str, now: float) -> None:
-        """Handle a node whose heartbeats have ceased."""
+    def node_silent(self, now: float) -> None:
+        """Handle a drive that was online and is silent: it may be listening."""
 
 
 class Supervision:
@@ -48,14 +49,12 @@ class Supervision:
     The node of one session.
 
     :ivar node: what is known of it.
-    :ivar report: what people are told of it.
     """
 
     def __init__(self, session: NodeUser) -> None:
         drive = session.configuration
         self.node = Node(drive.station, nmt_start=drive.options.nmt_start,
                          heartbeat_timeout=drive.options.heartbeat_timeout)
-        self.report = NodeReport(self.node, session.report)
         self._session = session
         self._in_use = False
 
@@ -86,10 +85,25 @@ class Supervision:
         if base == network.HEARTBEAT_BASE:
             self._take_heartbeat(network.decode_heartbeat(data), now)
         elif base == network.EMERGENCY_BASE:
-            self.report.emergency(data)
+            text = self.node.receive_emergency(network.decode_emergency(data))
+            if text:
+                self._session.report.note(Noted(text, warning=self.node.emergency is not None))
         else:
             return False
         return True
+
+    def silent(self, reason: str, now: float) -> None:
+        """Handle a drive that does not answer, or whose heartbeats have ceased."""
+        was_online = self._session.online
+        self._session.lose(reason, now)
+        self.node.offline(now)
+        if was_online:
+            self._session.node_silent(now)
+
+    def _close(self, reason: str, what: str, now: float) -> None:
+        self._session.lose(reason, now)
+        self._session.users.fail_all(f'{what}: {reason}')
+        self._session.node_closed(now)
 
     def _take_heartbeat(self, state: network.NmtState, now: float) -> None:
         session = self._session
@@ -98,11 +112,11 @@ class Supervision:
             return
         self._send()    # before a stop: the node hears that only when it was started
         if change is Change.RESTARTED:
-            self.report.restarted()
-            session.node_closed('the device restarted', now, restarted=True)
+            session.report.note(Noted('boot-up: the device has started'))
+            self._close('the device restarted', NO_ANSWER, now)
             session.report.advice = 'the device restarted: waiting for it to answer'
         elif change is Change.NOT_OPERATIONAL:
-            session.node_closed(self.node.refusal(now), now, restarted=False)
+            self._close(self.node.refusal(now), DRIVE_OFFLINE, now)
         self._follow(now, fresh=change is not Change.NONE)
 
     def _follow(self, now: float, *, fresh: bool = True) -> None:
@@ -129,8 +143,7 @@ class Supervision:
             change = self.node.handle_timer(now)
             self._send()
             if change is Change.HEARTBEAT_LOST:
-                self._session.node_silent(f'no heartbeat for {self.node.heartbeat_timeout:g} s',
-                                          now)
+                self.silent(f'no heartbeat for {self.node.heartbeat_timeout:g} s', now)
 
     def next_timer(self) -> float:
         """Return when ``handle_timer`` has something to do."""

@@ -2,10 +2,11 @@
 """
 The control word on its way through the mailbox.
 
-It is written when it changes. Whether the drive got it, its answer says; when that is missing,
-``disable`` is simply written again. Any other word might be executed twice: so it is read back
-first, and written again only if it is not there. Where it cannot be read back it is not repeated,
-and the control machine gives up by itself.
+It is written when it changes. Whether the drive got it, its answer says. A word that stops the
+drive may be executed twice: when its answer is missing, it is written again soon, before anything
+else, and with every round from then on. Any other word is read back first, and written again only
+if it is not there. Where it cannot be read back it is not repeated, and the control machine gives
+up by itself.
 
 A word that the drive refuses ends what the user wanted, with the reason that the drive gives. A
 refused ``disable`` is tried again and again: a device under local control, say, takes it as soon
@@ -23,8 +24,10 @@ from drive_can_bridge.protocols.canopen_pkw.mailbox import (
     Answered, MailboxChannel, Read, Refused, Reply, Silence, Step, Write,
 )
 from drive_can_bridge.protocols.canopen_pkw.procedures import tell
-from drive_can_bridge.protocols.channel import Lane
+from drive_can_bridge.protocols.channel import Lane, STOP_PATIENCE
 
+#: how often a word that stops the drive is written in a row while nobody answers
+STOPS_IN_A_ROW = 3
 #: s until a ``disable`` that was refused is written again
 RETRY_AFTER = 0.25
 
@@ -86,9 +89,10 @@ class ControlWriter:
 
     def _write(self) -> Generator[Step, Reply, None]:
         """Write the newest word, until it is answered or silence says to wait a while."""
+        unanswered = 0
         while True:
-            word = self._control.word
-            if word == self._doubtful and word != self._disable:
+            word, stopping = self._control.word, self._control.stopping
+            if word == self._doubtful and not stopping:
                 there = yield from self._read_back(word)
                 if there is None:
                     return
@@ -97,16 +101,23 @@ class ControlWriter:
                     if word == self._control.word:
                         return
                     continue
-                word = self._control.word
+                word, stopping = self._control.word, self._control.stopping
+            # the last has the time that any request has: a slow device is no silent one
+            again = stopping and unanswered < STOPS_IN_A_ROW - 1
+            timeout = min(STOP_PATIENCE, self._session.retry.timeout) if again else None
+            before = self._settled
+            if word != before:
+                self._settled = None    # from now on nobody knows: a stop does not rely on it
             reply = yield from tell(
                 self._session.told, CONTROL_WORD,
-                Write(self._span.address, self._placement.words(self._parameter, word),
-                      blind=self._control.stopping),
+                Write.of(self._placement, self._parameter, word, blind=stopping, timeout=timeout),
                 runs=word != self._disable)
             if isinstance(reply, Silence):
+                unanswered += stopping
+                self._settled = None if reply.sent else before
                 if reply.sent:
-                    self._settled, self._doubtful = None, word
-                if word == self._control.word:
+                    self._doubtful = word
+                if word == self._control.word and not again:
                     return
                 continue
             self._retry_at = math.inf

@@ -14,7 +14,6 @@ from drive_can_bridge.protocols.canopen.addressing import (
 )
 from drive_can_bridge.protocols.canopen_pkw import addresses, pkw
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
-from drive_can_bridge.protocols.canopen_pkw.identifiers import Identifiers
 from drive_can_bridge.protocols.canopen_pkw.options import PkwOptions
 from drive_can_bridge.protocols.family import Claim, Complaint, Family, Talk
 from drive_can_bridge.protocols.observer import DriveObserver, Emit
@@ -63,9 +62,9 @@ class CanopenPkw(Family):
                                      'says that this one was')
 
     def claims(self, drive: DriveConfiguration) -> list[Claim]:
-        request, response = Identifiers.of(drive)
-        return node_claims(drive, {request: f'PKW requests to node {drive.station}',
-                                   response: f'PKW responses of node {drive.station}'})
+        node, options = drive.station, drive.options
+        return node_claims(drive, {options.request_cob_id: f'PKW requests to node {node}',
+                                   options.response_cob_id: f'PKW responses of node {node}'})
 
     def reserved(self, drive: DriveConfiguration) -> list[Claim]:
         return reserved_claims(drive)
@@ -122,11 +121,11 @@ class CanopenPkw(Family):
         return len(addresses.round_plan(drive)) + len(drive.cyclic_request)
 
     def _check_identifiers(self, drive: DriveConfiguration) -> Iterator[Complaint]:
-        mine = Identifiers.of(drive)._asdict()
-        taken = [*mine.items(), ('emergency', network.EMERGENCY_BASE + drive.station),
-                 ('heartbeat', network.HEARTBEAT_BASE + drive.station)]
+        mine = {'request': drive.options.request_cob_id, 'response': drive.options.response_cob_id}
+        taken = {**mine, 'emergency': network.EMERGENCY_BASE + drive.station,
+                 'heartbeat': network.HEARTBEAT_BASE + drive.station}
         for own, identifier in mine.items():
-            purpose = next((purpose for purpose, other in taken
+            purpose = next((purpose for purpose, other in taken.items()
                             if purpose != own and other == identifier), None)
             if purpose is not None:
                 yield Complaint(f'{own}_cob_id', f'{identifier:03X}h is the identifier of the '

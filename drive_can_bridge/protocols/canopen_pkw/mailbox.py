@@ -28,9 +28,10 @@ import math
 from typing import Any, NamedTuple, Union
 
 from drive_can_bridge.core.outbox import Left
+from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.retry import RetryPolicy
 from drive_can_bridge.protocols.canopen_pkw import pkw, refusals
-from drive_can_bridge.protocols.canopen_pkw.addresses import Span
+from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Function, Message
 from drive_can_bridge.protocols.channel import Channel
 from drive_can_bridge.protocols.courier import Courier
@@ -68,6 +69,11 @@ class Write:
     words: tuple[int, ...]
     blind: bool = False
     timeout: float | None = None
+
+    @classmethod
+    def of(cls, placement: Placement, parameter: Parameter, raw: int, **how: Any) -> 'Write':
+        """Return what gives a parameter this raw integer."""
+        return cls(placement.span(parameter).address, placement.words(parameter, raw), **how)
 
     @property
     def span(self) -> Span:
@@ -144,8 +150,6 @@ class MailboxCourier(Courier[Step, Reply]):
         return isinstance(reply, Silence) and isinstance(step, Read)
 
     def begin(self, step: Step, now: float) -> None:
-        if self.busy:
-            raise RuntimeError('an exchange is under way')
         self.expect(step, math.inf)     # until its request is made
         if self._synchronised or isinstance(step, Write) and step.blind:
             self._send_step(step, now)
@@ -190,16 +194,10 @@ class MailboxCourier(Courier[Step, Reply]):
             return self._try_again(step, self._refused_at, now)
         if now < self._until:
             return False
-        if self._abandoned:
-            sent = request.code != Function.NONE
+        sent = request.code != Function.NONE
+        if sent or self._abandoned or isinstance(step, Write):
             self.forget()
             return Silence(sent)
-        if request.code != Function.NONE:
-            self.forget()
-            return Silence()
-        if isinstance(step, Write):
-            self.forget()
-            return Silence(sent=False)
         self._send_step(step, now)
         return False
 
@@ -223,7 +221,7 @@ class MailboxCourier(Courier[Step, Reply]):
                 self.deadline = self._until = max(self._until, now + 0.5 * self._patience)
             return
         self._refused_at = now
-        if self._waits_for_nobody:
+        if isinstance(self.step, Write) and self.step.blind:
             self.deadline = min(self._until, now + REFUSED_PAUSE)
         if self._request.code != Function.NONE:
             self._toggle = not self._toggle     # the device has not seen this one
@@ -233,13 +231,9 @@ class MailboxCourier(Courier[Step, Reply]):
             self._wrote(write)
         self._left(sent, now)
 
-    @property
-    def _waits_for_nobody(self) -> bool:
-        return isinstance(self.step, Write) and self.step.blind
-
     def _try_again(self, step: Step, refused_at: float, now: float) -> Reply | bool:
-        """Go on after a refusal: a read ends when its time is over, a write at once."""
-        again = self._waits_for_nobody
+        """Go on after a refusal: a read ends when its time is over, a write that may wait now."""
+        again = isinstance(step, Write) and step.blind
         if now >= self._until or self._abandoned or isinstance(step, Write) and not again:
             self.finish()   # what the device's last function byte is, is as known as before
             return Silence(sent=False, refused=True)

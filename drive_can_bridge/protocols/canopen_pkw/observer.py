@@ -6,8 +6,8 @@ A request that repeats the function byte of the one before starts nothing (:mod:
 shown, and no answer is expected.
 """
 
+from collections.abc import Sequence
 from functools import partial
-from typing import NamedTuple
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter, ParameterType
@@ -15,24 +15,14 @@ from drive_can_bridge.protocols.canopen.addressing import name_of_object
 from drive_can_bridge.protocols.canopen.observer import node_handlers
 from drive_can_bridge.protocols.canopen_pkw import addresses, pkw, refusals
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
-from drive_can_bridge.protocols.canopen_pkw.identifiers import Identifiers
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Function, Layout, Message
 from drive_can_bridge.protocols.observer import (
-    Direction, DriveObserver, Emit, Handler, Kind, raws_of, Verdict,
+    Direction, DriveObserver, Emit, Kind, listed_by, raws_of, Verdict,
 )
-from drive_can_bridge.protocols.watches import Questions, RoundWatch
+from drive_can_bridge.protocols.request_watch import Asked, Requests
 
 _REQUEST, _RESPONSE = Direction.REQUEST, Direction.RESPONSE
-_CYCLIC, _PARAMETER = Kind.CYCLIC, Kind.PARAMETER
-_TITLES = {True: 'write', False: 'read'}
-
-
-class _Asked(NamedTuple):
-    """What a request is about."""
-
-    span: Span
-    writes: bool
-    kind: Kind = _PARAMETER
+_PARAMETER = Kind.PARAMETER
 
 
 class PkwObserver(DriveObserver):
@@ -43,25 +33,20 @@ class PkwObserver(DriveObserver):
         options = drive.options
         self._decode = partial(pkw.decode, layout=Layout(options.layout))
         self._abort_order: str = options.abort_code_order
-        identifiers = Identifiers.of(drive)
-        self._handlers: dict[int, Handler] = {
+        self.handlers |= {
             **node_handlers(self, drive.station, self._booted),
-            identifiers.request: self._take_request,
-            identifiers.response: self._take_response,
+            options.request_cob_id: self._take_request,
+            options.response_cob_id: self._take_response,
         }
         placement = self._placement = Placement.of(drive)
-        self._spans = {placement.span(parameter): parameter
-                       for parameter in reversed(list(drive.profile.parameters.values()))
-                       if placement.address(parameter) is not None}
+        self._spans = listed_by(
+            drive.profile.parameters.values(), lambda parameter: (
+                None if placement.address(parameter) is None else placement.span(parameter)))
         self._wanted = addresses.round_spans(drive)
-        self._setpoints = {placement.span(parameter) for parameter in drive.cyclic_request}
-        self._round: RoundWatch[Span] = RoundWatch(addresses.round_plan(drive), self.observed)
-        self._questions: Questions[Message, _Asked] = Questions(
-            self, drive.parameter_timeout, self._unanswered)
+        self._requests: Requests[Message] = Requests(
+            self, drive.parameter_timeout, self._content, plan=addresses.round_plan(drive),
+            setpoints={placement.span(parameter) for parameter in drive.cyclic_request})
         self._last_byte: int | None = None
-
-    def handler(self, identifier: int, extended: bool) -> Handler | None:
-        return None if extended else self._handlers.get(identifier)
 
     # -- the mailbox ------------------------------------------------------------------------------
 
@@ -72,22 +57,16 @@ class PkwObserver(DriveObserver):
         repeated = message.function_byte == self._last_byte
         self._last_byte = message.function_byte
         if message.code == Function.NONE:
-            self._round.prelude = now
+            self._requests.round.prelude = now
             self.tell(now, _REQUEST, _PARAMETER, 'idle request')
             return
         asked = self._meant(message, now, _REQUEST, 'PKW request')
         if asked is None:
             return
-        span, writes, _ = asked
-        kind = self.count_request(cyclic=(
-            span in self._setpoints if writes else self._round.asked(span, now)))
-        note = self._questions.note if repeated else self._questions.ask
-        note(_key(message), asked._replace(kind=kind), now)
-        parameters, raws = self._content(span, message.words if writes else None)
-        self.tell(now, _REQUEST, kind, _TITLES[writes], parameters, raws,
-                  verdict=Verdict.SUSPICIOUS if repeated else Verdict.NORMAL,
-                  remark='the function byte is that of the request before: nothing is started'
-                  if repeated else '')
+        self._requests.ask(
+            _key(message), asked.span, now, message.words if asked.writes else None,
+            futile=repeated, wrong='the function byte is that of the request before: nothing is '
+            'started' if repeated else '')
 
     def _take_response(self, data: bytes, now: float) -> None:
         message = self.decoded(self._decode, data, now, _RESPONSE, _PARAMETER, 'PKW response')
@@ -97,7 +76,7 @@ class PkwObserver(DriveObserver):
             self.tell(now, _RESPONSE, _PARAMETER, 'idle response')
             return
         refused = message.code == Function.ERROR
-        known = self._questions.about
+        known = self._requests.about
         key = _key(message) if not refused else next(
             (key for key in reversed(known) if pkw.answers(message, key)), None)
         if key is None:
@@ -107,33 +86,24 @@ class PkwObserver(DriveObserver):
         asked = known.get(key) or self._meant(message, now, _RESPONSE, 'PKW response')
         if asked is None:
             return
-        span, writes, kind = asked
-        verdict, latency = self._questions.answer(key, now)
-        parameters, raws = self._content(span, None if refused or writes else message.words)
-        if verdict is Verdict.NORMAL and not writes:
-            if refused:
-                self._round.refused(span, addresses.instead_of(span, self._wanted), now)
-            else:
-                self._round.answered(span, now)
-        if refused:
-            verdict = Verdict.REFUSED
-        self.tell(now, _RESPONSE, kind, _TITLES[writes], parameters, raws, verdict=verdict,
-                  remark=self._refusal(message) if refused else '', latency=latency)
+        self._requests.answer(
+            key, asked, now, message.words, refusal=self._refusal(message) if refused else '',
+            parts=addresses.instead_of(asked.span, self._wanted))
 
     def _meant(self, message: Message, now: float, direction: Direction,
-               title: str) -> _Asked | None:
+               title: str) -> Asked | None:
         """Return what a message is about; None: its function does not exist, which was told."""
         meaning = message.meaning
         if meaning is None:
             self.tell(now, direction, _PARAMETER, title, verdict=Verdict.MALFORMED,
                       remark=f'unknown function {message.code:02X}h')
             return None
-        return _Asked(Span(message.address, meaning.count), meaning.writes)
+        return Asked(Span(message.address, meaning.count), meaning.writes)
 
     def _refusal(self, message: Message) -> str:
         return refusals.describe(refusals.code_from_words(message.words, self._abort_order))
 
-    def _content(self, span: Span, words: pkw.Words | None,
+    def _content(self, span: Span, words: Sequence[int] | None,
                  ) -> tuple[list[Parameter], list[int]]:
         """Return the parameters in a request or answer, and their values where there are any."""
         exact = self._spans.get(span)
@@ -148,12 +118,6 @@ class PkwObserver(DriveObserver):
 
     def _booted(self) -> None:
         self._last_byte = None
-
-    def _unanswered(self, key: Message, asked: _Asked, due: float) -> None:
-        if not asked.writes:
-            self._round.failed(asked.span)
-        self.tell_unanswered(due, asked.kind, _TITLES[asked.writes],
-                             self._content(asked.span, None)[0])
 
 
 def _key(message: Message) -> Message:

@@ -61,10 +61,6 @@ CODE_MASK = 0x7F
 WORD_MAX = 0xFFFF
 SUBINDEX_MAX = 0xFF
 
-_LITTLE = struct.Struct('<HBBHH')
-_SWAPPED = struct.Struct('<BBHHH')
-_BIG = struct.Struct('>HBBHH')
-
 Words = tuple[int, int]
 NO_WORDS: Words = (0, 0)
 
@@ -75,6 +71,15 @@ class Layout(Enum):
     WORD_LE = 'word_le'
     DWORD_SWAPPED = 'dword_swapped'
     WORD_BE = 'word_be'
+
+
+#: of each layout: how it packs them, and which of word 1, sub-index, function, words 3 and 4 comes
+#: in which place
+_PLACES = {
+    Layout.WORD_LE: (struct.Struct('<HBBHH'), (0, 1, 2, 3, 4)),
+    Layout.DWORD_SWAPPED: (struct.Struct('<BBHHH'), (1, 2, 0, 4, 3)),
+    Layout.WORD_BE: (struct.Struct('>HBBHH'), (0, 2, 1, 3, 4)),
+}
 
 
 class Function(IntEnum):
@@ -255,14 +260,10 @@ def encode(message: Message, layout: Layout) -> bytes:
 
     :raises LocalProtocolError: something does not fit its field.
     """
-    word, _, _, low, (third, fourth) = message
-    function = message.function_byte
+    packing, places = _PLACES[layout]
+    fields = message.word, message.low, message.function_byte, *message.words
     try:
-        if layout is Layout.WORD_LE:
-            return _LITTLE.pack(word, low, function, third, fourth)
-        if layout is Layout.DWORD_SWAPPED:
-            return _SWAPPED.pack(low, function, word, fourth, third)
-        return _BIG.pack(word, function, low, third, fourth)
+        return packing.pack(*[fields[place] for place in places])
     except struct.error:
         raise LocalProtocolError(f'{message!r} does not fit its words') from None
 
@@ -277,12 +278,8 @@ def decode(data: bytes, layout: Layout) -> Message:
     """
     if len(data) != PAYLOAD:
         raise RemoteProtocolError(f'{len(data)} data bytes instead of {PAYLOAD}')
-    if layout is Layout.WORD_LE:
-        word, low, function, third, fourth = _LITTLE.unpack(data)
-    elif layout is Layout.DWORD_SWAPPED:
-        low, function, word, fourth, third = _SWAPPED.unpack(data)
-    else:
-        word, function, low, third, fourth = _BIG.unpack(data)
+    packing, places = _PLACES[layout]
+    _, (word, low, function, third, fourth) = zip(*sorted(zip(places, packing.unpack(data))))
     return Message(word, function & CODE_MASK, bool(function & TOGGLE), low, (third, fourth))
 
 

@@ -23,7 +23,6 @@ from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.abort_codes import TEXTS
 from drive_can_bridge.protocols.canopen_pkw import pkw
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement
-from drive_can_bridge.protocols.canopen_pkw.identifiers import Identifiers
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Layout, Message
 from drive_can_bridge.protocols.canopen_pkw.refusals import describe
 from drive_can_bridge.protocols.prober import (
@@ -64,10 +63,9 @@ class PkwProber(Prober):
     """Asks one node."""
 
     def __init__(self, drive: DriveConfiguration) -> None:
-        self._identifiers = Identifiers.of(drive)
         self._toggle = False
         super().__init__(drive, [Route(each, STANDARD_IDENTIFIER_MAX, False) for each in (
-            self._identifiers.request, sdo.REQUEST_BASE + drive.station,
+            drive.options.request_cob_id, sdo.REQUEST_BASE + drive.station,
             network.NMT_IDENTIFIER)])
 
     def start_frame(self) -> Frame | None:
@@ -97,7 +95,7 @@ class PkwProber(Prober):
     def _mapped(self) -> Generator[Question, Frame | None, int | None]:
         """Return the object that the receive PDO4 maps; None: the node does not tell."""
         node = self.drive.station
-        if self._identifiers.request != network.REQUEST_BASE + node:
+        if self.drive.options.request_cob_id != network.REQUEST_BASE + node:
             return None     # some other PDO
         answer = yield Question(
             sdo.encode_upload(node, sdo.RPDO4_MAPPING, 1), sdo.RESPONSE_BASE + node,
@@ -153,8 +151,8 @@ class PkwProber(Prober):
 
     def _question(self, data: bytes, fits: Callable[[bytes], bool] = lambda data: True,
                   ) -> Question:
-        request, response = self._identifiers
-        return Question(Frame(request, data, False), response, fits)
+        options = self.drive.options
+        return Question(Frame(options.request_cob_id, data, False), options.response_cob_id, fits)
 
     def _ask(self, address: Address, count: int, layout: Layout) -> _Asking:
         request = pkw.read_request(address, count, self._toggle)

@@ -7,7 +7,6 @@ Every generator here is for :class:`.mailbox.MailboxChannel`.
 
 from collections.abc import Generator, Hashable, Sequence
 
-from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.requests import Failure, NOT_SENT, Outcome, Outcomes, Written
 from drive_can_bridge.core.told import Told
 from drive_can_bridge.protocols.access import Access, Found, Item
@@ -34,23 +33,22 @@ class RegisterAccess(Access[Span, Step, Reply]):
             return reply.words[:span.count]
         return self.retry.unanswered() if isinstance(reply, Silence) else Failure(reply.text)
 
-    def write(self, parameter: Parameter, raw: int) -> Generator[Step, Reply, Outcome]:
-        return self._put(
-            self.placement.span(parameter).address, self.placement.words(parameter, raw))
-
-    def write_together(self, items: Sequence[Item]) -> Generator[Step, Reply, Outcomes]:
+    def write(self, items: Sequence[Item]) -> Generator[Step, Reply, Outcomes]:
         words: dict[Address, int] = {}
-        spans = [self.placement.span(parameter) for parameter, _ in items]
-        for span, item in zip(spans, items):
-            words.update(zip(span.addresses, self.placement.words(*item)))
-        shared = self.placement.plan(spans)
-        if len(shared) != 1 or sum(span.count for span in spans) != shared[0].count:
-            return (Failure(NOT_TOGETHER),) * len(items)
+        for parameter, raw in items:
+            words.update(zip(self.placement.span(parameter).addresses,
+                             self.placement.words(parameter, raw)))
         outcome = yield from self._put(
-            shared[0].address, tuple(words[address] for address in shared[0].addresses))
+            Write(min(words), tuple(words[address] for address in sorted(words))))
         return (outcome,) * len(items)
 
-    def _put(self, address: Address, words: tuple[int, ...]) -> Generator[Step, Reply, Outcome]:
+    def misfit(self, items: Sequence[Item]) -> str:
+        spans = [self.placement.span(parameter) for parameter, _ in items]
+        shared = self.placement.plan(spans)
+        fits = len(shared) == 1 and sum(span.count for span in spans) == shared[0].count
+        return '' if fits else NOT_TOGETHER
+
+    def _put(self, write: Write) -> Generator[Step, Reply, Outcome]:
         """
         Write once.
 
@@ -58,7 +56,7 @@ class RegisterAccess(Access[Span, Step, Reply]):
         be executed twice. What was not sent because the mailbox was out of step is tried again.
         """
         for _ in range(self.retry.attempts):
-            reply = yield Write(address, words)
+            reply = yield write
             if isinstance(reply, Answered):
                 return Written()
             if isinstance(reply, Refused):
@@ -117,11 +115,10 @@ def write_until_answered(writes: Sequence[StopWrite], placement: Placement, atte
     failed = []
     for parameter, raw, is_word in writes:
         name = f'{parameter.name} {raw:04X}h' if is_word else parameter.name
-        address, words = placement.span(parameter).address, placement.words(parameter, raw)
         reply: Reply = Silence()
         for attempt in range(1, attempts + 1):
-            reply = yield Write(address, words, blind=True,
-                                timeout=last if attempt == attempts else timeout)
+            reply = yield Write.of(placement, parameter, raw, blind=True,
+                                   timeout=last if attempt == attempts else timeout)
             if not isinstance(reply, Silence):
                 break
         if isinstance(reply, Refused):

@@ -31,11 +31,9 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.session import LOOKING, Session, Stage
-from drive_can_bridge.core.users import DRIVE_OFFLINE, Users
-from drive_can_bridge.protocols.access import ChannelServer
+from drive_can_bridge.core.users import Users
 from drive_can_bridge.protocols.canopen.supervision import Supervision
 from drive_can_bridge.protocols.canopen_pkw import addresses, pkw, procedures
-from drive_can_bridge.protocols.canopen_pkw.identifiers import Identifiers
 from drive_can_bridge.protocols.canopen_pkw.mailbox import MailboxChannel, MailboxCourier
 from drive_can_bridge.protocols.canopen_pkw.pkw import Layout, Message
 from drive_can_bridge.protocols.canopen_pkw.round import Rounds
@@ -64,7 +62,6 @@ class PkwSession(Session):
             drive, controlled=control is not None, cells=addresses.keys,
             refusal=lambda parameter: addresses.half_refusal(parameter, drive.profile)))
         options, placement = drive.options, addresses.Placement.of(drive)
-        self._identifiers = Identifiers.of(drive)
         self._layout = Layout(options.layout)
         self._supervision = Supervision(self)
         self._node = self._supervision.node
@@ -79,7 +76,7 @@ class PkwSession(Session):
             answered=self._rounds.ended, missed=self._missed,
             present=lambda: not self._node.heartbeat_lost)
         self.users = Users(
-            self, ChannelServer(self._channel, procedures.RegisterAccess(self.retry, placement)),
+            self, procedures.RegisterAccess(self._channel, self.retry, placement),
             blocked=self._supervision.refusal, control_refusal=self._writers.control_refusal)
         self.look_after(channel=self._channel)
 
@@ -132,7 +129,7 @@ class PkwSession(Session):
 
     def _missed(self, reason: str, now: float) -> None:
         if reason and self.online:
-            self.node_silent(reason, now)
+            self._supervision.silent(reason, now)
         elif reason and not self._node.heartbeat_lost:
             self.report.advice = SILENT
 
@@ -148,14 +145,6 @@ class PkwSession(Session):
     def withdrawn(self, now: float) -> None:
         """Leave it to the stop to write ``disable``."""
 
-    def _stop_if_owed(self, now: float) -> None:
-        if self.told.owed:
-            self._stop_silent(now)
-
-    def _stop_silent(self, now: float) -> None:
-        self._writers.stop(
-            STOP_TIME_SILENT, now, in_the_end=self.configuration.parameter_timeout)
-
     # -- the node ---------------------------------------------------------------------------------
 
     def node_free(self, free_at: float, now: float, *, anew: bool) -> None:
@@ -164,21 +153,20 @@ class PkwSession(Session):
             self._exchange.timer.start(max(now, free_at))
         self._channel.advance(now)
 
-    def node_silent(self, reason: str, now: float) -> None:
-        """Handle a drive that is silent, but may be listening: it has to stand still."""
-        was_online = self.online
-        self.lose(reason, now)
-        self._node.offline(now)
-        if was_online:
-            self._stop_silent(now)
+    def node_silent(self, now: float) -> None:
+        self._writers.stop(
+            STOP_TIME_SILENT, now, in_the_end=self.configuration.parameter_timeout)
 
-    def node_closed(self, reason: str, now: float, *, restarted: bool) -> None:
-        self.lose(reason, now)
-        self.users.fail_all(f'{"no answer" if restarted else DRIVE_OFFLINE}: {reason}')
+    def node_closed(self, now: float) -> None:
         # a stop takes its course: however often a node starts anew, they do not pile up
         if self._channel.is_idle(Lane.STOP):
             self._channel.clear()
             self._stop_if_owed(now)
+
+    def _stop_if_owed(self, now: float) -> None:
+        """Have a drive stand still of which nobody knows whether it listens."""
+        if self.told.owed:
+            self.node_silent(now)
 
     def _end_futile_stop(self, now: float) -> None:
         """End a stop that was for safety only, of a node that takes no PDOs any more."""
@@ -186,10 +174,6 @@ class PkwSession(Session):
             self.stop_ended()
 
     # -- what the device is told ------------------------------------------------------------------
-
-    def _write_expired(self, now: float) -> None:
-        if self.gate.expire(now):
-            self._writers.write_setpoints(now)
 
     def see_to_control_word(self, now: float) -> None:
         if self.online:
@@ -199,7 +183,7 @@ class PkwSession(Session):
 
     def _send(self, message: Message, left: Left) -> None:
         request = pkw.encode(message, self._layout)
-        self.outbox.put(Frame(self._identifiers.request, request, False), left)
+        self.outbox.put(Frame(self.configuration.options.request_cob_id, request, False), left)
 
     def frames_left(self, now: float, refused: Collection[int] = ()) -> None:
         super().frames_left(now, refused)
@@ -210,15 +194,16 @@ class PkwSession(Session):
         identifier, data, extended = frame
         if extended:
             return
+        options = self.configuration.options
         try:
-            if identifier == self._identifiers.response:
+            if identifier == options.response_cob_id:
                 self._exchange.received_at = now - age
                 message = pkw.decode(data, self._layout)
                 if not self._channel.receive(message, now):
                     self.report.reject(f'PKW response that nobody asked for: {message}')
             elif self._supervision.receive(identifier, data, now):
                 self._end_futile_stop(now)
-            elif identifier == self._identifiers.request:
+            elif identifier == options.request_cob_id:
                 self.report.note(ForeignMasterSeen(
                     f'another master sends PKW requests to node {self.configuration.station}: '
                     f'{frame}'))
@@ -233,10 +218,12 @@ class PkwSession(Session):
             if self.control is not None and now >= self.control.next_timer():
                 self.control.handle_timer(now)
                 self.control_changed(now)
-            self._write_expired(now)
+            if self.gate.expire(now):
+                self._writers.write_setpoints(now)
         self._channel.advance(now)
         if now >= self._round_due:
-            self._write_expired(now)
+            if self.control is not None and self.control.stopping:
+                self.see_to_control_word(now)   # before setpoints, should it be due again
             if self.online:
                 self._writers.write_setpoints(now)
                 self.see_to_control_word(now)
@@ -258,9 +245,9 @@ class PkwSession(Session):
 
     @property
     def warning(self) -> str:
-        node = self._supervision.report
         return '; '.join(filter(None, (
-            node.ailing, *self._rounds.warnings(), *self._writers.warnings(), node.missing)))
+            self._node.ailing, *self._rounds.warnings(), *self._writers.warnings(),
+            self._node.missing)))
 
     def facts(self) -> dict[str, str]:
-        return self._supervision.report.facts()
+        return self._node.facts()

@@ -2,20 +2,22 @@
 """
 What a device is told: setpoints and control word while it is online, and the stop of both.
 
-Both are written when they change. Neutral setpoints follow the word that stops a drive at once,
-and so does everything in the stop, whatever is known of the node.
+Both are written when they change, setpoints also again after a while. Neutral setpoints follow the
+word that stops a drive at once, and so does everything in the stop, whatever is known of the node.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.session import Session
-from drive_can_bridge.protocols.canopen_pkw import procedures
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement
 from drive_can_bridge.protocols.canopen_pkw.control_writer import ControlWriter
-from drive_can_bridge.protocols.canopen_pkw.mailbox import MailboxChannel, Reply, Step
-from drive_can_bridge.protocols.canopen_pkw.setpoint_writer import SetpointWriter
+from drive_can_bridge.protocols.canopen_pkw.mailbox import (
+    MailboxChannel, Refused, Reply, Silence, Step, Write,
+)
+from drive_can_bridge.protocols.canopen_pkw.procedures import tell, write_until_answered
 from drive_can_bridge.protocols.channel import Lane
+from drive_can_bridge.protocols.polling import WriteSchedule
 from drive_can_bridge.protocols.safe_stop import SafeStop
 
 #: how often a drive is told to stand still
@@ -24,35 +26,41 @@ STOP_ATTEMPTS = 3
 
 class Writers:
     """
-    The writers of one drive.
+    What writes to one drive.
 
     :param stop_ended: called when a stop has run its course.
+    :ivar control: writes the control word; None: there is none.
     """
 
     def __init__(self, session: Session, channel: MailboxChannel,
                  stop_ended: Callable[[], None]) -> None:
+        drive = session.configuration
+        self.control = None if session.control is None else ControlWriter(
+            session, session.control, channel)
         self._session = session
         self._channel = channel
-        self._placement = Placement.of(session.configuration)
-        self._setpoints = SetpointWriter(session, channel)
-        self._control = None if session.control is None else ControlWriter(
-            session, session.control, channel)
+        self._placement = Placement.of(drive)
+        self._setpoints = session.setpoints
+        self._schedule = WriteSchedule(
+            len(session.setpoints.items), drive.options.refresh_interval)
+        self._refusals: dict[str, str] = {}     # of setpoints, by name
+        self._warned: dict[str, str] = {}
         self._stop: SafeStop[Step, Reply] = SafeStop(session, channel, stop_ended)
 
     def forget(self) -> None:
         """Take note that nothing is known of the drive."""
-        self._setpoints.forget()
-        if self._control is not None:
-            self._control.forget()
+        self._schedule.forget()
+        self._refusals.clear()
+        self._warned.clear()
+        if self.control is not None:
+            self.control.forget()
 
     def cancel(self) -> None:
         """Leave alone what is under way, but for a stop."""
         self._channel.cancel(Lane.SETPOINTS)
         self._channel.cancel(Lane.CONTROL)
 
-    def write_setpoints(self, now: float) -> None:
-        """Write the setpoints that are due."""
-        self._setpoints.look(now)
+    # -- while it is online -----------------------------------------------------------------------
 
     def write_control(self, now: float, *, known: bool) -> None:
         """
@@ -60,11 +68,41 @@ class Writers:
 
         :param known: the status was read just now, or there is none.
         """
-        if self._control is not None:
-            self._control.update(now, known=known)
-        setpoints = self._session.setpoints
-        if setpoints.changed and not setpoints.enabled:
-            self._setpoints.look(now)
+        if self.control is not None:
+            self.control.update(now, known=known)
+        if self._setpoints.changed and not self._setpoints.enabled:
+            self.write_setpoints(now)
+
+    def write_setpoints(self, now: float) -> None:
+        """Write the setpoints that are due, each once."""
+        self._setpoints.changed = False
+        items = self._setpoints.items
+        if not items:
+            return
+        self._schedule.look([setpoint.raw for setpoint in items], now, hold=[
+            index for index, setpoint in enumerate(items) if not setpoint.known])
+        if self._schedule.waiting and self._channel.is_idle(Lane.SETPOINTS):
+            self._channel.run(self._write_setpoints(), lambda _: None, now, Lane.SETPOINTS)
+
+    def _write_setpoints(self) -> Generator[Step, Reply, None]:
+        while self._schedule.waiting:
+            index = self._schedule.next()
+            setpoint = self._setpoints.items[index]
+            name, raw = setpoint.parameter.name, setpoint.raw
+            # at once: a look while the answer is awaited must not find it due again
+            self._schedule.written(index, raw, self._channel.now)
+            reply = yield from tell(
+                self._session.told, index, Write.of(self._placement, setpoint.parameter, raw),
+                runs=raw != setpoint.neutral)
+            if isinstance(reply, Silence):
+                self._schedule.failed(index)
+            elif isinstance(reply, Refused):
+                text = f'{name} {reply.text}'
+                if self._warned.get(name) != text:  # once: commands may go to and fro
+                    self._session.report.warn(f'write of {text}')
+                self._warned[name] = self._refusals[name] = text
+            else:
+                self._refusals.pop(name, None)
 
     # -- stopping ---------------------------------------------------------------------------------
 
@@ -83,7 +121,7 @@ class Writers:
         timeout = min(self._session.configuration.parameter_timeout,
                       time / (STOP_ATTEMPTS * max(1, len(writes))))
         self._stop.begin(
-            procedures.write_until_answered(
+            write_until_answered(
                 writes, self._placement, STOP_ATTEMPTS, timeout, max(timeout, in_the_end)),
             now, insist=insist)
 
@@ -92,8 +130,8 @@ class Writers:
     def control_refusal(self, action: ControlAction, refusal: str) -> str:
         """Say why a control action cannot be asked for, besides the usual."""
         if action is ControlAction.ENABLE:
-            for setpoint in self._session.setpoints.held:  # the drive has another position
-                refused = self._setpoints.refusals.get(setpoint.parameter.name)
+            for setpoint in self._setpoints.held:  # the drive has another position
+                refused = self._refusals.get(setpoint.parameter.name)
                 if refused:
                     return f'it would jump: write of {refused}'
         return refusal
@@ -101,7 +139,7 @@ class Writers:
     def warnings(self) -> list[str]:
         """Say what the drive refuses, and what to do."""
         texts = [f'write of {text}: correct cyclic_request, the command or the profile'
-                 for text in self._setpoints.refusals.values()]
-        if self._control is not None and self._control.refusal:
-            texts.append(f'write of {self._control.refusal}: look at the device')
+                 for text in self._refusals.values()]
+        if self.control is not None and self.control.refusal:
+            texts.append(f'write of {self.control.refusal}: look at the device')
         return texts

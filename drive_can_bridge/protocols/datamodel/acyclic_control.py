@@ -18,7 +18,9 @@ from drive_can_bridge.core.parameters import Parameter, Storage
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.told import CONTROL_WORD
 from drive_can_bridge.protocols.cycle_timer import stop_spacing
-from drive_can_bridge.protocols.datamodel.channel import AcyclicChannel, Procedure
+from drive_can_bridge.protocols.datamodel.channel import (
+    AcyclicChannel, ParameterCourier, Procedure,
+)
 from drive_can_bridge.protocols.datamodel.numbers import Numbers
 
 #: s between two looks at the status word, while a request is under way and otherwise
@@ -44,13 +46,14 @@ class AcyclicControl:
     """
 
     def __init__(self, session: Session, control: ControlMachine, channel: AcyclicChannel,
-                 numbers: Numbers, *, word: Parameter | None,
+                 courier: ParameterCourier, numbers: Numbers, *, word: Parameter | None,
                  status: Parameter | None) -> None:
         self._look_at = math.inf    # when the status word is to be read
         self._retry_at = math.inf   # when a refused word, or a pulse, is to be written again
         self._session = session
         self._control = control
         self._channel = channel
+        self._courier = courier
         self._word = word
         self._status = status
         self._spacing = stop_spacing(session.configuration.period)
@@ -96,8 +99,8 @@ class AcyclicControl:
             return
         self._written = word
         self._repeat_at = self._retry_at = math.inf      # until it left
-        write = (self._channel.write_now if self._control.stopping
-                 else self._channel.write_first)
+        write = (self._courier.write_now if self._control.stopping
+                 else self._courier.write_first)
         runs = not self._control.at_rest
         write(self._numbers.write(self._word, word),
               lambda sent, then: self._left(word, sent, then, runs=runs), now)

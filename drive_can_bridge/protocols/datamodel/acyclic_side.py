@@ -5,7 +5,7 @@ The acyclic side of a DataModel drive, whatever its identifiers look like.
 Requests of users, a control or status word without a slot in cyclic telegrams, stops by number.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator, Sequence
 import math
 from typing import Union
 
@@ -17,18 +17,22 @@ from drive_can_bridge.core.process_image import control_word, status_word
 from drive_can_bridge.core.roles import Cells
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.users import Users
-from drive_can_bridge.protocols.access import ChannelServer
+from drive_can_bridge.protocols.channel import Channel
 from drive_can_bridge.protocols.datamodel import procedures
 from drive_can_bridge.protocols.datamodel.acyclic_control import AcyclicControl
 from drive_can_bridge.protocols.datamodel.channel import (
-    AcyclicChannel, ParameterCourier, Read, Reply, Step, Words,
+    AcyclicChannel, ParameterCourier, Read, Reply, Step, Words, Write,
 )
 from drive_can_bridge.protocols.datamodel.extended import PAYLOAD, SLOTS
 from drive_can_bridge.protocols.datamodel.numbers import Numbers
 from drive_can_bridge.protocols.datamodel.options import DataModelOptions
-from drive_can_bridge.protocols.datamodel.stop_writes import ANSWER_TIME, confirm
 from drive_can_bridge.protocols.placement import SentWrites
 from drive_can_bridge.protocols.safe_stop import SafeStop
+
+#: how often everything is written at most that makes a drive stand still
+ATTEMPTS = 3
+#: s that an answer is waited for then, at most
+ANSWER_TIME = 0.1
 
 
 class AcyclicSide:
@@ -41,6 +45,7 @@ class AcyclicSide:
     :param together: parameters that fit one write frame.
     :param stop_ended: called when a stop by acyclic writes has run its course.
     :param quarantine: given where the exchange itself goes through the channel.
+    :ivar channel: everything acyclic goes through it, by the ``courier``.
     :ivar numbers: where the parameters of the drive stand.
     :ivar control_slot: of the control word in ``cyclic_request``, or None.
     :ivar status_slot: of the status word in ``cyclic_response``, or None.
@@ -57,12 +62,14 @@ class AcyclicSide:
         self._session = session
         self._decode = decode
         sent = SentWrites(session.sent, self.numbers)
-        self.channel = AcyclicChannel(ParameterCourier(
+        self.courier = ParameterCourier(
             encode_read=encode_read, encode_write=encode_write, send=session.outbox.put,
             wrote=lambda write: sent.note(write.chunk, write.words), retry=session.retry,
-            eeprom_gap=options.eeprom_write_gap, quarantine=quarantine))
-        session.users = Users(session, ChannelServer(self.channel, procedures.ParameterAccess(
-            session.retry, self.numbers, verify=drive.verify_writes, together=together)))
+            eeprom_gap=options.eeprom_write_gap, quarantine=quarantine)
+        self.channel: AcyclicChannel = Channel(self.courier)
+        session.users = Users(session, procedures.ParameterAccess(
+            self.channel, session.retry, self.numbers, verify=drive.verify_writes,
+            together=together))
         word = control_word(drive, controlled=session.control is not None)
         status = status_word(drive)
         self.control_slot = _slot(drive.cyclic_request, word)
@@ -70,7 +77,7 @@ class AcyclicSide:
         word = word if self.control_slot is None else None
         status = status if self.status_slot is None else None
         self.control_writer = None if session.control is None or not (word or status) else (
-            AcyclicControl(session, session.control, self.channel, self.numbers,
+            AcyclicControl(session, session.control, self.channel, self.courier, self.numbers,
                            word=word, status=status))
         self.parts = () if self.control_writer is None else (self.control_writer,)
         self.stop: SafeStop[Step, Reply] = SafeStop(session, self.channel, stop_ended)
@@ -89,7 +96,7 @@ class AcyclicSide:
         """Take an answer: to the outstanding read, or to nothing."""
         session = self._session
         try:
-            words = self._decode(frame, self.channel.outstanding)
+            words = self._decode(frame, self.courier.outstanding)
         except RemoteProtocolError as error:
             session.report.reject(str(error))
             return
@@ -120,9 +127,10 @@ class AcyclicSide:
 
     def begin_stop(self, now: float, *, setpoints: bool = True) -> None:
         """
-        Write ``disable`` and neutral setpoints by their numbers, and see that the drive has them.
+        Write ``disable`` and neutral setpoints by their numbers, which no map can misroute.
 
-        A stop that is under way goes on as it is.
+        The writes go at once, whatever is under way and wherever the drive keeps the values. A
+        stop that is under way goes on as it is.
 
         :param setpoints: False: what is in ``cyclic_request`` is stopped by cyclic frames.
         """
@@ -135,9 +143,40 @@ class AcyclicSide:
         writes.sort(key=lambda each: each[1].eeprom)
         stop.running = True     # before the first of them leaves
         for _, write in writes:
-            self.channel.write_now(write, lambda sent, then: None, now)
+            self.courier.write_now(write, lambda sent, then: None, now)
         timeout = min(self._session.retry.timeout, ANSWER_TIME)
         stop.begin(confirm(writes, timeout), now, setpoints=setpoints)
+
+
+def confirm(writes: Sequence[tuple[Parameter, Write]], timeout: float,
+            ) -> Generator[Step, Words | None, list[str]]:
+    """
+    Read back what stops a drive, since nobody acknowledges it, and write it again as needed.
+
+    :param writes: what was written.
+    :return: what failed, in words.
+    """
+    blind = [each for each in writes if not each[0].readable]
+    wrong = [each for each in writes if each[0].readable]
+    failed: list[str] = []
+    for attempt in range(ATTEMPTS):
+        for each in (*blind, *wrong) if attempt else ():
+            yield each[1]
+        doubtful, failed, silent = wrong, [], False
+        wrong = []
+        for parameter, write in doubtful:
+            reply = None if silent else (yield Read(
+                write.number, attempts=1, late_will_do=True, timeout=timeout))
+            silent = reply is None
+            if reply == write.words:
+                continue
+            wrong.append((parameter, write))
+            failed.append(f'{parameter.name} ({parameter.address}): ' + (
+                'no answer' if reply is None else
+                f'read back {reply[0]} instead of {write.words[0]}'))
+        if not wrong and not blind:
+            break
+    return failed
 
 
 def _slot(parameters: tuple[Parameter, ...], parameter: Parameter | None) -> int | None:

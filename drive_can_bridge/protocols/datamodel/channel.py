@@ -249,19 +249,4 @@ class ParameterCourier(Courier[Step, Reply]):
         return max(ready, self._eeprom_free_at) if self._first[0].eeprom else ready
 
 
-class AcyclicChannel(Channel[Step, Reply]):
-    """
-    Runs procedures, one frame at a time.
-
-    Where the exchange itself goes through it, our own procedures run to their end.
-    """
-
-    def __init__(self, courier: ParameterCourier) -> None:
-        self.courier = courier
-        self.write_first, self.write_now = courier.write_first, courier.write_now
-        super().__init__(courier, own_to_end=courier.anonymous)
-
-    @property
-    def outstanding(self) -> Read | None:
-        """The read that waits for its answer, if any."""
-        return self.courier.outstanding
+AcyclicChannel = Channel[Step, Reply]

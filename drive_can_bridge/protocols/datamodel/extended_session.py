@@ -10,7 +10,8 @@ The conversation with one DataModel drive that uses 29-bit identifiers.
       └──deactivate / bus down──┘    └─────────3 neutral cycles, then silence──────┘
 
 Whatever was told to run is told to stop: by neutral cycles where the request map is known to
-agree, otherwise by acyclic writes (:mod:`.stop_writes`), whatever the session is about to do next.
+agree, otherwise by acyclic writes (:mod:`.acyclic_side`), whatever the session is about to do
+next.
 
 A drive reads cyclic words by *its own* maps. So the maps are read before the first cyclic frame,
 every second while cycling, and again after each loss; a drive that does not answer gets no cyclic
@@ -30,13 +31,14 @@ from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.protocols.cyclic_exchange import CYCLE, CyclicExchange
 from drive_can_bridge.protocols.datamodel import extended
-from drive_can_bridge.protocols.datamodel.acyclic_side import AcyclicSide, map_cells
+from drive_can_bridge.protocols.datamodel.acyclic_side import (
+    AcyclicSide, ANSWER_TIME, ATTEMPTS, map_cells,
+)
 from drive_can_bridge.protocols.datamodel.map_supervision import (
     MapSupervision, SILENT_LOOKS, Verdict,
 )
 from drive_can_bridge.protocols.datamodel.positions import Positions
 from drive_can_bridge.protocols.datamodel.process_words import CyclicCodec
-from drive_can_bridge.protocols.datamodel.stop_writes import ANSWER_TIME, ATTEMPTS
 
 #: direction and station of an identifier
 FROM_WHOM = extended.DIR | extended.STATION_MASK

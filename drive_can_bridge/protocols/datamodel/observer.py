@@ -12,12 +12,11 @@ from drive_can_bridge.protocols.datamodel.extended import ReadRequest, Write
 from drive_can_bridge.protocols.datamodel.process_words import CyclicCodec
 from drive_can_bridge.protocols.datamodel.standard_round import reads
 from drive_can_bridge.protocols.observer import (
-    Direction, DriveObserver, Emit, Handler, Kind, raws_of, Telegram, Verdict,
+    Direction, DriveObserver, Emit, Handler, Kind, listed_by, raws_of, Telegram, Verdict,
 )
 from drive_can_bridge.protocols.polling import Chunk
-from drive_can_bridge.protocols.watches import (
-    CYCLES_WAITED, CyclicWatch, Questions, RoundWatch, WriteGap,
-)
+from drive_can_bridge.protocols.request_watch import Asked, Requests
+from drive_can_bridge.protocols.watches import CYCLES_WAITED, CyclicWatch, WriteGap
 
 _REQUEST, _RESPONSE = Direction.REQUEST, Direction.RESPONSE
 _CYCLIC, _PARAMETER = Kind.CYCLIC, Kind.PARAMETER
@@ -35,54 +34,42 @@ class _Traffic:
     def __init__(self, observer: DriveObserver, drive: DriveConfiguration, *,
                  plan: Sequence[Chunk] = (), setpoints: Sequence[Parameter] = ()) -> None:
         self._offset: int = drive.options.parameter_offset
-        self._observer = observer
-        self._listed = {parameter.number + self._offset: parameter
-                        for parameter in reversed(list(drive.profile.parameters.values()))
-                        if parameter.number is not None}
-        self._setpoints = {(parameter.number or 0) + self._offset for parameter in setpoints}
-        self._round: RoundWatch[Chunk] = RoundWatch(plan, observer.observed)
-        self._questions: Questions[Chunk, Kind] = Questions(
-            observer, drive.parameter_timeout, self._unanswered)
+        self._observed = observer.observed
+        self._listed = listed_by(
+            drive.profile.parameters.values(), lambda parameter: (
+                None if parameter.number is None else parameter.number + self._offset))
+        self._requests: Requests[Chunk] = Requests(
+            observer, drive.parameter_timeout, self._content, plan=plan,
+            setpoints={Chunk((parameter.number or 0) + self._offset) for parameter in setpoints})
         self._gap = WriteGap(drive.options.eeprom_write_gap)
 
     def take(self, request: ReadRequest | Write, now: float) -> None:
-        """Take a request."""
-        observer = self._observer
+        """Take a request; nobody answers a write."""
         if isinstance(request, ReadRequest):
             chunk = Chunk(request.number, request.count)
-            kind = observer.count_request(cyclic=self._round.asked(chunk, now))
-            self._questions.ask(chunk, kind, now)
-            observer.tell(now, _REQUEST, kind, 'read', self._named(chunk))
+            self._requests.ask(chunk, chunk, now)
             return
-        parameters = self._named(Chunk(request.number, len(request.words)))
+        chunk = Chunk(request.number, len(request.words))
         wrong = ''
-        if any(parameter.storage is not Storage.RAM for parameter in parameters):
+        if any(parameter.storage is not Storage.RAM for parameter in self._named(chunk)):
             wrong = self._gap.written(now)
-            observer.observed.fast_writes += bool(wrong)
-        kind = observer.count_request(cyclic=request.number in self._setpoints)
-        observer.tell(now, _REQUEST, kind, 'write', parameters,
-                      raws_of(parameters, request.words),
-                      verdict=Verdict.SUSPICIOUS if wrong else Verdict.NORMAL, remark=wrong)
+            self._observed.fast_writes += bool(wrong)
+        self._requests.ask(None, chunk, now, request.words, wrong=wrong)
 
     def answered(self, chunk: Chunk, words: Sequence[int], now: float) -> None:
         """Take the answer to a read."""
-        kind = self._questions.about.get(chunk, _PARAMETER)
-        verdict, latency = self._questions.answer(chunk, now)
-        parameters = self._named(chunk)
-        self._observer.tell(now, _RESPONSE, kind, 'read', parameters, raws_of(parameters, words),
-                            verdict=verdict, latency=latency)
-        if verdict is _NORMAL:
-            self._round.answered(chunk, now)
+        self._requests.answer(chunk, self._requests.about.get(chunk) or Asked(chunk), now, words)
 
-    def _unanswered(self, chunk: Chunk, kind: Kind, due: float) -> None:
-        self._round.failed(chunk)
-        self._observer.tell_unanswered(due, kind, 'read', self._named(chunk))
+    def _content(self, chunk: Chunk, words: Sequence[int] | None,
+                 ) -> tuple[list[Parameter], list[int]]:
+        parameters = self._named(chunk)
+        return parameters, [] if words is None else raws_of(parameters, words)
 
     def _named(self, chunk: Chunk) -> list[Parameter]:
         """Return the parameters with these numbers on the wire."""
         return [self._listed.get(each) or Parameter(
             f'p{each - self._offset}', number=each - self._offset, listed=False)
-            for each in range(chunk.address, chunk.address + chunk.size)]
+            for each in chunk.addresses]
 
 
 class ExtendedObserver(DriveObserver):
@@ -165,14 +152,9 @@ class StandardObserver(DriveObserver):
         self._strict: bool = options.length_policy == 'strict'
         self._request = standard.identifier(options.request_id_base, drive.station)
         self._response = standard.identifier(options.response_id_base, drive.station)
+        self.handlers |= {self._request: self._take_request, self._response: self._take_response}
         self._traffic = _Traffic(self, drive, plan=reads(drive), setpoints=drive.cyclic_request)
         self._last: Chunk | None = None
-
-    def handler(self, identifier: int, extended_format: bool) -> Handler | None:
-        if extended_format:
-            return None
-        return {self._request: self._take_request,
-                self._response: self._take_response}.get(identifier)
 
     def _take_request(self, data: bytes, now: float) -> None:
         request = self.decoded(

@@ -14,7 +14,9 @@ from drive_can_bridge.core.requests import (
 )
 from drive_can_bridge.core.retry import RetryPolicy
 from drive_can_bridge.protocols.access import Access, Found, Item, read_back
-from drive_can_bridge.protocols.datamodel.channel import Read, Reply, Step, Words, Write
+from drive_can_bridge.protocols.datamodel.channel import (
+    AcyclicChannel, Read, Reply, Step, Words, Write,
+)
 from drive_can_bridge.protocols.datamodel.extended import CYCLIC_PARAMETER, SLOTS
 from drive_can_bridge.protocols.datamodel.mapping import effective, padded
 from drive_can_bridge.protocols.datamodel.numbers import Numbers
@@ -66,33 +68,34 @@ class ParameterAccess(Access[Chunk, Step, Reply]):
     :param together: parameters that fit one write frame.
     """
 
-    def __init__(self, retry: RetryPolicy, numbers: Numbers, *, verify: bool,
-                 together: int) -> None:
-        super().__init__(retry, numbers)
+    def __init__(self, channel: AcyclicChannel, retry: RetryPolicy, numbers: Numbers, *,
+                 verify: bool, together: int) -> None:
+        super().__init__(channel, retry, numbers)
         self._numbers = numbers
         self._verify = verify
         self._together = together
+
+    def aside(self, parameter: Parameter, *, write: bool) -> Outcome | None:
+        never = write and self._numbers.number(parameter) == CYCLIC_PARAMETER
+        return Failure(NOT_WRITABLE) if never else None
 
     def read(self, span: Chunk) -> Generator[Step, Reply, Found]:
         # one bad number makes the drive ignore the whole frame
         words = yield Read(span.address, span.size)
         return self.retry.unanswered() if words is None else words
 
-    def write(self, parameter: Parameter, raw: int) -> Generator[Step, Reply, Outcome]:
-        if self._numbers.number(parameter) == CYCLIC_PARAMETER:
-            return Failure(NOT_WRITABLE)
-        outcome, = yield from self._put([(parameter, raw)])
-        return outcome
+    def misfit(self, items: Sequence[Item]) -> str:
+        numbers = sorted(parameter.number or 0 for parameter, _ in items)
+        consecutive = numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+        volatile = all(parameter.storage is Storage.RAM for parameter, _ in items)
+        if len(items) <= self._together and consecutive and volatile:
+            return ''
+        what = ('one parameter fits' if self._together == 1 else
+                f'at most {self._together} parameters with consecutive numbers and storage ram '
+                'fit')
+        return f'cannot be written in one frame, nothing was written: {what}'
 
-    def write_together(self, items: Sequence[Item]) -> Generator[Step, Reply, Outcomes]:
-        refusal = together_refusal(items, self._together)
-        if refusal:
-            return (Failure(refusal),) * len(items)
-        outcomes = yield from self._put(items)
-        return outcomes
-
-    def _put(self, items: Sequence[Item]) -> Generator[Step, Reply, Outcomes]:
-        """Write parameters with consecutive numbers in one frame."""
+    def write(self, items: Sequence[Item]) -> Generator[Step, Reply, Outcomes]:
         numbers = [self._numbers.number(parameter) for parameter, _ in items]
         first = min(numbers)
         words = [0] * len(items)
@@ -119,20 +122,6 @@ class Maps(NamedTuple):
 
     request: Words
     response: Words | None
-
-
-def together_refusal(items: Sequence[tuple[Parameter, int]], size: int = SLOTS) -> str:
-    """Say why these parameters do not fit one write frame; '' if they do."""
-    if len(items) < 2:
-        return ''
-    numbers = sorted(parameter.number or 0 for parameter, _ in items)
-    consecutive = numbers == list(range(numbers[0], numbers[0] + len(numbers)))
-    volatile = all(parameter.storage is Storage.RAM for parameter, _ in items)
-    if len(items) <= size and consecutive and volatile:
-        return ''
-    what = ('one parameter fits' if size == 1 else
-            f'at most {size} parameters with consecutive numbers and storage ram fit')
-    return f'cannot be written in one frame, nothing was written: {what}'
 
 
 def read_maps(request_base: int, response_base: int, *, needed: tuple[int, ...] | None = None,

@@ -31,7 +31,7 @@ class SetpointWriter:
         self.word_written_at = -math.inf
         self._session = session
         self._exchange = exchange
-        self._courier = side.channel.courier
+        self._courier = side.courier
         self._numbers = side.numbers
         self._slot = side.control_slot
         self._parameters = drive.cyclic_request

@@ -6,7 +6,7 @@ There is no cyclic service: once a period all of ``cyclic_response`` is read in 
 changed in ``cyclic_request`` is written, one parameter a frame. Rounds go on while the drive is
 silent; that is how it is found. Setpoints are written only to a drive that answers
 (:mod:`.setpoint_writer`). One that was lost, or is to be left alone, is written neutral and read
-back (:mod:`.stop_writes`).
+back (:mod:`.acyclic_side`).
 """
 
 from drive_can_bridge.core.configuration import DriveConfiguration
@@ -15,10 +15,11 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.protocols.datamodel import standard
-from drive_can_bridge.protocols.datamodel.acyclic_side import AcyclicSide, map_cells
+from drive_can_bridge.protocols.datamodel.acyclic_side import (
+    AcyclicSide, ANSWER_TIME, ATTEMPTS, map_cells,
+)
 from drive_can_bridge.protocols.datamodel.setpoint_writer import SetpointWriter
 from drive_can_bridge.protocols.datamodel.standard_round import StandardRound
-from drive_can_bridge.protocols.datamodel.stop_writes import ANSWER_TIME, ATTEMPTS
 from drive_can_bridge.protocols.polled_exchange import PolledExchange, Raws
 
 SILENT = 'no answer to reads: drive silent, wrong station, bit rate or identifier mode'
@@ -47,7 +48,7 @@ class StandardSession(Session):
         self._request_identifier = request
         self._identifiers = request, standard.identifier(
             options.response_id_base, drive.station)
-        self._round = StandardRound(drive, self._channel.courier, self._status_slot)
+        self._round = StandardRound(drive, self._side.courier, self._status_slot)
         self._exchange = PolledExchange(
             self, self._channel, self._round.read, found=self._found, answered=self._answered,
             missed=self._missed)
@@ -73,7 +74,7 @@ class StandardSession(Session):
         return ATTEMPTS * (ANSWER_TIME + float(self.configuration.options.quarantine))
 
     def time_lost(self, now: float) -> None:
-        self._expected = self._expected or self._channel.outstanding is not None
+        self._expected = self._expected or self._side.courier.outstanding is not None
         self._exchange.disregard()
         self._channel.time_lost(now)
         if self.stage is Stage.RUNNING:
@@ -101,7 +102,7 @@ class StandardSession(Session):
         super().fall_silent()
 
     def _clear_acyclic(self) -> None:
-        self._expected = self._expected or self._channel.outstanding is not None
+        self._expected = self._expected or self._side.courier.outstanding is not None
         self._side.clear()
         self._exchange.stop()
 
@@ -151,7 +152,7 @@ class StandardSession(Session):
         self._side.found(now)
 
     def _answered(self, raws: Raws, now: float, found: bool) -> None:
-        courier = self._channel.courier
+        courier = self._side.courier
         if self.told.ran and not found and courier.asked_at > courier.wrote_at:
             self.told.answered()
         # a status that was asked for before the word left says nothing about the word
@@ -184,10 +185,10 @@ class StandardSession(Session):
         if frame.identifier == self._request_identifier:
             self._side.foreign_master(frame)
             return
-        channel = self._channel
+        courier = self._side.courier
         # it may have come before the question
-        if channel.outstanding is None or now - age < channel.courier.asked_at:
-            channel.disturbed(now)
+        if courier.outstanding is None or now - age < courier.asked_at:
+            self._channel.disturbed(now)
             if self._expected:
                 self._expected = False
             else:

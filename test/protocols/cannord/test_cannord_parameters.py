@@ -470,6 +470,15 @@ def test_telegram_time_out_is_looked_at_again_when_it_was_written() -> None:
     assert talk.session.warning == ''
 
 
+def test_telegram_time_out_takes_turns_with_requests_of_users() -> None:
+    talk, _ = monitored(period=0.1)
+    talk.hears('203#0112000000000200', 10.005)
+    assert talk.submits(write((MONITORING, 5)), 10.006) == ['202#0122000000000500']
+    assert talk.submits(read(COUNTER), 10.0065) == []
+    assert talk.hears('203#0112000000000500', 10.007) == ['202#0112000000000000']
+    assert talk.hears('203#0112000000000500', 10.008) == ['202#CA12000000000000']
+
+
 def test_telegram_time_out_that_cannot_be_read() -> None:
     talk, _ = monitored()
     talk.hears('203#0172000000000000', 10.005)

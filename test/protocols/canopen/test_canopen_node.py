@@ -32,7 +32,7 @@ def test_start_goes_out_first_and_pdos_wait_a_moment() -> None:
     watched = node()
     assert sent(watched) == ['000#0105']
     assert watched.free_at == pytest.approx(10.05)
-    assert watched.state_text == 'unknown'
+    assert watched.facts()['nmt_state'] == 'unknown'
     assert watched.refusal(10.0) == ''
 
 
@@ -64,7 +64,7 @@ def test_boot_up_is_answered_by_start() -> None:
     watched = node()
     sent(watched)
     assert hears(watched, BOOT_UP, 10.5) == (Change.RESTARTED, ['000#0105'])
-    assert watched.state_text == 'pre-operational'
+    assert watched.facts()['nmt_state'] == 'pre-operational'
     assert watched.free_at == pytest.approx(10.55), 'no heartbeats: nobody will ever say so'
     assert watched.refusal(10.5) == ''
 

@@ -25,17 +25,26 @@ class Exchange:
         self.outbox = Outbox()
         self.report = Reporter(DriveStatistics(), '')
         self.online = False
+        self.users = self
+        self.reason = self.failed = ''
         self.told: list[object] = []
         self.supervision = Supervision(self)
 
     def node_free(self, free_at: float, now: float, *, anew: bool) -> None:
         self._write_down('free', free_at, anew)
 
-    def node_closed(self, reason: str, now: float, *, restarted: bool) -> None:
-        self._write_down('closed', reason, restarted)
+    def lose(self, reason: str, now: float) -> None:
+        self.reason = reason
 
-    def node_silent(self, reason: str, now: float) -> None:
-        self._write_down('silent', reason)
+    def fail_all(self, reason: str) -> None:
+        self.failed = reason
+
+    def node_closed(self, now: float) -> None:
+        assert self.failed.endswith(f': {self.reason}')
+        self._write_down('closed', self.reason, self.failed.startswith('no answer: '))
+
+    def node_silent(self, now: float) -> None:
+        self._write_down('silent', self.reason)
 
     def _write_down(self, *what: object) -> None:
         self.told += [*map(str, self.outbox.take()), what]
@@ -107,8 +116,8 @@ def test_a_node_that_is_not_used_is_only_listened_to() -> None:
         assert exchange.hears(text, 10.1) == []
     assert exchange.at(20.0) == []
     assert exchange.supervision.refusal(10.2) == ''
-    assert exchange.supervision.report.facts()['nmt_state'] == 'pre-operational'
-    assert exchange.supervision.report.ailing
+    assert exchange.supervision.node.facts()['nmt_state'] == 'pre-operational'
+    assert exchange.supervision.node.ailing
 
 
 def test_frames_of_others_and_malformed_ones() -> None:
@@ -139,3 +148,37 @@ def test_nothing_is_due_of_a_node_that_is_not_in_use() -> None:
     assert node.next_timer() == math.inf
     node.receive(0x705, b'\x05', 10.2)
     assert node.next_timer() == math.inf
+
+
+# -- what people are told -------------------------------------------------------------------------
+
+#: CiA 301: error code 2310h, error register 03h
+OVERCURRENT = '085#1023030000000000'
+NO_ERROR = '085#0000000000000000'
+
+
+def test_emergency_and_its_end() -> None:
+    exchange = begun()
+    node = exchange.supervision.node
+    assert (node.ailing, node.facts()['emergency']) == ('', 'none')
+    exchange.hears(OVERCURRENT, 10.1)
+    text = node.facts()['emergency']
+    assert '2310h' in text
+    assert node.ailing == f'emergency {text}: remove its cause'
+    exchange.hears(OVERCURRENT, 10.2)      # nothing new
+    exchange.hears(NO_ERROR, 10.3)
+    assert node.ailing == ''
+    assert exchange.report.take() == [
+        Noted(f'emergency {text}', warning=True),
+        Noted('emergency over: the node reports no error any more')]
+
+
+def test_state_and_missing_heartbeat() -> None:
+    exchange = begun(heartbeat_timeout=0.1)
+    node = exchange.supervision.node
+    assert node.facts()['nmt_state'] == 'unknown'
+    assert node.missing.startswith('no heartbeat although heartbeat_timeout is set')
+    exchange.hears('705#05', 10.05)
+    assert node.facts()['nmt_state'] == 'operational'
+    assert node.missing == ''
+    assert begun().supervision.node.missing == '', 'none is wanted'

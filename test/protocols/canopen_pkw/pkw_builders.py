@@ -143,7 +143,8 @@ def echo(text: str, status: str = 'C320') -> str:
 
 def driven(request: tuple[Parameter, ...] = (SPEED,), **options: Any) -> Conversation:
     """Return a drive that was enabled and runs at 10 Hz; the next round is due at 10.13 s."""
-    talk = online(request=request, control=CONTROL, **options)
+    options.setdefault('control', CONTROL)
+    talk = online(request=request, **options)
     first, = talk.at(10.07)
     assert talk.hears(echo(first, '4100'), 10.071) == []
     enable, = talk.asks(ControlAction.ENABLE, 10.075)

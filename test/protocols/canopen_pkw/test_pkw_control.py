@@ -190,11 +190,12 @@ def _answer(text: str) -> str:
 def test_disable_is_repeated_until_it_is_acknowledged() -> None:
     talk = running(parameter_timeout=0.1)
     assert talk.asks(ControlAction.DISABLE, 10.095) == [DISABLE_0]
-    assert talk.until(10.2) == [(10.195, IDLE)]
-    assert talk.hears(IDLE_ANSWER, 10.2) == [READ_1]
-    assert talk.hears(RUNS_1, 10.201) == [DISABLE_0]
-    assert talk.hears(DISABLED_0, 10.202) == []
-    assert talk.at(10.203) == [READ_1]
+    assert talk.until(10.294) == [(10.145, DISABLE_1), (10.195, DISABLE_0)]
+    assert talk.until(10.3) == [(10.295, IDLE)], 'it is silent: the round has its turn'
+    assert talk.hears(IDLE_ANSWER, 10.3) == [READ_1]
+    assert talk.hears(RUNS_1, 10.301) == [DISABLE_0]
+    assert talk.hears(DISABLED_0, 10.302) == []
+    assert talk.at(10.303) == [READ_1]
 
 
 def test_unsent_word_waits_for_the_mailbox() -> None:

@@ -156,6 +156,26 @@ def test_refused_setpoint_is_shown_until_one_is_taken() -> None:
     assert talk.session.warning == ''
 
 
+def test_what_was_refused_before_a_restart_is_forgotten_and_told_anew() -> None:
+    talk = armed(command_timeout=0.0)
+    refusal = 'write of speed refused by the drive: 06090030h (value out of range)'
+    for begin in (10.0, 11.0):
+        text, = talk.at(begin + 0.07)
+        assert text[:10] == '505#C60200' and text[12:] == '64000000'
+        refused = f'485#C60200{"CE" if text[10:12] == "AA" else "4E"}30000906'
+        answered(talk, talk.hears(refused, begin + 0.071), begin + 0.071)
+        assert talk.session.warning.startswith(refusal)
+        assert [note.text for note in talk.events(Noted) if 'refused' in note.text] == [refusal]
+        talk.hears(BOOT_UP, begin + 0.2)
+        talk.hears('485#C60200AA00000000', begin + 0.21)
+        talk.hears('485#C602002A00000000', begin + 0.21)
+        answered(talk, talk.at(begin + 0.3), begin + 0.3)
+        assert talk.session.online
+        assert talk.session.warning == ''
+        talk.commands(0, 0.0, begin + 1.06)
+        talk.commands(0, 10.0, begin + 1.06)
+
+
 # -- loss -----------------------------------------------------------------------------------------
 
 

@@ -284,6 +284,17 @@ def test_refused_enable_is_written_with_the_next_round() -> None:
     assert talk.control_outcomes() == [('enable', True, 'enabled')]
 
 
+def test_enable_that_is_due_again_goes_behind_setpoints() -> None:
+    talk = online(request=(SPEED,), control=CONTROL, refresh_interval=0.035)
+    assert talk.until(10.0701) == [(10.07, READ_0)]
+    assert talk.hears(ANSWER_0, 10.071) == []
+    refuse(talk)
+    assert talk.asks(ControlAction.ENABLE, 10.075) == []
+    accept(talk)
+    assert talk.until(10.0901) == [(10.09, STILL_1)]
+    assert talk.hears('485#C60200AA00000000', 10.091) == [ENABLE_0]
+
+
 def test_refused_neutral_at_a_command_time_out_is_written_although_nothing_refreshes() -> None:
     talk = online(request=(SPEED,), command_timeout=0.05, refresh_interval=0.0)
     talk.commands(0, 0.0, 10.06)
@@ -366,6 +377,90 @@ def test_disable_goes_before_setpoints_and_neutral_right_behind() -> None:
     assert talk.hears(CLASS_1, 10.116) == [DISABLE_0]
     assert talk.hears(DISABLED_0, 10.117) == [STILL_1]
     assert talk.hears('485#C60200AA00000000', 10.118) == []
+
+
+STOP_WORDS = pytest.mark.parametrize(('action', 'word'), [
+    (ControlAction.DISABLE, '00'), (ControlAction.QUICK_STOP, '02')])
+
+
+@STOP_WORDS
+def test_stop_word_whose_frame_got_lost_is_repeated_before_anything_else(
+        action: ControlAction, word: str) -> None:
+    """The adapter took it, the bus never had it. Once more does no harm."""
+    talk = driven(control=replace(CONTROL, quick_stop=0x0002))
+    assert talk.asks(action, 10.115) == [f'505#C00200AA{word}000000']
+    assert talk.submits(read(CLASS), 10.12) == []
+    assert talk.until(10.166) == [(10.165, f'505#C002002A{word}000000')], 'no function 00h'
+    assert talk.hears('485#C002002A00000000', 10.167) == [STILL_1], 'and no read-back'
+    assert talk.hears('485#C60200AA00000000', 10.168) == [READ_CLASS_0]
+    assert talk.session.told.owed is (word != '00')
+    assert worries(talk) == []
+
+
+@STOP_WORDS
+def test_stop_word_that_is_never_answered_has_three_attempts_before_others_go_on(
+        action: ControlAction, word: str) -> None:
+    """The last of them has the time that any request has."""
+    talk = driven(control=replace(CONTROL, quick_stop=0x0002), refresh_interval=0.05)
+    assert talk.asks(action, 10.115) == [f'505#C00200AA{word}000000']
+    assert talk.until(10.714) == [(10.165, f'505#C002002A{word}000000'),
+                                  (10.215, f'505#C00200AA{word}000000')]
+    assert talk.until(10.72) == [(10.715, IDLE)], 'setpoints still go out'
+    assert talk.hears(IDLE_ANSWER, 10.721) == [STILL_0]
+    assert talk.until(11.23) == [(11.221, IDLE)]
+    assert talk.hears(IDLE_ANSWER, 11.231) == [READ_1], 'of the round that was due at 10.13'
+    sent = talk.until(11.76)
+    assert [text for _, text in sent] == [f'505#C002002A{word}000000'], 'with the next round'
+    assert talk.hears('485#C002002A00000000', 11.765) == [STILL_1], 'which was due as well'
+
+
+def test_late_answer_to_a_stop_word_is_as_good_as_that_to_its_repetition() -> None:
+    """A device that takes 0.3 s for each answer."""
+    talk = driven()
+    assert talk.asks(ControlAction.DISABLE, 10.115) == [DISABLE_1]
+    assert [text for _, text in talk.until(10.414)] == [DISABLE_0, DISABLE_1]
+    assert talk.hears(DISABLED_1, 10.415) == [STILL_0]
+    assert talk.session.statistics.rejected == 0
+
+
+def test_word_that_changes_while_a_stop_is_repeated() -> None:
+    """A quick stop gives up after 0.2 s: what is repeated is the newest word."""
+    talk = driven(control=replace(CONTROL, quick_stop=0x0002), control_timeout=0.07)
+    assert talk.asks(ControlAction.QUICK_STOP, 10.115) == ['505#C00200AA02000000']
+    assert talk.until(10.164) == []
+    assert talk.until(10.166) == [(10.165, '505#C002002A02000000')]
+    assert [text for _, text in talk.until(10.24)] == [DISABLE_1], 'no more quick stop'
+
+
+def test_enable_that_is_not_answered_is_not_repeated_when_others_would_be() -> None:
+    talk = ready()
+    assert talk.asks(ControlAction.ENABLE, 10.075) == [ENABLE_0]
+    assert talk.until(10.574) == []
+    assert talk.until(10.6) == [(10.575, IDLE)]
+
+
+def test_stop_does_not_wait_for_the_answer_to_an_enable() -> None:
+    """Nor does it rely on the disable that the drive had before; and it has all its attempts."""
+    talk = ready()
+    assert talk.asks(ControlAction.ENABLE, 10.075) == [ENABLE_0]
+    assert talk.asks(ControlAction.DISABLE, 10.08) == []
+    assert talk.until(10.72) == [(10.13, DISABLE_1), (10.18, DISABLE_0), (10.23, DISABLE_1)]
+    assert talk.hears(DISABLED_1, 10.721) == [READ_0], 'of the round that was due at 10.09'
+
+
+def test_enable_that_the_bus_refused_leaves_the_drive_with_what_it_had() -> None:
+    talk = ready()
+    refuse(talk)
+    assert talk.asks(ControlAction.ENABLE, 10.075) == []
+    accept(talk)
+    assert talk.asks(ControlAction.DISABLE, 10.08) == [], 'it was never told anything else'
+    assert talk.until(10.0901) == [(10.09, READ_0)]
+
+
+def test_short_time_outs_make_short_attempts() -> None:
+    talk = running(parameter_timeout=0.03)
+    assert talk.asks(ControlAction.DISABLE, 10.095) == [DISABLE_0]
+    assert talk.until(10.184) == [(10.125, DISABLE_1), (10.155, DISABLE_0)]
 
 
 # -- nothing stale --------------------------------------------------------------------------------

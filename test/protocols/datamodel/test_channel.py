@@ -8,9 +8,9 @@ import pytest
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.outbox import Outbox
 from drive_can_bridge.core.retry import RetryPolicy
-from drive_can_bridge.protocols.channel import Lane
+from drive_can_bridge.protocols.channel import Channel, Lane
 from drive_can_bridge.protocols.datamodel.channel import (
-    AcyclicChannel, ParameterCourier, Procedure, Read, Words, Write,
+    ParameterCourier, Procedure, Read, Words, Write,
 )
 
 
@@ -24,11 +24,12 @@ class Line:
     def __init__(self, *, timeout: float = 0.1, attempts: int = 2, gap: float = 0.02,
                  quarantine: float | None = None) -> None:
         self.outbox = Outbox()
-        self.channel = AcyclicChannel(ParameterCourier(
+        self.courier = ParameterCourier(
             encode_read=lambda number, count: Frame(number, b'?' * count, True),
             encode_write=lambda number, words: Frame(number, bytes(words), True),
             send=self.outbox.put, retry=RetryPolicy(timeout, attempts), eeprom_gap=gap,
-            quarantine=quarantine))
+            quarantine=quarantine)
+        self.channel = Channel(self.courier)
         self.results: list[object] = []
 
     def sent(self, now: float | None = None) -> list[str]:
@@ -75,7 +76,7 @@ def test_nothing_to_do() -> None:
     line = Line()
     assert line.channel.next_timer() == math.inf
     assert line.at(1.0) == []
-    assert line.channel.outstanding is None
+    assert line.courier.outstanding is None
     assert line.channel.now == 1.0
 
 
@@ -127,8 +128,8 @@ def test_write_first_overtakes_and_replaces() -> None:
     line = Line()
     done: list[str] = []
     line.reads(1, 2, lane=Lane.USERS)
-    line.channel.write_first(Write(52, (1,), False), lambda *_: done.append('one'), 1.01)
-    line.channel.write_first(Write(53, (0,), False), lambda *_: done.append('two'), 1.02)
+    line.courier.write_first(Write(52, (1,), False), lambda *_: done.append('one'), 1.01)
+    line.courier.write_first(Write(53, (0,), False), lambda *_: done.append('two'), 1.02)
     assert line.sent() == []
     assert line.answer(0, 1.03) == ['53!']
     assert done == ['two']
@@ -138,7 +139,7 @@ def test_write_first_overtakes_and_replaces() -> None:
 def test_write_first_waits_for_its_eeprom() -> None:
     line = Line()
     line.writes((30, True))
-    line.channel.write_first(Write(52, (1,), True), nobody, 1.001)
+    line.courier.write_first(Write(52, (1,), True), nobody, 1.001)
     assert line.channel.next_timer() == pytest.approx(1.02)
     assert line.at(1.0199) == []
     assert line.at(1.0201) == ['52!']
@@ -148,12 +149,12 @@ def test_what_stops_a_drive_waits_for_spacing_only() -> None:
     line = Line()
     assert line.reads(1) == ['1?']          # not answered yet
     line.channel.hold(5.0)
-    line.channel.write_now(Write(52, (0,), False), nobody, 1.01)
-    line.channel.write_now(Write(50, (0,), False), nobody, 1.01)
+    line.courier.write_now(Write(52, (0,), False), nobody, 1.01)
+    line.courier.write_now(Write(50, (0,), False), nobody, 1.01)
     assert line.sent() == ['52!']
     assert line.channel.next_timer() == pytest.approx(1.011)
     assert line.at(1.0111) == ['50!']
-    assert line.channel.outstanding is not None
+    assert line.courier.outstanding is not None
 
 
 @pytest.mark.parametrize('gap, left_at', [(0.02, 1.02), (60.0, 1.03)])
@@ -161,7 +162,7 @@ def test_what_stops_a_drive_waits_for_its_eeprom_but_not_for_long(
         gap: float, left_at: float) -> None:
     line = Line(gap=gap)
     line.writes((30, True))
-    line.channel.write_now(Write(52, (0,), True), nobody, 1.005)
+    line.courier.write_now(Write(52, (0,), True), nobody, 1.005)
     assert line.at(left_at - 0.0001) == []
     assert line.at(left_at + 0.0001) == ['52!']
 
@@ -169,8 +170,8 @@ def test_what_stops_a_drive_waits_for_its_eeprom_but_not_for_long(
 def test_what_stops_a_drive_makes_a_word_that_waits_outdated() -> None:
     line = Line()
     assert line.reads(1) == ['1?']
-    line.channel.write_first(Write(52, (1,), False), nobody, 1.001)
-    line.channel.write_now(Write(52, (0,), False), nobody, 1.002)
+    line.courier.write_first(Write(52, (1,), False), nobody, 1.001)
+    line.courier.write_now(Write(52, (0,), False), nobody, 1.002)
     assert line.sent() == ['52!']
     assert line.answer(0, 1.01) == []
 
@@ -178,8 +179,8 @@ def test_what_stops_a_drive_makes_a_word_that_waits_outdated() -> None:
 def test_what_stops_a_drive_makes_a_stop_of_the_same_parameter_outdated() -> None:
     line = Line()
     for word in (9, 2, 0):
-        line.channel.write_now(Write(52, (word,), False), nobody, 1.0)
-    line.channel.write_now(Write(50, (0,), False), nobody, 1.0)
+        line.courier.write_now(Write(52, (word,), False), nobody, 1.0)
+    line.courier.write_now(Write(50, (0,), False), nobody, 1.0)
     left = []
     for now in (1.0, 1.001, 1.002, 1.003):
         line.channel.advance(now)
@@ -220,9 +221,9 @@ def test_what_is_sent_called_back_may_write_again() -> None:
 
     def again(sent: bool, now: float) -> None:
         assert sent
-        line.channel.write_first(Write(53, (0,), False), nobody, now)
+        line.courier.write_first(Write(53, (0,), False), nobody, now)
 
-    line.channel.write_first(Write(52, (0,), False), again, 1.0)
+    line.courier.write_first(Write(52, (0,), False), again, 1.0)
     assert line.sent() == ['52!']
     assert line.at(1.001) == ['53!']
 
@@ -246,7 +247,7 @@ def test_clear_forgets_everything_but_the_eeprom() -> None:
     line.reads(1, lane=Lane.USERS)
     line.reads(2, lane=Lane.USERS)
     line.reads(3)
-    line.channel.write_first(Write(52, (1,), False), lambda: None, 1.0)
+    line.courier.write_first(Write(52, (1,), False), lambda: None, 1.0)
     assert line.channel.waiting_users == 1
     line.channel.clear()
     assert line.channel.next_timer() == math.inf
@@ -319,12 +320,12 @@ def test_users_are_owed_a_step_after_each_round() -> None:
 def test_writes_that_go_first_do_not_wait_for_answers() -> None:
     line = Line(quarantine=0.1)
     line.reads(1)
-    line.channel.write_first(Write(52, (1,), False), nobody, 1.01)
+    line.courier.write_first(Write(52, (1,), False), nobody, 1.01)
     assert line.sent() == ['52!']
-    line.channel.write_first(Write(52, (0,), False), nobody, 1.0105)
+    line.courier.write_first(Write(52, (0,), False), nobody, 1.0105)
     assert line.channel.next_timer() == pytest.approx(1.011)
     assert line.at(1.011) == ['52!']
-    assert line.channel.outstanding is not None
+    assert line.courier.outstanding is not None
     assert line.channel.next_timer() == pytest.approx(1.1)
 
 

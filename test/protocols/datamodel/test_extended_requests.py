@@ -141,7 +141,7 @@ def test_look_at_the_maps_goes_between_two_reads_of_a_long_request() -> None:
         for _, text in talk.until(now):
             if text == ASK_REQUEST_MAP:
                 looks.append(answered)
-        outstanding = talk.session._channel.outstanding
+        outstanding = talk.session._side.courier.outstanding
         if outstanding is not None and outstanding.number >= 300:
             sent = talk.hears(f'10{0x200001 | outstanding.number << 4:06X}#0001', now)
             answered += 1
