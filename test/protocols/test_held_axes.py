@@ -255,7 +255,7 @@ def test_pkw_is_latched_when_it_is_enabled() -> None:
     assert round_with(talk, '41004400') == []
     assert round_with(talk, '41004400') == ['C602002A44000000']
     assert answered(talk, talk.asks(ControlAction.ENABLE, talk.now), talk.now) == [
-        'C002002A01000000']
+        'C602002A44000000', 'C002002A01000000']
     assert round_with(talk, 'C1004100') == []           # runs, and sags
     assert talk.control_outcomes() == [('enable', True, 'enabled')]
     assert round_with(talk, 'C1004000') == []

@@ -13,7 +13,7 @@ refused ``disable`` is tried again and again: a device under local control, say,
 as it is back under remote control.
 """
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 import math
 
 from drive_can_bridge.core.control_machine import ControlMachine
@@ -36,16 +36,18 @@ class ControlWriter:
     """
     Writes the control word of one drive.
 
-    :ivar refusal: what the drive says to a word that it refused; '' if it does not.
+    :param waits: tells whether setpoints have to be written before it.
+    :ivar refusal: why the drive does not take the word, '' if it does.
     """
 
     def __init__(self, session: Session, control: ControlMachine,
-                 channel: MailboxChannel) -> None:
+                 channel: MailboxChannel, waits: Callable[[], bool]) -> None:
         drive = session.configuration
         self.refusal = ''
         self._session = session
         self._control = control
         self._channel = channel
+        self._waits = waits
         self._parameter = drive.profile.parameters[control.table.parameter]
         self._disable = control.table.disable   # may be written any number of times
         self._placement = Placement.of(drive)
@@ -92,6 +94,8 @@ class ControlWriter:
         unanswered = 0
         while True:
             word, stopping = self._control.word, self._control.stopping
+            if self._waits():
+                return
             if word == self._doubtful and not stopping:
                 there = yield from self._read_back(word)
                 if there is None:
@@ -118,6 +122,8 @@ class ControlWriter:
                 if reply.sent:
                     self._doubtful = word
                 if word == self._control.word and not again:
+                    if stopping:
+                        self._tell_silence(word)
                     return
                 continue
             self._retry_at = math.inf
@@ -152,6 +158,13 @@ class ControlWriter:
             self._retry_at = now + RETRY_AFTER
         self._control.word_refused(word, reason, now)
         self._session.control_changed(now)
+
+    def _tell_silence(self, word: int) -> None:
+        """Say that a word that stops the drive is not acknowledged, once until one is."""
+        text = f'{self._parameter.name} {word:04X}h: no answer'
+        if text != self.refusal:
+            self._session.report.warn(f'write of {text}', may_run=self._session.told.owed)
+        self.refusal = text
 
     def _settle(self, word: int) -> None:
         """Take note that the drive has a word."""

@@ -6,9 +6,11 @@ Both are written when they change, setpoints also again after a while. Neutral s
 word that stops a drive at once, and so does everything in the stop, whatever is known of the node.
 """
 
+from collections import Counter
 from collections.abc import Callable, Generator
 
 from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.holding import Setpoint
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement
 from drive_can_bridge.protocols.canopen_pkw.control_writer import ControlWriter
@@ -19,6 +21,7 @@ from drive_can_bridge.protocols.canopen_pkw.procedures import tell, write_until_
 from drive_can_bridge.protocols.channel import Lane
 from drive_can_bridge.protocols.polling import WriteSchedule
 from drive_can_bridge.protocols.safe_stop import SafeStop
+from drive_can_bridge.protocols.setpoints_first import SetpointsFirst
 
 #: how often a drive is told to stand still
 STOP_ATTEMPTS = 3
@@ -35,23 +38,27 @@ class Writers:
     def __init__(self, session: Session, channel: MailboxChannel,
                  stop_ended: Callable[[], None]) -> None:
         drive = session.configuration
-        self.control = None if session.control is None else ControlWriter(
-            session, session.control, channel)
         self._session = session
         self._channel = channel
         self._placement = Placement.of(drive)
         self._setpoints = session.setpoints
         self._schedule = WriteSchedule(
             len(session.setpoints.items), drive.options.refresh_interval)
-        self._refusals: dict[str, str] = {}     # of setpoints, by name
+        self._first = SetpointsFirst(
+            session, self._schedule, range(len(session.setpoints.items)))
+        self.control = None if session.control is None else ControlWriter(
+            session, session.control, channel, waits=self._first.look)
+        self._failures: dict[str, str] = {}     # of setpoints, by name
         self._warned: dict[str, str] = {}
+        self._silences = Counter[int]()         # in a row, by index
         self._stop: SafeStop[Step, Reply] = SafeStop(session, channel, stop_ended)
 
     def forget(self) -> None:
         """Take note that nothing is known of the drive."""
         self._schedule.forget()
-        self._refusals.clear()
+        self._failures.clear()
         self._warned.clear()
+        self._silences.clear()
         if self.control is not None:
             self.control.forget()
 
@@ -68,9 +75,10 @@ class Writers:
 
         :param known: the status was read just now, or there is none.
         """
-        if self.control is not None:
+        waits = self._first.look()
+        if self.control is not None and not waits:
             self.control.update(now, known=known)
-        if self._setpoints.changed and not self._setpoints.enabled:
+        if waits or self._setpoints.changed and not self._setpoints.enabled:
             self.write_setpoints(now)
 
     def write_setpoints(self, now: float) -> None:
@@ -88,7 +96,7 @@ class Writers:
         while self._schedule.waiting:
             index = self._schedule.next()
             setpoint = self._setpoints.items[index]
-            name, raw = setpoint.parameter.name, setpoint.raw
+            raw = setpoint.raw
             # at once: a look while the answer is awaited must not find it due again
             self._schedule.written(index, raw, self._channel.now)
             reply = yield from tell(
@@ -96,13 +104,37 @@ class Writers:
                 runs=raw != setpoint.neutral)
             if isinstance(reply, Silence):
                 self._schedule.failed(index)
-            elif isinstance(reply, Refused):
-                text = f'{name} {reply.text}'
-                if self._warned.get(name) != text:  # once: commands may go to and fro
-                    self._session.report.warn(f'write of {text}')
-                self._warned[name] = self._refusals[name] = text
-            else:
-                self._refusals.pop(name, None)
+                self._silences[index] += reply.sent
+                if self._silences[index] >= self._session.configuration.missed_limit:
+                    self._failed(setpoint, ': no answer', neutral=raw == setpoint.neutral)
+                continue
+            del self._silences[index]
+            if isinstance(reply, Refused):
+                self._failed(setpoint, f' {reply.text}', neutral=raw == setpoint.neutral)
+                continue
+            self._failures.pop(setpoint.parameter.name, None)
+            if self._first.written(index):
+                self._session.see_to_control_word(self._channel.now)
+
+    def _failed(self, setpoint: Setpoint, why: str, *, neutral: bool) -> None:
+        """
+        Take note of a setpoint that the drive does not take.
+
+        :param neutral: it is the neutral one: a drive that is enabled would run on.
+        """
+        session, name = self._session, setpoint.parameter.name
+        control, now, text = session.control, self._channel.now, name + why
+        if self._warned.get(name) != text:  # once: commands may go to and fro
+            session.report.warn(f'write of {text}',
+                                may_run=neutral and control is None and session.told.owed)
+        self._warned[name] = self._failures[name] = text
+        if control is None:
+            return
+        if self._first.look():
+            control.word_refused(control.word, f'not sent: write of {text}', now)
+        elif neutral and control.operating:
+            control.drop(f'neutral is not taken, write of {text}')
+        session.control_changed(now)
 
     # -- stopping ---------------------------------------------------------------------------------
 
@@ -131,15 +163,15 @@ class Writers:
         """Say why a control action cannot be asked for, besides the usual."""
         if action is ControlAction.ENABLE:
             for setpoint in self._setpoints.held:  # the drive has another position
-                refused = self._refusals.get(setpoint.parameter.name)
-                if refused:
-                    return f'it would jump: write of {refused}'
+                failed = self._failures.get(setpoint.parameter.name)
+                if failed:
+                    return f'it would jump: write of {failed}'
         return refusal
 
     def warnings(self) -> list[str]:
         """Say what the drive refuses, and what to do."""
         texts = [f'write of {text}: correct cyclic_request, the command or the profile'
-                 for text in self._refusals.values()]
+                 for text in self._failures.values()]
         if self.control is not None and self.control.refusal:
             texts.append(f'write of {self.control.refusal}: look at the device')
         return texts

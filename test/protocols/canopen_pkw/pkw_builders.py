@@ -147,7 +147,12 @@ def driven(request: tuple[Parameter, ...] = (SPEED,), **options: Any) -> Convers
     talk = online(request=request, **options)
     first, = talk.at(10.07)
     assert talk.hears(echo(first, '4100'), 10.071) == []
-    enable, = talk.asks(ControlAction.ENABLE, 10.075)
+    asked = talk.asks(ControlAction.ENABLE, 10.075)
+    for _ in request:   # neutral first
+        text, = asked
+        assert text[12:] == '00000000'
+        asked = talk.hears(echo(text), 10.0755)
+    enable, = asked
     assert enable in ('505#C002002A01000000', '505#C00200AA01000000')
     assert talk.hears(echo(enable), 10.076) == []
     text, = talk.at(10.09)

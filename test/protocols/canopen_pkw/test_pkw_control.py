@@ -7,7 +7,7 @@ from builders import Conversation
 from pkw_builders import (
     ANSWER_0, ANSWER_1, CONTROL, DISABLE_0, DISABLE_1, DISABLED_0, DISABLED_1, driven, echo,
     ENABLE_0, ENABLE_1, ENABLED_1, IDLE, IDLE_ANSWER, READ_0, READ_1, ready, running, RUNS_0,
-    RUNS_1, START, started, STILL_1, TABLE, TRIPPED_0, WORD,
+    RUNS_1, START, started, STILL_0, TABLE, TRIPPED_0, WORD,
 )
 import pytest
 
@@ -99,7 +99,7 @@ def test_drive_that_refuses_its_status_is_not_driven_on() -> None:
     """455 and 456 share a read until it is refused; 456 alone is answered."""
     talk = driven(command_timeout=0.0)
     sent: list[str] = []
-    while DISABLE_0 not in sent and DISABLE_1 not in sent:
+    while DISABLE_1 not in sent and DISABLE_0 not in sent:
         now = talk.session.next_timer()
         assert now < 10.6
         asked = talk.at(now)
@@ -110,8 +110,8 @@ def test_drive_that_refuses_its_status_is_not_driven_on() -> None:
             if text.startswith('505#C701'):     # function 4Eh, 0602 0000h: no such object
                 answer = f'485#C70100{"CE" if text[10] == "A" else "4E"}00000206'
             asked += talk.hears(answer, now + 0.001)
-    together, alone, rest = '505#C70100A600000000', '505#C701002500000000', '505#C80100A500000000'
-    assert sent == [together, *3 * [alone, rest], DISABLE_0, STILL_1]
+    together, alone, rest = '505#C701002600000000', '505#C70100A500000000', '505#C801002500000000'
+    assert sent == [together, *3 * [alone, rest], DISABLE_1, STILL_0]
     assert 'enable withdrawn: 3 answers without a status word; only ~/enable starts the drive ' \
         'again' in [note.text for note in talk.events(Noted)]
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from builders import Conversation, read
 from pkw_builders import (
-    ANSWER_0, BOOT_UP, CLASS, DISABLE_0, DISABLE_1, DISABLED_1, driven, IDLE, IDLE_ANSWER, online,
+    ANSWER_0, BOOT_UP, CLASS, DISABLE_0, DISABLE_1, DISABLED_0, driven, IDLE, IDLE_ANSWER, online,
     POSITION, READ_0, SPEED, SPEED_0, SPEED_1, START, STILL_0, STILL_1, STOPPED, TORQUE,
 )
 import pytest
@@ -206,10 +206,10 @@ def test_silent_drive_gets_neutral_before_it_is_left_alone() -> None:
 
 def test_stop_is_acknowledged_and_then_silent() -> None:
     talk = driven()
-    assert talk.deactivate(10.115) == [DISABLE_1]
+    assert talk.deactivate(10.115) == [DISABLE_0]
     assert not talk.session.stopped
-    assert talk.hears(DISABLED_1, 10.116) == [STILL_0]
-    assert talk.hears('485#C602002A00000000', 10.117) == []
+    assert talk.hears(DISABLED_0, 10.116) == [STILL_1]
+    assert talk.hears('485#C60200AA00000000', 10.117) == []
     assert talk.session.stopped
     assert talk.session.next_timer() == math.inf
     assert talk.events(StationLost) == [StationLost('deactivated')]
@@ -222,7 +222,7 @@ def test_stop_is_tried_three_times() -> None:
     talk = driven()
     sent = [(10.115, *talk.deactivate(10.115)), *talk.until(20.0)]
     assert [text for _, text in sent] == [
-        DISABLE_1, DISABLE_0, DISABLE_1, STILL_0, STILL_1, STILL_0]
+        DISABLE_0, DISABLE_1, DISABLE_0, STILL_1, STILL_0, STILL_1]
     assert [round(now - 10.115, 3) for now, _ in sent] == [0.0, 0.5, 1.0, 1.5, 2.0, 2.5]
     assert talk.session.stopped
     assert talk.events(Noted) == [WITHDRAWN, Noted(
@@ -245,11 +245,11 @@ def test_stop_of_many_setpoints_has_its_limit() -> None:
 def test_slow_device_acknowledges_each_stop_once() -> None:
     """It takes 0.3 s for each answer."""
     talk = driven()
-    assert talk.deactivate(10.115) == [DISABLE_1]
+    assert talk.deactivate(10.115) == [DISABLE_0]
     assert talk.until(10.414) == []
-    assert talk.hears(DISABLED_1, 10.415) == [STILL_0]
+    assert talk.hears(DISABLED_0, 10.415) == [STILL_1]
     assert talk.until(10.714) == []
-    assert talk.hears('485#C602002A00000000', 10.715) == []
+    assert talk.hears('485#C60200AA00000000', 10.715) == []
     assert talk.session.stopped
     assert talk.events(Noted) == [WITHDRAWN]
 

@@ -372,11 +372,11 @@ def test_read_of_the_round_makes_room_too() -> None:
 def test_disable_goes_before_setpoints_and_neutral_right_behind() -> None:
     talk = driven()
     assert talk.session.state is DriveState.ONLINE
-    assert talk.submits(read(CLASS), 10.114) == [READ_CLASS_1]
+    assert talk.submits(read(CLASS), 10.114) == [READ_CLASS_0]
     assert talk.asks(ControlAction.DISABLE, 10.115) == []
-    assert talk.hears(CLASS_1, 10.116) == [DISABLE_0]
-    assert talk.hears(DISABLED_0, 10.117) == [STILL_1]
-    assert talk.hears('485#C60200AA00000000', 10.118) == []
+    assert talk.hears(CLASS_0, 10.116) == [DISABLE_1]
+    assert talk.hears(DISABLED_1, 10.117) == [STILL_0]
+    assert talk.hears('485#C602002A00000000', 10.118) == []
 
 
 STOP_WORDS = pytest.mark.parametrize(('action', 'word'), [
@@ -388,11 +388,11 @@ def test_stop_word_whose_frame_got_lost_is_repeated_before_anything_else(
         action: ControlAction, word: str) -> None:
     """The adapter took it, the bus never had it. Once more does no harm."""
     talk = driven(control=replace(CONTROL, quick_stop=0x0002))
-    assert talk.asks(action, 10.115) == [f'505#C00200AA{word}000000']
+    assert talk.asks(action, 10.115) == [f'505#C002002A{word}000000']
     assert talk.submits(read(CLASS), 10.12) == []
-    assert talk.until(10.166) == [(10.165, f'505#C002002A{word}000000')], 'no function 00h'
-    assert talk.hears('485#C002002A00000000', 10.167) == [STILL_1], 'and no read-back'
-    assert talk.hears('485#C60200AA00000000', 10.168) == [READ_CLASS_0]
+    assert talk.until(10.166) == [(10.165, f'505#C00200AA{word}000000')], 'no function 00h'
+    assert talk.hears('485#C00200AA00000000', 10.167) == [STILL_0], 'and no read-back'
+    assert talk.hears('485#C602002A00000000', 10.168) == [READ_CLASS_1]
     assert talk.session.told.owed is (word != '00')
     assert worries(talk) == []
 
@@ -402,34 +402,34 @@ def test_stop_word_that_is_never_answered_has_three_attempts_before_others_go_on
         action: ControlAction, word: str) -> None:
     """The last of them has the time that any request has."""
     talk = driven(control=replace(CONTROL, quick_stop=0x0002), refresh_interval=0.05)
-    assert talk.asks(action, 10.115) == [f'505#C00200AA{word}000000']
-    assert talk.until(10.714) == [(10.165, f'505#C002002A{word}000000'),
-                                  (10.215, f'505#C00200AA{word}000000')]
+    assert talk.asks(action, 10.115) == [f'505#C002002A{word}000000']
+    assert talk.until(10.714) == [(10.165, f'505#C00200AA{word}000000'),
+                                  (10.215, f'505#C002002A{word}000000')]
     assert talk.until(10.72) == [(10.715, IDLE)], 'setpoints still go out'
-    assert talk.hears(IDLE_ANSWER, 10.721) == [STILL_0]
+    assert talk.hears(IDLE_ANSWER, 10.721) == [STILL_1]
     assert talk.until(11.23) == [(11.221, IDLE)]
-    assert talk.hears(IDLE_ANSWER, 11.231) == [READ_1], 'of the round that was due at 10.13'
+    assert talk.hears(IDLE_ANSWER, 11.231) == [READ_0], 'of the round that was due at 10.13'
     sent = talk.until(11.76)
-    assert [text for _, text in sent] == [f'505#C002002A{word}000000'], 'with the next round'
-    assert talk.hears('485#C002002A00000000', 11.765) == [STILL_1], 'which was due as well'
+    assert [text for _, text in sent] == [f'505#C00200AA{word}000000'], 'with the next round'
+    assert talk.hears('485#C00200AA00000000', 11.765) == [STILL_0], 'which was due as well'
 
 
 def test_late_answer_to_a_stop_word_is_as_good_as_that_to_its_repetition() -> None:
     """A device that takes 0.3 s for each answer."""
     talk = driven()
-    assert talk.asks(ControlAction.DISABLE, 10.115) == [DISABLE_1]
-    assert [text for _, text in talk.until(10.414)] == [DISABLE_0, DISABLE_1]
-    assert talk.hears(DISABLED_1, 10.415) == [STILL_0]
+    assert talk.asks(ControlAction.DISABLE, 10.115) == [DISABLE_0]
+    assert [text for _, text in talk.until(10.414)] == [DISABLE_1, DISABLE_0]
+    assert talk.hears(DISABLED_0, 10.415) == [STILL_1]
     assert talk.session.statistics.rejected == 0
 
 
 def test_word_that_changes_while_a_stop_is_repeated() -> None:
     """A quick stop gives up after 0.2 s: what is repeated is the newest word."""
     talk = driven(control=replace(CONTROL, quick_stop=0x0002), control_timeout=0.07)
-    assert talk.asks(ControlAction.QUICK_STOP, 10.115) == ['505#C00200AA02000000']
+    assert talk.asks(ControlAction.QUICK_STOP, 10.115) == ['505#C002002A02000000']
     assert talk.until(10.164) == []
-    assert talk.until(10.166) == [(10.165, '505#C002002A02000000')]
-    assert [text for _, text in talk.until(10.24)] == [DISABLE_1], 'no more quick stop'
+    assert talk.until(10.166) == [(10.165, '505#C00200AA02000000')]
+    assert [text for _, text in talk.until(10.24)] == [DISABLE_0], 'no more quick stop'
 
 
 def test_enable_that_is_not_answered_is_not_repeated_when_others_would_be() -> None:
@@ -553,14 +553,15 @@ def test_what_was_left_standing_does_not_move_it_when_it_is_enabled(immediate: b
         assert talk.commands(0, 10.0, 10.06 + 0.001 * place) is CommandOutcome.DISABLED
     assert talk.until(10.0701) == [(10.07, READ_0)]
     assert talk.hears(ANSWER_0, 10.071) == []
-    assert talk.asks(ControlAction.ENABLE, 10.075) == ['505#C00200AA01000000']
-    assert talk.hears(DISABLED_1, 10.076) == []
+    assert talk.asks(ControlAction.ENABLE, 10.075) == [STILL_1]
+    assert talk.hears('485#C60200AA00000000', 10.0755) == [ENABLE_0]
+    assert talk.hears(DISABLED_0, 10.076) == []
     assert talk.commands(0, 10.0, 10.08) is CommandOutcome.DISABLED, 'not seen running yet'
-    assert talk.until(10.0901) == [(10.09, READ_0)]
-    assert talk.hears(RUNS_0, 10.091) == []
+    assert talk.until(10.0901) == [(10.09, READ_1)]
+    assert talk.hears(RUNS_1, 10.091) == []
     assert talk.session.state is DriveState.NOT_ARMED
-    assert talk.until(10.1101) == [(10.11, READ_1)], 'no setpoint'
-    assert talk.hears(RUNS_1, 10.111) == []
+    assert talk.until(10.1101) == [(10.11, READ_0)], 'no setpoint'
+    assert talk.hears(RUNS_0, 10.111) == []
     outcome = talk.commands(0, 10.0, 10.12)
     assert outcome is (CommandOutcome.ARMED if immediate else CommandOutcome.NOT_ARMED)
 
