@@ -107,7 +107,7 @@ def test_drive_without_control_that_does_not_take_neutral_may_run() -> None:
 
 
 def test_disable_that_is_not_answered_is_told() -> None:
-    """The drive answers everything else, and goes on: who is told that it is disabled is misled."""
+    """The drive answers everything else, and goes on."""
     talk = driven()
     asked = talk.asks(ControlAction.DISABLE, 10.115)
     sent: list[str] = []
