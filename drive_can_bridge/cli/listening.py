@@ -1,15 +1,13 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """What ``record`` and ``decode --live`` have in common: the buses of a file, listened to."""
 
-from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import contextmanager
-import math
-from pathlib import Path
 import queue
-import sys
 import time
 
+from drive_can_bridge.cli.command import complain
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.record import Record
@@ -19,28 +17,6 @@ from drive_can_bridge.transport.tap import QUEUE_MAX, Tap
 
 #: s between two looks at the clock while nothing arrives
 _PATIENCE = 0.05
-
-
-def add_params_file(parser: ArgumentParser, help_text: str) -> None:
-    """Add the option that names the parameter file."""
-    parser.add_argument('--params-file', metavar='FILE', type=Path, required=True, help=help_text)
-
-
-def add_seconds(parser: ArgumentParser) -> None:
-    """Add the option that ends listening."""
-    parser.add_argument('--seconds', metavar='S', type=positive, default=math.inf,
-                        help='end by itself after that time (default: runs until Ctrl-C)')
-
-
-def positive(text: str) -> float:
-    """Read a number above 0 from the command line."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not (math.isfinite(value) and value > 0):
-        raise ArgumentTypeError(f'{text}: allowed is a number above 0')
-    return value
 
 
 def load(args: Namespace) -> BridgeConfiguration:
@@ -96,8 +72,3 @@ def listening(configuration: BridgeConfiguration) -> Iterator[Taps]:
         yield taps
     finally:
         taps.close()
-
-
-def complain(text: str) -> None:
-    """Write a line to standard error."""
-    print(text, file=sys.stderr, flush=True)
