@@ -13,7 +13,7 @@ from drive_can_bridge.backup.comparison import (
 from drive_can_bridge.backup.document import Backup
 from drive_can_bridge.backup.reader import read_backup
 from drive_can_bridge.backup.settings import mode_bits
-from drive_can_bridge.cli.command import complain, WrongUsage
+from drive_can_bridge.cli.command import complain, say, WrongUsage
 from drive_can_bridge.cli.completion import complete_drives
 from drive_can_bridge.cli.drives import add_words, chosen_one, opened, read_all, source_of
 from drive_can_bridge.cli.tables import print_json, print_table
@@ -50,12 +50,19 @@ def run(args: Namespace) -> int:
     :raises DriveCanError: a file is wrong, or a drive cannot be reached or read.
     :raises OSError: a file cannot be read.
     """
-    found = _compare(args)
-    _show(args, found)
+    first, second = _sides_of(args)
+    found = differences(first, second)
+    if first.settings and second.settings and not (
+            first.settings.keys() & second.settings.keys() or args.json):
+        say(f'{" and ".join(args.words)} have no setting in common '
+            f'({len(first.settings)} and {len(second.settings)}): they are of different drive '
+            'types')
+    else:
+        _show(args, found)
     return DIFFERENT if found else SAME
 
 
-def _compare(args: Namespace) -> list[Difference]:
+def _sides_of(args: Namespace) -> list[Side]:
     words = args.words
     if len(words) != 2:
         raise WrongUsage(f'{" ".join(words)}: allowed are two, A and B')
@@ -76,7 +83,7 @@ def _compare(args: Namespace) -> list[Difference]:
             more = ', …' if len(side.left_out) > _NAMED_MAX else ''
             complain(f'{word}: left out, because no settings: {len(side.left_out)} '
                      f'values ({names}{more})')
-    return differences(*sides)
+    return sides
 
 
 def _sides(words: Sequence[str], files: dict[str, Backup], drives: Drives) -> list[Side]:

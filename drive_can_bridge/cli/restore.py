@@ -8,8 +8,8 @@ import time
 
 from drive_can_bridge.backup.document import Backup
 from drive_can_bridge.backup.plan import (
-    Change, names_to_restore, plan_restore, problems_in, RestorePlan, says_nothing, strangers,
-    why_left_alone,
+    Change, names_to_restore, other_type, plan_restore, problems_in, RestorePlan, says_nothing,
+    strangers, why_left_alone,
 )
 from drive_can_bridge.backup.reader import read_backup
 from drive_can_bridge.backup.restore import Restorer, RestoreResult
@@ -127,9 +127,10 @@ def _restore(args: Namespace, backup: Backup, drive: Drive) -> int:
 def _may_be(args: Namespace, backup: Backup, drive: Drive) -> bool:
     """Tell whether the file may be restored into the drive; say why not."""
     problems = problems_in(backup, drive)
-    for problem in problems:
-        complain(problem)
     if problems:
+        other = other_type(backup, drive)
+        complain(f'{backup.file}: of another drive type: {other}' if other else
+                 '\n'.join(problems))
         return False
     differing = strangers(backup, drive, _identity(backup, drive))
     for text in differing:

@@ -24,6 +24,8 @@ from drive_can_bridge.core.words import show, suggestion
 PARAMETERS_KEY = 'ros__parameters'
 #: tells the section of a bridge from those of other nodes
 MARK = 'buses'
+#: tell a profile, which is no file for nodes
+_PROFILE_KEYS = {'protocols', 'parameters'}
 #: the node that a section with wildcards is meant for, where it leaves the name open
 _NODE = 'drive_can_bridge'
 
@@ -62,7 +64,11 @@ class _FileReader:
             self._note(error.line, (), str(error))
             return
         for _, root in documents:
-            if root.kind is Kind.MAPPING:
+            if _PROFILE_KEYS <= {key.text for key, _ in root.pairs}:
+                # a line for everything in it would not help
+                self._note(root.line, (), f'a profile, allowed is NODE_NAME: {{{PARAMETERS_KEY}: '
+                                          '…}; drive_can profile check looks at profiles')
+            elif root.kind is Kind.MAPPING:
                 self._names(root, ())
             else:
                 self._note(root.line, (), 'no mapping, allowed is '

@@ -3,11 +3,12 @@
 
 from pathlib import Path
 
-from configuration_builders import FILE
+from configuration_builders import FILE, PROFILE
 import pytest
 
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.configuration.parameter_file import read_parameter_file, unseen_problems
+from drive_can_bridge.configuration.profiles import read_profile
 from drive_can_bridge.core.errors import ConfigurationError
 
 HEAD = '/**/drive_can_bridge:\n  ros__parameters:\n'
@@ -306,6 +307,20 @@ def test_buses_are_named_in_the_order_of_the_file(tmp_path: Path) -> None:
     with pytest.raises(ConfigurationError) as caught:
         configuration_from_file(path)
     assert "'quite_another' is unknown, allowed: " + ', '.join(names) in str(caught.value)
+
+
+def test_a_profile_is_no_parameter_file(tmp_path: Path) -> None:
+    assert read(tmp_path, PROFILE) == (None, [
+        'f.yaml:1: yaml: a profile, allowed is NODE_NAME: {ros__parameters: …}; drive_can profile '
+        'check looks at profiles'])
+
+
+def test_a_parameter_file_is_no_profile(tmp_path: Path) -> None:
+    path = tmp_path / 'f.yaml'
+    path.write_text(FILE, encoding='utf-8')
+    assert [str(problem) for problem in read_profile(path).problems] == [
+        f'{path}:1: yaml: parameters of nodes, allowed is a profile; drive_can validate looks at '
+        'the file of a bridge']
 
 
 def test_dotted_buses_still_mark_the_section(tmp_path: Path) -> None:
