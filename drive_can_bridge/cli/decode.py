@@ -3,7 +3,7 @@
 
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable, Iterable
-from contextlib import ExitStack
+from contextlib import closing, ExitStack
 import json
 from pathlib import Path
 import sys
@@ -11,7 +11,8 @@ import time
 
 from drive_can_bridge.cli.arguments import add_params_file, add_seconds
 from drive_can_bridge.cli.command import complain, FAILED, WrongUsage
-from drive_can_bridge.cli.listening import listening, load
+from drive_can_bridge.cli.listening import Taps
+from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.record import Record
@@ -75,7 +76,7 @@ def run(args: Namespace) -> int:
         args.plot = args.plot or None
     if (args.file is None) is not args.live or args.plot == []:
         raise WrongUsage('give a trace file, or --live')
-    configuration = load(args)
+    configuration = configuration_from_file(args.params_file)
     unknown = [name for name in args.drive if not any(c in name for c in '*?[')
                and name not in configuration.drives]
     if unknown:
@@ -110,8 +111,8 @@ def _sinks(args: Namespace, configuration: BridgeConfiguration, stack: ExitStack
     """Return who takes telegrams, and what is to be done at the end."""
     sinks: list[Sink] = []
     endings: list[Callable[[], None]] = []
-    drives = [drive for drive in configuration.drives.values()
-              if Selection(args.drive, set()).takes('', _about(drive.name))]
+    selection = Selection(args.drive, args.only)
+    drives = [drive for drive in configuration.drives.values() if selection.names(drive.name)]
     if args.csv is not None:
         stream = stack.enter_context(args.csv.open('w', encoding='utf-8', newline=''))
         sinks.append(TableWriter(stream, drives))
@@ -122,13 +123,8 @@ def _sinks(args: Namespace, configuration: BridgeConfiguration, stack: ExitStack
         endings.append(lambda: _draw(plotter, picture))
     if not (sinks or args.summary):
         write = _flushed if args.live else sys.stdout.write
-        sinks.append(LineWriter(write, Selection(args.drive, args.only), as_json=args.json))
+        sinks.append(LineWriter(write, selection, as_json=args.json))
     return sinks, endings
-
-
-def _about(drive: str) -> Telegram:
-    from drive_can_bridge.protocols.observer import Direction, Kind
-    return Telegram(0.0, drive, Direction.NEITHER, Kind.OTHER, '')
 
 
 def _together(sinks: list[Sink]) -> Sink:
@@ -168,7 +164,7 @@ def _run_through(records: Iterable[Record], tracer: Tracer) -> bool:
 
 
 def _live(args: Namespace, configuration: BridgeConfiguration, tracer: Tracer) -> int:
-    with listening(configuration) as taps:
+    with closing(Taps(configuration)) as taps:
         looked_at = None
         try:
             for record in taps.records(args.seconds):

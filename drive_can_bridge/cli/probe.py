@@ -10,9 +10,9 @@ from drive_can_bridge.cli.arguments import add_params_file
 from drive_can_bridge.cli.asking import Asker, LISTEN
 from drive_can_bridge.cli.command import complain, FAILED
 from drive_can_bridge.cli.drives import chosen, split_words
-from drive_can_bridge.cli.listening import load
 from drive_can_bridge.cli.questions import agree_to_hazard
 from drive_can_bridge.cli.tables import print_json, print_table
+from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import BridgeConfiguration, DriveConfiguration
 from drive_can_bridge.exchange.one_master import END_FIRST, Ownership
 from drive_can_bridge.protocols.families import FAMILIES
@@ -53,7 +53,7 @@ def run(args: Namespace) -> int:
     :raises WrongUsage: it is not clear which drive is meant, or nobody agrees.
     :raises DriveCanError: the file is wrong, there is another master, the bus cannot be used.
     """
-    configuration = load(args)
+    configuration = configuration_from_file(args.params_file)
     known = list(configuration.drives)
     names = split_words(known, [])[0] if args.drive is None else chosen(known, [args.drive])
     drives = [configuration.drives[name] for name in names]

@@ -2,6 +2,7 @@
 """``drive_can record``: everything on the buses of a parameter file, in a trace file."""
 
 from argparse import ArgumentParser, Namespace
+from contextlib import closing
 from pathlib import Path
 import sys
 import time
@@ -9,7 +10,9 @@ from typing import Any, TextIO
 
 from drive_can_bridge.cli.arguments import above_zero, add_params_file, add_seconds
 from drive_can_bridge.cli.command import complain, WrongUsage
-from drive_can_bridge.cli.listening import listening, load
+from drive_can_bridge.cli.listening import Taps
+from drive_can_bridge.cli.tables import print_json
+from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.frame import bits_on_bus, STUFFING
 from drive_can_bridge.core.record import Record, RecordKind
 from drive_can_bridge.trace.channels import label
@@ -50,7 +53,7 @@ def run(args: Namespace) -> int:
     :raises DriveCanError: a parameter file with problems, a bus that cannot be opened.
     :raises OSError: a file cannot be read or written.
     """
-    configuration = load(args)
+    configuration = configuration_from_file(args.params_file)
     buses = list(configuration.buses.values())
     try:
         check_writable(args.output, len(buses))
@@ -59,7 +62,7 @@ def run(args: Namespace) -> int:
     for loss in LOSSES.get(args.output.suffix.lower(), ()):
         complain(f'warning: {args.output.suffix} does not keep {loss}; .log does')
     status = _Status(sys.stderr)
-    with listening(configuration) as taps:      # before a file is replaced
+    with closing(Taps(configuration)) as taps:      # before a file is replaced
         counters = {label(bus): _Counter(bus.name, bus.bitrate) for bus in buses}
         output = _Rotating(args.output, [label(bus) for bus in buses], args.rotate)
         try:
@@ -70,7 +73,10 @@ def run(args: Namespace) -> int:
             status.clear()
             output.close()
     for counter in counters.values():
-        print(counter.document(output) if args.json else counter.line(output))
+        if args.json:
+            print_json(counter.document(output))
+        else:
+            print(counter.line(output))
     return 0
 
 
@@ -123,15 +129,14 @@ class _Counter:
                 f'{self._error_frames} error frames, {seconds:.1f} s, '
                 f'load {self._load(self._bits, seconds):.1f} %: {output.names}')
 
-    def document(self, output: '_Rotating') -> str:
+    def document(self, output: '_Rotating') -> dict[str, Any]:
         """Sum up for programs."""
-        import json
         seconds = time.monotonic() - self._began
-        return json.dumps({
+        return {
             'bus': self._name, 'file': str(output.last), 'files': output.count,
             'frames': self._frames, 'sent': self._sent, 'error_frames': self._error_frames,
             'seconds': round(seconds, 3),
-            'load_percent': round(self._load(self._bits, seconds), 1)})
+            'load_percent': round(self._load(self._bits, seconds), 1)}
 
     def _load(self, bits: int, seconds: float) -> float:
         return 100.0 * STUFFING * bits / (max(seconds, 1e-3) * self._bitrate)
