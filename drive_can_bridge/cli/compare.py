@@ -26,6 +26,8 @@ from drive_can_bridge.core.words import value_text
 SAME, DIFFERENT = 0, 1
 _DRIVE = re.compile(r'[a-z][a-z0-9_]*')
 _NONE = '-'
+#: settings that may all be misspelt
+_FEW = 3
 #: names of what is left out that are told
 _NAMED_MAX = 5
 
@@ -52,7 +54,7 @@ def run(args: Namespace) -> int:
     """
     first, second = _sides_of(args)
     found = differences(first, second)
-    if first.settings and second.settings and not (
+    if min(len(first.settings), len(second.settings)) > _FEW and not (
             first.settings.keys() & second.settings.keys() or args.json):
         say(f'{" and ".join(args.words)} have no setting in common '
             f'({len(first.settings)} and {len(second.settings)}): they are of different drive '

@@ -272,6 +272,14 @@ class TestRestore:
         said = command('restore', 'mixer.yaml', 'conveyor', '--yes')
         assert len(said.errors) == count + 1
 
+    def test_of_nothing_that_is_written(self, shop: Shop, command: Command) -> None:
+        shop.write_backup('conveyor', speed_setpoint=5.0)
+        before = shop.drives['conveyor'].requests
+        said = command('restore', 'conveyor.yaml', '--yes')
+        assert (said.code, said.lines) == (
+            0, ['conveyor: nothing to restore, 0 settings are as in conveyor.yaml'])
+        assert shop.drives['conveyor'].requests == before
+
     def test_of_an_older_table_of_the_same_type(self, shop: Shop, command: Command) -> None:
         command('backup', 'conveyor', '-o', 'b.yaml')
         text = Path('b.yaml').read_text()
@@ -359,7 +367,10 @@ class TestCompare:
             f'mixer.yaml and pump have no setting in common ({count} and ')
         assert said.lines[0].endswith('): they are of different drive types')
         assert len(command('compare', 'mixer.yaml', 'pump', '--json').documents) > count
-        shop.write_backup('both', acceleration_time=1.0, flc1_ratio=50.0)
+        shop.write_backup('few', acceleration_time=1.0, braking_time=1.0, torque=1)
+        assert command('compare', 'few.yaml', 'pump').lines[0].startswith('parameter')
+        shop.write_backup('both', acceleration_time=1.0, braking_time=1.0, torque=1,
+                          flc1_ratio=50.0)
         assert command('compare', 'both.yaml', 'pump').lines[0].startswith('parameter')
 
     def test_two_drives(self, shop: Shop, command: Command) -> None:

@@ -266,3 +266,17 @@ def test_what_goes_to_a_pipe_is_neither_cut_nor_wrapped() -> None:
     rows = shown.stdout.split('\n\n')[1].splitlines()
     assert len(rows) == 95
     assert max(map(len, rows)) > 150 and '\x1b' not in shown.stdout
+
+
+def test_nobody_can_be_asked_about_a_file(table: Path, tmp_path: Path,
+                                          capsys: pytest.CaptureFixture[str],
+                                          monkeypatch: pytest.MonkeyPatch) -> None:
+    with open(os.devnull, encoding='ascii') as nobody:
+        monkeypatch.setattr(sys, 'stdin', nobody)
+        target = tmp_path / 'there.yaml'
+        target.write_text('something else')
+        assert main(['profile', 'import', str(table), '-o', str(target)]) == 2
+    assert capsys.readouterr().err.splitlines()[-1] == (
+        f'drive_can profile import: {target} exists and holds something else. Overwrite it? '
+        'Nothing was written: nobody can be asked here; --yes overwrites it')
+    assert target.read_text() == 'something else'
