@@ -280,3 +280,14 @@ def test_nobody_can_be_asked_about_a_file(table: Path, tmp_path: Path,
         f'drive_can profile import: {target} exists and holds something else. Overwrite it? '
         'Nothing was written: nobody can be asked here; --yes overwrites it')
     assert target.read_text() == 'something else'
+
+
+def test_nothing_upsets_a_terminal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / 'p.yaml'
+    file.write_text('description: "all\\e[2J"\nprotocols: [cannord]\nparameters:\n'
+                    '  speed: {number: 1, type: int16, description: "one\\e[2J"}\n')
+    assert main(['profile', 'show', str(file)]) == 0
+    assert main(['profile', 'check', 'no\x1b[2J.yaml']) == 1
+    out, err = capsys.readouterr()
+    assert out.count('\\x1b[2J') == 2 and err == 'no\\x1b[2J.yaml: No such file or directory\n'
+    assert '\x1b' not in out
