@@ -22,10 +22,9 @@ from dataclasses import dataclass, field
 
 from drive_can_bridge.backup.values import value_in_file
 from drive_can_bridge.client.drive import DriveFacts
+from drive_can_bridge.configuration.parameter_file import PARAMETERS_KEY
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.text import printable
-
-PARAMETERS_KEY = 'ros__parameters'
 
 
 @dataclass(frozen=True, slots=True)

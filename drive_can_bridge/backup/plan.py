@@ -42,6 +42,8 @@ _LEFT_ALONE = {
     LeftAlone.CONTROL: 'the control word',
     LeftAlone.MODE: "set by the section 'restore' of its profile",
 }
+#: names that may all be misspelt
+_FEW = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,6 +108,23 @@ def problems_in(backup: Backup, drive: Drive) -> list[str]:
         if reason:
             found.append(backup.problem(name, reason))
     return found
+
+
+def other_type(backup: Backup, drive: Drive) -> str:
+    """
+    Say of which other drive type a file is, most of which can only be wrong then; '': of this one.
+
+    Without a head it is one of which the drive knows no name at all.
+    """
+    head, facts = backup.head, drive.facts
+    here = f'{drive.name} has {facts.profile} ({facts.protocol})'
+    if says_nothing(head):
+        unknown = len(backup.values) > _FEW and not any(map(drive.find, backup.values))
+        return f'{here}, which has none of its {len(backup.values)} names' if unknown else ''
+    if head.profile_sha256 == facts.profile_sha256 or (head.profile, head.protocol) == (
+            facts.profile, facts.protocol):
+        return ''
+    return f'it is a backup with profile {head.profile or "?"} ({head.protocol or "?"}), {here}'
 
 
 def strangers(backup: Backup, drive: Drive, identity: str) -> list[str]:

@@ -6,18 +6,14 @@ from collections.abc import Sequence
 from datetime import datetime, timezone
 import os
 from pathlib import Path
-from typing import Any
 
 from drive_can_bridge.backup.document import head_of, written
 from drive_can_bridge.backup.settings import settings_of
+from drive_can_bridge.cli.command import complain, FAILED, say, WrongUsage
 from drive_can_bridge.cli.completion import complete_drives
-from drive_can_bridge.cli.drives import (
-    add_drive_options, chosen, FAILED, opened, source_of, WRONG_USAGE, WrongUsage,
-)
-from drive_can_bridge.cli.listening import complain
-from drive_can_bridge.cli.progress import Bar
-from drive_can_bridge.cli.questions import agreed, NobodyToAsk
-from drive_can_bridge.cli.tables import print_json, printable
+from drive_can_bridge.cli.drives import add_words, chosen, opened, read_all, source_of
+from drive_can_bridge.cli.questions import agreed
+from drive_can_bridge.cli.tables import print_json
 from drive_can_bridge.cli.whole_file import differs, write_whole
 from drive_can_bridge.client.drive import Drive, ReadOutcome
 from drive_can_bridge.core.errors import DriveCanError
@@ -26,27 +22,23 @@ from drive_can_bridge.core.parameters import Parameter
 SUFFIX = '.yaml'
 
 
-def add_parser(subparsers: Any) -> None:
-    """Add the subcommand to the parser of ``drive_can``."""
-    parser: ArgumentParser = subparsers.add_parser(
-        'backup', help='write the settings of a drive to a file', allow_abbrev=False,
-        description='Write the settings of a drive to a file that drive_can restore and ros2 '
-                    'param load take: everything that can be restored, nothing else. Sends reads '
-                    'only.',
-        epilog='Exit code 0: written. 1: something could not be read or written, and there is no '
-               'file. 2: wrong usage, or a file exists and nobody can be asked. --json, for each '
-               'drive: drive, file, settings (how many), identity, left_out (parameter, reason).')
-    words = parser.add_argument(
-        'words', metavar='DRIVE', nargs='*',
-        help='name or shell pattern; may be left out where there is only one')
-    words.completer = complete_drives  # type: ignore[attr-defined]  # for argcomplete
+def define(parser: ArgumentParser) -> None:
+    """Define the words and options of the subcommand."""
+    parser.description = (
+        'Write the settings of a drive to a file that drive_can restore and ros2 '
+        'param load take: everything that can be restored, nothing else. Sends reads '
+        'only.')
+    parser.epilog = (
+        'Exit code 0: written. 1: something could not be read or written, and there is no '
+        'file. 2: wrong usage, or a file exists and nobody can be asked. --json, for each '
+        'drive: drive, file, settings (how many), identity, left_out (parameter, reason).')
     parser.add_argument('-o', '--output', metavar='FILE', required=True,
                         help='where it goes; for several drives DIR/, a file each')
     parser.add_argument('--partial', action='store_true',
                         help='write the file although parameters could not be read; it lists them '
                              'in a comment')
-    add_drive_options(parser)
-    parser.set_defaults(run=run)
+    add_words(parser, complete_drives, 'DRIVE', '*',
+              'name or shell pattern; may be left out where there is only one')
 
 
 def run(args: Namespace) -> int:
@@ -54,20 +46,17 @@ def run(args: Namespace) -> int:
     Write the backups.
 
     :return: exit code.
+    :raises WrongUsage: which drives, where to, or nobody can be asked.
     :raises DriveCanError: the drives cannot be reached.
     :raises OSError: a file cannot be written.
     """
-    try:
-        with source_of(args) as source:
-            names = chosen(source.names, args.words)
-            files = _files(args.output, names)
-            if not _may_write(list(files.values()), yes=args.yes):
-                return FAILED
-            with opened(source, names) as drives:
-                texts = {name: _text(args, drives[name]) for name in names}
-    except (WrongUsage, NobodyToAsk) as error:
-        complain(printable(f'drive_can backup: {error}'))
-        return WRONG_USAGE
+    with source_of(args) as source:
+        names = chosen(source.names, args.words)
+        files = _files(args.output, names)
+        if not _may_write(list(files.values()), yes=args.yes):
+            return FAILED
+        with opened(source, names) as drives:
+            texts = {name: _text(args, drives[name]) for name in names}
     for name, made in texts.items():
         if made is not None:
             files[name].parent.mkdir(exist_ok=True)
@@ -129,14 +118,13 @@ class _Made:
                                      for name, reason in self._left_out]})
         else:
             settings = f'{self._count} setting{"" if self._count == 1 else "s"}'
-            print(printable(f'{self._name}: {settings} in {file}'))
+            say(f'{self._name}: {settings} in {file}')
 
 
 def _text(args: Namespace, drive: Drive) -> _Made | None:
     """Read a drive; None: there is to be no file, and it was said why."""
     names = settings_of(drive)
-    with Bar(f'reading {drive.name}', len(names)) as bar:
-        outcomes = drive.read(*names, told=bar.step) if names else {}
+    outcomes = read_all(drive, names)
     settings: list[tuple[Parameter, int]] = []
     unread: list[tuple[str, str]] = []
     useless: list[tuple[str, str]] = []
@@ -150,15 +138,15 @@ def _text(args: Namespace, drive: Drive) -> _Made | None:
         else:
             settings.append((outcome.parameter, outcome.raw))
     for name, reason in useless:
-        complain(printable(f'warning: {drive.name}: {name} is left out: {reason}'))
+        complain(f'warning: {drive.name}: {name} is left out: {reason}')
     for name, reason in unread:
-        complain(printable(f'{drive.name}: {name} could not be read: {reason}'))
+        complain(f'{drive.name}: {name} could not be read: {reason}')
     if unread and not args.partial:
-        complain(printable(f'{drive.name}: no file was written; --partial writes one without '
-                           f'{"it" if len(unread) == 1 else "them"}'))
+        complain(f'{drive.name}: no file was written; --partial writes one without '
+                 f'{"it" if len(unread) == 1 else "them"}')
         return None
     if not settings:
-        complain(printable(f'{drive.name}: has no settings that could be written to a file'))
+        complain(f'{drive.name}: has no settings that could be written to a file')
         return None
     return _Made(drive, settings, [*unread, *useless])
 

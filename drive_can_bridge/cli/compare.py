@@ -5,7 +5,6 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from pathlib import Path
 import re
-from typing import Any
 
 from drive_can_bridge.backup.comparison import (
     Difference, differences, names_to_read, Setting, Side, side_of_drive, side_of_file,
@@ -14,63 +13,58 @@ from drive_can_bridge.backup.comparison import (
 from drive_can_bridge.backup.document import Backup
 from drive_can_bridge.backup.reader import read_backup
 from drive_can_bridge.backup.settings import mode_bits
+from drive_can_bridge.cli.command import complain, say, WrongUsage
 from drive_can_bridge.cli.completion import complete_drives
-from drive_can_bridge.cli.drives import (
-    add_drive_options, chosen_one, opened, source_of, WrongUsage,
-)
-from drive_can_bridge.cli.listening import complain
-from drive_can_bridge.cli.progress import Bar
-from drive_can_bridge.cli.tables import print_json, print_table, printable
+from drive_can_bridge.cli.drives import add_words, chosen_one, opened, read_all, source_of
+from drive_can_bridge.cli.tables import print_json, print_table
 from drive_can_bridge.client.drive import Drive, Drives
 from drive_can_bridge.configuration.profiles import ProfileStore
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.core.words import value_text
 
-SAME, DIFFERENT, TROUBLE = 0, 1, 2
+SAME, DIFFERENT = 0, 1
 _DRIVE = re.compile(r'[a-z][a-z0-9_]*')
 _NONE = '-'
+#: settings that may all be misspelt
+_FEW = 3
 #: names of what is left out that are told
 _NAMED_MAX = 5
 
 
-def add_parser(subparsers: Any) -> None:
-    """Add the subcommand to the parser of ``drive_can``."""
-    parser: ArgumentParser = subparsers.add_parser(
-        'compare', help='show what differs between two backups or drives', allow_abbrev=False,
-        description='Compare the settings of A and B, each of them a backup file or a drive: what '
-                    'looks like the name of a drive is one, ./NAME is a file. Sends reads only.',
-        epilog='Exit code 0: the same. 1: different. 2: trouble, a drive in use included. '
-               '--json, for each setting that differs: parameter, unit, a, b (null: not there).')
-    words = parser.add_argument('words', metavar='A B', nargs='+', help='backup files or drives')
-    words.completer = complete_drives  # type: ignore[attr-defined]  # for argcomplete
-    add_drive_options(parser)
-    parser.set_defaults(run=run)
+def define(parser: ArgumentParser) -> None:
+    """Define the words and options of the subcommand."""
+    parser.description = (
+        'Compare the settings of A and B, each of them a backup file or a drive: what '
+        'looks like the name of a drive is one, ./NAME is a file. Sends reads only.')
+    parser.epilog = (
+        'Exit code 0: the same. 1: different. 2: trouble, a drive in use included. '
+        '--json, for each setting that differs: parameter, unit, a, b (null: not there).')
+    add_words(parser, complete_drives, 'A B', '+', 'backup files or drives')
 
 
 def run(args: Namespace) -> int:
     """
     Compare.
 
-    :return: 0 the same, 1 different, 2 trouble.
+    :return: 0 the same, 1 different.
+    :raises WrongUsage: not two of them, or it is not clear which drives.
+    :raises DriveCanError: a file is wrong, or a drive cannot be reached or read.
+    :raises OSError: a file cannot be read.
     """
-    try:
-        found = _compare(args)
-    except WrongUsage as error:
-        complain(printable(f'drive_can compare: {error}'))
-        return TROUBLE
-    except DriveCanError as error:
-        complain(str(error))
-        return TROUBLE
-    except OSError as error:
-        place = f'{error.filename}: ' if error.filename else ''
-        complain(printable(f'drive_can compare: {place}{error.strerror or error}'))
-        return TROUBLE
-    _show(args, found)
+    first, second = _sides_of(args)
+    found = differences(first, second)
+    if min(len(first.settings), len(second.settings)) > _FEW and not (
+            first.settings.keys() & second.settings.keys() or args.json):
+        say(f'{" and ".join(args.words)} have no setting in common '
+            f'({len(first.settings)} and {len(second.settings)}): they are of different drive '
+            'types')
+    else:
+        _show(args, found)
     return DIFFERENT if found else SAME
 
 
-def _compare(args: Namespace) -> list[Difference]:
+def _sides_of(args: Namespace) -> list[Side]:
     words = args.words
     if len(words) != 2:
         raise WrongUsage(f'{" ".join(words)}: allowed are two, A and B')
@@ -89,9 +83,9 @@ def _compare(args: Namespace) -> list[Difference]:
         if side.left_out:
             names = ', '.join(side.left_out[:_NAMED_MAX])
             more = ', …' if len(side.left_out) > _NAMED_MAX else ''
-            complain(printable(f'{word}: left out, because no settings: {len(side.left_out)} '
-                               f'values ({names}{more})'))
-    return differences(*sides)
+            complain(f'{word}: left out, because no settings: {len(side.left_out)} '
+                     f'values ({names}{more})')
+    return sides
 
 
 def _sides(words: Sequence[str], files: dict[str, Backup], drives: Drives) -> list[Side]:
@@ -114,12 +108,11 @@ def _drive(drive: Drive, files: Sequence[Backup]) -> Side:
     :raises DriveCanError: something cannot be read: nobody knows whether it differs.
     """
     names = names_to_read(drive, *files)
-    with Bar(f'reading {drive.name}', len(names)) as bar:
-        outcomes = drive.read(*names, told=bar.step) if names else {}
+    outcomes = read_all(drive, names)
     unread = [f'{drive.name}: {outcome.name} could not be read: {outcome.reason}'
               for outcome in outcomes.values() if not outcome.ok]
     if unread:
-        raise DriveCanError('\n'.join(map(printable, unread)))
+        raise DriveCanError('\n'.join(unread))
     return side_of_drive(drive, outcomes)
 
 
@@ -145,9 +138,8 @@ def _file_alone(backup: Backup, profile: Profile | None) -> Side:
 def _tell_profile(backup: Backup, drive: Drive) -> None:
     head = backup.head
     if head.profile_sha256 and head.profile_sha256 != drive.facts.profile_sha256:
-        complain(printable(f'warning: {backup.file} was made with another profile '
-                           f'({head.profile}) than the one of {drive.name} '
-                           f'({drive.facts.profile})'))
+        complain(f'warning: {backup.file} was made with another profile ({head.profile}) than '
+                 f'the one of {drive.name} ({drive.facts.profile})')
 
 
 def _show(args: Namespace, found: Sequence[Difference]) -> None:

@@ -3,16 +3,16 @@
 
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable, Iterable
-from contextlib import ExitStack
+from contextlib import closing, ExitStack
 import json
 from pathlib import Path
 import sys
 import time
-from typing import Any
 
-from drive_can_bridge.cli.listening import (
-    add_params_file, add_seconds, complain, listening, load,
-)
+from drive_can_bridge.cli.arguments import add_params_file, add_seconds
+from drive_can_bridge.cli.command import complain, FAILED, WrongUsage
+from drive_can_bridge.cli.listening import Taps
+from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.record import Record
@@ -24,24 +24,22 @@ from drive_can_bridge.trace.lines import LineWriter, Only, Selection
 from drive_can_bridge.trace.series import Plotter, TableWriter
 from drive_can_bridge.trace.tracer import Sink, Tracer
 
-FAILED = 1
-WRONG_USAGE = 2
 #: complaints about a file that are shown one by one
 _COMPLAINTS_MAX = 5
 #: s that a frame may take from the bus to here before it counts as missing
 _DELIVERY_TIME = 0.05
 
 
-def add_parser(subparsers: Any) -> None:
-    """Add the subcommand to the parser of ``drive_can``."""
-    parser: ArgumentParser = subparsers.add_parser(
-        'decode', help='say what the frames of a trace, or of a bus, mean',
-        description='One line for each telegram: s since the trace began, s since the last of '
-                    'its kind, bus, drive, > request or < response, and what it carries. What '
-                    'was not answered, refused, late, unasked or malformed is named; frames of '
-                    'nobody in the parameter file are shown in hex.',
-        epilog=f'Traces: {", ".join(READABLE)}; "-" reads candump\'s text from standard input. '
-               'Direction and error frames are shown as far as the format keeps them.')
+def define(parser: ArgumentParser) -> None:
+    """Define the words and options of the subcommand."""
+    parser.description = (
+        'One line for each telegram: s since the trace began, s since the last of '
+        'its kind, bus, drive, > request or < response, and what it carries. What '
+        'was not answered, refused, late, unasked or malformed is named; frames of '
+        'nobody in the parameter file are shown in hex.')
+    parser.epilog = (
+        f'Traces: {", ".join(READABLE)}; "-" reads candump\'s text from standard input. '
+        'Direction and error frames are shown as far as the format keeps them.')
     parser.add_argument('file', metavar='FILE', nargs='?', help='the trace')
     parser.add_argument('--live', action='store_true',
                         help='listen to the buses of the parameter file instead; sends nothing')
@@ -62,14 +60,14 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument('--json', action='store_true',
                         help='a JSON document a line: time, bus, drive, direction, kind, title, '
                              'values, parameters, verdict, remark, latency_ms')
-    parser.set_defaults(run=run)
 
 
 def run(args: Namespace) -> int:
     """
     Decode a trace to its end, or a bus until a signal.
 
-    :return: 0; 1 where nothing could be read; 2 wrong usage.
+    :return: 0; 1 where nothing could be read.
+    :raises WrongUsage: no trace, no such drive, or a file that would be written over.
     :raises DriveCanError: a parameter file with problems, a bus that cannot be opened.
     :raises OSError: a file cannot be read or written.
     """
@@ -77,20 +75,16 @@ def run(args: Namespace) -> int:
         args.file = args.plot.pop()
         args.plot = args.plot or None
     if (args.file is None) is not args.live or args.plot == []:
-        complain('drive_can decode: give a trace file, or --live')
-        return WRONG_USAGE
-    configuration = load(args)
+        raise WrongUsage('give a trace file, or --live')
+    configuration = configuration_from_file(args.params_file)
     unknown = [name for name in args.drive if not any(c in name for c in '*?[')
                and name not in configuration.drives]
     if unknown:
-        complain(f'drive_can decode: --drive {unknown[0]}: no such drive; drives: '
-                 f'{", ".join(configuration.drives) or "none"}')
-        return WRONG_USAGE
+        raise WrongUsage(f'--drive {unknown[0]}: no such drive; drives: '
+                         f'{", ".join(configuration.drives) or "none"}')
     taken = _written_over(args)
     if taken is not None:
-        complain(f'drive_can decode: {taken}: is read, and would be written over, choose another '
-                 'name')
-        return WRONG_USAGE
+        raise WrongUsage(f'{taken}: is read, and would be written over, choose another name')
     with ExitStack() as stack:
         sinks, endings = _sinks(args, configuration, stack)
         tracer = Tracer(configuration, _together(sinks))
@@ -117,8 +111,8 @@ def _sinks(args: Namespace, configuration: BridgeConfiguration, stack: ExitStack
     """Return who takes telegrams, and what is to be done at the end."""
     sinks: list[Sink] = []
     endings: list[Callable[[], None]] = []
-    drives = [drive for drive in configuration.drives.values()
-              if Selection(args.drive, set()).takes('', _about(drive.name))]
+    selection = Selection(args.drive, args.only)
+    drives = [drive for drive in configuration.drives.values() if selection.names(drive.name)]
     if args.csv is not None:
         stream = stack.enter_context(args.csv.open('w', encoding='utf-8', newline=''))
         sinks.append(TableWriter(stream, drives))
@@ -129,13 +123,8 @@ def _sinks(args: Namespace, configuration: BridgeConfiguration, stack: ExitStack
         endings.append(lambda: _draw(plotter, picture))
     if not (sinks or args.summary):
         write = _flushed if args.live else sys.stdout.write
-        sinks.append(LineWriter(write, Selection(args.drive, args.only), as_json=args.json))
+        sinks.append(LineWriter(write, selection, as_json=args.json))
     return sinks, endings
-
-
-def _about(drive: str) -> Telegram:
-    from drive_can_bridge.protocols.observer import Direction, Kind
-    return Telegram(0.0, drive, Direction.NEITHER, Kind.OTHER, '')
 
 
 def _together(sinks: list[Sink]) -> Sink:
@@ -158,8 +147,7 @@ def _file(args: Namespace, tracer: Tracer) -> int:
     try:
         frames = _run_through(read_records(Path(args.file), complaints), tracer)
     except UnknownFormat as error:
-        complain(f'drive_can decode: {error}')
-        return WRONG_USAGE
+        raise WrongUsage(str(error)) from None
     complaints.conclude()
     if not frames:
         complain(f'{args.file}: there is no frame in it')
@@ -176,7 +164,7 @@ def _run_through(records: Iterable[Record], tracer: Tracer) -> bool:
 
 
 def _live(args: Namespace, configuration: BridgeConfiguration, tracer: Tracer) -> int:
-    with listening(configuration) as taps:
+    with closing(Taps(configuration)) as taps:
         looked_at = None
         try:
             for record in taps.records(args.seconds):

@@ -6,13 +6,11 @@ Needs rclpy, but no hardware, no root and no kernel module.
 """
 
 import argparse
-import math
 from pathlib import Path
 import sys
-from typing import Any
 
-from drive_can_bridge.cli.without_ros import what_is_missing
-from drive_can_bridge.core.configuration import BridgeConfiguration
+from drive_can_bridge.cli.arguments import above_zero, of_drive, whole
+from drive_can_bridge.cli.command import what_is_missing, WrongUsage
 from drive_can_bridge.core.errors import DriveCanError, ValueRefused
 from drive_can_bridge.process import environment
 from drive_can_bridge.process.signals import SignalWatcher
@@ -20,21 +18,20 @@ from drive_can_bridge.resources import config_file
 from drive_can_bridge.simulation.faults import parse_fault, usage_lines
 from drive_can_bridge.simulation.simulation import Simulation
 
-WRONG_USAGE = 2
 PARAMETER_FILE = 'demo.yaml'
 
 
-def add_parser(subparsers: Any) -> None:
-    """Add the subcommand to the parser of ``drive_can``."""
+def define(parser: argparse.ArgumentParser) -> None:
+    """Define the words and options of the subcommand."""
     faults = '\n'.join(usage_lines())
-    parser = subparsers.add_parser(
-        'demo', help='run a bridge, simulated drives and the live view of them',
-        description='Run simulated drives, a bridge for them and the view of drive_can monitor, '
-                    'until SIGINT or SIGTERM. In a terminal the view is live; elsewhere it is one '
-                    'line per drive and second.',
-        epilog=f'faults:\n{faults}\n\nROS traffic stays on this machine unless '
-               f'{environment.DISCOVERY_RANGE} says otherwise.',
-        formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.description = (
+        'Run simulated drives, a bridge for them and the view of drive_can monitor, '
+        'until SIGINT or SIGTERM. In a terminal the view is live; elsewhere it is one '
+        'line per drive and second.')
+    parser.epilog = (
+        f'faults:\n{faults}\n\nROS traffic stays on this machine unless '
+        f'{environment.DISCOVERY_RANGE} says otherwise.')
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.add_argument('--params-file', metavar='FILE', type=Path,
                         help='parameter file of a bridge, instead of the one of the demo; its '
                              'buses are replaced by pseudo-terminals')
@@ -44,18 +41,18 @@ def add_parser(subparsers: Any) -> None:
                         help='begin with a fault, for example lift:silent; repeatable')
     parser.add_argument('--log-frames', metavar='FILE', type=Path,
                         help='write every frame, as candump -L does')
-    parser.add_argument('--duration', metavar='SECONDS', type=_duration,
+    parser.add_argument('--duration', metavar='SECONDS', type=above_zero,
                         help='end by itself after that time')
-    parser.add_argument('--domain-id', metavar='N', type=_domain_id,
+    parser.add_argument('--domain-id', metavar='N', type=whole(0, environment.DOMAIN_ID_MAX),
                         help='ROS domain, instead of the one of the environment')
-    parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
     """
     Run the demo.
 
-    :return: 0 after SIGINT, SIGTERM or the duration, 1 failure, 2 wrong usage.
+    :return: 0 after SIGINT, SIGTERM or the duration, 1 failure.
+    :raises WrongUsage: a fault that no drive can have.
     :raises DriveCanError: a parameter file with problems, no ROS.
     :raises OSError: a file cannot be read or written.
     """
@@ -73,47 +70,12 @@ def run(args: argparse.Namespace) -> int:
         configuration = configuration_from_file(args.params_file or config_file(PARAMETER_FILE))
         for warning in configuration.warnings:
             print(f'warning: {warning}', file=sys.stderr)
-        try:
-            for text in args.fault:
-                _check_fault(text, configuration)
-        except ValueRefused as error:
-            print(f'drive_can demo: --fault {error}', file=sys.stderr)
-            return WRONG_USAGE
+        for text in args.fault:
+            name, fault = of_drive('--fault', text, configuration, parse_fault)
+            try:
+                Simulation(configuration).drives[name].fault(fault)
+            except ValueRefused as error:
+                raise WrongUsage(f'--fault {text}: {error}') from None
         return watcher.exit_code(run_demo(Options(
             configuration, tuple(args.fault), args.drive, args.log_frames, args.duration),
             watcher))
-
-
-def _check_fault(text: str, configuration: BridgeConfiguration) -> None:
-    """
-    Look at an argument of ``--fault``.
-
-    :raises ValueRefused: it makes no sense; says what is allowed.
-    """
-    name, colon, fault = text.partition(':')
-    if not colon:
-        raise ValueRefused(f'{text}: write DRIVE:FAULT, for example conveyor:late=0.15')
-    drives = configuration.drives
-    if name not in drives:
-        raise ValueRefused(f"{text}: no drive '{name}'; drives: {', '.join(drives) or 'none'}")
-    try:
-        Simulation(configuration).drives[name].fault(parse_fault(fault))
-    except ValueRefused as error:
-        raise ValueRefused(f'{text}: {error}') from None
-
-
-def _duration(text: str) -> float:
-    try:
-        seconds = float(text)
-    except ValueError:
-        seconds = math.nan
-    if not (math.isfinite(seconds) and seconds > 0):
-        raise argparse.ArgumentTypeError(f'{text}: allowed are seconds, more than 0')
-    return seconds
-
-
-def _domain_id(text: str) -> int:
-    if not (text.isdecimal() and int(text) <= environment.DOMAIN_ID_MAX):
-        raise argparse.ArgumentTypeError(
-            f'{text}: allowed are 0 to {environment.DOMAIN_ID_MAX}')
-    return int(text)

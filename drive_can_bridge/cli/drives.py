@@ -6,28 +6,28 @@ Positional arguments of such a command are called ``words``; options may stand b
 """
 
 from argparse import ArgumentParser, Namespace
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from fnmatch import fnmatchcase
 from pathlib import Path
 
-from drive_can_bridge.cli.listening import complain
-from drive_can_bridge.cli.progress import waiting
-from drive_can_bridge.cli.without_ros import what_is_missing
-from drive_can_bridge.client.drive import Drives, Source, WhichBridge
+from drive_can_bridge.cli.command import complain, what_is_missing, WrongUsage
+from drive_can_bridge.cli.progress import Bar, waiting
+from drive_can_bridge.client.drive import Drive, Drives, ReadOutcome, Source, WhichBridge
 from drive_can_bridge.client.opening import find_source
 from drive_can_bridge.core.errors import DriveCanError
 
-FAILED = 1
-WRONG_USAGE = 2
 
+def add_words(parser: ArgumentParser, completer: Callable[..., list[str]], metavar: str,
+              nargs: str, help_text: str) -> None:
+    """
+    Add the positional arguments, and the options that say how to get to the drives.
 
-class WrongUsage(Exception):
-    """The command line cannot be obeyed; nothing was written."""
-
-
-def add_drive_options(parser: ArgumentParser) -> None:
-    """Add the options that say how to get to the drives."""
+    :param completer: proposes words to the shell.
+    """
+    parser.allow_abbrev = False
+    words = parser.add_argument('words', metavar=metavar, nargs=nargs, help=help_text)
+    words.completer = completer     # type: ignore[attr-defined]  # for argcomplete
     parser.add_argument('--params-file', metavar='FILE', type=Path,
                         help='open the buses of this parameter file; else the drives of a running '
                              'bridge are asked through it')
@@ -127,3 +127,9 @@ def opened(source: Source, names: Sequence[str]) -> Iterator[Drives]:
         for warning in drives.warnings:
             complain(f'warning: {warning}')
         yield drives
+
+
+def read_all(drive: Drive, names: Sequence[str]) -> dict[str, ReadOutcome]:
+    """Read parameters of a drive, none if there are no names; show how far it is."""
+    with Bar(f'reading {drive.name}', len(names)) as bar:
+        return drive.read(*names, told=bar.step) if names else {}

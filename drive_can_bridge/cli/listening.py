@@ -1,16 +1,11 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """What ``record`` and ``decode --live`` have in common: the buses of a file, listened to."""
 
-from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Iterator
-from contextlib import contextmanager
-import math
-from pathlib import Path
 import queue
-import sys
 import time
 
-from drive_can_bridge.configuration.load import configuration_from_file
+from drive_can_bridge.cli.command import complain
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.record import Record
 from drive_can_bridge.exchange.one_master import END_FIRST, Ownership
@@ -21,35 +16,12 @@ from drive_can_bridge.transport.tap import QUEUE_MAX, Tap
 _PATIENCE = 0.05
 
 
-def add_params_file(parser: ArgumentParser, help_text: str) -> None:
-    """Add the option that names the parameter file."""
-    parser.add_argument('--params-file', metavar='FILE', type=Path, required=True, help=help_text)
-
-
-def add_seconds(parser: ArgumentParser) -> None:
-    """Add the option that ends listening."""
-    parser.add_argument('--seconds', metavar='S', type=positive, default=math.inf,
-                        help='end by itself after that time (default: runs until Ctrl-C)')
-
-
-def positive(text: str) -> float:
-    """Read a number above 0 from the command line."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not (math.isfinite(value) and value > 0):
-        raise ArgumentTypeError(f'{text}: allowed is a number above 0')
-    return value
-
-
-def load(args: Namespace) -> BridgeConfiguration:
-    """Read the parameter file; whatever is suspicious about it was told by ``validate``."""
-    return configuration_from_file(args.params_file)
-
-
 class Taps:
-    """All buses of a file, listened to; entries come out in the order they arrived."""
+    """
+    All buses of a file, listened to until closed; entries come out in the order they arrived.
+
+    :raises DriveCanError: a bus that cannot be opened.
+    """
 
     def __init__(self, configuration: BridgeConfiguration) -> None:
         self._queue: queue.Queue[Record] = queue.Queue(QUEUE_MAX)
@@ -86,18 +58,3 @@ class Taps:
                 complain(f'bus {tap.bus.name}: {tap.lost} frames lost: this machine is too slow '
                          f'for the traffic')
         self._ownership.release()
-
-
-@contextmanager
-def listening(configuration: BridgeConfiguration) -> Iterator[Taps]:
-    """Listen to all buses of a file."""
-    taps = Taps(configuration)
-    try:
-        yield taps
-    finally:
-        taps.close()
-
-
-def complain(text: str) -> None:
-    """Write a line to standard error."""
-    print(text, file=sys.stderr, flush=True)

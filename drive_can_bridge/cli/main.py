@@ -3,8 +3,8 @@
 """
 The command ``drive_can``: everything that a person runs by hand.
 
-Every subcommand is a module with ``add_parser(subparsers)`` and ``run(args) -> exit code``. Only
-the one that was asked for is imported, so that ``validate`` needs neither python-can nor ROS.
+Of the subcommands (see :mod:`.command`) only the one that was asked for is imported, so that
+``validate`` needs neither python-can nor ROS.
 
 Exit codes: 0 success, 1 the request failed, 2 wrong usage.
 """
@@ -19,45 +19,36 @@ from typing import Any
 
 from drive_can_bridge import __version__
 from drive_can_bridge.cli.argcomplete_hook import complete, typed
+from drive_can_bridge.cli.command import complain, FAILED, WRONG_USAGE, WrongUsage
 from drive_can_bridge.core.errors import DriveCanError
 
 PROGRAM = 'drive_can'
 
-#: subcommand -> module and one line of help
-SUBCOMMANDS: dict[str, tuple[str, str]] = {
-    'validate': ('drive_can_bridge.cli.validate',
-                 'check a parameter file without touching a bus'),
-    'simulate': ('drive_can_bridge.cli.simulate',
-                 'play every drive of a parameter file on its bus'),
-    'demo': ('drive_can_bridge.cli.demo',
-             'run a bridge, simulated drives and the live view of them'),
-    'monitor': ('drive_can_bridge.cli.monitor',
-                'show all bridges and their drives, live'),
-    'panel': ('drive_can_bridge.cli.panel',
-              'show all bridges and their drives in a browser'),
-    'security': ('drive_can_bridge.cli.security', 'write who may talk to a bridge'),
-    'profile': ('drive_can_bridge.cli.profile',
-                'list, show, check and import parameter tables'),
-    'scan': ('drive_can_bridge.cli.scan', 'find the drives on a bus'),
-    'probe': ('drive_can_bridge.cli.probe',
-              'settle by reads which keys a drive needs'),
-    'read': ('drive_can_bridge.cli.read', 'read parameters of a drive'),
-    'write': ('drive_can_bridge.cli.write', 'set parameters of a drive'),
-    'backup': ('drive_can_bridge.cli.backup',
-               'write the settings of drives to files'),
-    'restore': ('drive_can_bridge.cli.restore',
-                'write the settings of a backup into a drive'),
-    'compare': ('drive_can_bridge.cli.compare',
-                'show what differs between backups and drives'),
-    'record': ('drive_can_bridge.cli.record',
-               'write everything on the buses of a parameter file to a trace'),
-    'decode': ('drive_can_bridge.cli.decode',
-               'say what the frames of a trace, or of a bus, mean'),
+#: subcommand, the module of its name -> one line of help
+SUBCOMMANDS = {
+    'validate': 'check a parameter file without touching a bus',
+    'simulate': 'play every drive of a parameter file on its bus',
+    'demo': 'run a bridge, simulated drives and the live view of them',
+    'monitor': 'show all bridges and their drives, live',
+    'panel': 'show all bridges and their drives in a browser',
+    'security': 'write who may talk to a bridge',
+    'profile': 'list, show, check and import parameter tables',
+    'scan': 'find the drives on a bus',
+    'probe': 'settle by reads which keys a drive needs',
+    'read': 'read parameters of a drive',
+    'write': 'set parameters of a drive',
+    'backup': 'write the settings of drives to files',
+    'restore': 'write the settings of a backup into a drive',
+    'compare': 'show what differs between backups and drives',
+    'record': 'write everything on the buses of a parameter file to a trace',
+    'decode': 'say what the frames of a trace, or of a bus, mean',
 }
 #: what runs until a signal comes: that is no failure
 ENDLESS = ('simulate', 'demo', 'record', 'monitor', 'panel')
 #: options that make a subcommand one of these
 ENDLESS_OPTIONS = ('--live', '--watch')
+#: exit codes of what could not be done, where 1 says something else
+TROUBLE = {'compare': 2}
 #: exit code of what is interrupted before it is done
 INTERRUPTED = 130
 
@@ -70,7 +61,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     :return: exit code.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
-    endless = _wanted(arguments) in ENDLESS or any(
+    wanted = _wanted(arguments)
+    failed = TROUBLE.get(wanted, FAILED)
+    endless = wanted in ENDLESS or any(
         word.partition('=')[0] in ENDLESS_OPTIONS for word in arguments)
     if argv is None and endless:  # until the subcommand looks after signals itself
         signal.signal(signal.SIGTERM, signal.default_int_handler)
@@ -85,26 +78,30 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         if endless:
             return 0
-        _fail('interrupted')
+        complain(f'{PROGRAM}: interrupted')
         return INTERRUPTED
     except DriveCanError as error:
-        print(error, file=sys.stderr)
-        return 1
+        complain(str(error))
+        return failed
     except OSError as error:
         place = f'{error.filename}: ' if error.filename else ''
-        return _fail(f'{place}{error.strerror or error}')
+        complain(f'{PROGRAM}: {place}{error.strerror or error}')
+        return failed
     except ImportError as error:
-        return _fail(f'this needs a Python module that is not installed: {error.name or error}')
+        complain(f'{PROGRAM}: this needs a Python module that is not installed: '
+                 f'{error.name or error}')
+        return failed
     except Exception as error:  # noqa: BLE001  no traceback ever reaches a user
-        return _fail(f'internal error, please report it: {type(error).__name__}: {error}')
+        complain(f'{PROGRAM}: internal error, please report it: {type(error).__name__}: {error}')
+        return failed
     finally:
         if argv is None and endless:  # all is done; Python takes a moment to leave
             for number in (signal.SIGINT, signal.SIGTERM):
                 signal.signal(number, signal.SIG_IGN)
 
 
-def _wanted(arguments: list[str]) -> str | None:
-    return next((word for word in arguments if not word.startswith('-')), None)
+def _wanted(arguments: list[str]) -> str:
+    return next((word for word in arguments if not word.startswith('-')), '')
 
 
 def _run(arguments: list[str]) -> int:
@@ -115,13 +112,12 @@ def _run(arguments: list[str]) -> int:
                                   'CAN buses to ROS 2.')
     parser.add_argument('--version', action='version', version=f'{PROGRAM} {__version__}')
     subparsers = parser.add_subparsers(dest='subcommand', metavar='SUBCOMMAND', required=True)
+    parsers = {name: subparsers.add_parser(name, help=help_line)
+               for name, help_line in SUBCOMMANDS.items()}
     module: Any = None
-    for name, (path, help_line) in SUBCOMMANDS.items():
-        if name == wanted:
-            module = importlib.import_module(path)
-            module.add_parser(subparsers)
-        else:
-            subparsers.add_parser(name, help=help_line)
+    if wanted in parsers:
+        module = importlib.import_module(f'{__package__}.{wanted}')
+        module.define(parsers[wanted])
     complete(parser)
     args, rest = parser.parse_known_args(arguments)
     if hasattr(args, 'words'):  # argparse takes positional arguments in one piece only
@@ -129,13 +125,13 @@ def _run(arguments: list[str]) -> int:
         rest = [word for word in rest if word.startswith('-')]
     if rest:
         parser.error(f'unrecognized arguments: {" ".join(rest)}')
-    code: int = module.run(args)
+    try:
+        code: int = module.run(args)
+    except WrongUsage as error:
+        action = f' {args.action}' if 'action' in args else ''
+        complain(f'{PROGRAM} {args.subcommand}{action}: {error}')
+        return WRONG_USAGE
     return code
-
-
-def _fail(message: str) -> int:
-    print(f'{PROGRAM}: {message}', file=sys.stderr)
-    return 1
 
 
 if __name__ == '__main__':

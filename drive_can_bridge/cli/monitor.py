@@ -10,10 +10,9 @@ import argparse
 import os
 import sys
 import time
-from typing import Any
 
-from drive_can_bridge.cli.namespaces import namespace
-from drive_can_bridge.cli.without_ros import what_is_missing
+from drive_can_bridge.cli.arguments import namespace
+from drive_can_bridge.cli.command import what_is_missing
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.monitor.lines import balance, Lines
 from drive_can_bridge.monitor.model import Model
@@ -26,19 +25,17 @@ LINE_PERIOD = 1.0
 _POLL_PERIOD = 0.1
 
 
-def add_parser(subparsers: Any) -> None:
-    """Add the subcommand to the parser of ``drive_can``."""
-    parser = subparsers.add_parser(
-        'monitor', help='show all bridges and their drives, live',
-        description='Show all bridges and their drives, live, until SIGINT or SIGTERM. Needs ROS, '
-                    'and nothing of a bridge but its topics and services. In a terminal its last '
-                    'line names the keys; elsewhere one line per drive and second.')
+def define(parser: argparse.ArgumentParser) -> None:
+    """Define the words and options of the subcommand."""
+    parser.description = (
+        'Show all bridges and their drives, live, until SIGINT or SIGTERM. Needs ROS, '
+        'and nothing of a bridge but its topics and services. In a terminal its last '
+        'line names the keys; elsewhere one line per drive and second.')
     parser.add_argument('--namespace', metavar='NS', default='', type=namespace,
                         help='only bridges in this namespace, or below it')
     # how drive_can demo runs it
     parser.add_argument('--title', default='drive_can monitor', help=argparse.SUPPRESS)
     parser.add_argument('--quit-code', type=int, default=0, help=argparse.SUPPRESS)
-    parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -7,10 +7,9 @@ A ROS client and a web server, nothing of a bridge. It never moves anything.
 
 import argparse
 import sys
-from typing import Any
 
-from drive_can_bridge.cli.namespaces import namespace
-from drive_can_bridge.cli.without_ros import what_is_missing
+from drive_can_bridge.cli.arguments import namespace, whole
+from drive_can_bridge.cli.command import what_is_missing
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.monitor.model import Model
 from drive_can_bridge.process import environment
@@ -23,22 +22,21 @@ _MISSING = (f"{COMMAND}: the Python module {{module}} is not installed: it comes
             f"'panel' of this package (pip install 'drive_can_bridge[panel]')")
 
 
-def add_parser(subparsers: Any) -> None:
-    """Add the subcommand to the parser of ``drive_can``."""
-    parser = subparsers.add_parser(
-        'panel', help='show all bridges and their drives in a browser',
-        description='Show all bridges and their drives in a browser, until SIGINT or SIGTERM. '
-                    'Prints an address for each role: a viewer looks, an operator may stop '
-                    'drives, too. Never moves anything.')
+def define(parser: argparse.ArgumentParser) -> None:
+    """Define the words and options of the subcommand."""
+    parser.description = (
+        'Show all bridges and their drives in a browser, until SIGINT or SIGTERM. '
+        'Prints an address for each role: a viewer looks, an operator may stop '
+        'drives, too. Never moves anything.')
     parser.add_argument('--host', default='127.0.0.1',
                         help='address to listen on; anything but the loopback lets others on the '
                              'network in who have a token (default: %(default)s)')
-    parser.add_argument('--port', type=_port, default=8080, help='0: any (default: %(default)s)')
+    parser.add_argument('--port', type=whole(0, 65535), default=8080,
+                        help='0: any (default: %(default)s)')
     parser.add_argument('--allow-writes', action='store_true',
                         help='operators may write parameters and restore backups')
     parser.add_argument('--namespace', metavar='NS', default='', type=namespace,
                         help='only bridges in this namespace, or below it')
-    parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -82,9 +80,3 @@ def run(args: argparse.Namespace) -> int:
         finally:
             source.close()
         leave(watcher.exit_code(0))
-
-
-def _port(text: str) -> int:
-    if not (text.isdecimal() and int(text) <= 65535):
-        raise argparse.ArgumentTypeError(f'{text}: allowed are 0 to 65535')
-    return int(text)

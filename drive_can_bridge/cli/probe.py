@@ -3,40 +3,36 @@
 
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator, Sequence
-from fnmatch import fnmatchcase
 import json
-import sys
 from typing import Any
 
+from drive_can_bridge.cli.arguments import add_params_file
 from drive_can_bridge.cli.asking import Asker, LISTEN
-from drive_can_bridge.cli.listening import add_params_file, complain, load
+from drive_can_bridge.cli.command import complain, FAILED
+from drive_can_bridge.cli.drives import chosen, split_words
+from drive_can_bridge.cli.questions import agree_to_hazard
 from drive_can_bridge.cli.tables import print_json, print_table
+from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import BridgeConfiguration, DriveConfiguration
 from drive_can_bridge.exchange.one_master import END_FIRST, Ownership
 from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.protocols.prober import Finding, Prober
 from drive_can_bridge.transport.port import open_port
 
-FAILED = 1
-WRONG_USAGE = 2
 UNDECIDED = 'undecided'
 
 
-class _WrongUsage(Exception):
-    """The command line cannot be obeyed."""
-
-
-def add_parser(subparsers: Any) -> None:
-    """Add the subcommand to the parser of ``drive_can``."""
-    parser: ArgumentParser = subparsers.add_parser(
-        'probe', help='settle by reads which keys a drive needs',
-        description='Find out by harmless reads what the manuals leave open: value_order and '
-                    'index_byte (cannord), layout, word_order and abort_code_order (canopen_pkw), '
-                    'parameter_offset and maps (DataModel). Sends reads only. Listens for 1.2 s '
-                    'before, and ends when another master talks to a drive of the file.',
-        epilog='Exit code 0: the drive answered, whether or not everything could be decided. 1: '
-               'it did not, or there is another master, or the bus cannot be used. 2: wrong '
-               'usage.')
+def define(parser: ArgumentParser) -> None:
+    """Define the words and options of the subcommand."""
+    parser.description = (
+        'Find out by harmless reads what the manuals leave open: value_order and '
+        'index_byte (cannord), layout, word_order and abort_code_order (canopen_pkw), '
+        'parameter_offset and maps (DataModel). Sends reads only. Listens for 1.2 s '
+        'before, and ends when another master talks to a drive of the file.')
+    parser.epilog = (
+        'Exit code 0: the drive answered, whether or not everything could be decided. 1: '
+        'it did not, or there is another master, or the bus cannot be used. 2: wrong '
+        'usage.')
     parser.add_argument('drive', metavar='DRIVE', nargs='?',
                         help='name in the file, or a shell pattern; may be left out where there '
                              'is only one')
@@ -47,25 +43,26 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument('--json', action='store_true',
                         help='a document for each key: drive, key, value (null: undecided), '
                              'configured, reason')
-    parser.set_defaults(run=run)
 
 
 def run(args: Namespace) -> int:
     """
     Probe.
 
-    :return: 0 the drives answered, 1 one of them did not, 2 wrong usage.
+    :return: 0 the drives answered, 1 one of them did not.
+    :raises WrongUsage: it is not clear which drive is meant, or nobody agrees.
     :raises DriveCanError: the file is wrong, there is another master, the bus cannot be used.
     """
-    configuration = load(args)
-    try:
-        drives = _chosen(configuration, args.drive)
-        probers = [FAMILIES[drive.protocol].make_prober(drive) for drive in drives]
-        for prober in probers:      # before anything is sent
-            _confirm(args, prober)
-    except _WrongUsage as error:
-        complain(f'drive_can probe: {error}')
-        return WRONG_USAGE
+    configuration = configuration_from_file(args.params_file)
+    known = list(configuration.drives)
+    names = split_words(known, [])[0] if args.drive is None else chosen(known, [args.drive])
+    drives = [configuration.drives[name] for name in names]
+    probers = [FAMILIES[drive.protocol].make_prober(drive) for drive in drives]
+    for prober in probers:      # before anything is sent
+        if prober.hazard:
+            name = prober.drive.name
+            agree_to_hazard(f'{name}: {prober.hazard}', 'Ask all the same?', yes=args.yes,
+                            who=name)
     results: list[tuple[Prober, list[Finding]]] = []
     for bus in dict.fromkeys(drive.bus for drive in drives):
         together = [prober for prober in probers if prober.drive.bus == bus]
@@ -93,42 +90,6 @@ def _probe_bus(configuration: BridgeConfiguration, name: str, probers: Sequence[
                 yield prober, asker.probe(prober)
         finally:
             port.close()
-
-
-def _chosen(configuration: BridgeConfiguration, word: str | None) -> list[DriveConfiguration]:
-    """
-    Return the drives that are meant.
-
-    :raises _WrongUsage: none of them, or it is not clear which.
-    """
-    names = list(configuration.drives)
-    if word is None:
-        if len(names) != 1:
-            raise _WrongUsage(f'which drive? There are: {", ".join(names) or "none"}')
-        word = names[0]
-    found = [drive for drive in configuration.drives.values() if fnmatchcase(drive.name, word)]
-    if not found:
-        raise _WrongUsage(f'no drive {word!r}; there are: {", ".join(names) or "none"}')
-    return found
-
-
-def _confirm(args: Namespace, prober: Prober) -> None:
-    """
-    Have it confirmed that a drive is asked in a way that may move others.
-
-    :raises _WrongUsage: nobody can be asked, or says no.
-    """
-    if not prober.hazard:
-        return
-    complain(f'{prober.drive.name}: {prober.hazard}')
-    if args.yes:
-        return
-    if not sys.stdin.isatty():
-        raise _WrongUsage(f'{prober.drive.name} needs --yes where nobody can be asked')
-    sys.stderr.write('Ask all the same? [y/N] ')
-    sys.stderr.flush()
-    if sys.stdin.readline().strip().lower() not in ('y', 'yes'):
-        raise _WrongUsage('nothing was sent')
 
 
 def _show(args: Namespace, results: Sequence[tuple[Prober, list[Finding]]]) -> None:

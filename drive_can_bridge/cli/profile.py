@@ -53,13 +53,12 @@ _OPTIONS: dict[tuple[str, ...], tuple[dict[str, Any], Any, tuple[str, ...]]] = {
 }
 
 
-def add_parser(subparsers: Any) -> None:
-    """Add the subcommand to the command's parser."""
-    parser = subparsers.add_parser(
-        'profile', help='list, show, check and import parameter tables',
-        description='Profiles are the parameter tables of drive types. docs/profiles.md says how '
-                    'to make one from a manual.',
-        epilog='Exit code 0: everything is all right. 1: it is not. 2: wrong usage.')
+def define(parser: ArgumentParser) -> None:
+    """Define the words and options of the subcommand."""
+    parser.description = (
+        'Profiles are the parameter tables of drive types. docs/profiles.md says how '
+        'to make one from a manual.')
+    parser.epilog = 'Exit code 0: everything is all right. 1: it is not. 2: wrong usage.'
     _add_options(parser)
     actions = parser.add_subparsers(dest='action', metavar='ACTION', required=True,
                                     help=', '.join(_HELP))

@@ -3,10 +3,10 @@
 
 from argparse import Namespace
 from pathlib import Path
-import sys
 
-from drive_can_bridge.cli.questions import agreed, NobodyToAsk
-from drive_can_bridge.cli.tables import print_json, printable
+from drive_can_bridge.cli.command import complain, FAILED, say, WrongUsage
+from drive_can_bridge.cli.questions import agreed
+from drive_can_bridge.cli.tables import print_json
 from drive_can_bridge.cli.whole_file import differs, write_whole
 from drive_can_bridge.profiles.draft import LeftOut
 from drive_can_bridge.profiles.importing import (
@@ -16,13 +16,12 @@ from drive_can_bridge.profiles.numerals import DecimalSign
 from drive_can_bridge.profiles.table import WrongColumns
 from drive_can_bridge.protocols.families import FAMILIES
 
-WRONG_USAGE = 2
-
 
 def run_import(args: Namespace) -> int:
     """
     Import a file.
 
+    :raises WrongUsage: an option means nothing, or nobody can be asked.
     :raises ImportFailed: nothing of it can be used.
     :raises OSError: a file cannot be read or written.
     """
@@ -36,20 +35,22 @@ def run_import(args: Namespace) -> int:
             raise WrongOption('--json says on standard output what became of the file: say where '
                               'the profile goes with -o FILE')
     except (WrongOption, WrongColumns) as error:
-        print(printable(f'drive_can profile import: {error}'), file=sys.stderr)
-        return WRONG_USAGE
+        raise WrongUsage(str(error)) from None
     if not args.json:
         _report(args.file, imported)
     if args.output is None:
         print(imported.built.text, end='')
         return 0
-    code = _write(args.output, imported.built.text, yes=args.yes)
-    if code:
-        return code
+    data = imported.built.text.encode('utf-8')
+    if differs(args.output, data) and not agreed(
+            f'{args.output} exists and holds something else. Overwrite it?', yes=args.yes,
+            otherwise='Nothing was written', yes_means='overwrites it'):
+        return FAILED
+    write_whole(args.output, data)
     if args.json:
         _report_json(args, imported)
     else:
-        print(printable(f'{args.output}: {_counted(imported)}'))
+        say(f'{args.output}: {_counted(imported)}')
     return 0
 
 
@@ -70,9 +71,9 @@ def _protocols(text: str) -> tuple[str, ...]:
 def _report(file: Path, imported: Imported) -> None:
     """Say on standard error what the file was taken for, and what of it is left out and why."""
     for note in imported.found.notes:
-        print(printable(f'{file}: {note}'), file=sys.stderr)
+        complain(f'{file}: {note}')
     for each in imported.found.complaints:
-        print(printable(f'{file}:{each}'), file=sys.stderr)
+        complain(f'{file}:{each}')
 
 
 def _counted(imported: Imported) -> str:
@@ -98,25 +99,3 @@ def _report_json(args: Namespace, imported: Imported) -> None:
 def _document(each: LeftOut) -> dict[str, object]:
     return {'line': each.place.line, 'section': each.place.section, 'what': each.what,
             'reason': each.reason}
-
-
-# -- where it goes --------------------------------------------------------------------------------
-
-
-def _write(path: Path, text: str, *, yes: bool) -> int:
-    """
-    Write the profile, whole or not at all; an existing file that differs only after asking.
-
-    :return: exit code.
-    """
-    data = text.encode('utf-8')
-    if differs(path, data):
-        try:
-            if not agreed(f'{path} exists and holds something else. Overwrite it?', yes=yes,
-                          otherwise='Nothing was written', yes_means='overwrites it'):
-                return 1
-        except NobodyToAsk as error:
-            print(error, file=sys.stderr)
-            return WRONG_USAGE
-    write_whole(path, data)
-    return 0

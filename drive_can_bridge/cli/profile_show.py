@@ -3,10 +3,10 @@
 
 from argparse import Namespace
 from pathlib import Path
-import sys
 from typing import Any
 
-from drive_can_bridge.cli.tables import print_json, print_table, printable
+from drive_can_bridge.cli.command import complain, FAILED, say
+from drive_can_bridge.cli.tables import print_json, print_table
 from drive_can_bridge.configuration.problems import Problem
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.profiles.catalogue import available, check, Checked, description, find
@@ -44,14 +44,14 @@ def run_show(args: Namespace) -> int:
     checked = check(find(args.name, args.directory))
     if checked.problems:
         _print_problems(checked.problems)
-        return 1
+        return FAILED
     profile, entries = checked.loaded.profile, checked.entries
     if args.json:
         for name, parameter in profile.parameters.items():
             print_json(description(name, parameter, entries[name]))
         return 0
-    print(printable(f'{profile.description or profile.name} ({", ".join(profile.protocols)})'))
-    print(printable(str(checked.path)))
+    say(f'{profile.description or profile.name} ({", ".join(profile.protocols)})')
+    say(str(checked.path))
     if profile.identity:
         print(f'identity: {", ".join(profile.identity)}')
     print()
@@ -90,17 +90,17 @@ def run_check(args: Namespace) -> int:
             continue
         _print_problems(checked.problems)
         for warning in checked.warnings:
-            print(f'warning: {printable(str(warning))}', file=sys.stderr)
+            complain(f'warning: {warning}')
         if not checked.problems:
-            print(printable(f'{path}: {_counted(checked)}'))
-    return 0 if good else 1
+            say(f'{path}: {_counted(checked)}')
+    return 0 if good else FAILED
 
 
 def _checked(path: Path) -> Checked | None:
     try:
         return check(path)
     except OSError as error:  # the other files are checked all the same
-        print(printable(f'{path}: {error.strerror or error}'), file=sys.stderr)
+        complain(f'{path}: {error.strerror or error}')
         return None
 
 
@@ -118,4 +118,4 @@ def _problem(problem: Problem) -> dict[str, Any]:
 
 def _print_problems(problems: tuple[Problem, ...]) -> None:
     for problem in problems:
-        print(problem, file=sys.stderr)
+        complain(str(problem))

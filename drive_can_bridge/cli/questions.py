@@ -3,12 +3,8 @@
 
 import sys
 
-from drive_can_bridge.cli.tables import printable
-from drive_can_bridge.core.errors import DriveCanError
-
-
-class NobodyToAsk(DriveCanError):
-    """There is no terminal, and no ``--yes``: exit code 2."""
+from drive_can_bridge.cli.command import complain, WrongUsage
+from drive_can_bridge.core.text import printable
 
 
 def must_be_answerable(*, yes: bool, otherwise: str, yes_means: str) -> None:
@@ -17,23 +13,42 @@ def must_be_answerable(*, yes: bool, otherwise: str, yes_means: str) -> None:
 
     :param otherwise: what was not done.
     :param yes_means: what ``--yes`` does.
-    :raises NobodyToAsk: it cannot.
+    :raises WrongUsage: it cannot.
     """
     if not (yes or sys.stdin.isatty()):
-        raise NobodyToAsk(f'{otherwise}: nobody can be asked here; --yes {yes_means}')
+        raise WrongUsage(f'{otherwise}: nobody can be asked here; --yes {yes_means}')
 
 
 def agreed(question: str, *, yes: bool, otherwise: str, yes_means: str) -> bool:
     """
     Ask.
 
-    :raises NobodyToAsk: nobody is there.
+    :raises WrongUsage: nobody is there.
     """
     must_be_answerable(yes=yes, otherwise=f'{question} {otherwise}', yes_means=yes_means)
-    if yes:
+    if yes or answered(question):
         return True
-    print(printable(f'{question} [y/N] '), end='', file=sys.stderr, flush=True)
-    if sys.stdin.readline().strip().lower() in ('y', 'yes'):
-        return True
-    print(printable(f'{otherwise}.'), file=sys.stderr)
+    complain(f'{otherwise}.')
     return False
+
+
+def agree_to_hazard(hazard: str, question: str, *, yes: bool, who: str) -> None:
+    """
+    Say what may happen, and have it confirmed that it shall be done all the same.
+
+    :param who: needs ``--yes`` where nobody can be asked.
+    :raises WrongUsage: nobody can be asked, or somebody says no.
+    """
+    complain(hazard)
+    if yes:
+        return
+    if not sys.stdin.isatty():
+        raise WrongUsage(f'{who} needs --yes where nobody can be asked')
+    if not answered(question):
+        raise WrongUsage('nothing was sent')
+
+
+def answered(question: str) -> bool:
+    """Tell whether the answer to a question is yes."""
+    print(printable(f'{question} [y/N] ', None), end='', file=sys.stderr, flush=True)
+    return sys.stdin.readline().strip().lower() in ('y', 'yes')

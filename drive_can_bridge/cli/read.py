@@ -9,12 +9,10 @@ from typing import Any
 
 from rich.live import Live
 
+from drive_can_bridge.cli.arguments import above_zero
+from drive_can_bridge.cli.command import FAILED
 from drive_can_bridge.cli.completion import complete_words
-from drive_can_bridge.cli.drives import (
-    add_drive_options, FAILED, opened, source_of, split_words, WRONG_USAGE, WrongUsage,
-)
-from drive_can_bridge.cli.listening import complain, positive
-from drive_can_bridge.cli.progress import Bar
+from drive_can_bridge.cli.drives import add_words, opened, read_all, source_of, split_words
 from drive_can_bridge.cli.tables import fitting_table, print_json, print_table
 from drive_can_bridge.client.drive import Drive, Drives, ReadOutcome
 from drive_can_bridge.core.words import value_text
@@ -24,48 +22,40 @@ _HEADINGS = ('drive', 'name', 'value', 'unit', 'raw', 'number', 'storage', 'desc
 _NUMBERS = ('value', 'raw')
 
 
-def add_parser(subparsers: Any) -> None:
-    """Add the subcommand to the parser of ``drive_can``."""
-    parser: ArgumentParser = subparsers.add_parser(
-        'read', help='read parameters of a drive', allow_abbrev=False,
-        description='Read all parameters of a drive that its profile lists, or those named: '
-                    'through a running bridge, or directly with --params-file. Sends reads only.',
-        epilog='Exit code 0: all was read. 1: something was not, its row says why. 2: wrong '
-               'usage.')
-    words = parser.add_argument('words', metavar='[DRIVE] NAME', nargs='*', help=(
+def define(parser: ArgumentParser) -> None:
+    """Define the words and options of the subcommand."""
+    parser.description = (
+        'Read all parameters of a drive that its profile lists, or those named: '
+        'through a running bridge, or directly with --params-file. Sends reads only.')
+    parser.epilog = (
+        'Exit code 0: all was read. 1: something was not, its row says why. 2: wrong '
+        'usage.')
+    add_words(parser, complete_words, '[DRIVE] NAME', '*', (
         'the drive, also as a shell pattern (may be left out where there is only one); names of '
         'the profile, or raw ones: p30, p613.5, x2004.10'))
-    words.completer = complete_words  # type: ignore[attr-defined]  # for argcomplete
-    add_drive_options(parser)
-    parser.add_argument('--watch', metavar='S', type=positive,
+    parser.add_argument('--watch', metavar='S', type=above_zero,
                         help='read again every S seconds, until Ctrl-C')
-    parser.set_defaults(run=run)
 
 
 def run(args: Namespace) -> int:
     """
     Read.
 
-    :return: 0 everything, 1 not everything, 2 wrong usage.
+    :return: 0 everything, 1 not everything.
+    :raises WrongUsage: it is not clear which drive is meant.
     :raises DriveCanError: another master, a bus or a bridge that is not there.
     """
-    try:
-        with source_of(args) as source:
-            names, wanted = split_words(source.names, args.words)
-            with opened(source, names) as drives:
-                return _watch(args, drives, wanted) if args.watch else _read(args, drives, wanted)
-    except WrongUsage as error:
-        complain(f'drive_can read: {error}')
-        return WRONG_USAGE
+    with source_of(args) as source:
+        names, wanted = split_words(source.names, args.words)
+        with opened(source, names) as drives:
+            return _watch(args, drives, wanted) if args.watch else _read(args, drives, wanted)
 
 
 def _read(args: Namespace, drives: Drives, wanted: Sequence[str]) -> int:
     outcomes = []
     for drive in drives.values():
         names = wanted or drive.readable_names
-        with Bar(f'reading {drive.name}', len(names)) as bar:
-            outcomes += [(drive, outcome)
-                         for outcome in drive.read(*names, told=bar.step).values()]
+        outcomes += [(drive, outcome) for outcome in read_all(drive, names).values()]
     if args.json:
         for drive, outcome in outcomes:
             print_json(document(drive, outcome))

@@ -2,14 +2,17 @@
 """``drive_can record``: everything on the buses of a parameter file, in a trace file."""
 
 from argparse import ArgumentParser, Namespace
+from contextlib import closing
 from pathlib import Path
 import sys
 import time
 from typing import Any, TextIO
 
-from drive_can_bridge.cli.listening import (
-    add_params_file, add_seconds, complain, listening, load, positive,
-)
+from drive_can_bridge.cli.arguments import above_zero, add_params_file, add_seconds
+from drive_can_bridge.cli.command import complain, WrongUsage
+from drive_can_bridge.cli.listening import Taps
+from drive_can_bridge.cli.tables import print_json
+from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.frame import bits_on_bus, STUFFING
 from drive_can_bridge.core.record import Record, RecordKind
 from drive_can_bridge.trace.channels import label
@@ -17,52 +20,49 @@ from drive_can_bridge.trace.files import (
     check_writable, LOSSES, TraceWriter, UnknownFormat, WRITABLE,
 )
 
-WRONG_USAGE = 2
 #: s between two looks at counts and file size
 _LOOK_PERIOD = 1.0
 _MEGABYTE = 1_000_000
 
 
-def add_parser(subparsers: Any) -> None:
-    """Add the subcommand to the parser of ``drive_can``."""
-    parser: ArgumentParser = subparsers.add_parser(
-        'record', help='write everything on the buses of a parameter file to a trace',
-        description='Listen to all buses of a parameter file and write every frame to a file, '
-                    'with direction and error frames, until SIGINT or SIGTERM. Sends nothing; on '
-                    'SocketCAN it works beside a running bridge.',
-        epilog=f'Formats, by suffix: {", ".join(WRITABLE)}. Only .log, the format of candump, '
-               'loses nothing.')
+def define(parser: ArgumentParser) -> None:
+    """Define the words and options of the subcommand."""
+    parser.description = (
+        'Listen to all buses of a parameter file and write every frame to a file, '
+        'with direction and error frames, until SIGINT or SIGTERM. Sends nothing; on '
+        'SocketCAN it works beside a running bridge.')
+    parser.epilog = (
+        f'Formats, by suffix: {", ".join(WRITABLE)}. Only .log, the format of candump, '
+        'loses nothing.')
     parser.add_argument('-o', '--output', metavar='FILE', type=Path, required=True,
                         help='the trace; an existing file is replaced')
     add_params_file(parser, 'parameter file of the bridge: names the buses')
     add_seconds(parser)
-    parser.add_argument('--rotate', metavar='MB', type=positive,
+    parser.add_argument('--rotate', metavar='MB', type=above_zero,
                         help='begin a new file when one has that size: FILE_000, FILE_001, …')
     parser.add_argument('--json', action='store_true',
                         help='at the end, a JSON document for each bus: bus, file (the last), '
                              'files (how many), frames, sent, error_frames, load_percent, seconds')
-    parser.set_defaults(run=run)
 
 
 def run(args: Namespace) -> int:
     """
     Record until a signal.
 
-    :return: 0, or 2 for a suffix that cannot be written.
+    :raises WrongUsage: a suffix that cannot be written.
     :raises DriveCanError: a parameter file with problems, a bus that cannot be opened.
     :raises OSError: a file cannot be read or written.
     """
-    configuration = load(args)
+    configuration = configuration_from_file(args.params_file)
     buses = list(configuration.buses.values())
     try:
         check_writable(args.output, len(buses))
     except UnknownFormat as error:
-        complain(f'drive_can record: {error}')
-        return WRONG_USAGE
+        raise WrongUsage(str(error)) from None
     for loss in LOSSES.get(args.output.suffix.lower(), ()):
         complain(f'warning: {args.output.suffix} does not keep {loss}; .log does')
     status = _Status(sys.stderr)
-    with listening(configuration) as taps:      # before a file is replaced
+    with closing(Taps(configuration)) as taps:      # before a file is replaced
         counters = {label(bus): _Counter(bus.name, bus.bitrate) for bus in buses}
         output = _Rotating(args.output, [label(bus) for bus in buses], args.rotate)
         try:
@@ -73,7 +73,10 @@ def run(args: Namespace) -> int:
             status.clear()
             output.close()
     for counter in counters.values():
-        print(counter.document(output) if args.json else counter.line(output))
+        if args.json:
+            print_json(counter.document(output))
+        else:
+            print(counter.line(output))
     return 0
 
 
@@ -126,15 +129,14 @@ class _Counter:
                 f'{self._error_frames} error frames, {seconds:.1f} s, '
                 f'load {self._load(self._bits, seconds):.1f} %: {output.names}')
 
-    def document(self, output: '_Rotating') -> str:
+    def document(self, output: '_Rotating') -> dict[str, Any]:
         """Sum up for programs."""
-        import json
         seconds = time.monotonic() - self._began
-        return json.dumps({
+        return {
             'bus': self._name, 'file': str(output.last), 'files': output.count,
             'frames': self._frames, 'sent': self._sent, 'error_frames': self._error_frames,
             'seconds': round(seconds, 3),
-            'load_percent': round(self._load(self._bits, seconds), 1)})
+            'load_percent': round(self._load(self._bits, seconds), 1)}
 
     def _load(self, bits: int, seconds: float) -> float:
         return 100.0 * STUFFING * bits / (max(seconds, 1e-3) * self._bitrate)

@@ -5,24 +5,21 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from pathlib import Path
 import time
-from typing import Any
 
 from drive_can_bridge.backup.document import Backup
 from drive_can_bridge.backup.plan import (
-    Change, names_to_restore, plan_restore, problems_in, RestorePlan, says_nothing, strangers,
-    why_left_alone,
+    Change, names_to_restore, other_type, plan_restore, problems_in, RestorePlan, says_nothing,
+    strangers, why_left_alone,
 )
 from drive_can_bridge.backup.reader import read_backup
 from drive_can_bridge.backup.restore import Restorer, RestoreResult
 from drive_can_bridge.backup.settings import is_setting
+from drive_can_bridge.cli.command import complain, FAILED, say, WrongUsage
 from drive_can_bridge.cli.completion import complete_drives
-from drive_can_bridge.cli.drives import (
-    add_drive_options, chosen_one, FAILED, opened, source_of, WRONG_USAGE, WrongUsage,
-)
-from drive_can_bridge.cli.listening import complain
+from drive_can_bridge.cli.drives import add_words, chosen_one, opened, read_all, source_of
 from drive_can_bridge.cli.progress import Bar
-from drive_can_bridge.cli.questions import agreed, must_be_answerable, NobodyToAsk
-from drive_can_bridge.cli.tables import print_json, print_table, printable
+from drive_can_bridge.cli.questions import agreed, must_be_answerable
+from drive_can_bridge.cli.tables import print_json, print_table
 from drive_can_bridge.client.drive import Drive, Enabled, Source
 from drive_can_bridge.core.parameters import Parameter, Storage, Value
 from drive_can_bridge.core.words import value_text
@@ -36,30 +33,26 @@ _WHY_VOLATILE = {True: 'its profile says: storage: ram',
 _HEADINGS = ('parameter', 'drive', 'file', 'unit', '')
 
 
-def add_parser(subparsers: Any) -> None:
-    """Add the subcommand to the parser of ``drive_can``."""
-    parser: ArgumentParser = subparsers.add_parser(
-        'restore', help='write the settings of a backup into a drive', allow_abbrev=False,
-        description='Read the drive, show what would change, ask, write only what differs, read '
-                    'everything back. Repeating it is safe.',
-        epilog='Exit code 0: the drive is as in the file. 1: it is not, or nothing may be '
-               'written. 2: wrong usage, or nobody can be asked. 130: interrupted; what was '
-               'written is said. --json, for each setting that differs: drive, parameter, unit, '
-               'found, wanted, left_alone (why, or null); and after writing for each that was to '
-               'be changed: drive, parameter, ok, found, wanted, reason.')
-    words = parser.add_argument(
-        'words', metavar='FILE [DRIVE]', nargs='+',
-        help='what drive_can backup has written, and where to (default: the drive that the file '
-             'is of)')
-    words.completer = complete_drives  # type: ignore[attr-defined]  # for argcomplete
+def define(parser: ArgumentParser) -> None:
+    """Define the words and options of the subcommand."""
+    parser.description = (
+        'Read the drive, show what would change, ask, write only what differs, read '
+        'everything back. Repeating it is safe.')
+    parser.epilog = (
+        'Exit code 0: the drive is as in the file. 1: it is not, or nothing may be '
+        'written. 2: wrong usage, or nobody can be asked. 130: interrupted; what was '
+        'written is said. --json, for each setting that differs: drive, parameter, unit, '
+        'found, wanted, left_alone (why, or null); and after writing for each that was to '
+        'be changed: drive, parameter, ok, found, wanted, reason.')
     parser.add_argument('--dry-run', action='store_true', help='only show what would change')
     parser.add_argument('--include-protected', action='store_true',
                         help='also what the profile protects: station, bit rate, what cuts off '
                              'the bus')
     parser.add_argument('--force', action='store_true',
                         help='although profile or identity are not those of the file')
-    add_drive_options(parser)
-    parser.set_defaults(run=run)
+    add_words(parser, complete_drives, 'FILE [DRIVE]', '+', (
+        'what drive_can backup has written, and where to (default: the drive that the file is '
+        'of)'))
 
 
 def run(args: Namespace) -> int:
@@ -67,23 +60,20 @@ def run(args: Namespace) -> int:
     Restore.
 
     :return: exit code.
+    :raises WrongUsage: it is not clear which drive is meant, or nobody can be asked.
     :raises DriveCanError: the file is wrong, or the drive cannot be reached.
     :raises OSError: the file cannot be read.
     """
-    try:
-        if len(args.words) > 2:
-            raise WrongUsage(f'{" ".join(args.words)}: allowed is FILE [DRIVE]')
-        file, word = [*args.words, None][:2]
-        backup = read_backup(Path(file))
-        if not args.dry_run:
-            must_be_answerable(yes=args.yes, otherwise=_NOTHING, yes_means='writes without asking')
-        with source_of(args) as source:
-            name = _target(backup, word, source)
-            with opened(source, [name]) as drives:
-                return _restore(args, backup, drives[name])
-    except (WrongUsage, NobodyToAsk) as error:
-        complain(printable(f'drive_can restore: {error}'))
-        return WRONG_USAGE
+    if len(args.words) > 2:
+        raise WrongUsage(f'{" ".join(args.words)}: allowed is FILE [DRIVE]')
+    file, word = [*args.words, None][:2]
+    backup = read_backup(Path(file))
+    if not args.dry_run:
+        must_be_answerable(yes=args.yes, otherwise=_NOTHING, yes_means='writes without asking')
+    with source_of(args) as source:
+        name = _target(backup, word, source)
+        with opened(source, [name]) as drives:
+            return _restore(args, backup, drives[name])
 
 
 def _target(backup: Backup, word: str | None, source: Source) -> str:
@@ -107,13 +97,12 @@ def _restore(args: Namespace, backup: Backup, drive: Drive) -> int:
     if not _may_be(args, backup, drive):
         return FAILED
     names = names_to_restore(backup, drive)
-    with Bar(f'reading {drive.name}', len(names)) as bar:
-        outcomes = drive.read(*names, told=bar.step) if names else {}
+    outcomes = read_all(drive, names)
     plan = plan_restore(backup, drive, outcomes, include_protected=args.include_protected)
     if plan.unread:
         for outcome in plan.unread:
-            complain(printable(f'{drive.name}: {outcome.name} could not be read: '
-                               f'{outcome.reason}'))
+            complain(f'{drive.name}: {outcome.name} could not be read: '
+                     f'{outcome.reason}')
         complain(f'{_NOTHING}.')
         return FAILED
     _show(args, backup, drive, plan)
@@ -138,23 +127,24 @@ def _restore(args: Namespace, backup: Backup, drive: Drive) -> int:
 def _may_be(args: Namespace, backup: Backup, drive: Drive) -> bool:
     """Tell whether the file may be restored into the drive; say why not."""
     problems = problems_in(backup, drive)
-    for problem in problems:
-        complain(problem)
     if problems:
+        other = other_type(backup, drive)
+        complain(f'{backup.file}: of another drive type: {other}' if other else
+                 '\n'.join(problems))
         return False
     differing = strangers(backup, drive, _identity(backup, drive))
     for text in differing:
-        complain(printable(f'{backup.file}: {text}'))
+        complain(f'{backup.file}: {text}')
     if differing and not (args.force or args.dry_run):
         complain(f'{_NOTHING}; --force restores it all the same.')
         return False
     if says_nothing(backup.head):
-        complain(printable(f'{backup.file}: does not say of which profile it is: whether it suits '
-                           f'{drive.name} is not checked'))
+        complain(f'{backup.file}: does not say of which profile it is: whether it suits '
+                 f'{drive.name} is not checked')
     if drive.facts.restore is None and not args.force:
-        complain(printable(
+        complain(
             f'{drive.name}: the bridge does not tell in which mode the drive takes settings; '
-            f'{_NOTHING.lower()}. --params-file goes without it, --force does not ask'))
+            f'{_NOTHING.lower()}. --params-file goes without it, --force does not ask')
         return False
     if drive.enabled() is Enabled.YES and not args.dry_run:
         _is_enabled(drive)
@@ -197,13 +187,13 @@ def _show(args: Namespace, backup: Backup, drive: Drive, plan: RestorePlan) -> N
     for name in backup.values:
         why = why_left_alone(drive, name, include_protected=True)
         if why is not None and not is_setting(drive, name):
-            complain(printable(f'{drive.name}: {name} is left alone: {why.text}'))
+            complain(f'{drive.name}: {name} is left alone: {why.text}')
     if backup.without_value:
-        complain(printable(f'{backup.file}: no value in it, left alone: '
-                           f'{_list(backup.without_value)}'))
+        complain(f'{backup.file}: no value in it, left alone: '
+                 f'{_list(backup.without_value)}')
     if not plan.changes and not args.json:
-        print(printable(f'{drive.name}: nothing to restore, {len(plan.same)} settings are as in '
-                        f'{backup.file}'))
+        say(f'{drive.name}: nothing to restore, {len(plan.same)} settings are as in '
+            f'{backup.file}')
 
 
 def _report(args: Namespace, drive: Drive, plan: RestorePlan, result: RestoreResult,
@@ -216,35 +206,35 @@ def _report(args: Namespace, drive: Drive, plan: RestorePlan, result: RestoreRes
         for each in result.wrong:
             _print_outcome(drive, each.name, False, each.found, each.wanted, each.reason)
     for text in result.steps:
-        complain(printable(f'{drive.name}: {text}. Look at it by hand: the drive may still be in '
-                           'the mode in which settings are written'))
+        complain(f'{drive.name}: {text}. Look at it by hand: the drive may still be in '
+                 'the mode in which settings are written')
     volatile = [change.name for change in plan.changes
                 if change.name in result.written and _is_volatile(drive, change.parameter)]
     if volatile:
-        complain(printable(f'{drive.name}: gone when it loses power: {_list(volatile)} '
-                           f'({_WHY_VOLATILE[drive.facts.persist_writes]})'))
+        complain(f'{drive.name}: gone when it loses power: {_list(volatile)} '
+                 f'({_WHY_VOLATILE[drive.facts.persist_writes]})')
     if result.trouble is not None:
-        complain(printable(f'{drive.name}: {result.trouble}'))
+        complain(f'{drive.name}: {result.trouble}')
     if result.stopped is not None:
-        complain(printable(
+        complain(
             f'{drive.name}: interrupted. Written: {_list(result.written)}. Not written: '
-            f'{_list(result.stopped)}. Repeat the command to go on'))
+            f'{_list(result.stopped)}. Repeat the command to go on')
         return interrupted.exit_code
     if wrong:
-        complain(printable(f'{drive.name}: confirmed: {_list(result.written)}; not as in the '
-                           'file:'))
+        complain(f'{drive.name}: confirmed: {_list(result.written)}; not as in the '
+                 'file:')
         for each in result.wrong:
             found = 'unknown' if each.found is None else _with_unit(plan, each.name, each.found)
             reason = f': {each.reason}' if each.reason else ''
-            complain(printable(f'  {each.name}: {found} instead of '
-                               f'{_with_unit(plan, each.name, each.wanted)}{reason}'))
+            complain(f'  {each.name}: {found} instead of '
+                     f'{_with_unit(plan, each.name, each.wanted)}{reason}')
     elif result.trouble is not None:
-        complain(printable(f'{drive.name}: written before: {_list(result.written)}'))
+        complain(f'{drive.name}: written before: {_list(result.written)}')
     if not result.complete:
         return FAILED
     if not args.json:
-        print(printable(f'{drive.name}: {_count(plan.changes)} written, {len(plan.words)} read '
-                        'back: as in the file'))
+        say(f'{drive.name}: {_count(plan.changes)} written, {len(plan.words)} read '
+            'back: as in the file')
     return 0
 
 

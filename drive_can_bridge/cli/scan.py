@@ -4,47 +4,41 @@
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Sequence
 from dataclasses import replace
-import json
 from pathlib import Path
-import sys
-from typing import Any
 
+from drive_can_bridge.cli.arguments import above_zero
+from drive_can_bridge.cli.command import complain, FAILED, WrongUsage
 from drive_can_bridge.cli.found_file import write_parameter_file
-from drive_can_bridge.cli.listening import complain, positive
+from drive_can_bridge.cli.questions import agree_to_hazard
 from drive_can_bridge.cli.survey import Survey
+from drive_can_bridge.cli.tables import print_json
 from drive_can_bridge.core.configuration import BusConfiguration
+from drive_can_bridge.core.text import column_lines
 from drive_can_bridge.exchange.one_master import END_FIRST, Ownership
 from drive_can_bridge.protocols.families import FAMILIES
-from drive_can_bridge.trace.summary import table
 from drive_can_bridge.transport.adapters import adapter_keywords, check_interface
 from drive_can_bridge.transport.end_point import EndPoint
 from drive_can_bridge.transport.port import open_port
 
-FAILED = 1
-WRONG_USAGE = 2
 #: families whose reads may be commands of others: only when named
 _NAMED = tuple(name for name, family in FAMILIES.items() if not family.make_scout().unmistakable)
 _COLUMNS = ('protocol', 'station', 'how sure', 'what it said')
 
 
-class _WrongUsage(Exception):
-    """The command line cannot be obeyed."""
-
-
-def add_parser(subparsers: Any) -> None:
-    """Add the subcommand to the parser of ``drive_can``."""
-    parser: ArgumentParser = subparsers.add_parser(
-        'scan', help='find the drives on a bus',
-        description='Listen, then ask: 29-bit DataModel reads and CANopen SDO reads, which mean '
-                    'nothing to other devices, at 30 % bus load at most. Only listens while '
-                    'another master asks. Sends reads only, never a setpoint, a control word or '
-                    'an NMT command.',
-        epilog='Exit code 0: something was found. 1: nothing, or the bus cannot be used. 2: wrong '
-               'usage, or a question that could not be asked.')
+def define(parser: ArgumentParser) -> None:
+    """Define the words and options of the subcommand."""
+    parser.description = (
+        'Listen, then ask: 29-bit DataModel reads and CANopen SDO reads, which mean '
+        'nothing to other devices, at 30 % bus load at most. Only listens while '
+        'another master asks. Sends reads only, never a setpoint, a control word or '
+        'an NMT command.')
+    parser.epilog = (
+        'Exit code 0: something was found. 1: nothing, or the bus cannot be used. 2: wrong '
+        'usage, or a question that could not be asked.')
     parser.add_argument('--interface', required=True, help='python-can interface: socketcan, …')
     parser.add_argument('--channel', required=True, help='what it calls its channel: can0, …')
     parser.add_argument('--bitrate', type=int, default=125_000, metavar='B', help='bit/s')
-    parser.add_argument('--listen', type=positive, default=2.0, metavar='S',
+    parser.add_argument('--listen', type=above_zero, default=2.0, metavar='S',
                         help='s to listen before anything is asked (default 2)')
     parser.add_argument('--passive', action='store_true', help='only listen')
     parser.add_argument('--protocols', type=_protocols, default=[], metavar='NAME',
@@ -59,31 +53,28 @@ def add_parser(subparsers: Any) -> None:
                         help='write what was found as a parameter file')
     parser.add_argument('--json', action='store_true',
                         help='a document for each drive: protocol, station, certainty, text')
-    parser.set_defaults(run=run)
 
 
 def run(args: Namespace) -> int:
     """
     Scan.
 
-    :return: 0 found something, 1 nothing, 2 wrong usage.
+    :return: 0 found something, 1 nothing.
+    :raises WrongUsage: an adapter that cannot be used so, or nobody agrees.
     :raises DriveCanError: the bus cannot be used.
     :raises OSError: the output cannot be written.
     """
     reason = check_interface(args.interface)
     if reason is not None:
-        complain(f'drive_can scan: --interface: {reason}')
-        return WRONG_USAGE
+        raise WrongUsage(f'--interface: {reason}')
     bus = BusConfiguration('main', args.interface, args.channel, args.bitrate)
-    try:
-        if args.bitrates:
-            return _compare_bitrates(args, bus)
-        for name in args.protocols:     # before anything is sent
-            _confirm(args, name)
-        return _scan(args, bus)
-    except _WrongUsage as error:
-        complain(f'drive_can scan: {error}')
-        return WRONG_USAGE
+    if args.bitrates:
+        return _compare_bitrates(args, bus)
+    for name in args.protocols:     # before anything is sent
+        agree_to_hazard(f'{name}: {FAMILIES[name].make_scout().hazard}',
+                        f'Ask {name} all the same?', yes=args.yes or args.passive,
+                        who=f'--protocols {name}')
+    return _scan(args, bus)
 
 
 def _scan(args: Namespace, bus: BusConfiguration) -> int:
@@ -122,30 +113,12 @@ def _ask(args: Namespace, survey: Survey) -> None:
         complain(f'there is another master ({survey.master}): only listening')
 
 
-def _confirm(args: Namespace, name: str) -> None:
-    """
-    Have it confirmed that a family is asked whose reads may be commands.
-
-    :raises _WrongUsage: nobody can be asked, or says no.
-    """
-    complain(f'{name}: {FAMILIES[name].make_scout().hazard}')
-    if args.yes or args.passive:
-        return
-    if not sys.stdin.isatty():
-        raise _WrongUsage(f'--protocols {name} needs --yes where nobody can be asked')
-    sys.stderr.write(f'Ask {name} all the same? [y/N] ')
-    sys.stderr.flush()
-    if sys.stdin.readline().strip().lower() not in ('y', 'yes'):
-        raise _WrongUsage('nothing was sent')
-
-
 def _show(args: Namespace, survey: Survey) -> None:
     sightings = survey.sightings
     if args.json:
         for each in sightings:
-            print(json.dumps({'protocol': each.protocol, 'station': each.station,
-                              'certainty': each.certainty.value, 'text': each.text},
-                             ensure_ascii=False))
+            print_json({'protocol': each.protocol, 'station': each.station,
+                        'certainty': each.certainty.value, 'text': each.text})
         return
     drives = {each.station for each in sightings if each.protocol == 'canopen_pkw'}
     rows = [(each.protocol, str(each.station), each.certainty.value, each.text)
@@ -153,8 +126,7 @@ def _show(args: Namespace, survey: Survey) -> None:
     rows += [('CANopen node', str(node), '–', text)
              for node, text in sorted(survey.nodes.items()) if node not in drives]
     if rows:
-        for line in table(_COLUMNS, rows, texts=(0, 2, 3)):
-            print(line)
+        print('\n'.join(column_lines(_COLUMNS, rows, numbers=('station',))))
     else:
         print(f'no drive found, {survey.frames} frames heard')
 
@@ -178,8 +150,8 @@ def _tell_trouble(survey: Survey, port: EndPoint, *, asked: bool) -> None:
 
 def _compare_bitrates(args: Namespace, bus: BusConfiguration) -> int:
     if 'listen_only' not in (adapter_keywords(bus.interface) or ()):
-        raise _WrongUsage(f'--bitrates: {bus.interface} has no listen-only mode here, and trying '
-                          'bit rates without it would disturb the bus')
+        raise WrongUsage(f'--bitrates: {bus.interface} has no listen-only mode here, and trying '
+                         'bit rates without it would disturb the bus')
     heard = 0
     for bitrate in args.bitrates:
         with Ownership([(bus, ())], 'drive_can scan', END_FIRST):

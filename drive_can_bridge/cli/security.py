@@ -8,9 +8,8 @@ Writes files only; docs/security.md says what they protect against, and what enf
 import argparse
 import ipaddress
 from pathlib import Path
-from typing import Any
 
-from drive_can_bridge.cli.namespaces import namespace
+from drive_can_bridge.cli.arguments import namespace, whole
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.security.policy import BRIDGE, OPERATOR, policy, VIEWER
 from drive_can_bridge.security.tls import bridge_profile, client_profile, Meeting
@@ -19,14 +18,13 @@ _NODE = 'drive_can_bridge'
 _POLICY, _TLS_BRIDGE, _TLS_CLIENT = 'policy.xml', 'tls_bridge.xml', 'tls_client.xml'
 
 
-def add_parser(subparsers: Any) -> None:
-    """Add the subcommand to the parser of ``drive_can``."""
+def define(parser: argparse.ArgumentParser) -> None:
+    """Define the words and options of the subcommand."""
     usual = Meeting()
-    parser = subparsers.add_parser(
-        'security', help='write who may talk to a bridge',
-        description='Write the SROS2 policy for the bridge of a parameter file (enclaves '
-                    f'{BRIDGE}, {OPERATOR}, {VIEWER}), and Fast DDS profiles for TLS between '
-                    'hosts with certificates of your own.')
+    parser.description = (
+        'Write the SROS2 policy for the bridge of a parameter file (enclaves '
+        f'{BRIDGE}, {OPERATOR}, {VIEWER}), and Fast DDS profiles for TLS between '
+        'hosts with certificates of your own.')
     parser.add_argument('file', metavar='FILE', help='parameter file of the bridge')
     parser.add_argument('-o', '--output', metavar='DIR', type=Path, required=True,
                         help='directory for the files, made where it is missing')
@@ -34,12 +32,11 @@ def add_parser(subparsers: Any) -> None:
                         help='in which the bridge runs (default: none)')
     parser.add_argument('--host', metavar='ADDRESS', default=usual.host, type=_address,
                         help='of the host of the bridge, for TLS (default: %(default)s)')
-    parser.add_argument('--port', metavar='PORT', default=usual.port, type=_port,
+    parser.add_argument('--port', metavar='PORT', default=usual.port, type=whole(1, 65535),
                         help='of TCP on that host (default: %(default)s)')
     parser.add_argument('--certificates', metavar='DIR', default=usual.certificates, type=Path,
                         help='where key.pem, cert.pem and ca.pem are on each host '
                              '(default: %(default)s)')
-    parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -66,9 +63,3 @@ def _address(text: str) -> str:
         return str(ipaddress.IPv4Address(text))
     except ValueError:
         raise argparse.ArgumentTypeError(f'{text}: an IPv4 address is wanted') from None
-
-
-def _port(text: str) -> int:
-    if not (text.isdecimal() and 0 < int(text) <= 65535):
-        raise argparse.ArgumentTypeError(f'{text}: allowed are 1 to 65535')
-    return int(text)

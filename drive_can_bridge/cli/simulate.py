@@ -17,8 +17,10 @@ import signal
 import sys
 import threading
 import time
-from typing import Any, TextIO, TypeVar
+from typing import Any, TextIO
 
+from drive_can_bridge.cli.arguments import of_drive
+from drive_can_bridge.cli.command import FAILED, WrongUsage
 from drive_can_bridge.core.configuration import BridgeConfiguration, BusConfiguration
 from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, ValueRefused
 from drive_can_bridge.simulation.console import Console, describe, help_lines, LineReader
@@ -28,26 +30,17 @@ from drive_can_bridge.simulation.player import ShowFrame
 from drive_can_bridge.simulation.simulation import Simulation
 from drive_can_bridge.simulation.terminal import SlcanTerminal
 
-Parsed = TypeVar('Parsed')
-
-FAILED = 1
-WRONG_USAGE = 2
 #: s between two looks at the threads
 _LOOK_PERIOD = 0.5
 
 
-class _WrongUsage(Exception):
-    """The command line cannot be obeyed."""
-
-
-def add_parser(subparsers: Any) -> None:
-    """Add the subcommand to the parser of ``drive_can``."""
-    parser = subparsers.add_parser(
-        'simulate', help='play the drives of a parameter file',
-        description='Play every drive of a bridge parameter file on its buses, until SIGINT or '
-                    'SIGTERM.',
-        epilog='Lines on standard input: ' + '\n'.join(help_lines()),
-        formatter_class=argparse.RawDescriptionHelpFormatter)
+def define(parser: argparse.ArgumentParser) -> None:
+    """Define the words and options of the subcommand."""
+    parser.description = (
+        'Play every drive of a bridge parameter file on its buses, until SIGINT or '
+        'SIGTERM.')
+    parser.epilog = 'Lines on standard input: ' + '\n'.join(help_lines())
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.add_argument('--params-file', metavar='FILE', type=Path, required=True,
                         help='parameter file of the bridge')
     parser.add_argument('--interface', help='python-can interface for all buses, instead of the '
@@ -69,33 +62,30 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument('--log-frames', metavar='FILE', type=Path, nargs='?', const=Path('-'),
                         help='print every frame: (seconds) BUS ID#DATA R|T; or write it to FILE, '
                              'as candump -L does')
-    parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
     """
     Simulate until a signal.
 
-    :return: 0 after SIGINT or SIGTERM, 1 failure, 2 wrong usage; one line on standard error each.
+    :return: 0 after SIGINT or SIGTERM, 1 failure; one line on standard error each.
+    :raises WrongUsage: options that exclude each other, or mean nothing.
     :raises ConfigurationError: the file has problems.
     :raises OSError: a file cannot be read, or written.
     """
     try:
         pty = args.pty or args.pty_link is not None
         if pty and (args.interface or args.channel):
-            raise _WrongUsage('--pty and --interface/--channel exclude each other')
+            raise WrongUsage('--pty and --interface/--channel exclude each other')
         configuration = _on_buses(_load(args.params_file), args.interface, args.channel,
                                   args.bitrate)
-        faults = [_of_drive('--fault', text, configuration, parse_fault) for text in args.fault]
-        mechanics = dict(_of_drive('--axis', text, configuration, Mechanics.parse)
+        faults = [of_drive('--fault', text, configuration, parse_fault) for text in args.fault]
+        mechanics = dict(of_drive('--axis', text, configuration, Mechanics.parse)
                          for text in args.axis)
         with ExitStack() as stack:
             return _simulate(stack, configuration, faults, mechanics, pty=pty,
                              link=args.pty_link, log_frames=args.log_frames,
                              strict=args.bitrate is not None)
-    except _WrongUsage as error:
-        _complain(str(error))
-        return WRONG_USAGE
     except (BusMisconfigured, BusUnavailable) as error:
         _complain(str(error))
         return FAILED
@@ -119,7 +109,7 @@ def _simulate(stack: ExitStack, configuration: BridgeConfiguration,
         try:
             simulation.drives[name].fault(fault)
         except ValueRefused as error:
-            raise _WrongUsage(f'--fault {name}:{fault}: {error}') from None
+            raise WrongUsage(f'--fault {name}:{fault}: {error}') from None
     for bus in configuration.buses.values():
         if pty:
             terminals[bus.name] = terminal = SlcanTerminal(bus.bitrate if strict else None)
@@ -197,23 +187,6 @@ def _on_buses(configuration: BridgeConfiguration, interface: str | None, channel
             changed = replace(changed, options={})
         buses[bus.name] = changed
     return replace(configuration, buses=buses)
-
-
-def _of_drive(option: str, text: str, configuration: BridgeConfiguration,
-              parse: Callable[[str], Parsed]) -> tuple[str, Parsed]:
-    """Read an argument that begins with the name of a drive."""
-    name, colon, rest = text.partition(':')
-    if not colon:
-        raise _WrongUsage(f'{option} {text}: write DRIVE:FAULT, for example conveyor:late=0.15'
-                          if option == '--fault' else
-                          f'{option} {text}: write DRIVE:KEY=VALUE, for example lift:load=0.3')
-    if name not in configuration.drives:
-        raise _WrongUsage(f"{option} {text}: no drive '{name}'; drives: "
-                          f"{', '.join(configuration.drives) or 'none'}")
-    try:
-        return name, parse(rest)
-    except ValueRefused as error:
-        raise _WrongUsage(f'{option} {text}: {error}') from None
 
 
 class _Output:

@@ -15,8 +15,8 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-#: between two columns
-_GAP = '  '
+from drive_can_bridge.core.text import column_lines, printable
+
 
 
 def print_table(headings: Sequence[str], rows: Iterable[Sequence[str]], *,
@@ -30,21 +30,7 @@ def print_table(headings: Sequence[str], rows: Iterable[Sequence[str]], *,
     if sys.stdout.isatty():
         Console().print(_fitting(headings, written, numbers))
     else:
-        for line in plain_lines(headings, written, numbers=numbers):
-            print(line)
-
-
-def plain_lines(headings: Sequence[str], rows: Sequence[Sequence[str]], *,
-                numbers: Sequence[str] = ()) -> list[str]:
-    """Write a table as text in columns; nothing is cut."""
-    widths = [max(len(row[place]) for row in (headings, *rows))
-              for place in range(len(headings))]
-    lines = []
-    for row in (headings, *rows):
-        cells = [cell.rjust(width) if heading in numbers else cell.ljust(width)
-                 for cell, width, heading in zip(row, widths, headings, strict=True)]
-        lines.append(_GAP.join(cells).rstrip())
-    return lines
+        print('\n'.join(column_lines(headings, written, numbers=numbers)))
 
 
 def fitting_table(headings: Sequence[str], rows: Iterable[Sequence[str]],
@@ -56,7 +42,7 @@ def fitting_table(headings: Sequence[str], rows: Iterable[Sequence[str]],
 def _used(headings: Sequence[str], rows: Iterable[Sequence[str]],
           ) -> tuple[list[str], list[list[str]]]:
     """Return headings and cells of the columns with any content, fit for a terminal."""
-    written = [[printable(cell) for cell in row] for row in rows]
+    written = [[printable(cell, None) for cell in row] for row in rows]
     used = [place for place in range(len(headings)) if any(row[place] for row in written)]
     return [headings[place] for place in used], [[row[place] for place in used]
                                                  for row in written]
@@ -77,8 +63,3 @@ def _fitting(headings: Sequence[str], rows: Sequence[Sequence[str]],
 def print_json(document: Mapping[str, Any]) -> None:
     """Print one JSON document as a line of standard output."""
     print(json.dumps(document, ensure_ascii=False))
-
-
-def printable(text: str) -> str:
-    """Return a text that cannot upset a terminal."""
-    return ''.join(letter if letter.isprintable() else '?' for letter in text)

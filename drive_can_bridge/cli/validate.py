@@ -1,9 +1,8 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The subcommand ``drive_can validate``: check a parameter file without touching a bus."""
 
-from argparse import Namespace
+from argparse import ArgumentParser, Namespace
 import sys
-from typing import Any
 
 from drive_can_bridge.configuration.bus_check import Adapters
 from drive_can_bridge.configuration.load import configuration_from_file
@@ -12,14 +11,13 @@ from drive_can_bridge.core.configuration import BusConfiguration, DriveConfigura
 from drive_can_bridge.core.parameters import Parameter
 
 
-def add_parser(subparsers: Any) -> None:
-    """Add the subcommand to the command's parser."""
-    parser = subparsers.add_parser(
-        'validate', help='check a parameter file without touching a bus',
-        description='Check a parameter file and the profiles it names. Prints one line per '
-                    'drive, or on standard error one line per problem '
-                    '(FILE:LINE: key.path: what is wrong, what is allowed).',
-        epilog='Exit code 0: everything is all right. 1: it is not. 2: wrong usage.')
+def define(parser: ArgumentParser) -> None:
+    """Define the words and options of the subcommand."""
+    parser.description = (
+        'Check a parameter file and the profiles it names. Prints one line per '
+        'drive, or on standard error one line per problem '
+        '(FILE:LINE: key.path: what is wrong, what is allowed).')
+    parser.epilog = 'Exit code 0: everything is all right. 1: it is not. 2: wrong usage.'
     parser.add_argument('file', metavar='FILE', help='ROS 2 parameter file of the bridge')
 
 

@@ -3,13 +3,10 @@
 
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
-from typing import Any
 
+from drive_can_bridge.cli.command import FAILED, WrongUsage
 from drive_can_bridge.cli.completion import complete_words
-from drive_can_bridge.cli.drives import (
-    add_drive_options, FAILED, opened, source_of, split_words, WRONG_USAGE, WrongUsage,
-)
-from drive_can_bridge.cli.listening import complain
+from drive_can_bridge.cli.drives import add_words, opened, source_of, split_words
 from drive_can_bridge.cli.progress import Bar
 from drive_can_bridge.cli.tables import print_json, print_table
 from drive_can_bridge.client.drive import Drive, Drives, WriteOutcome
@@ -19,39 +16,33 @@ _HEADINGS = ('drive', 'name', 'value', 'unit', 'number', 'storage', 'result')
 _BOOLS = {'true': True, '1': True, 'false': False, '0': False}
 
 
-def add_parser(subparsers: Any) -> None:
-    """Add the subcommand to the parser of ``drive_can``."""
-    parser: ArgumentParser = subparsers.add_parser(
-        'write', help='set parameters of a drive', allow_abbrev=False,
-        description='Set parameters of a drive one after the other: through a running bridge, or '
-                    'directly with --params-file. Each one is acknowledged by the drive, or read '
-                    'back. No setpoint, no control word.',
-        epilog='Exit code 0: all was written. 1: something was not, its row says why. 2: wrong '
-               'usage, nothing was sent. After Ctrl-C (130) the write under way is complete.')
-    words = parser.add_argument('words', metavar='[DRIVE] NAME=VALUE', nargs='+', help=(
+def define(parser: ArgumentParser) -> None:
+    """Define the words and options of the subcommand."""
+    parser.description = (
+        'Set parameters of a drive one after the other: through a running bridge, or '
+        'directly with --params-file. Each one is acknowledged by the drive, or read '
+        'back. No setpoint, no control word.')
+    parser.epilog = (
+        'Exit code 0: all was written. 1: something was not, its row says why. 2: wrong '
+        'usage, nothing was sent. After Ctrl-C (130) the write under way is complete.')
+    add_words(parser, complete_words, '[DRIVE] NAME=VALUE', '+', (
         'the drive, also as a shell pattern (may be left out where there is only one); names of '
         'the profile, or raw ones, with the new value'))
-    words.completer = complete_words  # type: ignore[attr-defined]  # for argcomplete
-    add_drive_options(parser)
-    parser.set_defaults(run=run)
 
 
 def run(args: Namespace) -> int:
     """
     Write.
 
-    :return: 0 everything, 1 not everything, 2 wrong usage.
+    :return: 0 everything, 1 not everything.
+    :raises WrongUsage: it is not clear which drive is meant, or a word is no NAME=VALUE.
     :raises DriveCanError: another master, a bus or a bridge that is not there.
     """
-    try:
-        with source_of(args) as source:
-            names, words = split_words(source.names, args.words)
-            wanted = _assignments(words)
-            with opened(source, names) as drives:
-                return _write(args, drives, wanted)
-    except WrongUsage as error:
-        complain(f'drive_can write: {error}')
-        return WRONG_USAGE
+    with source_of(args) as source:
+        names, words = split_words(source.names, args.words)
+        wanted = _assignments(words)
+        with opened(source, names) as drives:
+            return _write(args, drives, wanted)
 
 
 def _assignments(words: Sequence[str]) -> dict[str, str]:

@@ -90,11 +90,13 @@ class DriveChecker:
             return
         if loaded.tree.is_damaged(('parameters',)):
             return
-        self._loaded = loaded
         protocols = loaded.profile.protocols
         if family is not None and protocols and family.name not in protocols:
+            # nothing of it fits, and nothing is wrong with it
             self._wrong(('profile',), f'{show(name)} is for {", ".join(protocols)}, allowed is a '
                                      f'profile for {family.name}')
+            return
+        self._loaded = loaded
 
     def _list(self, key: str) -> tuple[Parameter, ...]:
         """Resolve a list of parameter names; what has a problem is a stand-in, not listed."""

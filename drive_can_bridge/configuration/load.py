@@ -125,7 +125,8 @@ def _forget_findings(tree: Tree) -> None:
 def _names(tree: Tree, key: str) -> list[str]:
     """Return all keys of a mapping, also of those entries that turned out to be wrong."""
     names = list(tree.data.get(key, {}))
-    return names + [str(path[1]) for path in tree.damaged if len(path) == 2 and path[0] == key]
+    wrong = [path for path in tree.damaged if len(path) == 2 and path[0] == key]
+    return names + [str(path[1]) for path in sorted(wrong, key=tree.line)]
 
 
 def _look_for_directories(tree: Tree, directories: list[str]) -> None:

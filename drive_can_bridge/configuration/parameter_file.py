@@ -4,14 +4,15 @@ Find the bridge's parameters in a ROS parameter file.
 
 A file may serve many nodes: ``NODE: {ros__parameters: …}``, the node name possibly split over
 nested namespaces. ``validate`` and ``simulate`` have no node name; they take the one section that
-holds ``buses``. What makes rcl refuse the whole file counts in every section, what only garbles
-parameters counts in ours.
+holds ``buses``, and like rcl all others that are for the same node, such as ``/**``: of what
+stands in several, the last in the file counts. What makes rcl refuse the whole file counts in
+every section, what only garbles parameters counts in ours.
 """
 
 from collections.abc import Iterable
 from pathlib import Path as FilePath
 import re
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from drive_can_bridge.configuration.problems import Path, Problem, Tree
 from drive_can_bridge.configuration.tree_reader import DUPLICATE, Rules, TreeReader
@@ -23,6 +24,10 @@ from drive_can_bridge.core.words import show, suggestion
 PARAMETERS_KEY = 'ros__parameters'
 #: tells the section of a bridge from those of other nodes
 MARK = 'buses'
+#: tell a profile, which is no file for nodes
+_PROFILE_KEYS = {'protocols', 'parameters'}
+#: the node that a section with wildcards is meant for, where it leaves the name open
+_NODE = 'drive_can_bridge'
 
 _TOKEN = re.compile(r'[A-Za-z_][A-Za-z0-9_]*|\*\*?', re.ASCII)
 
@@ -59,7 +64,11 @@ class _FileReader:
             self._note(error.line, (), str(error))
             return
         for _, root in documents:
-            if root.kind is Kind.MAPPING:
+            if _PROFILE_KEYS <= {key.text for key, _ in root.pairs}:
+                # a line for everything in it would not help
+                self._note(root.line, (), f'a profile, allowed is NODE_NAME: {{{PARAMETERS_KEY}: '
+                                          '…}; drive_can profile check looks at profiles')
+            elif root.kind is Kind.MAPPING:
                 self._names(root, ())
             else:
                 self._note(root.line, (), 'no mapping, allowed is '
@@ -190,7 +199,7 @@ def read_parameter_file(path: FilePath) -> tuple[Tree | None, list[Problem]]:
     # one with drives, but without buses, is meant for us, too: what is wrong with it can be told
     ours = reader.sections_with(MARK) or reader.sections_with('drives')
     if len(ours) == 1:
-        tree = ours[0].tree
+        tree = _as_rcl_merges(reader.sections, ours[0])
         tree.problems[:0] = problems
         return tree, tree.problems
     for section in ours:
@@ -206,3 +215,54 @@ def read_parameter_file(path: FilePath) -> tuple[Tree | None, list[Problem]]:
             str(path), 1, MARK, 'no section of the file holds it, allowed is one '
             f'/**/drive_can_bridge: {{{PARAMETERS_KEY}: {{{MARK}: …}}}}{found}'))
     return None, problems
+
+
+def _as_rcl_merges(sections: Iterable[Section], own: Section) -> Tree:
+    """
+    Return what the node of a section gets from all sections of a file.
+
+    Those that are for it in other namespaces are told: nobody knows here where it will run.
+    """
+    node = _some_node(own.name)
+    together: dict[str, list[Tree]] = {}     # rcl lets a name stand where it stands first
+    elsewhere: list[Problem] = []
+    for name, tree, _ in sections:
+        other = _some_node(name)
+        if _is_for(name, node):
+            together.setdefault(name, []).append(tree)
+        elif _is_for(own.name, other) and other.rpartition('/')[2] == node.rpartition('/')[2]:
+            elsewhere.append(Problem(tree.file, tree.line(()), name, 'counts for the bridge in '
+                                     f'another namespace, and is not checked: checked is {node}'))
+    merged, *later = (tree for found in together.values() for tree in found)
+    for tree in later:
+        _lay_over(merged, tree)
+    merged.warnings.extend(elsewhere)
+    return merged
+
+
+def _some_node(section: str) -> str:
+    """Return the full name of a node that a section is for, in the root namespace if it can be."""
+    *above, name = section.removeprefix('/').split('/')
+    spaces = [_NODE if token == '*' else token for token in above if token != '**']
+    return '/' + '/'.join([*spaces, _NODE if '*' in name else name])
+
+
+def _lay_over(below: Tree, above: Tree) -> None:
+    """Lay the parameters of a section over those of an earlier one."""
+    def lay(path: Path, under: dict[str, Any], over: dict[str, Any]) -> None:
+        for key, value in over.items():
+            there, here = under.get(key), (*path, key)
+            if isinstance(there, dict) and isinstance(value, dict):
+                lay(here, there, value)
+            elif key in under and isinstance(there, dict) != isinstance(value, dict):
+                # rcl keeps both
+                below.wrong(here, 'has a value in one section, and keys below it in another; '
+                                  'allowed is one of them')
+            else:
+                under[key] = value
+
+    below.lines.update(above.lines)
+    below.damaged.update(above.damaged)
+    below.incomplete.update(above.incomplete)
+    below.problems.extend(above.problems)
+    lay((), below.data, above.data)

@@ -37,7 +37,8 @@ _MADE: dict[str, Callable[[Any], Any]] = {
     'type': ParameterType, 'access': Access, 'storage': Storage,
     'bits': lambda bits: tuple(bits.items()),
     **dict.fromkeys(('scale', 'offset', 'minimum', 'maximum', 'arming_tolerance'), float)}
-_RAW_NAME = re.compile(r'p[0-9]+|x[0-9a-f]+', re.ASCII)
+#: what reads as the name of a parameter that stands in no profile
+RAW_NAME = re.compile(r'p[0-9]+|x[0-9a-f]+', re.ASCII)
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +116,7 @@ def _check_names(tree: Tree, path: Path, parameter: Parameter) -> None:
         if name in RESERVED:
             tree.wrong(place, f'{show(name)} is taken by the node of the drive, allowed is any '
                               'other name')
-        elif _RAW_NAME.fullmatch(name):
+        elif RAW_NAME.fullmatch(name):
             tree.wrong(place, f'{show(name)} reads as a raw parameter, allowed are names other '
                               'than p<digits> and x<hexadecimal digits>')
 

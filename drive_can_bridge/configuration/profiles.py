@@ -6,6 +6,7 @@ from dataclasses import replace
 import hashlib
 from pathlib import Path as FilePath
 
+from drive_can_bridge.configuration.parameter_file import PARAMETERS_KEY
 from drive_can_bridge.configuration.problems import Problem, Tree
 from drive_can_bridge.configuration.profile_check import LoadedProfile, profile_from_tree
 from drive_can_bridge.configuration.tree_reader import Rules, TreeReader
@@ -100,8 +101,12 @@ def read_profile(path: FilePath) -> LoadedProfile:
     if not documents or documents[0].root.kind is not Kind.MAPPING:
         return _unusable(file, 1, 'no mapping, allowed are protocols, parameters, control, '
                                   'description')
+    root = documents[0].root
+    if any(below.text == PARAMETERS_KEY for _, value in root.pairs for below, _ in value.pairs):
+        return _unusable(file, root.line, 'parameters of nodes, allowed is a profile; drive_can '
+                                          'validate looks at the file of a bridge')
     reader = TreeReader(file, Rules.PROFILE)
-    reader.read(documents[0].root)
+    reader.read(root)
     tree = reader.tree
     tree.problems[:0] = reader.refused
     if len(documents) > 1:

@@ -6,6 +6,8 @@ A name with a line feed in it forges a line of the log, one with escape sequence
 on the screen, and one of two megabytes fills both.
 """
 
+from collections.abc import Sequence
+
 #: characters of what users or the bus bring
 TEXT_MAX = 256
 _CUT = '…'
@@ -28,3 +30,16 @@ def printable(text: str, limit: int | None = TEXT_MAX) -> str:
                        each.encode('unicode_escape', 'surrogatepass').decode('ascii')
                        for each in text)
     return text if limit is None or len(text) <= limit else text[:limit - 1] + _CUT
+
+
+def column_lines(headings: Sequence[str], rows: Sequence[Sequence[str]], *,
+                 numbers: Sequence[str] = ()) -> list[str]:
+    """
+    Write a table as lines of columns; nothing is cut.
+
+    :param numbers: headings of columns that are aligned to the right.
+    """
+    widths = [max(map(len, column)) for column in zip(headings, *rows)]
+    return ['  '.join(cell.rjust(width) if heading in numbers else cell.ljust(width)
+                      for cell, width, heading in zip(row, widths, headings, strict=True)).rstrip()
+            for row in (headings, *rows)]

@@ -2,7 +2,7 @@
 """The web application: pages in one frame, files, actions, and the gate in front of all."""
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -72,36 +72,28 @@ def application(feed: Feed, access: Access, setting: Setting) -> ASGIApp:
 
 
 def _add_pages(feed: Feed, setting: Setting) -> None:
-    @ui.page('/')
-    def overview(request: Request) -> Response | None:
+    def shown(request: Request, here: str, make: Callable[[Role], View]) -> Response | None:
         role = request.scope[ROLE]
         if _full(role):
             return _too_many()
-        with _frame('/', role):
-            page = Overview(role, setting.place)
-        _live(feed, View(page.show))
+        with _frame(here, role):
+            view = make(role)
+        _live(feed, view)
         return None
+
+    @ui.page('/')
+    def overview(request: Request) -> Response | None:
+        return shown(request, '/', lambda role: View(Overview(role, setting.place).show))
 
     @ui.page('/drive/{name:path}')
     def drive(request: Request, name: str) -> Response | None:
-        role = request.scope[ROLE]
-        if _full(role):
-            return _too_many()
         ui.page_title(f'{name} · {_TITLE}')
-        with _frame('', role):
-            page = DrivePage(feed, f'/{name}', role, allow_writes=setting.allow_writes)
-        _live(feed, page.view)
-        return None
+        return shown(request, '', lambda role: DrivePage(
+            feed, f'/{name}', role, allow_writes=setting.allow_writes).view)
 
     @ui.page('/log')
     def log(request: Request) -> Response | None:
-        role = request.scope[ROLE]
-        if _full(role):
-            return _too_many()
-        with _frame('/log', role):
-            page = LogPage()
-        _live(feed, View(page.show))
-        return None
+        return shown(request, '/log', lambda role: View(LogPage().show))
 
 
 def _full(role: Role) -> bool:

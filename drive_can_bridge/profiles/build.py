@@ -11,9 +11,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from drive_can_bridge.configuration.problems import Tree
-from drive_can_bridge.configuration.profile_check import profile_from_tree
+from drive_can_bridge.configuration.profile_check import LoadedProfile, profile_from_tree
 from drive_can_bridge.core.parameters import ParameterType
-from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.profiles.draft import Draft, Found, LeftOut
 from drive_can_bridge.profiles.errors import ImportFailed
 from drive_can_bridge.profiles.family_check import family_complaints
@@ -140,10 +139,8 @@ def _narrowed(drafts: Sequence[Draft], found: Found) -> list[Draft]:
 
 def _sound(named: dict[str, Draft], found: Found, protocols: Sequence[str]) -> dict[str, Draft]:
     """Leave out what the checks of a profile complain about."""
-    tree = Tree({'protocols': list(protocols),
-                 'parameters': {name: draft.entry for name, draft in named.items()}})
     reasons: dict[str, str] = {}
-    for problem in profile_from_tree(tree).problems:
+    for problem in _loaded(named, protocols).problems:
         _note(reasons, problem.key, problem.message)
     return _without(named, found, reasons)
 
@@ -154,15 +151,15 @@ def _note(reasons: dict[str, str], key: str, message: str) -> None:
     reasons.setdefault(name, ' '.join(filter(None, ('.'.join(filter(None, rest)), message))))
 
 
-def _profile(named: dict[str, Draft], protocols: Sequence[str]) -> Profile:
+def _loaded(named: dict[str, Draft], protocols: Sequence[str]) -> LoadedProfile:
     tree = Tree({'protocols': list(protocols),
                  'parameters': {name: draft.entry for name, draft in named.items()}})
-    return profile_from_tree(tree).profile
+    return profile_from_tree(tree)
 
 
 def _carriers(named: dict[str, Draft]) -> tuple[str, ...]:
     """Return the families that can carry all entries; else the one that can carry most."""
-    profile = _profile(named, tuple(FAMILIES))
+    profile = _loaded(named, tuple(FAMILIES)).profile
     missed = {protocol: len({complaint.key.split('.')[1] for complaint in family_complaints(
         replace(profile, protocols=(protocol,)), protocol)}) for protocol in FAMILIES}
     # registers have no elements: all of an array would be one and the same
@@ -176,7 +173,7 @@ def _carriers(named: dict[str, Draft]) -> tuple[str, ...]:
 def _carried(named: dict[str, Draft], found: Found,
              protocols: Sequence[str]) -> dict[str, Draft]:
     """Leave out what one of the families cannot carry."""
-    profile = _profile(named, protocols)
+    profile = _loaded(named, protocols).profile
     reasons: dict[str, str] = {}
     for protocol in protocols:
         for complaint in family_complaints(profile, protocol):

@@ -17,15 +17,12 @@ from collections.abc import Iterable
 import re
 import unicodedata
 
-from drive_can_bridge.configuration.profile_check import RESERVED
+from drive_can_bridge.configuration.profile_check import RAW_NAME, RESERVED
+from drive_can_bridge.profiles.text import YAML_WORDS
 from drive_can_bridge.profiles.units import known_unit
 
 LENGTH_MAX = 60
 
-_TAKEN = RESERVED | {'request'}
-_YAML_WORDS = frozenset(('y', 'n', 'yes', 'no', 'on', 'off', 'true', 'false', 'null', 'nan',
-                         'inf', 'infinity'))
-_RAW = re.compile(r'p[0-9]+|x[0-9a-f]+')
 _LETTERS = str.maketrans({
     'ä': 'ae', 'ö': 'oe', 'ü': 'ue', 'Ä': 'Ae', 'Ö': 'Oe', 'Ü': 'Ue', 'ß': 'ss', 'ẞ': 'SS',
     'æ': 'ae', 'Æ': 'Ae', 'ø': 'oe', 'Ø': 'Oe', 'å': 'aa', 'Å': 'Aa', 'œ': 'oe', 'Œ': 'Oe',
@@ -74,7 +71,7 @@ def name_of(text: str, address: str = '', taken: frozenset[str] = frozenset()) -
         name = words[0][:LENGTH_MAX] if words else ''
     if not name or not name[0].isalpha():
         name = '_'.join(part for part in ('parameter', name or address) if part)
-    if name in _TAKEN | taken or name in _YAML_WORDS or _RAW.fullmatch(name):
+    if name in RESERVED | taken | YAML_WORDS or RAW_NAME.fullmatch(name):
         name += '_value'
     return name
 

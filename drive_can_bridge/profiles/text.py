@@ -29,7 +29,7 @@ _TIED = ':\N{NO-BREAK SPACE}'
 
 _PLAIN = re.compile(r'[A-Za-z](?:[A-Za-z0-9_./() %-]*[A-Za-z0-9_/)%])?', re.ASCII)
 #: plain words that some YAML parser takes for something else than text
-_WORDS = frozenset(('null', 'true', 'false', 'yes', 'no', 'on', 'off', 'y', 'n', 'nan', 'inf',
+YAML_WORDS = frozenset(('null', 'true', 'false', 'yes', 'no', 'on', 'off', 'y', 'n', 'nan', 'inf',
                     'infinity'))
 
 
@@ -55,7 +55,7 @@ def scalar(value: Any, key: str = '', *, hexadecimal: bool = False) -> str:
     if isinstance(value, float):
         return _number(value)
     text = one_line(str(value))
-    plain = _PLAIN.fullmatch(text) and text.lower() not in _WORDS and read_scalar(text) == text
+    plain = _PLAIN.fullmatch(text) and text.lower() not in YAML_WORDS and read_scalar(text) == text
     return text if plain else "'" + text.replace("'", "''") + "'"
 
 

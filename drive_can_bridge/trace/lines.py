@@ -57,15 +57,18 @@ class Selection:
         """Nothing is left out."""
         return not (self._patterns or self._only)
 
+    def names(self, drive: str) -> bool:
+        """Tell whether somebody wants to see a drive."""
+        wanted = self._wanted.get(drive)
+        if wanted is None:
+            wanted = self._wanted[drive] = not self._patterns or any(
+                fnmatchcase(drive, pattern) for pattern in self._patterns)
+        return wanted
+
     def takes(self, bus: str, telegram: Telegram) -> bool:
         """Tell whether somebody wants to see it."""
-        if self._patterns:
-            wanted = self._wanted.get(telegram.drive)
-            if wanted is None:
-                wanted = self._wanted[telegram.drive] = any(
-                    fnmatchcase(telegram.drive, pattern) for pattern in self._patterns)
-            if not wanted:
-                return False
+        if self._patterns and not self.names(telegram.drive):
+            return False
         only = self._only
         if not only:
             return True

@@ -1,11 +1,12 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """A whole trace in a few lines: what each drive and each bus did."""
 
-from collections.abc import Container, Iterator, Sequence
+from collections.abc import Iterator
 import math
 from typing import Any
 
 from drive_can_bridge.core.statistics import Statistic
+from drive_can_bridge.core.text import column_lines
 from drive_can_bridge.protocols.observer import Observed
 from drive_can_bridge.trace.tracer import BusTrace, Tracer
 
@@ -21,9 +22,9 @@ def lines(tracer: Tracer) -> Iterator[str]:
     drives = [(name, *_drive_cells(observed)) for name, observed in tracer.observed().items()]
     buses = [(bus.name, *_bus_cells(bus)) for bus in tracer.buses.values()]
     if drives:
-        yield from table(_DRIVE_COLUMNS, drives)
+        yield from column_lines(_DRIVE_COLUMNS, drives, numbers=_DRIVE_COLUMNS[1:])
         yield ''
-    yield from table(_BUS_COLUMNS, buses)
+    yield from column_lines(_BUS_COLUMNS, buses, numbers=_BUS_COLUMNS[1:])
 
 
 def documents(tracer: Tracer) -> Iterator[dict[str, Any]]:
@@ -39,21 +40,6 @@ def documents(tracer: Tracer) -> Iterator[dict[str, Any]]:
                'foreign_frames': bus.strays, 'load_percent': _rounded(100.0 * bus.load, 1),
                'peak_load_percent': _rounded(100.0 * bus.peak_load, 1),
                'seconds': _rounded(bus.last - bus.first, 6)}
-
-
-def table(headings: Sequence[str], rows: Sequence[Sequence[str]], *,
-          texts: Container[int] = (0,)) -> Iterator[str]:
-    """
-    Yield lines of columns, numbers to the right.
-
-    :param texts: which columns are text, to the left.
-    """
-    widths = [max(len(row[place]) for row in (headings, *rows))
-              for place in range(len(headings))]
-    for row in (headings, *rows):
-        yield '  '.join(
-            cell.ljust(width) if place in texts else cell.rjust(width)
-            for place, (cell, width) in enumerate(zip(row, widths))).rstrip()
 
 
 def _drive_cells(observed: Observed) -> Iterator[str]:

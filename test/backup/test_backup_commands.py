@@ -252,11 +252,42 @@ class TestRestore:
 
     def test_of_another_family(self, shop: Shop, command: Command) -> None:
         command('backup', 'mixer', '-o', 'mixer.yaml')
-        said = command('restore', 'mixer.yaml', 'conveyor', '--yes')
-        assert said.code == 1
-        assert 'mixer.yaml:11: acceleration_time: unknown parameter acceleration_time' in \
-            said.errors[0]
+        for force in ((), ('--force',)):
+            assert command('restore', 'mixer.yaml', 'conveyor', '--yes', *force) == (1, [], [
+                'mixer.yaml: of another drive type: it is a backup with profile nord_sk500e '
+                '(cannord), conveyor has datamodel_example (datamodel_extended)'])
         assert shop.drives['conveyor'].eeprom_writes == 0
+
+    def test_of_another_family_and_nobody_says_so(self, shop: Shop, command: Command) -> None:
+        count = len(BY_HAND['mixer'])
+        shop.write_backup('mixer', **BY_HAND['mixer'])
+        said = command('restore', 'mixer.yaml', 'conveyor', '--yes')
+        assert [line.partition(',')[0].partition(': ')[2] for line in said.errors] == [
+            f'{name}: unknown parameter {name}' for name in BY_HAND['mixer']]   # a slip or three
+        shop.write_backup('mixer', **BY_HAND['mixer'], braking_time=1.0)
+        assert command('restore', 'mixer.yaml', 'conveyor', '--yes') == (1, [], [
+            'mixer.yaml: of another drive type: conveyor has datamodel_example '
+            f'(datamodel_extended), which has none of its {count + 1} names'])
+        shop.write_backup('mixer', **BY_HAND['mixer'], braking_time=1.0, ramp_time=1.0)
+        said = command('restore', 'mixer.yaml', 'conveyor', '--yes')
+        assert len(said.errors) == count + 1
+
+    def test_of_nothing_that_is_written(self, shop: Shop, command: Command) -> None:
+        shop.write_backup('conveyor', speed_setpoint=5.0)
+        before = shop.drives['conveyor'].requests
+        said = command('restore', 'conveyor.yaml', '--yes')
+        assert (said.code, said.lines) == (
+            0, ['conveyor: nothing to restore, 0 settings are as in conveyor.yaml'])
+        assert shop.drives['conveyor'].requests == before
+
+    def test_of_an_older_table_of_the_same_type(self, shop: Shop, command: Command) -> None:
+        command('backup', 'conveyor', '-o', 'b.yaml')
+        text = Path('b.yaml').read_text()
+        digest = next(line for line in text.splitlines() if 'profile_sha256' in line)
+        Path('b.yaml').write_text(text.replace(digest, '# profile_sha256: 00').replace(
+            '    ramp_time:', '    ramp:'))
+        said = command('restore', 'b.yaml', '--yes')
+        assert len(said.errors) == 1 and ': ramp: unknown parameter ramp' in said.errors[0]
 
     def test_not_all_is_as_in_the_file(self, shop: Shop, command: Command) -> None:
         shop.drives['conveyor'].fault('refuse=ramp_time')
@@ -326,6 +357,21 @@ class TestCompare:
         said = command('compare', 'conveyor', str(file))
         assert said.code == 2
         assert 'conveyor: ramp_time could not be read: no answer; drive offline' in said.errors
+
+    def test_nothing_in_common(self, shop: Shop, command: Command) -> None:
+        command('backup', 'mixer', '-o', 'mixer.yaml')
+        said = command('compare', 'mixer.yaml', 'pump')
+        count = len(read_backup(Path('mixer.yaml')).values)
+        assert said.code == 1 and len(said.lines) == 1
+        assert said.lines[0].startswith(
+            f'mixer.yaml and pump have no setting in common ({count} and ')
+        assert said.lines[0].endswith('): they are of different drive types')
+        assert len(command('compare', 'mixer.yaml', 'pump', '--json').documents) > count
+        shop.write_backup('few', acceleration_time=1.0, braking_time=1.0, torque=1)
+        assert command('compare', 'few.yaml', 'pump').lines[0].startswith('parameter')
+        shop.write_backup('both', acceleration_time=1.0, braking_time=1.0, torque=1,
+                          flc1_ratio=50.0)
+        assert command('compare', 'both.yaml', 'pump').lines[0].startswith('parameter')
 
     def test_two_drives(self, shop: Shop, command: Command) -> None:
         said = command('compare', 'conveyor', 'lift', '--json')

@@ -37,6 +37,12 @@ def run(world: World, capsys: pytest.CaptureFixture[str]) -> Run:
     return started
 
 
+def test_no_option_is_abbreviated(run: Run) -> None:
+    with pytest.raises(SystemExit) as ended:    # a drive might be called so one day
+        run('read', 'conveyor', 'ramp_time', '--js')
+    assert ended.value.code == 2
+
+
 def test_table(run: Run, world: World) -> None:
     world.drives['conveyor'].set_value('ramp_time', 2.5)
     code, lines, errors = run('read', 'conveyor', 'ramp_time', 'p30', 'brake_enabled')
@@ -211,6 +217,7 @@ def test_completion(tmp_path: Path) -> None:
     start = f'drive_can read --params-file {file} '
     assert {'conveyor', 'lift'} <= set(completions(start))
     assert completions(f'{start}conveyor ram') == ['ramp_time']
+    assert 'lift' not in completions(f'{start}conveyor ')
     assert completions(f'drive_can write --params-file {file} lift maxi') == ['maximum_speed=']
     assert {'read', 'record'} <= set(completions('drive_can re'))
     assert completions(f'drive_can read --params-file {file}x conv') == []

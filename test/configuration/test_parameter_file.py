@@ -3,11 +3,12 @@
 
 from pathlib import Path
 
-from configuration_builders import FILE
+from configuration_builders import FILE, PROFILE
 import pytest
 
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.configuration.parameter_file import read_parameter_file, unseen_problems
+from drive_can_bridge.configuration.profiles import read_profile
 from drive_can_bridge.core.errors import ConfigurationError
 
 HEAD = '/**/drive_can_bridge:\n  ros__parameters:\n'
@@ -227,6 +228,99 @@ def test_several_sections_of_bridges(tmp_path: Path) -> None:
     assert read(tmp_path, text) == (None, [
         'f.yaml:6: buses: in a second section, /b/drive_can_bridge; allowed is one section that '
         'holds it (the first is /**/drive_can_bridge)'])
+
+
+@pytest.mark.parametrize(('head', 'sections', 'value'), [
+    ('/**/drive_can_bridge', '/**: {ros__parameters: {a: 2}}', 2),
+    ('/**/drive_can_bridge', 'drive_can_bridge: {ros__parameters: {a: 2}}', 2),
+    ('/cell/drive_can_bridge', '/*/drive_can_bridge: {ros__parameters: {a: 2}}', 2),
+    ('/cell/drive_can_bridge', '/drive_can_bridge: {ros__parameters: {a: 2}}', 1),
+    ('/**', 'drive_can_bridge: {ros__parameters: {a: 2}}', 2),
+    ('/**/*', '/drive_can_bridge: {ros__parameters: {a: 2}}', 2),
+    ('/*/left', '/*/right: {ros__parameters: {a: 2}}', 1)])
+def test_all_sections_for_the_node_count(tmp_path: Path, head: str, sections: str,
+                                         value: int) -> None:
+    own = f'{head}:\n  ros__parameters:\n    a: 1\n{BUSES}'
+    after, before = read(tmp_path, f'{own}{sections}\n'), read(tmp_path, f'{sections}\n{own}')
+    assert after[0] is not None and before[0] is not None
+    assert (after[0]['a'], after[1]) == (value, [])
+    # the last in the file counts
+    assert (before[0]['a'], before[1]) == (1, [])
+
+
+def test_lines_of_what_another_section_says(tmp_path: Path) -> None:
+    text = (f'{HEAD}    a: {{b: 1}}\n    list: [true]\n{BUSES}/**:\n  ros__parameters:\n'
+            '    a: 1\n    list: [1, 2]\n    c.d: 1\n')
+    tree, problems = read(tmp_path, text)
+    assert tree is not None and tree['list'] == [1, 2]
+    assert problems == [
+        'f.yaml:10: c.d: a key with dots, allowed are nested keys',
+        'f.yaml:8: a: has a value in one section, and keys below it in another; allowed is one of '
+        'them']
+
+
+@pytest.mark.parametrize(('section', 'told'), [
+    ('/cell/drive_can_bridge', True), ('/*/drive_can_bridge', True), ('/camera', False),
+    ('/cell/camera', False), ('/**/other', False)])
+@pytest.mark.parametrize('head', ['/**/drive_can_bridge', '/**'])
+def test_section_for_another_namespace(tmp_path: Path, head: str, section: str,
+                                       told: bool) -> None:
+    path = tmp_path / 'f.yaml'
+    path.write_text(f'{head}:\n  ros__parameters:\n{BUSES}{section}:\n  ros__parameters:\n'
+                    '    a: 1\n', encoding='utf-8')
+    tree, problems = read_parameter_file(path)
+    assert tree is not None and problems == [] and 'a' not in tree.data
+    assert [(each.line, each.key, each.message) for each in tree.warnings] == ([
+        (6, section, 'counts for the bridge in another namespace, and is not checked: checked is '
+                     '/drive_can_bridge')] if told else [])
+
+
+def test_another_bridge_is_no_section_for_this_one(tmp_path: Path) -> None:
+    path = tmp_path / 'f.yaml'
+    path.write_text(f'/a/drive_can_bridge:\n  ros__parameters:\n{BUSES}'
+                    '/b/drive_can_bridge: {ros__parameters: {a: 1}}\n', encoding='utf-8')
+    tree, _ = read_parameter_file(path)
+    assert tree is not None and tree.warnings == []
+
+
+@pytest.mark.parametrize(('drive', 'line', 'problem'), [
+    ('profile: ', 11, 'drives.x.profile: no value (rcl refuses the file), allowed is a value, or '
+                      '[] for an empty list'),
+    ('pro.file: 1', 11, 'drives.x.pro.file: a key with dots, allowed are nested keys')])
+def test_what_nobody_can_read_elsewhere_is_not_missing(tmp_path: Path, drive: str, line: int,
+                                                       problem: str) -> None:
+    path = tmp_path / 'f.yaml'
+    path.write_text(f'{HEAD}    buses: {{m: {{interface: virtual, channel: c}}}}\n/**:\n'
+                    '  ros__parameters:\n    drives:\n      x:\n        bus: m\n'
+                    '        station: 1\n        protocol: datamodel_extended\n'
+                    f'        {drive}\n', encoding='utf-8')
+    with pytest.raises(ConfigurationError) as caught:
+        configuration_from_file(path)
+    assert str(caught.value) == f'{path}:{line}: {problem}'
+
+
+def test_buses_are_named_in_the_order_of_the_file(tmp_path: Path) -> None:
+    path = tmp_path / 'f.yaml'
+    names = ['zeta', 'alpha', 'omega', 'beta', 'main']
+    path.write_text(f'{HEAD}    buses:\n' + ''.join(f'      {name}: 1\n' for name in names)
+                    + '    drives: {x: {bus: quite_another}}\n', encoding='utf-8')
+    with pytest.raises(ConfigurationError) as caught:
+        configuration_from_file(path)
+    assert "'quite_another' is unknown, allowed: " + ', '.join(names) in str(caught.value)
+
+
+def test_a_profile_is_no_parameter_file(tmp_path: Path) -> None:
+    assert read(tmp_path, PROFILE) == (None, [
+        'f.yaml:1: yaml: a profile, allowed is NODE_NAME: {ros__parameters: …}; drive_can profile '
+        'check looks at profiles'])
+
+
+def test_a_parameter_file_is_no_profile(tmp_path: Path) -> None:
+    path = tmp_path / 'f.yaml'
+    path.write_text(FILE, encoding='utf-8')
+    assert [str(problem) for problem in read_profile(path).problems] == [
+        f'{path}:1: yaml: parameters of nodes, allowed is a profile; drive_can validate looks at '
+        'the file of a bridge']
 
 
 def test_dotted_buses_still_mark_the_section(tmp_path: Path) -> None:

@@ -155,6 +155,12 @@ CASES = [
       'datamodel_extended',
       "f.yaml:23: drives.lift.profile: 'table' is for cannord, allowed is a profile for "
       'datamodel_extended']),
+    ('protocols: [datamodel_extended]\nparameters:\n  speed: {number: 50,',
+     'protocols: [cannord]\nparameters:\n  torque: {type: int32}\n  speeds: {',
+     ["f.yaml:14: drives.conveyor.profile: 'table' is for cannord, allowed is a profile for "
+      'datamodel_extended',     # nothing of it fits
+      "f.yaml:23: drives.lift.profile: 'table' is for cannord, allowed is a profile for "
+      'datamodel_extended']),
     ('protocols: [datamodel_extended]', 'protocols: [datamodel]',
      ["table.yaml:2: protocols: 'datamodel' is unknown (did you mean 'datamodel_standard'?), "
       f'allowed is {PROTOCOLS}']),

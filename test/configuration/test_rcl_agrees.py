@@ -55,6 +55,17 @@ TAKEN = [
     '    a:\n      b:\n        c: 1\n    d:\n      e: {f: 1, g: [x]}\n    h: 1\n',
     '    1: 2\n    true: 3\n    "a b": 4\n    a-b: 5\n', '    ? a\n    : 1\n',
     '    "a": 1 # comment\n', 'x:\n  ros__parameters: {a.b: 1, c: 5}\n',
+    # of several sections that are for the node the later one counts, parameter by parameter
+    '    a: 1\n/**:\n  ros__parameters: {a: 2, b: 3}\n',
+    '    a: {p: 1, q: 2}\n/**:\n  ros__parameters: {a: {p: x, r: 3}}\n',
+    '    a: [u, v]\n/*:\n  ros__parameters: {a: [z]}\n',
+    '    a: [u, v]\n/**:\n  ros__parameters: {a: []}\n',
+    '    a: 1\ndrive_can_bridge:\n  ros__parameters: {a: x}\n',
+    '    a: 1\n/**:\n  drive_can_bridge:\n    other:\n      ros__parameters: {a: 2}\n',
+    '    a: 1\n/drive_can_bridge:\n  ros__parameters: {a: 2}\n'
+    '/**:\n  drive_can_bridge:\n    ros__parameters: {a: 3}\n',
+    '    a: 1\n/**/other:\n  ros__parameters: {a: 2}\n',
+    '    a: 1\n/*/drive_can_bridge:\n  ros__parameters: {a: 2}\n',
 ]
 
 #: refused by both, or read by rcl in a way nobody means
@@ -70,6 +81,9 @@ REFUSED = [
 GARBLED = [
     '    a: {}\n    b: 1\n', '    a: {b: {}, c: 1}\n', '    a: 1\n    a: x\n',
     '    a: 1\n    a: {b: 2}\n', '    a: "x\\0y"\n', '    a: [{a: 1}]\n',
+    '    a: {p: 1}\n/**:\n  ros__parameters: {a: 3}\n',
+    '    a: 3\n/**:\n  ros__parameters: {a: {p: 1}}\n',
+    '    a: 3\n/**:\n  ros__parameters: {b.c: 1}\n',
     '    a: [b: 1]\n', '    a: [[], 1]\n', '    ? {a: 1}\n    : 1\n',
 ]
 

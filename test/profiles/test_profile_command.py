@@ -266,3 +266,28 @@ def test_what_goes_to_a_pipe_is_neither_cut_nor_wrapped() -> None:
     rows = shown.stdout.split('\n\n')[1].splitlines()
     assert len(rows) == 95
     assert max(map(len, rows)) > 150 and '\x1b' not in shown.stdout
+
+
+def test_nobody_can_be_asked_about_a_file(table: Path, tmp_path: Path,
+                                          capsys: pytest.CaptureFixture[str],
+                                          monkeypatch: pytest.MonkeyPatch) -> None:
+    with open(os.devnull, encoding='ascii') as nobody:
+        monkeypatch.setattr(sys, 'stdin', nobody)
+        target = tmp_path / 'there.yaml'
+        target.write_text('something else')
+        assert main(['profile', 'import', str(table), '-o', str(target)]) == 2
+    assert capsys.readouterr().err.splitlines()[-1] == (
+        f'drive_can profile import: {target} exists and holds something else. Overwrite it? '
+        'Nothing was written: nobody can be asked here; --yes overwrites it')
+    assert target.read_text() == 'something else'
+
+
+def test_nothing_upsets_a_terminal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / 'p.yaml'
+    file.write_text('description: "all\\e[2J"\nprotocols: [cannord]\nparameters:\n'
+                    '  speed: {number: 1, type: int16, description: "one\\e[2J"}\n')
+    assert main(['profile', 'show', str(file)]) == 0
+    assert main(['profile', 'check', 'no\x1b[2J.yaml']) == 1
+    out, err = capsys.readouterr()
+    assert out.count('\\x1b[2J') == 2 and err == 'no\\x1b[2J.yaml: No such file or directory\n'
+    assert '\x1b' not in out

@@ -4,6 +4,7 @@
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+import io
 import json
 from pathlib import Path
 from typing import Any
@@ -547,3 +548,22 @@ def test_which_drive(words: list[str], told: str, tmp_path: Path,
         return
     assert drive_can('probe', '--params-file', config_file('all_families.yaml')) == 2
     assert 'which drive? There are: ' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(('answer', 'code', 'told'), [
+    ('n\n', 2, 'Ask all the same? [y/N] drive_can probe: nothing was sent\n'), ('', 2, 'sent'),
+    ('y\n', 1, 'Ask all the same? [y/N] ')])
+def test_somebody_is_asked(answer: str, code: int, told: str, tmp_path: Path,
+                           monkeypatch: pytest.MonkeyPatch,
+                           capsys: pytest.CaptureFixture[str]) -> None:
+    class Terminal(io.StringIO):
+        def isatty(self) -> bool:
+            return True
+
+    monkeypatch.setattr('sys.stdin', Terminal(answer))
+    content = config_file('all_families.yaml').read_text(encoding='utf-8')
+    file = tmp_path / 'f.yaml'
+    file.write_text(content.replace('channel: all_families', 'channel: nobody_answers'))
+    # nobody is there: whether it asks shows by what becomes of it
+    assert drive_can('probe', 'lift', '--params-file', file) == code
+    assert told in capsys.readouterr().err

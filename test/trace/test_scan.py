@@ -322,3 +322,10 @@ def test_wrong_usage(arguments: list[str], text: str,
                      capsys: pytest.CaptureFixture[str]) -> None:
     assert drive_can('scan', *arguments) == 2
     assert text in capsys.readouterr().err
+
+
+def test_who_only_listens_is_not_asked(capsys: pytest.CaptureFixture[str]) -> None:
+    bus = ['scan', '--interface', 'virtual', '--channel', 'nobody_scans', '--listen', '0.05',
+           '--protocols', 'cannord']
+    assert drive_can(*bus, '--passive') == 1
+    assert '--yes' not in capsys.readouterr().err

@@ -1,0 +1,78 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""What words of a command line mean, and options that several commands have."""
+
+from argparse import ArgumentParser, ArgumentTypeError
+from collections.abc import Callable
+import math
+from pathlib import Path
+from typing import TypeVar
+
+from drive_can_bridge.cli.command import WrongUsage
+from drive_can_bridge.core.configuration import BridgeConfiguration
+from drive_can_bridge.core.errors import ValueRefused
+from drive_can_bridge.monitor.text import is_ros_name
+
+Parsed = TypeVar('Parsed')
+#: what an argument that begins with the name of a drive looks like
+_EXAMPLES = {'--fault': 'DRIVE:FAULT, for example conveyor:late=0.15',
+             '--axis': 'DRIVE:KEY=VALUE, for example lift:load=0.3'}
+
+
+def above_zero(text: str) -> float:
+    """Read a finite number above 0."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not (math.isfinite(value) and value > 0):
+        raise ArgumentTypeError(f'{text}: allowed is a number above 0')
+    return value
+
+
+def whole(low: int, high: int) -> Callable[[str], int]:
+    """Return what reads an integer within limits."""
+    def read(text: str) -> int:
+        if not (text.isdecimal() and low <= int(text) <= high):
+            raise ArgumentTypeError(f'{text}: allowed are {low} to {high}')
+        return int(text)
+    return read
+
+
+def namespace(text: str) -> str:
+    """Read ``/cell1``, or ``cell1``; '' for the root."""
+    name = f'/{text.strip("/")}'
+    if name != '/' and not is_ros_name(name):
+        raise ArgumentTypeError(f'{text!r} is no namespace, write /cell1')
+    return name if name != '/' else ''
+
+
+def add_params_file(parser: ArgumentParser, help_text: str) -> None:
+    """Add the option that names the parameter file."""
+    parser.add_argument('--params-file', metavar='FILE', type=Path, required=True, help=help_text)
+
+
+def add_seconds(parser: ArgumentParser) -> None:
+    """Add the option that ends listening."""
+    parser.add_argument('--seconds', metavar='S', type=above_zero, default=math.inf,
+                        help='end by itself after that time (default: runs until Ctrl-C)')
+
+
+def of_drive(option: str, text: str, configuration: BridgeConfiguration,
+             parse: Callable[[str], Parsed]) -> tuple[str, Parsed]:
+    """
+    Read an argument that begins with the name of a drive.
+
+    :param option: ``--fault`` or ``--axis``.
+    :param parse: reads what stands behind the colon; may raise ValueRefused.
+    :raises WrongUsage: it makes no sense; says what is allowed.
+    """
+    name, colon, rest = text.partition(':')
+    if not colon:
+        raise WrongUsage(f'{option} {text}: write {_EXAMPLES[option]}')
+    if name not in configuration.drives:
+        raise WrongUsage(f"{option} {text}: no drive '{name}'; drives: "
+                         f"{', '.join(configuration.drives) or 'none'}")
+    try:
+        return name, parse(rest)
+    except ValueRefused as error:
+        raise WrongUsage(f'{option} {text}: {error}') from None
