@@ -115,11 +115,11 @@ class WriteSchedule:
                     or 0.0 < self._refresh <= now - self._written_at[index] + _TOLERANCE):
                 self._due.append(index)
 
-    def hurry(self, index: int) -> None:
-        """Let a setpoint go before all others, if it is due."""
+    def order(self, index: int, *, first: bool) -> None:
+        """Let a setpoint go before all others, if it is due, or behind them."""
         if index in self._due:
             self._due.remove(index)
-            self._due.insert(0, index)
+            self._due.insert(0 if first else len(self._due), index)
 
     @property
     def waiting(self) -> bool:

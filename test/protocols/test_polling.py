@@ -117,10 +117,17 @@ def test_setpoints_are_written_on_change_and_again_after_a_while() -> None:
 
 def test_one_may_go_before_the_others() -> None:
     writes = WriteSchedule(3, 0.0)
-    writes.hurry(2)
+    writes.order(2, first=True)
     writes.look([1, 2, 3], 10.0)
-    writes.hurry(2)
+    writes.order(2, first=True)
     assert [writes.next(), writes.next(), writes.next()] == [2, 0, 1]
+
+
+def test_one_may_go_behind_the_others() -> None:
+    writes = WriteSchedule(3, 0.0)
+    writes.look([1, 2, 3], 10.0)
+    writes.order(0, first=False)
+    assert [writes.next(), writes.next(), writes.next()] == [1, 2, 0]
 
 
 def test_without_refresh_only_changes_are_written() -> None:

@@ -63,6 +63,9 @@ class SetpointWriter:
             hold += [index for index, parameter in enumerate(self._parameters)
                      if parameter.name in unknown]
         self._schedule.look(self._raws(), now, hold=hold)
+        if self._slot is not None and control is not None:
+            # a word that starts the drive behind setpoints, also when all are only refreshed
+            self._schedule.order(self._slot, first=control.stopping or control.pulsing)
 
     @property
     def holds_word(self) -> bool:
@@ -87,10 +90,6 @@ class SetpointWriter:
     def write_word(self, now: float) -> None:
         """Write a control word that is due, or what it waits for, without waiting for a period."""
         self.look(now)
-        control, setpoints = self._session.control, self._session.setpoints
-        if self._slot is not None and control is not None and (
-                control.stopping or not setpoints.held):
-            self._schedule.hurry(self._slot)
         self.write(now)
 
     def handle_timer(self, now: float) -> None:

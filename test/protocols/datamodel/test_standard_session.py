@@ -934,3 +934,15 @@ def test_an_offset_moves_every_number() -> None:
     talk.hears(ANSWER, 10.002)
     assert [text for _, text in talk.until(10.01)] == [
         '3F1#0631000000000000', '3F1#0632000000000000']
+
+
+def test_word_that_runs_is_refreshed_behind_the_setpoints() -> None:
+    """A drive that was off for a moment, unseen, has neutral before it has ``enable``."""
+    talk = polling(request=(WORD, SPEED), control=CONTROL, refresh_interval=0.1)
+    talk.hears(READY, 10.002)
+    assert [text for _, text in talk.until(10.01)] == [DISABLE_WORD, SPEED_ZERO]
+    talk.asks(ControlAction.ENABLE, 10.01)
+    sent = round_of(talk, 10.02, READY)
+    for number in range(2, 10):
+        sent += round_of(talk, 10.0 + 0.02 * number, ENABLED)
+    assert sent == [SPEED_ZERO, ENABLE_WORD] * 2
