@@ -5,8 +5,8 @@ The flight recorder of a bridge: what came before a failure, on disk before anyb
 A thread of its own waits for a second after the event, so that what followed is in the trace, too,
 and writes in small steps between which it gives way: the exchange goes on undisturbed.
 
-A trace that somebody asks for takes nothing from those of failures: it does not count among them,
-and is not in their way.
+A trace that somebody asks for takes nothing from those of failures: one that comes soon behind it
+is written all the same, when a trace of this bus may be written again.
 """
 
 from collections.abc import Callable, Iterable
@@ -26,7 +26,7 @@ from drive_can_bridge.trace.ring import Ring
 
 #: s after an event that belong into its trace
 AFTERMATH = 1.0
-#: least s between two traces of a bus, and from any of them to one that somebody asks for
+#: least s between two traces of a bus
 SPACING = 10.0
 #: traces of a run that are never replaced by later ones: how it all began
 FIRST_KEPT = 5
@@ -49,8 +49,8 @@ class _Wanted:
     """
     A trace that is to be written.
 
-    :ivar since: the moment before which the recorded seconds are in it; ``at`` that after which
-        the aftermath is.
+    :ivar since: the moment before which the recorded seconds are in it.
+    :ivar at: the moment after whose aftermath it is written.
     """
 
     reason: str
@@ -86,7 +86,7 @@ class FlightRecorder:
                  say: Callable[[str], None], complain: Callable[[str], None]) -> None:
         self._say = say
         self._complain = complain
-        self._buses = {bus.name: _Bus(bus, Ring(bus.trace_seconds + AFTERMATH + _SLACK),
+        self._buses = {bus.name: _Bus(bus, Ring(bus.trace_seconds + AFTERMATH + SPACING + _SLACK),
                                       Path(bus.trace_directory).expanduser()
                                       if bus.trace_directory else default_folder)
                        for bus in buses if bus.trace_seconds > 0.0}
@@ -122,7 +122,8 @@ class FlightRecorder:
             if wanted is None:
                 if now - found.failed >= SPACING:
                     found.failed = now
-                    self._want(found, _Wanted(reason, rank, now, now))
+                    self._want(found, _Wanted(
+                        reason, rank, now, max(now, found.last + SPACING)))
             elif rank > wanted.rank:
                 if wanted.rank == _ASKED:   # from now on it is that of a failure
                     found.failed = wanted.at = now
@@ -133,15 +134,17 @@ class FlightRecorder:
         found = self._buses[bus]
         with self._changed:
             now = time.monotonic()
-            if found.wanted is not None:
-                found.wanted.done.append(done)
-                return
-            if now - found.last >= SPACING:
+            wanted = found.wanted
+            if wanted is None and now - found.last >= SPACING:
                 self._want(found, _Wanted(reason, _ASKED, now, now, [done]))
                 return
-            ago, path = now - found.last, found.last_path
-        done('', f'bus {bus}: one trace in {SPACING:g} s at most; the last, {ago:.0f} s ago, is '
-                 f'{path or "not written"}')
+            if wanted is not None and wanted.at <= now:
+                wanted.done.append(done)
+                return
+            other = (f'the last, {now - found.last:.0f} s ago, is '
+                     f'{found.last_path or "not written"}' if wanted is None else
+                     f'that of {wanted.reason} follows in {wanted.at - now + AFTERMATH:.0f} s')
+        done('', f'bus {bus}: one trace in {SPACING:g} s at most; {other}')
 
     def close(self) -> None:
         """Write what is still wanted, and end the thread."""
@@ -190,7 +193,7 @@ class FlightRecorder:
     def _write(self, bus: _Bus, wanted: _Wanted) -> None:
         name = bus.configuration.name
         offset = time.time() - time.monotonic()
-        stamp = time.strftime('%Y%m%dT%H%M%SZ', time.gmtime(wanted.at + offset))
+        stamp = time.strftime('%Y%m%dT%H%M%SZ', time.gmtime(wanted.since + offset))
         path = bus.folder / f'{name}_{stamp}_{_plain(wanted.reason)}.log'
         try:
             bus.folder.mkdir(parents=True, exist_ok=True)

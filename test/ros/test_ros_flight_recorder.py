@@ -149,8 +149,8 @@ def test_whoever_calls_takes_no_trace_from_a_failure(bridge: StartBridge, client
     one.online()
     assert client.call('/drive_can_bridge/save_trace', Trigger).success
     one.played['lift'].fault('trip')
-    # sooner than the next one that somebody asks for
-    wait_until(lambda: [path for path in traces(tmp_path) if 'lift_fault' in path.name], 8.0)
+    # one in 10 s at most, but with what came before the fault
+    wait_until(lambda: [path for path in traces(tmp_path) if 'lift_fault' in path.name], 30.0)
 
 
 def test_nothing_is_recorded_unless_asked_for(bridge: StartBridge, client: Client) -> None:
