@@ -4,8 +4,10 @@
 from collections.abc import Sequence
 import json
 from pathlib import Path
+import re
 from typing import Any
 
+from drive_can_bridge.cli.whole_file import write_whole
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.protocols.scout import Sighting
 
@@ -18,13 +20,22 @@ _HEAD = """\
 # Found by drive_can scan. Look it over before a bridge runs with it: profiles are the shipped ones
 # where there is one, and otherwise tables of raw numbers beside this file, without units.
 """
+#: families without a known table -> what their drives are called
+_UNKNOWN = {'datamodel_extended': 'drive', 'datamodel_standard': 'drive_std'}
+
+
+def tables_beside(path: Path) -> list[Path]:
+    """Return the tables there are that a parameter file of this name may be written with."""
+    table = re.compile(rf'{re.escape(path.stem)}_(?:{"|".join(_UNKNOWN.values())})_[0-9]+\.yaml')
+    return sorted(each for each in path.parent.glob('*.yaml') if table.fullmatch(each.name))
 
 
 def write_parameter_file(path: Path, bus: BusConfiguration, sightings: Sequence[Sighting],
                          settings: Sequence[dict[str, Any]]) -> list[Path]:
     """
-    Write a parameter file that ``validate`` accepts.
+    Write a parameter file that ``validate`` accepts, after the tables that it names.
 
+    :param sightings: at least one.
     :param settings: for each sighting, what its scout knows.
     :return: the files written.
     :raises OSError: they cannot be written.
@@ -34,12 +45,12 @@ def write_parameter_file(path: Path, bus: BusConfiguration, sightings: Sequence[
     period = max(0.05, 0.01 * len(sightings))
     lines = [_HEAD, '/**/drive_can_bridge:', '  ros__parameters:', '    buses:', '      main:',
              f'        interface: {bus.interface}', f'        channel: {json.dumps(bus.channel)}',
-             f'        bitrate: {bus.bitrate}', '    drives:' if sightings else '    drives: {}']
+             f'        bitrate: {bus.bitrate}', '    drives:']
     for sighting, keys in zip(sightings, settings):
         if sighting.protocol in _KNOWN:
             kind, profile, request, response = _KNOWN[sighting.protocol]
         else:
-            kind = 'drive' if sighting.protocol == 'datamodel_extended' else 'drive_std'
+            kind = _UNKNOWN[sighting.protocol]
             table = path.with_name(f'{path.stem}_{kind}_{sighting.station}.yaml').absolute()
             request = [f'parameter_{number}' for number in keys['request_numbers']]
             response = [f'parameter_{number}' for number in keys['response_numbers']]
@@ -53,7 +64,7 @@ def write_parameter_file(path: Path, bus: BusConfiguration, sightings: Sequence[
                   f'        profile: {json.dumps(profile)}',
                   f'        period: {period:g}', f'        cyclic_request: [{", ".join(request)}]',
                   f'        cyclic_response: [{", ".join(response)}]']
-    path.write_text('\n'.join(lines) + '\n', encoding='utf-8')
+    _write(path, lines)
     return written
 
 
@@ -66,4 +77,8 @@ def _write_table(path: Path, sighting: Sighting, keys: dict[str, Any]) -> None:
               for number, entry in sorted(entries.items())]
     if not entries:
         lines[-1] = 'parameters: {}'
-    path.write_text('\n'.join(lines) + '\n', encoding='utf-8')
+    _write(path, lines)
+
+
+def _write(path: Path, lines: Sequence[str]) -> None:
+    write_whole(path, ('\n'.join(lines) + '\n').encode('utf-8'))

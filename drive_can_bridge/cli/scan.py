@@ -8,10 +8,11 @@ from pathlib import Path
 
 from drive_can_bridge.cli.arguments import above_zero
 from drive_can_bridge.cli.command import complain, FAILED, WrongUsage
-from drive_can_bridge.cli.found_file import write_parameter_file
-from drive_can_bridge.cli.questions import agree_to_hazard
+from drive_can_bridge.cli.found_file import tables_beside, write_parameter_file
+from drive_can_bridge.cli.questions import agree_to_hazard, agreed
 from drive_can_bridge.cli.survey import Survey
 from drive_can_bridge.cli.tables import print_json
+from drive_can_bridge.cli.whole_file import differs
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.text import column_lines
 from drive_can_bridge.exchange.one_master import END_FIRST, Ownership
@@ -50,7 +51,8 @@ def define(parser: ArgumentParser) -> None:
                         help='only listen, at each of these; needs an adapter with a listen-only '
                              'mode')
     parser.add_argument('-o', '--output', type=Path, metavar='FILE',
-                        help='write what was found as a parameter file')
+                        help='write what was found as a parameter file; one that exists, and '
+                             'tables beside it, are asked for')
     parser.add_argument('--json', action='store_true',
                         help='a document for each drive: protocol, station, certainty, text')
 
@@ -70,11 +72,20 @@ def run(args: Namespace) -> int:
     bus = BusConfiguration('main', args.interface, args.channel, args.bitrate)
     if args.bitrates:
         return _compare_bitrates(args, bus)
+    if args.output is not None and not _may_write(args.output, yes=args.yes):
+        return FAILED
     for name in args.protocols:     # before anything is sent
         agree_to_hazard(f'{name}: {FAMILIES[name].make_scout().hazard}',
                         f'Ask {name} all the same?', yes=args.yes or args.passive,
                         who=f'--protocols {name}')
     return _scan(args, bus)
+
+
+def _may_write(output: Path, *, yes: bool) -> bool:
+    there = [str(path) for path in (output, *tables_beside(output)) if differs(path)]
+    return not there or agreed(
+        f'{", ".join(there)} exist{"s" if len(there) == 1 else ""}. Overwrite?', yes=yes,
+        otherwise='Nothing was sent or written', yes_means='overwrites')
 
 
 def _scan(args: Namespace, bus: BusConfiguration) -> int:
@@ -89,7 +100,9 @@ def _scan(args: Namespace, bus: BusConfiguration) -> int:
             port.close()
     _tell_trouble(survey, port, asked=not args.passive)
     _show(args, survey)
-    if args.output is not None:
+    if args.output is not None and not survey.sightings:
+        complain(f'{args.output}: not written, no drive was found')
+    elif args.output is not None:
         for path in write_parameter_file(
                 args.output, bus, survey.sightings,
                 [survey.scouts[each.protocol].settings(each.station)

@@ -249,6 +249,43 @@ def test_simulated_drives_are_found_and_written(tmp_path: Path,
             bus.wait_exchanges(name, 3)
 
 
+def test_what_is_there_is_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str],
+                                    monkeypatch: pytest.MonkeyPatch) -> None:
+    output, beside = tmp_path / 'found.yaml', tmp_path / 'found_drive_std_7.yaml'
+    (tmp_path / 'found_drive_of_mine.yaml').write_text('mine')
+    arguments = ('scan', '--interface', 'virtual', '--channel', 'all_families', '--bitrate',
+                 500_000, '--listen', 0.1, '-o', output)
+    monkeypatch.setattr('sys.stdin', open('/dev/null'))
+    frames: list[Frame] = []
+    with Simulation(configuration_from_file(config_file('all_families.yaml')),
+                    show_frame=lambda bus, frame, sent: sent or frames.append(frame)):
+        for existing in (output, beside):
+            existing.write_text('by hand')
+            assert drive_can(*arguments) == 2
+            assert capsys.readouterr().err == (
+                f'drive_can scan: {existing} exists. Overwrite? Nothing was sent or written: '
+                'nobody can be asked here; --yes overwrites\n')
+            assert existing.read_text() == 'by hand' and not frames
+            existing.rename(tmp_path / 'kept')
+        output.write_text('by hand')
+        assert drive_can(*arguments, '--yes') == 0
+    assert drive_can('validate', output) == 0
+    assert frames
+
+
+def test_nothing_found_nothing_written(tmp_path: Path,
+                                       capsys: pytest.CaptureFixture[str]) -> None:
+    output = tmp_path / 'found.yaml'
+    arguments = ('scan', '--interface', 'virtual', '--channel', 'empty', '--listen', 0.1, '-o',
+                 output, '--yes')
+    assert drive_can(*arguments) == 1
+    assert capsys.readouterr().err.endswith(f'{output}: not written, no drive was found\n')
+    assert not output.exists()
+    output.write_text('by hand')
+    assert drive_can(*arguments) == 1
+    assert output.read_text() == 'by hand'
+
+
 @pytest.mark.parametrize(('request_map', 'response_map', 'unfit'), [
     ('0032003200000000', '00D300D100000000', ['its request map, 50 50,']),
     ('0032003300000000', '00D300D300000000', ['its response map, 211 211,']),
