@@ -19,8 +19,9 @@ from drive_can_bridge.core.record import Record
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.protocols.observer import Telegram
 from drive_can_bridge.trace import summary
-from drive_can_bridge.trace.files import read_records, READABLE, UnknownFormat
+from drive_can_bridge.trace.files import check_readable, read_records, READABLE, UnknownFormat
 from drive_can_bridge.trace.lines import LineWriter, Only, Selection
+from drive_can_bridge.trace.output import open_text
 from drive_can_bridge.trace.series import Plotter, TableWriter
 from drive_can_bridge.trace.tracer import Sink, Tracer
 
@@ -85,6 +86,11 @@ def run(args: Namespace) -> int:
     taken = _written_over(args)
     if taken is not None:
         raise WrongUsage(f'{taken}: is read, and would be written over, choose another name')
+    if not args.live and args.file != '-':      # before a file is replaced
+        try:
+            check_readable(Path(args.file))
+        except UnknownFormat as error:
+            raise WrongUsage(str(error)) from None
     with ExitStack() as stack:
         sinks, endings = _sinks(args, configuration, stack)
         tracer = Tracer(configuration, _together(sinks))
@@ -92,8 +98,9 @@ def run(args: Namespace) -> int:
             endings.append(lambda: _summarise(tracer, as_json=args.json))
         code = _live(args, configuration, tracer) if args.live else _file(args, tracer)
         tracer.finish()
-        for ending in endings:
-            ending()
+        if code == 0:
+            for ending in endings:
+                ending()
     return code
 
 
@@ -114,7 +121,7 @@ def _sinks(args: Namespace, configuration: BridgeConfiguration, stack: ExitStack
     selection = Selection(args.drive, args.only)
     drives = [drive for drive in configuration.drives.values() if selection.names(drive.name)]
     if args.csv is not None:
-        stream = stack.enter_context(args.csv.open('w', encoding='utf-8', newline=''))
+        stream = stack.enter_context(open_text(args.csv, newline=''))
         sinks.append(TableWriter(stream, drives))
     if args.plot:
         picture, *wanted = args.plot
@@ -144,10 +151,7 @@ def _flushed(line: str) -> None:
 
 def _file(args: Namespace, tracer: Tracer) -> int:
     complaints = _Complaints(args.file)
-    try:
-        frames = _run_through(read_records(Path(args.file), complaints), tracer)
-    except UnknownFormat as error:
-        raise WrongUsage(str(error)) from None
+    frames = _run_through(read_records(Path(args.file), complaints), tracer)
     complaints.conclude()
     if not frames:
         complain(f'{args.file}: there is no frame in it')

@@ -9,7 +9,7 @@ from drive_can_bridge.cli.command import complain
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.record import Record
 from drive_can_bridge.exchange.one_master import END_FIRST, Ownership
-from drive_can_bridge.trace.channels import label
+from drive_can_bridge.trace.channels import labels
 from drive_can_bridge.transport.tap import QUEUE_MAX, Tap
 
 #: s between two looks at the clock while nothing arrives
@@ -29,9 +29,10 @@ class Taps:
         # nothing is sent: only serial ports, which one process can read, are locked
         self._ownership = Ownership([(bus, ()) for bus in configuration.buses.values()],
                                     'drive_can listening', END_FIRST)
+        channels = labels(configuration.buses.values())
         try:
             for bus in configuration.buses.values():
-                self.taps.append(Tap(bus, label(bus), self._queue, complain))
+                self.taps.append(Tap(bus, channels[bus.name], self._queue, complain))
         except BaseException:
             self.close()
             raise

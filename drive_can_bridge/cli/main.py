@@ -12,6 +12,7 @@ Exit codes: 0 success, 1 the request failed, 2 wrong usage.
 import argparse
 from collections.abc import Sequence
 import importlib
+import io
 import os
 import signal
 import sys
@@ -47,6 +48,8 @@ SUBCOMMANDS = {
 ENDLESS = ('simulate', 'demo', 'record', 'monitor', 'panel')
 #: options that make a subcommand one of these
 ENDLESS_OPTIONS = ('--live', '--watch')
+#: only shows things: whoever reads no further has seen enough
+SHOWING = ('validate', 'decode', 'profile')
 #: exit codes of what could not be done, where 1 says something else
 TROUBLE = {'compare': 2}
 #: exit code of what is interrupted before it is done
@@ -65,6 +68,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     failed = TROUBLE.get(wanted, FAILED)
     endless = wanted in ENDLESS or any(
         word.partition('=')[0] in ENDLESS_OPTIONS for word in arguments)
+    if argv is None:
+        _look_after_outputs()
+    code = None
     if argv is None and endless:  # until the subcommand looks after signals itself
         signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
@@ -74,7 +80,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         # Whoever read our output has gone. Python flushes once more on its way out: into nothing.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 1
+        if code is None:    # it was not done yet
+            code = 0 if wanted in SHOWING else failed
+        return code
     except KeyboardInterrupt:
         if endless:
             return 0
@@ -100,11 +108,30 @@ def main(argv: Sequence[str] | None = None) -> int:
                 signal.signal(number, signal.SIG_IGN)
 
 
+def _look_after_outputs() -> None:
+    """Let nothing that is said raise an error, whatever the outputs of this process are."""
+    for number, name in enumerate(('stdout', 'stderr'), start=1):
+        stream = getattr(sys, name)
+        if stream is None:  # closed; nor is the next file that is opened to be taken for it
+            sink = os.open(os.devnull, os.O_WRONLY)
+            if sink != number:
+                os.dup2(sink, number)
+                os.close(sink)
+            setattr(sys, name, open(number, 'w', encoding='utf-8', closefd=False))
+        elif isinstance(stream, io.TextIOWrapper):  # may be one that has no … or °
+            stream.reconfigure(errors='backslashreplace')
+
+
 def _wanted(arguments: list[str]) -> str:
     return next((word for word in arguments if not word.startswith('-')), '')
 
 
-def _run(arguments: list[str]) -> int:
+def understood(arguments: list[str]) -> tuple[Any, argparse.Namespace]:
+    """
+    Return the module of the subcommand, and what its arguments mean.
+
+    :raises SystemExit: they mean nothing, or help is all that is wanted.
+    """
     completing = typed()
     wanted = _wanted(arguments if completing is None else completing)
     parser = argparse.ArgumentParser(
@@ -125,6 +152,11 @@ def _run(arguments: list[str]) -> int:
         rest = [word for word in rest if word.startswith('-')]
     if rest:
         parser.error(f'unrecognized arguments: {" ".join(rest)}')
+    return module, args
+
+
+def _run(arguments: list[str]) -> int:
+    module, args = understood(arguments)
     try:
         code: int = module.run(args)
     except WrongUsage as error:

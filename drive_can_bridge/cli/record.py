@@ -15,7 +15,7 @@ from drive_can_bridge.cli.tables import print_json
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.frame import bits_on_bus, STUFFING
 from drive_can_bridge.core.record import Record, RecordKind
-from drive_can_bridge.trace.channels import label
+from drive_can_bridge.trace.channels import labels
 from drive_can_bridge.trace.files import (
     check_writable, LOSSES, TraceWriter, UnknownFormat, WRITABLE,
 )
@@ -35,7 +35,8 @@ def define(parser: ArgumentParser) -> None:
         f'Formats, by suffix: {", ".join(WRITABLE)}. Only .log, the format of candump, '
         'loses nothing.')
     parser.add_argument('-o', '--output', metavar='FILE', type=Path, required=True,
-                        help='the trace; an existing file is replaced')
+                        help='the trace; an existing file, or what --rotate has made of it, is '
+                             'replaced')
     add_params_file(parser, 'parameter file of the bridge: names the buses')
     add_seconds(parser)
     parser.add_argument('--rotate', metavar='MB', type=above_zero,
@@ -63,8 +64,9 @@ def run(args: Namespace) -> int:
         complain(f'warning: {args.output.suffix} does not keep {loss}; .log does')
     status = _Status(sys.stderr)
     with closing(Taps(configuration)) as taps:      # before a file is replaced
-        counters = {label(bus): _Counter(bus.name, bus.bitrate) for bus in buses}
-        output = _Rotating(args.output, [label(bus) for bus in buses], args.rotate)
+        channels = labels(buses)
+        counters = {channels[bus.name]: _Counter(bus.name, bus.bitrate) for bus in buses}
+        output = _Rotating(args.output, list(counters), args.rotate)
         try:
             _record(taps.records(args.seconds), output, counters, status)
         except KeyboardInterrupt:
@@ -154,14 +156,24 @@ class _Rotating:
         self._channels = channels
         self._limit = None if megabytes is None else megabytes * _MEGABYTE
         self.count = 1
+        if self._limit is not None:
+            self._remove_last_recording()
         self._writer = self._open()
         self._full = False
 
     def _open(self) -> TraceWriter:
-        path = self._path
-        if self._limit is not None:
-            path = path.with_name(f'{path.stem}_{self.count - 1:03d}{path.suffix}')
+        path = self._path if self._limit is None else self._part(self.count - 1)
         return TraceWriter(path, self._channels)
+
+    def _part(self, number: int) -> Path:
+        return self._path.with_name(f'{self._path.stem}_{number:03d}{self._path.suffix}')
+
+    def _remove_last_recording(self) -> None:
+        """Remove all parts of it: those that are not replaced would look like ours."""
+        number = 0
+        while (part := self._part(number)).is_file():
+            part.unlink()
+            number += 1
 
     @property
     def last(self) -> Path:

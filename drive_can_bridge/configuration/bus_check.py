@@ -1,6 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The buses of a configuration: interface, channel, and the keys for the adapter."""
 
+from collections.abc import Iterable
 from typing import Any, Protocol
 
 from drive_can_bridge.configuration.problems import Path, Tree
@@ -45,6 +46,7 @@ def check_buses(tree: Tree, adapters: Adapters | None) -> dict[str, BusConfigura
         _look_for_twin(tree, bus, buses)
         if len(tree.problems) == known:
             buses[name] = bus
+    _look_for_channels_of_others(tree, buses.values())
     return buses
 
 
@@ -88,3 +90,14 @@ def _look_for_twin(tree: Tree, bus: BusConfiguration, others: dict[str, BusConfi
                 f'{show(bus.channel)} is also the channel of bus {other.name}; identifiers and '
                 'load are checked for each bus alone')
             return
+
+
+def _look_for_channels_of_others(tree: Tree, buses: Iterable[BusConfiguration]) -> None:
+    """A trace names channels, or buses."""
+    names = {bus.name: bus for bus in buses}
+    for other in names.values():
+        named = names.get(str(other.channel), other)
+        if named is not other:
+            tree.suspicious(
+                ('buses', named.name), f'bus {other.name} has a channel of this name: decode '
+                "takes what other programs' traces have of it for this bus")

@@ -6,12 +6,15 @@ The two texts that candump writes: its log file (``-l``, ``-L``) and its screen.
 
     (1700000000.123456) can0 003FFFF0#05DC000000000000 T
      (1700000000.123456)  can0  TX - -  003FFFF0   [8]  05 DC 00 00 00 00 00 00
+     (2026-11-21 23:04:38.123456)  can0  003FFFF0   [8]  05 DC 00 00 00 00 00 00
 
 Not read by python-can: its reader takes error frames for data frames unless one certain bit is
 set, ends at the first line that is none of its own, and knows the screen not at all.
 """
 
+from datetime import datetime
 import math
+import re
 
 from drive_can_bridge.core.frame import EXTENDED_IDENTIFIER_MAX, STANDARD_IDENTIFIER_MAX
 from drive_can_bridge.core.record import DATA, Record, RecordKind
@@ -23,6 +26,7 @@ _LENGTH_MAX = 64
 #: the highest identifiers as they are written; lower ones come before them in the alphabet, too
 _EXTENDED_DIGITS, _STANDARD_DIGITS = '1FFFFFFF', '7FF'
 _TIME_MAX = 1e18
+_DATE = re.compile(r'\([0-9]{4}-[0-9]{2}-[0-9]{2} [0-9]{2}:[0-9]{2}:[0-9]{2}\.[0-9]{6}\)')
 _DIRECTIONS = {'R': False, 'T': True, 'RX': False, 'TX': True}
 #: characters of a line of eight bytes, with room to spare; a longer one is no frame
 LINE_MAX = 400
@@ -99,7 +103,12 @@ def _shown(words: list[str]) -> Record:
     if place is None or place < 2:
         raise ValueError('neither a line of a candump log nor of its screen')
     before, length, after = words[:place], words[place], words[place + 1:]
-    time = _time(before.pop(0)) if before[0][:1] == '(' else 0.0
+    time = 0.0
+    if before[0][:1] == '(':
+        word = before.pop(0)
+        time = _time(word) if word[-1:] == ')' else _date(f'{word} {before.pop(0)}')
+        if len(before) < 2:
+            raise ValueError('neither a line of a candump log nor of its screen')
     identifier = before[-1]
     sent = next((_DIRECTIONS[word] for word in before[1:-1] if word in _DIRECTIONS), None)
     number, extended = _number(identifier), len(identifier) == 8
@@ -122,6 +131,16 @@ def _time(word: str) -> float:
         return float(word[1:-1])
     except ValueError:
         raise ValueError(f'{word[1:-1]!r} is no time') from None
+
+
+def _date(words: str) -> float:
+    """Read what ``candump -t A`` writes: date and time where it was written."""
+    try:
+        if _DATE.fullmatch(words):
+            return datetime.fromisoformat(words[1:-1]).timestamp()
+    except (ValueError, OverflowError, OSError):
+        pass
+    raise ValueError(f'{words.strip("()")!r} is no time')
 
 
 def _number(digits: str) -> int:

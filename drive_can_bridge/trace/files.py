@@ -19,6 +19,7 @@ import can
 
 from drive_can_bridge.core.record import Record
 from drive_can_bridge.trace import candump
+from drive_can_bridge.trace.output import Database, open_binary, open_text
 from drive_can_bridge.transport.messages import message_of, record_of
 
 #: suffixes of candump's texts; everything else is python-can's
@@ -26,8 +27,12 @@ _CANDUMP = ('.log', '.txt', '.candump')
 _TEXT_READERS: dict[str, Any] = {
     '.asc': can.ASCReader, '.csv': can.CSVReader, '.trc': can.TRCReader}
 _BINARY_READERS = ('.blf', '.db', '.mf4')
-_WRITERS: dict[str, Any] = {'.asc': can.ASCWriter, '.blf': can.BLFWriter, '.csv': can.CSVWriter,
-                            '.db': can.SqliteWriter, '.trc': can.TRCWriter}
+_WRITERS: dict[str, Callable[[Path], Any]] = {
+    '.asc': lambda path: can.ASCWriter(open_text(path)),
+    '.blf': lambda path: can.BLFWriter(open_binary(path)),
+    '.csv': lambda path: can.CSVWriter(open_text(path)),
+    '.db': Database,
+    '.trc': lambda path: can.TRCWriter(open_text(path))}
 #: what the formats cannot hold
 LOSSES = {
     '.csv': ('which bus a frame was on', 'its direction'),
@@ -65,15 +70,10 @@ def read_records(path: Path, complain: Complain) -> Iterator[Record]:
     if str(path) == '-':
         yield from _candump_records(sys.stdin, complain)
         return
-    packed = path.suffix.lower() == '.gz'
-    suffix = Path(path.stem).suffix.lower() if packed else path.suffix.lower()
+    suffix, packed = check_readable(path)
     if suffix in _BINARY_READERS and not packed:
-        path.open('rb').close()     # sqlite would make a new one
         yield from _binary_records(path, complain)
         return
-    if suffix not in _CANDUMP and suffix not in _TEXT_READERS:
-        raise UnknownFormat(f'{path}: no trace format has the suffix {suffix or "(none)"!s}; '
-                            f'known are {", ".join(READABLE)}, and .gz behind those of text')
     with _open_text(path, packed) as stream:
         try:
             if suffix in _CANDUMP:
@@ -84,11 +84,28 @@ def read_records(path: Path, complain: Complain) -> Iterator[Record]:
             complain(f'the rest cannot be unpacked: {error}')
 
 
+def check_readable(path: Path) -> tuple[str, bool]:
+    """
+    Look whether there is a trace that can be read, before anything else is begun.
+
+    :return: the suffix that says the format, and whether the file is packed.
+    :raises UnknownFormat: no format has this suffix.
+    :raises OSError: the file cannot be read.
+    """
+    packed = path.suffix.lower() == '.gz'
+    suffix = Path(path.stem).suffix.lower() if packed else path.suffix.lower()
+    if suffix not in (_CANDUMP + tuple(_TEXT_READERS) + (() if packed else _BINARY_READERS)):
+        raise UnknownFormat(f'{path}: no trace format has the suffix {suffix or "(none)"!s}; '
+                            f'known are {", ".join(READABLE)}, and .gz behind those of text')
+    path.open('rb').close()
+    return suffix, packed
+
+
 def _open_text(path: Path, packed: bool) -> TextIO:
     if packed:
-        return io.TextIOWrapper(gzip.open(path, 'rb'), encoding='utf-8',
+        return io.TextIOWrapper(gzip.open(path, 'rb'), encoding='utf-8-sig',
                                 errors='replace')
-    return path.open(encoding='utf-8', errors='replace')
+    return path.open(encoding='utf-8-sig', errors='replace')
 
 
 def _candump_records(stream: TextIO, complain: Complain) -> Iterator[Record]:
@@ -216,9 +233,9 @@ class TraceWriter:
         self._writer: Any = None
         self._file: TextIO | None = None
         if path.suffix.lower() == '.log':
-            self._file = path.open('w', encoding='ascii', errors='replace')
+            self._file = open_text(path)
         else:
-            self._writer = _WRITERS[path.suffix.lower()](str(path))
+            self._writer = _WRITERS[path.suffix.lower()](path)
 
     def write(self, record: Record) -> None:
         """Write an entry."""
@@ -239,12 +256,22 @@ class TraceWriter:
             return self.path.stat().st_size
 
     def flush(self) -> None:
-        """Hand what was written to the system, where the format lets it."""
+        """
+        Hand what was written to the system, where the format lets it.
+
+        :raises OSError: it cannot be written.
+        """
         if self._file is not None:
             self._file.flush()
+        elif isinstance(self._writer, Database):
+            self._writer.check()
 
     def close(self) -> None:
-        """Finish the file."""
+        """
+        Finish the file.
+
+        :raises OSError: not all of it is written.
+        """
         if self._file is not None:
             self._file.close()
         else:

@@ -21,7 +21,7 @@ import time
 
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.trace.candump import format_record
-from drive_can_bridge.trace.channels import label
+from drive_can_bridge.trace.channels import labels
 from drive_can_bridge.trace.ring import Ring
 
 #: s after an event that belong into its trace
@@ -65,6 +65,7 @@ class _Bus:
     """One recorded bus."""
 
     configuration: BusConfiguration
+    channel: str
     ring: Ring
     folder: Path
     wanted: _Wanted | None = None
@@ -86,10 +87,14 @@ class FlightRecorder:
                  say: Callable[[str], None], complain: Callable[[str], None]) -> None:
         self._say = say
         self._complain = complain
-        self._buses = {bus.name: _Bus(bus, Ring(bus.trace_seconds + AFTERMATH + SPACING + _SLACK),
-                                      Path(bus.trace_directory).expanduser()
-                                      if bus.trace_directory else default_folder)
-                       for bus in buses if bus.trace_seconds > 0.0}
+        buses = list(buses)
+        channels = labels(buses)
+        self._buses = {
+            bus.name: _Bus(bus, channels[bus.name],
+                           Ring(bus.trace_seconds + AFTERMATH + SPACING + _SLACK),
+                           Path(bus.trace_directory).expanduser() if bus.trace_directory
+                           else default_folder)
+            for bus in buses if bus.trace_seconds > 0.0}
         self._first: dict[str, list[Path]] = {name: [] for name in self._buses}
         self._changed = threading.Condition()
         self._closing = False
@@ -221,7 +226,7 @@ class FlightRecorder:
         """Write a file that has its name only when it is complete."""
         unfinished = path.with_suffix('.part')
         since = wanted.since - bus.configuration.trace_seconds
-        entries = bus.ring.entries(since, label(bus.configuration), offset)
+        entries = bus.ring.entries(since, bus.channel, offset)
         count = 0
         try:
             with unfinished.open('w', encoding='ascii', errors='replace') as file:

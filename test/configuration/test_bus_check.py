@@ -171,6 +171,17 @@ def test_bus_that_is_opened_twice(tmp_path: Path) -> None:
         'load are checked for each bus alone']
 
 
+def test_bus_with_the_name_of_another_channel(tmp_path: Path) -> None:
+    text = changed(FILE, '    drives:\n', """\
+      twin: {interface: virtual, channel: main}
+      own: {interface: virtual, channel: own}
+    drives:
+""")
+    assert warnings(tmp_path, text) == [
+        'f.yaml:5: buses.main: bus twin has a channel of this name: decode takes what other '
+        "programs' traces have of it for this bus"]
+
+
 def test_no_drives(tmp_path: Path) -> None:
     assert warnings(tmp_path, FILE[:FILE.index('    drives:')]) == [
         'f.yaml:3: drives: no drive is configured']

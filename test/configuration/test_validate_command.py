@@ -220,7 +220,43 @@ def test_reader_that_went_away(tmp_path: Path) -> None:
             [sys.executable, '-m', 'drive_can_bridge.cli.main', 'validate', str(write(tmp_path))],
             stdout=gone, stderr=subprocess.PIPE, text=True, env=ENVIRONMENT, timeout=60,
             check=False)
-    assert (done.returncode, done.stderr) == (1, '')
+    # all is checked, and right
+    assert (done.returncode, done.stderr) == (0, '')
+
+
+def test_reader_who_has_seen_enough(tmp_path: Path) -> None:
+    trace = tmp_path / 'long.log'
+    trace.write_text('(1.0) can0 123#00\n' * 20_000)
+    with subprocess.Popen(
+            [sys.executable, '-m', 'drive_can_bridge.cli.main', 'decode', str(trace),
+             '--params-file', str(write(tmp_path))], stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE, env=ENVIRONMENT) as decoding:
+        assert decoding.stdout is not None and decoding.stderr is not None
+        assert b'123#00' in decoding.stdout.readline()
+        decoding.stdout.close()
+        assert (decoding.wait(60), decoding.stderr.read()) == (0, b'')
+
+
+def test_outputs_that_are_closed(tmp_path: Path) -> None:
+    for file, code in ((write(tmp_path), 0), (tmp_path / 'absent.yaml', 1)):
+        for closed in ('>&-', '2>&-', '>&- 2>&-'):
+            done = subprocess.run(
+                f'exec {sys.executable} -m drive_can_bridge.cli.main validate {file} {closed}',
+                shell=True, stdin=subprocess.DEVNULL, capture_output=True, text=True,
+                env=ENVIRONMENT, timeout=60, check=False)
+            assert done.returncode == code
+            assert 'internal error' not in done.stdout + done.stderr
+
+
+@pytest.mark.parametrize('encoding', ['ascii', 'latin-1'])
+@pytest.mark.parametrize('subcommand', ['scan', 'simulate'])
+def test_terminals_that_lack_characters(encoding: str, subcommand: str) -> None:
+    done = subprocess.run(
+        [sys.executable, '-m', 'drive_can_bridge.cli.main', subcommand, '--help'],
+        capture_output=True, env={**ENVIRONMENT, 'PYTHONIOENCODING': encoding}, timeout=60,
+        check=False)
+    assert (done.returncode, done.stderr) == (0, b'')
+    assert b'\\u2026' in done.stdout
 
 
 @pytest.mark.parametrize(('error', 'line'), [

@@ -123,6 +123,23 @@ def test_what_is_read_is_not_written_over(file: Path, trace: Path, option: str, 
     assert file.read_text().startswith('\n/**/drive_can_bridge')
 
 
+def test_a_table_on_a_full_disk(file: Path, trace: Path, tmp_path: Path,
+                                capsys: pytest.CaptureFixture[str]) -> None:
+    table = tmp_path / 'values.csv'
+    table.symlink_to('/dev/full')
+    assert drive_can('decode', trace, '--csv', table, '--params-file', file) == 1
+    assert capsys.readouterr() == ('', f'drive_can: {table}: No space left on device\n')
+
+
+def test_nothing_is_replaced_for_a_trace_that_cannot_be_read(file: Path, trace: Path,
+                                                             tmp_path: Path) -> None:
+    table = tmp_path / 'values.csv'
+    table.write_text('of yesterday')
+    for wrong, code in ((tmp_path / 'absent.log', 1), (trace.with_suffix('.pcap'), 2)):
+        assert drive_can('decode', wrong, '--csv', table, '--params-file', file) == code
+        assert table.read_text() == 'of yesterday'
+
+
 def test_plot(file: Path, trace: Path, tmp_path: Path,
               capsys: pytest.CaptureFixture[str]) -> None:
     picture = tmp_path / 'values.png'
@@ -146,6 +163,7 @@ def test_plot(file: Path, trace: Path, tmp_path: Path,
      '.asc, .blf, .candump, .csv, .db, .log, .mf4, .trc, .txt, and .gz behind those of text'),
     (['absent.log'], 1, 'drive_can: absent.log: No such file or directory'),
     (['empty.log'], 1, 'empty.log: there is no frame in it'),
+    (['empty.log', '--summary'], 1, 'empty.log: there is no frame in it'),
 ])
 def test_wrong_usage(file: Path, trace: Path, monkeypatch: pytest.MonkeyPatch,
                      capsys: pytest.CaptureFixture[str], arguments: list[str], code: int,
@@ -275,6 +293,19 @@ def test_record_in_files_of_limited_size(file: Path, tmp_path: Path,
     assert len(written) >= 2
     document = json.loads(capsys.readouterr().out)
     assert (document['file'], document['files']) == (str(written[-1]), len(written))
+
+
+def test_all_parts_of_a_recording_are_replaced(file: Path, tmp_path: Path,
+                                               capsys: pytest.CaptureFixture[str]) -> None:
+    for number in (0, 1, 2, 2026):
+        (tmp_path / f'out_{number:03d}.log').write_text('of yesterday')
+    with Talker(f'trace_{tmp_path.name}'):
+        assert drive_can('record', '-o', tmp_path / 'out.log', '--params-file', file,
+                         '--seconds', '0.3', '--rotate', '1') == 0
+    assert capsys.readouterr().out.endswith('out_000.log is the only file\n')
+    # what has another number is nobody's part
+    assert sorted(each.name for each in tmp_path.glob('*.log')) == ['out_000.log', 'out_2026.log']
+    assert 'yesterday' not in (tmp_path / 'out_000.log').read_text()
 
 
 def test_no_file_is_begun_for_a_bus_that_fell_silent(

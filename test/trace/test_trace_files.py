@@ -1,14 +1,20 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Reading and writing traces: candump's texts, python-can's formats, what is damaged."""
 
+from datetime import datetime
+from errno import ENOSPC
 import gzip
 from pathlib import Path
+import subprocess
+import sys
 
 from hypothesis import given, strategies as st
 import pytest
 
+from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.record import Record, RecordKind
 from drive_can_bridge.trace.candump import format_record, parse_line
+from drive_can_bridge.trace.channels import Channels, labels
 from drive_can_bridge.trace.files import (
     check_writable, read_records, TraceWriter, UnknownFormat, WRITABLE,
 )
@@ -35,6 +41,12 @@ DATA, ERROR = RecordKind.DATA, RecordKind.ERROR
      Record(1.25, 'can0', 0x3FFFF0, b'\x0A\x0B\x0C', True, DATA, False)),
     (" (1.250000)  can0  TX - -  123   [2]  41 42   'AB'",
      Record(1.25, 'can0', 0x123, b'AB', False, DATA, True)),
+    # -t A
+    (' (2026-11-21 23:04:38.250000)  can0  RX - -  123   [2]  41 42',
+     Record(datetime(2026, 11, 21, 23, 4, 38, 250_000).timestamp(), 'can0', 0x123, b'AB', False,
+            DATA, False)),
+    (' (2026-11-21 23:04:38.250000)  can0  123   [0]',
+     Record(datetime(2026, 11, 21, 23, 4, 38, 250_000).timestamp(), 'can0', 0x123, b'', False)),
     ('  can0  123   [4]  remote request', Record(0.0, 'can0', 0x123, b'', False,
                                                  RecordKind.REMOTE)),
     ('  can0  20000040   [8]  00 00 00 00 00 00 00 00   ERRORFRAME',
@@ -54,7 +66,8 @@ def test_nothing(line: str) -> None:
     'x', '(1.0) can0', '(1.0) can0 12#00', '(1.0) can0 -12#00', '(1.0) can0 800#00',
     '(1.0) can0 123#0', '(1.0) can0 123#001122334455667788', '(nan) can0 123#00',
     '(inf) can0 123#00', '(1.0) can0 123456789#00', '(1.0) can0 123', 'can0 123 [2] 00',
-    'can0 123 [x] 00', '(1.0) can0 0-1#00',
+    'can0 123 [x] 00', '(1.0) can0 0-1#00', '(2026-11-31 23:04:38.250000)  can0  123   [0]',
+    '(2026-11-21 23:04:38.250000)  123  [0]', '(2026-11-21  can0  123   [0]',
 ])
 def test_what_is_no_line_of_candump(line: str) -> None:
     with pytest.raises(ValueError):
@@ -157,6 +170,95 @@ def test_a_packed_text(tmp_path: Path) -> None:
     complaints: list[str] = []
     list(read_records(path, complaints.append))
     assert len(complaints) == 1
+
+
+def test_a_byte_order_mark_costs_nothing(tmp_path: Path) -> None:
+    path = tmp_path / 'trace.log'
+    path.write_text(''.join(map(format_record, TRACE)), encoding='utf-8-sig')
+    assert list(read_records(path, print)) == TRACE
+
+
+@pytest.mark.parametrize('suffix', [each for each in WRITABLE if each != '.db'])
+def test_a_full_disk_is_told_with_the_name_of_the_file(suffix: str, tmp_path: Path) -> None:
+    path = tmp_path / f'trace{suffix}'
+    path.symlink_to('/dev/full')
+    writer = TraceWriter(path, ['can0'])
+    with pytest.raises(OSError) as raised:
+        for record in 4000 * TRACE:
+            writer.write(record)
+        writer.close()
+    assert (raised.value.errno, raised.value.filename) == (ENOSPC, str(path))
+
+
+#: sqlite takes a limit of the process for a full disk
+FULL = """
+import pathlib, resource, sys, time
+from drive_can_bridge.core.record import Record
+from drive_can_bridge.trace.files import TraceWriter
+path, looking = pathlib.Path(sys.argv[1]), sys.argv[2] == 'looking'
+resource.setrlimit(resource.RLIMIT_FSIZE, (30_000, 30_000))
+writer = TraceWriter(path, ['can0'])
+try:
+    for number in range(5000):
+        writer.write(Record(1.0 * number, 'can0', 0x123, bytes(8), False))
+    while looking:
+        writer.flush()
+        time.sleep(0.01)
+    writer.close()
+except OSError as error:
+    print(error.filename, error.strerror)
+    if looking:
+        try:
+            writer.close()
+        except OSError:
+            pass
+"""
+
+
+@pytest.mark.parametrize('way', ['looking', 'closing'])
+def test_a_database_that_cannot_be_written(way: str, tmp_path: Path) -> None:
+    path = tmp_path / 'trace.db'
+    told = subprocess.run([sys.executable, '-c', FULL, path, way], capture_output=True, text=True,
+                          check=True, timeout=60)
+    assert told.stdout in (f'{path} {reason}\n' for reason in (
+        'disk I/O error', 'database or disk is full'))
+    assert told.stderr == ''
+
+
+def test_a_database_is_replaced(tmp_path: Path) -> None:
+    path = tmp_path / 'trace.db'
+    path.write_text('of yesterday')
+    for _ in range(2):
+        writer = TraceWriter(path, ['can0'])
+        for record in TRACE:
+            writer.write(record)
+        writer.close()
+    assert len(list(read_records(path, print))) == len(TRACE)
+
+
+def bus(name: str, channel: str, interface: str = 'socketcan') -> BusConfiguration:
+    return BusConfiguration(name, interface, channel)
+
+
+@pytest.mark.parametrize(('buses', 'said', 'found'), [
+    ([bus('main', 'can0'), bus('aux', 'can1')], ['can0', 'can1'],
+     {'main': 'main', 'can0': 'main', 'can1': 'aux', 'can2': None, 1: 'aux'}),
+    ([bus('can1', 'can0'), bus('can0', 'can1')], ['can1', 'can0'],
+     {'can0': 'can0', 'can1': 'can1'}),
+    ([bus('main', 'can0'), bus('can0', 'can2')], ['main', 'can2'],
+     {'main': 'main', 'can0': 'can0', 'can2': 'can0'}),
+    ([bus('a', 'b'), bus('b', '/dev/ttyACM0', 'slcan')], ['a', 'b'],
+     {'a': 'a', 'b': 'b', '/dev/ttyACM0': 'b'}),
+    ([bus('a', 'can0'), bus('b', 'can0')], ['a', 'b'], {'a': 'a', 'b': 'b', 'can0': 'a'}),
+])
+def test_which_bus_a_trace_means(buses: list[BusConfiguration], said: list[str],
+                                 found: dict[str | int, str | None]) -> None:
+    """What record calls a bus is that bus; otherwise names come first, then channels."""
+    channels = Channels(buses)
+    assert {word: each and each.name for word in found
+            for each in [channels.find(word)]} == found
+    assert list(labels(buses).values()) == said
+    assert [Channels(buses).find(word) for word in said] == buses
 
 
 @given(st.sampled_from(['.log', '.asc', '.csv', '.trc', '.blf', '.db']), st.binary(max_size=300))

@@ -1,0 +1,43 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Commands that the README and the documents show: ``drive_can`` understands them as they stand."""
+
+from pathlib import Path
+import re
+import shlex
+
+import pytest
+
+import drive_can_bridge
+from drive_can_bridge.cli import main as front_end
+
+ROOT = Path(drive_can_bridge.__file__).resolve().parents[1]
+#: at the beginning of a line, behind a prompt, or between backticks
+COMMAND = re.compile(r'(?:^(?:\$ )?|`)drive_can ([a-z][^`\n]*)', re.MULTILINE)
+#: what follows is for the shell
+END = re.compile(r'\s[|>&]')
+
+
+def shown(text: str) -> list[str]:
+    """Return the commands of a text; a bare name, or one that is left open, is only mentioned."""
+    commands = [END.split(each)[0].strip() for each in COMMAND.findall(text)]
+    return [each for each in commands if not re.search(r'[…\[]', each) and re.search(
+        r'\s[^-\s]', each.removeprefix('profile '))]
+
+
+PAGES = {page: commands for page in [ROOT / 'README.md', *sorted((ROOT / 'docs').glob('*.md'))]
+         if (commands := shown(page.read_text(encoding='utf-8')))}
+
+
+@pytest.mark.parametrize('page', PAGES, ids=lambda page: page.name)
+def test_commands_are_understood(page: Path) -> None:
+    for command in PAGES[page]:
+        try:
+            front_end.understood(shlex.split(command, comments=True))
+        except SystemExit as end:
+            assert end.code == 0, command
+
+
+def test_commands_are_found() -> None:
+    assert sum(map(len, PAGES.values())) > 40
+    assert shown('$ drive_can record -o a.log | x\n`drive_can decode …` `drive_can scan`\n') == [
+        'record -o a.log']
