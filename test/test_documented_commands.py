@@ -1,5 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""Commands that the README and the documents show: ``drive_can`` understands them as they stand."""
+"""Commands that README and documents show: ``drive_can`` understands them as they stand."""
 
 from pathlib import Path
 import re

@@ -93,7 +93,7 @@ def _look_for_twin(tree: Tree, bus: BusConfiguration, others: dict[str, BusConfi
 
 
 def _look_for_channels_of_others(tree: Tree, buses: Iterable[BusConfiguration]) -> None:
-    """A trace names channels, or buses."""
+    """Warn of a bus that a trace may mean by its name, or another one by its channel."""
     names = {bus.name: bus for bus in buses}
     for other in names.values():
         named = names.get(str(other.channel), other)

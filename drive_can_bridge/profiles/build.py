@@ -12,6 +12,8 @@ from typing import Any
 
 from drive_can_bridge.configuration.problems import Tree
 from drive_can_bridge.configuration.profile_check import LoadedProfile, profile_from_tree
+from drive_can_bridge.configuration.scalars import read_scalar
+from drive_can_bridge.configuration.yaml_nodes import SIZE_MAX
 from drive_can_bridge.core.parameters import ParameterType
 from drive_can_bridge.profiles.draft import Draft, Found, LeftOut
 from drive_can_bridge.profiles.errors import ImportFailed
@@ -64,6 +66,9 @@ def build_profile(found: Found, source: str, *, description: str = '',
     named = _named(list(named.values()), taken)
     text = _text(named, entries, source, description or found.description, spoken,
                  said=bool(protocols))
+    if len(text.encode('utf-8')) > SIZE_MAX << 20:
+        raise ImportFailed(f'the profile of its {len(named)} entries would be larger than '
+                           f'{SIZE_MAX} MiB, which no bridge reads')
     return Built(text, tuple(named), spoken, entries,
                  sum(bool(draft.remarks) for draft in named.values()))
 
@@ -139,7 +144,9 @@ def _narrowed(drafts: Sequence[Draft], found: Found) -> list[Draft]:
 
 def _sound(named: dict[str, Draft], found: Found, protocols: Sequence[str]) -> dict[str, Draft]:
     """Leave out what the checks of a profile complain about."""
-    reasons: dict[str, str] = {}
+    reasons = {name: f'{key} {value} cannot be written: too close to 0'
+               for name, draft in named.items() for key, value in draft.entry.items()
+               if isinstance(value, float) and read_scalar(scalar(value)) != value}
     for problem in _loaded(named, protocols).problems:
         _note(reasons, problem.key, problem.message)
     return _without(named, found, reasons)

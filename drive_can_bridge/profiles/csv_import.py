@@ -13,7 +13,7 @@ from typing import Any
 
 from drive_can_bridge.core.parameters import ParameterType
 from drive_can_bridge.profiles.draft import Draft, Found, LeftOut, Place
-from drive_can_bridge.profiles.errors import Unusable
+from drive_can_bridge.profiles.errors import ImportFailed, Unusable
 from drive_can_bridge.profiles.headings import Column
 from drive_can_bridge.profiles.names import name_of, split_unit
 from drive_can_bridge.profiles.numerals import (
@@ -47,10 +47,19 @@ def read_table(text: str, given: Mapping[Column, str],
     :raises ImportFailed: it is no table of parameters.
     :raises WrongColumns: a given column is not there.
     """
-    table = make_table(read_rows(text), given)
+    rows, torn = read_rows(text)
+    try:
+        table = make_table(rows, given)
+    except ImportFailed as error:
+        if not torn:
+            raise
+        raise ImportFailed(f'in line {torn[0].line} a quote opens that is never closed; '
+                           f'{error}') from None
     if sign is DecimalSign.UNKNOWN:
         sign = decimal_sign(table.cell(row, column) for row in table.rows for column in _NUMERIC)
-    found = Found(notes=_notes(table))
+    found = Found(notes=_notes(table), left_out=[
+        LeftOut(Place(each.line), _shortened(each.text), 'a quote opens here that is never closed')
+        for each in torn])
     reader = _RowReader(table, sign)
     headings = []
     for row in table.rows:
@@ -79,7 +88,11 @@ def _notes(table: Table) -> list[str]:
 
 
 def _shown(row: Row) -> str:
-    text = one_line(' '.join(cell for cell in row.cells if cell))
+    return _shortened(' '.join(cell for cell in row.cells if cell))
+
+
+def _shortened(text: str) -> str:
+    text = one_line(text)
     return text if len(text) <= 40 else text[:39] + '…'
 
 

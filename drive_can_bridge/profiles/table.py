@@ -2,7 +2,7 @@
 """A table in a text file: what separates its cells, and what its columns hold."""
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 import csv
 from dataclasses import dataclass
 
@@ -63,24 +63,74 @@ class Table:
         return self.headings[place] if place is not None and place < len(self.headings) else ''
 
 
-def read_rows(text: str) -> list[Row]:
+@dataclass(frozen=True, slots=True)
+class Torn:
+    """A line in which a quote opens that is never closed: nobody knows where its cell ends."""
+
+    line: int
+    text: str
+
+
+def read_rows(text: str) -> tuple[list[Row], list[Torn]]:
     """
     Split a text into rows, with whatever separates its cells.
 
+    :return: rows, and lines that are none.
     :raises ImportFailed: it cannot be split.
     """
     lines = text.split('\n')
-    delimiter = _delimiter(lines[:_SAMPLE_LINES])
-    rows, line = [], 1
-    reader = csv.reader((f'{each}\n' for each in lines), delimiter=delimiter,
-                        skipinitialspace=True)
+    rows: list[Row] = []
+    torn: list[Torn] = []
+    for line, cells in _split(lines, _delimiter(lines[:_SAMPLE_LINES])):
+        if cells is None:
+            torn.append(Torn(line, lines[line - 1]))
+        elif any(row := tuple(' '.join(cell.split()) for cell in cells)):
+            rows.append(Row(line, row))
+    return rows, torn
+
+
+def _split(lines: Sequence[str], delimiter: str) -> Iterator[tuple[int, list[str] | None]]:
+    """
+    Yield the cells of each row with the line it begins in; None: a quote is never closed.
+
+    Row by row, because the reader would take all that follows such a quote for one cell.
+
+    :raises ImportFailed: a row cannot be split.
+    """
+    place = 0
+    while place < len(lines):
+        line = place + 1
+        try:
+            count, cells = _row(lines, place, delimiter, strict=False)
+        except csv.Error as error:
+            if _closed(lines[place], delimiter):
+                raise ImportFailed(f'line {line}: cannot be split into cells: {error}') from None
+            count, cells = 2, None
+        if count > 1:   # over several lines only what is beyond doubt
+            try:
+                _row(lines, place, delimiter, strict=True)
+            except csv.Error:
+                count, cells = 1, None
+        place += count
+        yield line, cells
+
+
+def _row(lines: Sequence[str], place: int, delimiter: str, *,
+         strict: bool) -> tuple[int, list[str] | None]:
+    reader = csv.reader((f'{lines[each]}\n' for each in range(place, len(lines))),
+                        delimiter=delimiter, skipinitialspace=True, strict=strict)
+    cells = next(reader)
+    return reader.line_num, cells
+
+
+def _closed(line: str, delimiter: str) -> bool:
+    """Tell whether every quote that opens in a line is closed in it."""
+    reader = csv.reader((f'{line}\n', '\n'), delimiter=delimiter, skipinitialspace=True)
     try:
-        for cells in reader:
-            rows.append(Row(line, tuple(' '.join(cell.split()) for cell in cells)))
-            line = reader.line_num + 1
-    except csv.Error as error:
-        raise ImportFailed(f'line {line}: cannot be split into cells: {error}') from None
-    return [row for row in rows if any(row.cells)]
+        next(reader)
+    except csv.Error:
+        return True     # too long by itself
+    return reader.line_num == 1
 
 
 def _delimiter(lines: Sequence[str]) -> str:
@@ -88,9 +138,9 @@ def _delimiter(lines: Sequence[str]) -> str:
     best, delimiter = 0.0, ','
     for candidate in _DELIMITERS:
         try:
-            widths = Counter(len(cells) for cells in csv.reader(
-                (f'{line}\n' for line in lines), delimiter=candidate) if any(cells))
-        except csv.Error:
+            widths = Counter(len(cells) for _, cells in _split(lines, candidate)
+                             if cells is not None and any(cells))
+        except ImportFailed:
             continue
         width, rows = max(widths.items(), key=lambda item: (item[0] - 1) * item[1],
                           default=(0, 0))

@@ -112,10 +112,11 @@ class _Taker:
         """Hand each joint its part."""
         names, columns = message
         wrong = self._problem(names, columns)
-        if wrong:
+        if wrong is not None:
             for name in self._joints.keys() & set(names):
                 self._joints[name].count_refused()
-            self._warn('joint commands', f'joint_commands refused: {wrong}')
+            kind, text = wrong
+            self._warn(f'joint commands: {kind}', f'joint_commands refused: {text}')
             return
         if names != self._names:
             self._names = names
@@ -134,15 +135,20 @@ class _Taker:
             intake.count_refused()
         self._warn(topic, text)
 
-    def _problem(self, names: list[str], columns: Sequence[Column]) -> str:
+    def _problem(self, names: list[str],
+                 columns: Sequence[Column]) -> tuple[str, str] | None:
+        """Return what kind of problem a message has, and the words for it; None: it has none."""
+        if columns and not names:
+            return 'no names', f'{len(columns[0][1])} {columns[0][0]} values and no names'
         for quantity, values in columns:
             if len(values) != len(names):
-                return (f'{len(values)} {quantity} values for {len(names)} names; allowed are as '
-                        f'many as names, with NaN for joints that are to be left alone, or none')
+                return 'length', (
+                    f'{len(values)} {quantity} values for {len(names)} names; allowed are as '
+                    f'many as names, with NaN for joints that are to be left alone, or none')
         if names != self._names and len(set(names)) != len(names):
             twice = next(name for name in names if names.count(name) > 1)
-            return f'{printable(twice)} stands twice, allowed is once'
-        return ''
+            return 'twice', f'{printable(twice)} stands twice, allowed is once'
+        return None
 
     def _tell_stranger(self, name: str) -> None:
         """Say once that a joint is none of this bridge; there may be any number of them."""

@@ -26,9 +26,9 @@ class Channels:
     """
     Finds buses by the channels of a trace.
 
-    A word is the name of a bus; if none has it, its channel. A number is its place in the file. The one bus of a file
-    that has only one is meant by a trace without channels, too, and by the first channel of
-    another name that turns up.
+    A word is the name of a bus; if none has it, its channel. A number is its place in the file.
+    The one bus of a file that has only one is meant by a trace without channels, too, and by the
+    first channel of another name that turns up.
     """
 
     def __init__(self, buses: Sequence[BusConfiguration]) -> None:

@@ -136,6 +136,8 @@ def test_one_row(tmp_path: Path, heading: str, row: str, expected: dict[str, Any
     ('70000;b;rpm;1;;;rw;int16', 'number 70000 is out of range, allowed is 0 to 65535'),
     ('1;b;rpm;1;;;rw;int16', 'the same address as in line 2'),
     (';b;rpm;1;;;rw;int16', 'has no number'),
+    ('2;b;rpm;1e-320;;;rw;int16', 'scale 1e-320 cannot be written: too close to 0'),
+    ('2;"b;rpm;1;;;rw;int16', 'a quote opens here that is never closed'),
     ('2;b;rpm;1;100000;200000;rw;int16',
      'no value of int16 lies in the limits; it holds -32768 to 32767'),
     ('2;b;;;0.5;;rw;int16', 'minimum 0.5 is no integer, allowed without scale, offset and unit '
@@ -146,6 +148,32 @@ def test_what_is_left_out(tmp_path: Path, row: str, reason: str) -> None:
     assert list(made.parameters) == ['a']
     [line] = made.left_out
     assert line.startswith('3: ') and line.endswith(f': {reason}')
+
+
+@pytest.mark.parametrize('heading', ['', 'Table of "drives"\n', '"A\ntable";of;drives\n'])
+def test_a_quote_that_stays_open_costs_one_row(tmp_path: Path, heading: str) -> None:
+    made = bring_in(tmp_path, heading + '''No.;Name;Unit
+1;"Ramp; up";s
+2;"Encoder wheel 10 inch;mm
+3;"Speed
+of the ""motor""";rpm
+4;Wheel 12";mm
+5;"Torque" now;%
+6;"Current;A
+''')
+    assert [parameter.description for parameter in made.parameters.values()] == [
+        'Ramp; up', 'Speed of the "motor"', 'Wheel 12"', 'Torque now']
+    first = 4 + heading.count('\n') - 1
+    assert made.left_out == [
+        f'{first}: 2;"Encoder wheel 10 inch;mm: a quote opens here that is never closed',
+        f'{first + 5}: 6;"Current;A: a quote opens here that is never closed']
+
+
+def test_a_table_that_no_bridge_would_read(tmp_path: Path) -> None:
+    rows = ''.join(f'{number};parameter {number};{"x" * 80}\n' for number in range(40_000))
+    with pytest.raises(ImportFailed, match='table.csv: the profile of its 40000 entries would be '
+                                           'larger than 4 MiB, which no bridge reads'):
+        bring_in(tmp_path, f'Nr;Name;Description\n{rows}')
 
 
 def test_ambiguous_numbers_can_be_settled(tmp_path: Path) -> None:
@@ -199,6 +227,8 @@ def test_columns_that_are_not_there(tmp_path: Path, columns: str) -> None:
     (b'%PDF-1.7', 'is a PDF; copy its table into a spreadsheet and save that as CSV'),
     (b'a\0b', 'is no text: it contains NUL characters'),
     (b'\xff\xfea', 'begins like utf-16 text and is none'),
+    (b'"Nr;Name\n1;a\n2;b\n', 'table.csv: in line 1 a quote opens that is never closed; '
+                                'no column with parameter numbers was found'),
     (b'Nr;Name\n', 'no entry can be used: there is none'),
     (b'Nr;Name\nx;a\n',
      "no entry can be used; the first reason, in line 2: x a: 'x' is no number"),

@@ -196,6 +196,9 @@ def test_array_of_another_length_is_refused_whole(bridge: StartBridge, client: C
     client.publish(COMMANDS, JointState(name=['wj', 'nj'], velocity=[RPM, RPM],
                                         effort=[1.0, 1.0, 1.0]))
     client.publish(COMMANDS, JointState(name=['wj', 'wj'], velocity=[RPM, RPM]))
+    client.wait_logged('joint_commands refused: wj stands twice, allowed is once')
+    client.publish(COMMANDS, JointState(name=[], velocity=[RPM]))
+    client.wait_logged('joint_commands refused: 1 velocity values and no names')
     wait_until(lambda: one.node.drives['west'].session.statistics.commands_refused == 3)
     wait_until(lambda: one.node.drives['north'].session.statistics.commands_refused == 2)
     assert set(speeds(one).values()) == {0}

@@ -2,7 +2,7 @@
 """
 Somebody who commands the drives, as any other ROS node would: ``drive_can demo --drive``.
 
-``~/enable`` where there is control, neutral until every setpoint is armed, then a slow sine.
+``~/enable`` where there is control, then neutral until every setpoint is armed, then a slow sine.
 Setpoints without a negative side (limits) get a steady value.
 """
 
@@ -58,13 +58,15 @@ class _DriveCommander:
                     message_type, f'/{drive.name}/command/{parameter.name}', 8), message_type()))
         self._client = node.create_client(SetBool, f'/{drive.name}/enable')
         self._ask_at = 0.0
+        self._controlled = table is not None
+        self._ready = False
         self._begun_at: float | None = None
 
     def reported(self, report: Report, now: float) -> None:
         """Take what the bridge says of the drive."""
         control = report.facts.get('control_state')
         there = report.state not in ('offline', 'mapping differs', 'fault')
-        ready = there and (control is None or control in _ENABLED)
+        ready = self._ready = there and (control is None or control in _ENABLED)
         if not (ready and report.state == 'online'):
             # gone, back again, or the process stood still: whatever it was, begin anew
             self._begun_at = None
@@ -76,6 +78,8 @@ class _DriveCommander:
 
     def command(self, now: float) -> None:
         """Publish what is due, once."""
+        if self._controlled and not self._ready:    # would be in vain, and warned about
+            return
         elapsed = 0.0 if self._begun_at is None else max(0.0, now - self._begun_at)
         for parameter, publisher, message in self._setpoints:
             message.data = neutral(parameter) if elapsed <= 0.0 else commanded(parameter, elapsed)
