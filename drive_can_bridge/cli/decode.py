@@ -189,6 +189,9 @@ def _draw(plotter: Plotter, path: str) -> None:
     except ImportError:
         raise DriveCanError('drive_can decode: --plot needs the Python module matplotlib '
                             '(package python3-matplotlib, or pip install matplotlib)') from None
+    except OSError as error:
+        error.filename = path
+        raise
     except ValueError as error:     # a suffix that matplotlib does not know
         raise DriveCanError(f'drive_can decode: --plot {path}: {error}') from None
 

@@ -73,6 +73,8 @@ def run(args: Namespace) -> int:
             pass
         finally:
             status.clear()
+            for counter in counters.values():
+                counter.end()
             output.close()
     for counter in counters.values():
         if args.json:
@@ -103,6 +105,7 @@ class _Counter:
         self._name = name
         self._bitrate = bitrate
         self._began = time.monotonic()
+        self._seconds = 0.0
         self._frames = self._sent = self._error_frames = 0
         self._bits = self._bits_shown = 0
         self._shown_at = self._began
@@ -124,21 +127,23 @@ class _Counter:
         return (f'{self._name}: {self._frames} frames, {self._error_frames} error frames, '
                 f'load {load:.1f} %')
 
+    def end(self) -> None:
+        """Take the time; what is written still may take its own."""
+        self._seconds = time.monotonic() - self._began
+
     def line(self, output: '_Rotating') -> str:
         """Sum up."""
-        seconds = time.monotonic() - self._began
         return (f'{self._name}: {self._frames} frames ({self._sent} sent by this machine), '
-                f'{self._error_frames} error frames, {seconds:.1f} s, '
-                f'load {self._load(self._bits, seconds):.1f} %: {output.names}')
+                f'{self._error_frames} error frames, {self._seconds:.1f} s, '
+                f'load {self._load(self._bits, self._seconds):.1f} %: {output.names}')
 
     def document(self, output: '_Rotating') -> dict[str, Any]:
         """Sum up for programs."""
-        seconds = time.monotonic() - self._began
         return {
             'bus': self._name, 'file': str(output.last), 'files': output.count,
             'frames': self._frames, 'sent': self._sent, 'error_frames': self._error_frames,
-            'seconds': round(seconds, 3),
-            'load_percent': round(self._load(self._bits, seconds), 1)}
+            'seconds': round(self._seconds, 3),
+            'load_percent': round(self._load(self._bits, self._seconds), 1)}
 
     def _load(self, bits: int, seconds: float) -> float:
         return 100.0 * STUFFING * bits / (max(seconds, 1e-3) * self._bitrate)

@@ -131,6 +131,15 @@ def test_a_table_on_a_full_disk(file: Path, trace: Path, tmp_path: Path,
     assert capsys.readouterr() == ('', f'drive_can: {table}: No space left on device\n')
 
 
+def test_a_picture_on_a_full_disk(file: Path, trace: Path, tmp_path: Path,
+                                  capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip('matplotlib')
+    picture = tmp_path / 'values.svg'
+    picture.symlink_to('/dev/full')
+    assert drive_can('decode', trace, '--params-file', file, '--plot', picture) == 1
+    assert capsys.readouterr() == ('', f'drive_can: {picture}: No space left on device\n')
+
+
 def test_nothing_is_replaced_for_a_trace_that_cannot_be_read(file: Path, trace: Path,
                                                              tmp_path: Path) -> None:
     table = tmp_path / 'values.csv'
