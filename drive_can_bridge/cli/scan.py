@@ -71,6 +71,9 @@ def run(args: Namespace) -> int:
         raise WrongUsage(f'--interface: {reason}')
     bus = BusConfiguration('main', args.interface, args.channel, args.bitrate)
     if args.bitrates:
+        if args.output is not None:
+            raise WrongUsage('--bitrates only counts frames, there is nothing to write: leave -o '
+                             'away')
         return _compare_bitrates(args, bus)
     if args.output is not None and not _may_write(args.output, yes=args.yes):
         return FAILED

@@ -354,6 +354,8 @@ def test_named_families_are_not_asked_where_there_is_a_canopen_node(
     (['--interface', 'nothing', '--channel', 'x'], "'nothing' is no interface of python-can"),
     (['--interface', 'virtual', '--channel', 'x', '--bitrates', '125000'],
      'virtual has no listen-only mode'),
+    (['--interface', 'virtual', '--channel', 'x', '--bitrates', '125000', '-o', 'x.yaml'],
+     '--bitrates only counts frames, there is nothing to write: leave -o away'),
 ])
 def test_wrong_usage(arguments: list[str], text: str,
                      capsys: pytest.CaptureFixture[str]) -> None:
