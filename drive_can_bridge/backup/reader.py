@@ -6,6 +6,7 @@ Output of ``ros2 param dump`` is read as well: it has no head, and ``null`` for 
 not give.
 """
 
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 import re
@@ -75,10 +76,13 @@ def _flat(data: Mapping[str, Any], above: tuple[str, ...]) -> Iterator[tuple[tup
 
 
 def _head(path: Path) -> Head:
-    """Read the comments before the first line that is none."""
+    """Read the comments before the first line that is none, encoded as YAML may be."""
     found: dict[str, str] = {}
-    for line in path.read_text(encoding='utf-8', errors='replace').splitlines():
-        if not line.startswith('#'):
+    data = path.read_bytes()
+    encoding = 'utf-16' if data.startswith((BOM_UTF16_LE, BOM_UTF16_BE)) else 'utf-8-sig'
+    for line in data.decode(encoding, errors='replace').splitlines():
+        line = line.strip()
+        if line and not line.startswith('#'):
             break
         match = _COMMENT.fullmatch(line)
         if match is not None and match[1] in Head.__dataclass_fields__:

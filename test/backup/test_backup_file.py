@@ -59,6 +59,17 @@ def test_read(tmp_path: Path) -> None:
     assert backup.problem('mode', 'no') == f'{tmp_path}/b.yaml:14: mode: no'
 
 
+@pytest.mark.parametrize('encoding', ['utf-8', 'utf-8-sig', 'utf-16'])
+@pytest.mark.parametrize('before', ['', '\n', ' '])
+def test_the_head_is_read_as_the_rest_is(tmp_path: Path, encoding: str, before: str) -> None:
+    file = tmp_path / 'b.yaml'
+    file.write_text(f'{before}# profile_sha256: abc\n# identity: serial_number=7 \u00b5\n'
+                    '/conveyor:\n  ros__parameters:\n    ramp_time: 1.5\n', encoding=encoding)
+    backup = read_backup(file)
+    assert backup.values == {'ramp_time': 1.5}
+    assert (backup.head.profile_sha256, backup.head.identity) == ('abc', 'serial_number=7 \u00b5')
+
+
 def test_rclpy_reads_it_as_ros2_param_load_does(tmp_path: Path) -> None:
     parameter = pytest.importorskip('rclpy.parameter')
     (tmp_path / 'b.yaml').write_text(TEXT)
