@@ -4,10 +4,12 @@ One drive, asked by this process.
 
 A drive that is not there costs a few time-outs, not one for each parameter: while nobody knows
 whether it is there (at the beginning, and after a request of which nothing was answered), it is
-greeted by single reads before anything else.
+greeted by single reads before anything else. What did not answer when its node was to be started
+is not greeted again at once.
 """
 
 from collections.abc import Iterator, Sequence
+import time
 
 from drive_can_bridge.client.conversation import BusConversation
 from drive_can_bridge.client.drive import (
@@ -30,9 +32,11 @@ BLOCK = 8
 AHEAD = 3
 #: parameters that are tried until a drive counts as absent
 TRIES = 3
-#: s between looks whether a node has started, and how many there are
+#: s for which a drive that did not answer at the beginning counts as absent
+_ABSENT_FOR = 2.0
+#: s between looks whether a node has started, and s until there is no other look
 _START_PAUSE = 0.1
-_START_LOOKS = 25
+_START_PATIENCE = 2.5
 _START_HINT = 'a CANopen node that is not operational answers no PKW, --nmt-start starts it'
 
 
@@ -51,6 +55,7 @@ class DirectDrive(Drive):
             drive.profile.parameters, lambda name: family.raw_parameter(drive, name)))
         self._conversation = conversation
         self._session = conversation.sessions[drive.name]
+        self._absent: tuple[float, Failure] | None = None   # since when, and what it said
         self._start_frame = family.make_prober(drive).start_frame()
         self._nmt_start = nmt_start
 
@@ -62,10 +67,14 @@ class DirectDrive(Drive):
         """Start the node where that is wanted; yield what the user should know."""
         if self._nmt_start and self._start_frame is not None:
             self._start()
-            for _ in range(_START_LOOKS):   # until its heartbeat, too, says that it has started
+            end = time.monotonic() + _START_PATIENCE
+            while True:     # until its heartbeat, too, says that it has started
                 self._conversation.listen(_START_PAUSE)
-                if self._greet()[1] is None:
+                failure = self._greet()[1]
+                if failure is None or time.monotonic() >= end:
                     break
+            if failure is not None:
+                self._absent = time.monotonic(), failure
         supervision = self._family.supervision(self._drive)
         if supervision is not None:
             outcome, = self._wait_for((supervision,))
@@ -101,8 +110,7 @@ class DirectDrive(Drive):
         while blocks or waiting:
             if blocks and not self._session.online:
                 # nobody answered last time, or ever: not a time-out for each parameter
-                self._start()   # it may have restarted
-                known, failure = self._greet([each for _, each in blocks[0]])
+                known, failure = self._look([each for _, each in blocks[0]])
                 if failure is not None:
                     for block in blocks:
                         yield from _paired(block, [failure] * len(block))
@@ -123,6 +131,15 @@ class DirectDrive(Drive):
                 blocks.insert(0, block)
             else:
                 yield from _paired(block, outcomes)
+
+    def _look(self, wanted: Sequence[Parameter] = (),
+              ) -> tuple[dict[Parameter, Outcome], Failure | None]:
+        """Greet a drive, which may have restarted, unless that was done just now."""
+        if self._absent is not None and time.monotonic() - self._absent[0] < _ABSENT_FOR:
+            return {}, self._absent[1]
+        self._absent = None
+        self._start()
+        return self._greet(wanted)
 
     def _greet(self, wanted: Sequence[Parameter] = (),
                ) -> tuple[dict[Parameter, Outcome], Failure | None]:
@@ -168,8 +185,7 @@ class DirectDrive(Drive):
 
     def put(self, name: str, parameter: Parameter, value: Value) -> WriteOutcome:
         if not self._session.online:    # what does not answer is told nothing
-            self._start()
-            _, failure = self._greet()
+            _, failure = self._look()
             if failure is not None:
                 return WriteOutcome(name, False, parameter, self._explained(failure.reason))
         request = WriteRequest(((parameter, self._directory.raw_from_user(parameter, value)),))

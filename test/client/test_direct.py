@@ -23,6 +23,7 @@ from drive_can_bridge.exchange.one_master import InUse
 #: everything that only a master sends to these drives, but acyclic requests
 CYCLIC_REQUEST = 0x003FFFF0
 MIXER_PROCESS_DATA = 0x260
+PUMP_REQUEST = 0x505
 
 
 @pytest.fixture(scope='module')
@@ -195,6 +196,20 @@ def test_a_silent_drive_costs_little(tmp_path: Path) -> None:
             assert len(world.seen()) - before == 18
             world.drives['conveyor'].fault('ok')
             assert drives['conveyor'].read('ramp_time')['ramp_time'].ok
+
+
+def test_a_silent_drive_that_is_to_be_started_costs_little(tmp_path: Path) -> None:
+    with a_world(tmp_path, pump={**PUMP, 'parameter_timeout': 0.3}) as world:
+        world.drives['pump'].fault('silent')
+        with open_drives(world.file, nmt_start=True) as drives:
+            assert drives['pump'].identity() == ''
+            assert set(reasons(drives['pump'].read()).values()) == {'no answer; drive offline'}
+            # three parameters, three times each, once
+            requests = [each for each in world.seen()
+                        if each.identifier == PUMP_REQUEST and any(each.data)]
+            assert len(requests) == 9
+            world.drives['pump'].fault('ok')
+            wait_for(lambda: drives['pump'].read('trip_code')['trip_code'].ok, 'an answer')
 
 
 def test_a_drive_that_goes_away_in_the_middle(tmp_path: Path) -> None:
