@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import math
 
 from drive_can_bridge.backup.document import Backup
-from drive_can_bridge.backup.settings import in_order, is_setting, mode_bits, ModeBits, settings_of
+from drive_can_bridge.backup.settings import in_order, is_setting, settings_of
 from drive_can_bridge.backup.values import raw_in_file
 from drive_can_bridge.client.drive import Drive, ReadOutcome
 from drive_can_bridge.core.errors import ConfigurationError, ValueRefused
@@ -55,28 +55,25 @@ class Side:
 
     :param settings: by name, in order.
     :param parameters: what is known of them.
-    :param bits: bits of them that count for nothing.
     :param left_out: names in a file that are no settings.
     """
 
     settings: Mapping[str, Setting]
     parameters: Mapping[str, Parameter]
-    bits: Mapping[str, ModeBits]
     left_out: tuple[str, ...] = ()
 
 
-def side_of_drive(drive: Drive, outcomes: Mapping[str, ReadOutcome]) -> Side:
+def side_of_drive(outcomes: Mapping[str, ReadOutcome]) -> Side:
     """Take the settings of a drive that were read; those that were not are missing."""
     found = {name: outcome for name, outcome in outcomes.items() if outcome.ok}
     return Side({name: Setting(outcome.value, outcome.raw) for name, outcome in found.items()
                  if outcome.value is not None},
                 {name: outcome.parameter for name, outcome in found.items()
-                 if outcome.parameter is not None},
-                mode_bits(drive.facts.restore))
+                 if outcome.parameter is not None})
 
 
 def side_of_file(backup: Backup, *, find: Callable[[str], Parameter | None],
-                 counts: Callable[[str], bool], bits: Mapping[str, ModeBits]) -> Side:
+                 counts: Callable[[str], bool]) -> Side:
     """
     Take the settings of a file.
 
@@ -102,13 +99,12 @@ def side_of_file(backup: Backup, *, find: Callable[[str], Parameter | None],
                 problems.append(backup.problem(name, str(error)))
     if problems:
         raise ConfigurationError(problems)
-    return Side(settings, parameters, bits, tuple(left_out))
+    return Side(settings, parameters, tuple(left_out))
 
 
 def side_of_file_and_drive(backup: Backup, drive: Drive) -> Side:
     """Take the settings of a file, as the profile of a drive knows them."""
-    return side_of_file(backup, find=drive.find, counts=lambda name: is_setting(drive, name),
-                        bits=mode_bits(drive.facts.restore))
+    return side_of_file(backup, find=drive.find, counts=lambda name: is_setting(drive, name))
 
 
 def names_to_read(drive: Drive, *others: Backup) -> tuple[str, ...]:
@@ -126,23 +122,13 @@ def differences(first: Side, second: Side) -> list[Difference]:
     for name in names:
         one, other = first.settings.get(name), second.settings.get(name)
         parameter = first.parameters.get(name) or second.parameters.get(name)
-        bits = first.bits.get(name) or second.bits.get(name)
-        if one is None or other is None or not _same(one, other, parameter, bits):
+        if one is None or other is None or not _same(one, other, parameter):
             found.append(Difference(name, parameter, one, other))
     return found
 
 
-def _same(one: Setting, other: Setting, parameter: Parameter | None,
-          bits: ModeBits | None) -> bool:
+def _same(one: Setting, other: Setting, parameter: Parameter | None) -> bool:
     if one.raw is None or other.raw is None or parameter is None:
         return type(one.value) is type(other.value) and math.isclose(
             one.value, other.value, rel_tol=_RELATIVE_TOLERANCE)
-    return same_raw(parameter, one.raw, other.raw, bits)
-
-
-def same_raw(parameter: Parameter, one: int, other: int, bits: ModeBits | None = None) -> bool:
-    """Tell whether raw integers of a parameter are the same, but for bits of a mode."""
-    if bits is None:
-        return one == other
-    return (bits.without(parameter.word_from_raw(one))
-            == bits.without(parameter.word_from_raw(other)))
+    return one.raw == other.raw

@@ -7,17 +7,17 @@ First the file alone (:func:`problems_in`), then the file against what the drive
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
-from drive_can_bridge.backup.comparison import same_raw
 from drive_can_bridge.backup.document import Backup, Head
-from drive_can_bridge.backup.settings import in_order, is_setting, mode_bits
+from drive_can_bridge.backup.settings import in_order, is_setting, mode_bits, ModeBits
 from drive_can_bridge.backup.values import raw_in_file
 from drive_can_bridge.client.drive import Drive, ReadOutcome
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.roles import Role
+from drive_can_bridge.core.words import value_text
 
 
 class LeftAlone(Enum):
@@ -42,6 +42,8 @@ _LEFT_ALONE = {
     LeftAlone.CONTROL: 'the control word',
     LeftAlone.MODE: "set by the section 'restore' of its profile",
 }
+_ENDED = "becomes {}: the mode that the section 'restore' of its profile sets is ended"
+_NO_MODE = ModeBits(0, 0)
 #: names that may all be misspelt
 _FEW = 3
 
@@ -49,20 +51,29 @@ _FEW = 3
 @dataclass(frozen=True, slots=True)
 class Change:
     """
-    A setting that is not as in the file.
+    A setting that is not as in the file, or a mode that the drive was left in.
 
-    :param wanted: value in the file, of which only the setting counts.
+    :param wanted: value in the file, of which only the setting counts; None: it has none.
     :param word: what is to be written, as unsigned word.
     :param found: value that the drive has.
     :param left_alone: why it will not be written; None: it will.
+    :param not_all: its bits of a mode will not be as in the file.
     """
 
     name: str
     parameter: Parameter
-    wanted: Value
+    wanted: Value | None
     word: int
     found: Value
     left_alone: LeftAlone | None = None
+    not_all: bool = False
+
+    @property
+    def note(self) -> str:
+        """What is to be said of it; '' where it will be as in the file."""
+        if self.left_alone is not None:
+            return self.left_alone.text
+        return _ENDED.format(value_text(self.value)) if self.not_all else ''
 
     @property
     def value(self) -> Value:
@@ -150,7 +161,7 @@ def plan_restore(backup: Backup, drive: Drive, outcomes: Mapping[str, ReadOutcom
     """
     Compare a file that is all right with what was read of the drive.
 
-    :param outcomes: of :func:`names_to_restore`.
+    :param outcomes: of :func:`names_to_read`.
     """
     bits = mode_bits(drive.facts.restore)
     changes: list[Change] = []
@@ -158,24 +169,29 @@ def plan_restore(backup: Backup, drive: Drive, outcomes: Mapping[str, ReadOutcom
     same, unread = [], []
     words: dict[str, int] = {}
     wanted: dict[str, Value] = {}
-    for name in names_to_restore(backup, drive):
-        parameter, outcome, value = drive.find(name), outcomes[name], backup.values[name]
+    settings = names_to_restore(backup, drive)
+    for name in names_to_read(backup, drive):
+        parameter, outcome = drive.find(name), outcomes[name]
         if parameter is None or outcome.raw is None or outcome.value is None:
             unread.append(outcome)
             continue
-        raw, own_bits = raw_in_file(parameter, value), bits.get(name)
-        word = parameter.word_from_raw(raw)
-        if own_bits is not None:
-            word = own_bits.with_setting(word)
-        left_alone = why_left_alone(drive, name, include_protected=include_protected)
-        if left_alone is None:
-            words[name], wanted[name] = word, value_of_word(parameter, word)
-        if same_raw(parameter, raw, outcome.raw, own_bits):
-            same.append(name)
-            continue
+        found = in_file = parameter.word_from_raw(outcome.raw)
+        value, left_alone = None, None
+        if name in settings:
+            value = backup.values[name]
+            in_file = parameter.word_from_raw(raw_in_file(parameter, value))
+            left_alone = why_left_alone(drive, name, include_protected=include_protected)
+        word = bits.get(name, _NO_MODE).to_write(found, in_file if left_alone is None else found)
         change = Change(name, parameter, value, word,   # type: ignore[arg-type]
-                        outcome.value, left_alone)
-        (changes if left_alone is None else kept).append(change)
+                        outcome.value, left_alone, not_all=in_file != word)
+        if left_alone is None and (name in settings or word != found):
+            words[name], wanted[name] = word, change.value
+        if word != found:
+            changes.append(replace(change, left_alone=None))
+        elif in_file != found:
+            kept.append(replace(change, left_alone=left_alone or LeftAlone.MODE))
+        elif name in settings:
+            same.append(name)
     return RestorePlan(tuple(changes), tuple(kept), tuple(same), words, wanted,
                        tuple(unread))
 
@@ -183,6 +199,16 @@ def plan_restore(backup: Backup, drive: Drive, outcomes: Mapping[str, ReadOutcom
 def names_to_restore(backup: Backup, drive: Drive) -> tuple[str, ...]:
     """Return the settings of a file, in the order in which they are written."""
     return in_order(drive, [name for name in backup.values if is_setting(drive, name)])
+
+
+def names_to_read(backup: Backup, drive: Drive) -> tuple[str, ...]:
+    """Return what to read before: these settings, and what tells the mode of the drive."""
+    modes = [name for name, bits in mode_bits(drive.facts.restore).items() if bits.ended]
+    known = [(name, drive.find(name)) for name in modes]
+    return in_order(drive, list(dict.fromkeys([
+        *names_to_restore(backup, drive),
+        *(name for name, parameter in known
+          if parameter is not None and parameter.readable and parameter.writable)])))
 
 
 def why_left_alone(drive: Drive, name: str, *, include_protected: bool) -> LeftAlone | None:

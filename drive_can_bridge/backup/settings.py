@@ -4,8 +4,8 @@ Which parameters of a drive are settings: what a backup holds, and a restored on
 
 Setpoints, the control word, and what process data alone carry, are none: no command writes them.
 Neither are the bits that the profile's section ``restore`` sets and clears: they say in which mode
-a drive is, not how it is set up. A parameter with such bits comes last, as its other bits are
-written with them.
+a drive is, not how it is set up. No file brings them back; a mode that a drive was left in is
+ended. A parameter with such bits comes last, as its other bits are written with them.
 """
 
 from dataclasses import dataclass
@@ -23,18 +23,23 @@ class ModeBits:
 
     :param mask: those bits.
     :param at_end: what they are afterwards.
+    :param ended: those of them in which a drive is left that was not taken out of the mode: set
+        before, and otherwise afterwards.
     """
 
     mask: int
     at_end: int
+    ended: int = 0
 
-    def without(self, word: int) -> int:
-        """Return a word without the bits of the mode: what is left is a setting."""
-        return word & ~self.mask
+    def to_write(self, found: int, wanted: int) -> int:
+        """
+        Return the word that a drive is to have in the end.
 
-    def with_setting(self, word: int) -> int:
-        """Return the word to be written at the end, given that of a backup."""
-        return self.without(word) | self.at_end
+        :param found: what it has: also the result where it has the setting and is not in the mode.
+        :param wanted: in the backup.
+        """
+        word = wanted & ~self.mask | self.at_end
+        return word if (found ^ word) & (~self.mask | self.ended) else found
 
 
 def mode_bits(table: RestoreTable | None) -> dict[str, ModeBits]:
@@ -42,8 +47,9 @@ def mode_bits(table: RestoreTable | None) -> dict[str, ModeBits]:
     found: dict[str, ModeBits] = {}
     for step in (*table.before, *table.after) if table is not None else ():
         known = found.get(step.parameter, ModeBits(0, 0))
-        found[step.parameter] = ModeBits(known.mask | step.mask,
-                                         known.at_end & ~step.mask | step.bits)
+        at_end = known.at_end & ~step.mask | step.bits
+        found[step.parameter] = ModeBits(
+            known.mask | step.mask, at_end, known.ended | (known.at_end ^ at_end) & known.mask)
     return found
 
 

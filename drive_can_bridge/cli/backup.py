@@ -11,7 +11,9 @@ from drive_can_bridge.backup.document import head_of, written
 from drive_can_bridge.backup.settings import settings_of
 from drive_can_bridge.cli.command import complain, FAILED, say, WrongUsage
 from drive_can_bridge.cli.completion import complete_drives
-from drive_can_bridge.cli.drives import add_words, chosen, opened, read_all, source_of
+from drive_can_bridge.cli.drives import (
+    add_words, chosen, opened, read_all, source_of, unread,
+)
 from drive_can_bridge.cli.questions import agreed
 from drive_can_bridge.cli.tables import print_json
 from drive_can_bridge.cli.whole_file import differs, write_whole
@@ -126,11 +128,11 @@ def _text(args: Namespace, drive: Drive) -> _Made | None:
     names = settings_of(drive)
     outcomes = read_all(drive, names)
     settings: list[tuple[Parameter, int]] = []
-    unread: list[tuple[str, str]] = []
+    missing: list[tuple[str, str]] = []
     useless: list[tuple[str, str]] = []
     for name, outcome in outcomes.items():
         if outcome.parameter is None or outcome.raw is None:
-            unread.append((name, outcome.reason))
+            missing.append((name, outcome.reason))
             continue
         reason = _why_not_restorable(drive, outcome)
         if reason:
@@ -139,16 +141,17 @@ def _text(args: Namespace, drive: Drive) -> _Made | None:
             settings.append((outcome.parameter, outcome.raw))
     for name, reason in useless:
         complain(f'warning: {drive.name}: {name} is left out: {reason}')
-    for name, reason in unread:
-        complain(f'{drive.name}: {name} could not be read: {reason}')
-    if unread and not args.partial:
-        complain(f'{drive.name}: no file was written; --partial writes one without '
-                 f'{"it" if len(unread) == 1 else "them"}')
+    for line in unread(drive, outcomes.values()):
+        complain(line)
+    if missing and not args.partial:
+        advice = ('' if not settings else '; --partial writes one without '
+                  f'{"it" if len(missing) == 1 else "them"}')
+        complain(f'{drive.name}: no file was written{advice}')
         return None
     if not settings:
         complain(f'{drive.name}: has no settings that could be written to a file')
         return None
-    return _Made(drive, settings, [*unread, *useless])
+    return _Made(drive, settings, [*missing, *useless])
 
 
 def _why_not_restorable(drive: Drive, outcome: ReadOutcome) -> str:

@@ -12,10 +12,11 @@ from drive_can_bridge.backup.comparison import (
 )
 from drive_can_bridge.backup.document import Backup
 from drive_can_bridge.backup.reader import read_backup
-from drive_can_bridge.backup.settings import mode_bits
 from drive_can_bridge.cli.command import complain, say, WrongUsage
 from drive_can_bridge.cli.completion import complete_drives
-from drive_can_bridge.cli.drives import add_words, chosen_one, opened, read_all, source_of
+from drive_can_bridge.cli.drives import (
+    add_words, chosen_one, opened, read_all, source_of, unread,
+)
 from drive_can_bridge.cli.tables import print_json, print_table
 from drive_can_bridge.client.drive import Drive, Drives
 from drive_can_bridge.configuration.profiles import ProfileStore
@@ -109,11 +110,10 @@ def _drive(drive: Drive, files: Sequence[Backup]) -> Side:
     """
     names = names_to_read(drive, *files)
     outcomes = read_all(drive, names)
-    unread = [f'{drive.name}: {outcome.name} could not be read: {outcome.reason}'
-              for outcome in outcomes.values() if not outcome.ok]
-    if unread:
-        raise DriveCanError('\n'.join(unread))
-    return side_of_drive(drive, outcomes)
+    problems = unread(drive, outcomes.values())
+    if problems:
+        raise DriveCanError('\n'.join(problems))
+    return side_of_drive(outcomes)
 
 
 def _profile_of(backup: Backup) -> Profile | None:
@@ -127,12 +127,11 @@ def _profile_of(backup: Backup) -> Profile | None:
 
 def _file_alone(backup: Backup, profile: Profile | None) -> Side:
     if profile is None:
-        return side_of_file(backup, find=lambda name: None, counts=lambda name: True, bits={})
+        return side_of_file(backup, find=lambda name: None, counts=lambda name: True)
     parameters = profile.parameters
     return side_of_file(
         backup, find=parameters.get,
-        counts=lambda name: parameters[name].readable and parameters[name].writable,
-        bits=mode_bits(profile.restore))
+        counts=lambda name: parameters[name].readable and parameters[name].writable)
 
 
 def _tell_profile(backup: Backup, drive: Drive) -> None:

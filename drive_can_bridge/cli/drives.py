@@ -6,7 +6,7 @@ Positional arguments of such a command are called ``words``; options may stand b
 """
 
 from argparse import ArgumentParser, Namespace
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -127,6 +127,16 @@ def opened(source: Source, names: Sequence[str]) -> Iterator[Drives]:
         for warning in drives.warnings:
             complain(f'warning: {warning}')
         yield drives
+
+
+def unread(drive: Drive, outcomes: Iterable[ReadOutcome]) -> list[str]:
+    """Say what could not be read: a line each, or one where nothing could be for one reason."""
+    found = list(outcomes)
+    wrong = [outcome for outcome in found if not outcome.ok]
+    if 1 < len(wrong) == len(found) and len({outcome.reason for outcome in wrong}) == 1:
+        return [f'{drive.name}: nothing could be read: {wrong[0].reason}']
+    return [f'{drive.name}: {outcome.name} could not be read: {outcome.reason}'
+            for outcome in wrong]
 
 
 def read_all(drive: Drive, names: Sequence[str]) -> dict[str, ReadOutcome]:

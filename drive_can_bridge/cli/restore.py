@@ -2,26 +2,29 @@
 """``drive_can restore``: the settings of a backup back into a drive."""
 
 from argparse import ArgumentParser, Namespace
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 import time
 
 from drive_can_bridge.backup.document import Backup
 from drive_can_bridge.backup.plan import (
-    Change, names_to_restore, other_type, plan_restore, problems_in, RestorePlan, says_nothing,
+    Change, LeftAlone, names_to_read, other_type, plan_restore, problems_in, RestorePlan, says_nothing,
     strangers, why_left_alone,
 )
 from drive_can_bridge.backup.reader import read_backup
-from drive_can_bridge.backup.restore import Restorer, RestoreResult
+from drive_can_bridge.backup.restore import NotAsInFile, Restorer, RestoreResult
 from drive_can_bridge.backup.settings import is_setting
 from drive_can_bridge.cli.command import complain, FAILED, say, WrongUsage
 from drive_can_bridge.cli.completion import complete_drives
-from drive_can_bridge.cli.drives import add_words, chosen_one, opened, read_all, source_of
+from drive_can_bridge.cli.drives import (
+    add_words, chosen_one, opened, read_all, source_of, unread,
+)
 from drive_can_bridge.cli.progress import Bar
 from drive_can_bridge.cli.questions import agreed, must_be_answerable
 from drive_can_bridge.cli.tables import print_json, print_table
-from drive_can_bridge.client.drive import Drive, Enabled, Source
+from drive_can_bridge.client.drive import Drive, Enabled, ReadOutcome, Source
 from drive_can_bridge.core.parameters import Parameter, Storage, Value
+from drive_can_bridge.core.requests import Failure, is_answer
 from drive_can_bridge.core.words import value_text
 from drive_can_bridge.process.interruption import Interruption, postponed
 
@@ -30,6 +33,7 @@ _PATIENCE = 2.0
 _NOTHING = 'Nothing was written'
 _WHY_VOLATILE = {True: 'its profile says: storage: ram',
                  False: 'persist_writes: true in its configuration would write to EEPROM'}
+_NONE = '-'
 _HEADINGS = ('parameter', 'drive', 'file', 'unit', '')
 
 
@@ -96,15 +100,11 @@ def _target(backup: Backup, word: str | None, source: Source) -> str:
 def _restore(args: Namespace, backup: Backup, drive: Drive) -> int:
     if not _may_be(args, backup, drive):
         return FAILED
-    names = names_to_restore(backup, drive)
+    names = names_to_read(backup, drive)
     outcomes = read_all(drive, names)
     plan = plan_restore(backup, drive, outcomes, include_protected=args.include_protected)
     if plan.unread:
-        for outcome in plan.unread:
-            complain(f'{drive.name}: {outcome.name} could not be read: '
-                     f'{outcome.reason}')
-        complain(f'{_NOTHING}.')
-        return FAILED
+        return _could_not_read(drive, outcomes)
     _show(args, backup, drive, plan)
     if args.dry_run or not plan.changes:
         return 0
@@ -132,7 +132,14 @@ def _may_be(args: Namespace, backup: Backup, drive: Drive) -> bool:
         complain(f'{backup.file}: of another drive type: {other}' if other else
                  '\n'.join(problems))
         return False
-    differing = strangers(backup, drive, _identity(backup, drive))
+    identity = _identity(backup, drive)
+    if backup.head.identity and not identity:
+        # maybe it says nothing at all: then nobody knows whether it is another one
+        asked = read_all(drive, names_to_read(backup, drive)[:1])
+        if any(not (each.ok or is_answer(Failure(each.reason))) for each in asked.values()):
+            _could_not_read(drive, asked)
+            return False
+    differing = strangers(backup, drive, identity)
     for text in differing:
         complain(f'{backup.file}: {text}')
     if differing and not (args.force or args.dry_run):
@@ -152,12 +159,17 @@ def _may_be(args: Namespace, backup: Backup, drive: Drive) -> bool:
     return True
 
 
+def _could_not_read(drive: Drive, outcomes: Mapping[str, ReadOutcome]) -> int:
+    complain('\n'.join([*unread(drive, outcomes.values()), f'{_NOTHING}.']))
+    return FAILED
+
+
 def _identity(backup: Backup, drive: Drive) -> str:
     """Return who a drive is; a bridge that has just started is about to find out."""
     end = time.monotonic() + _PATIENCE
     while True:
         found = drive.identity()
-        if found or not backup.head.identity or time.monotonic() > end:
+        if found or not (drive.facts.through and backup.head.identity) or time.monotonic() > end:
             return found
         time.sleep(_PATIENCE / 10.0)
 
@@ -181,8 +193,9 @@ def _show(args: Namespace, backup: Backup, drive: Drive, plan: RestorePlan) -> N
                         change.left_alone.value if change.left_alone else None})
     elif differing:
         print_table(_HEADINGS, [
-            (change.name, value_text(change.found), value_text(change.wanted),
-             change.parameter.unit, change.left_alone.text if change.left_alone else '')
+            (change.name, value_text(change.found),
+             _NONE if change.wanted is None else value_text(change.wanted),
+             change.parameter.unit, change.note)
             for change in differing], numbers=('drive', 'file'))
     for name in backup.values:
         why = why_left_alone(drive, name, include_protected=True)
@@ -202,9 +215,10 @@ def _report(args: Namespace, drive: Drive, plan: RestorePlan, result: RestoreRes
     if args.json:
         for change in plan.changes:
             if change.name not in wrong and result.stopped is None:
-                _print_outcome(drive, change.name, True, change.wanted, change.wanted, '')
+                _print_outcome(drive, change.name, True, change.value, change.value, '')
         for each in result.wrong:
-            _print_outcome(drive, each.name, False, each.found, each.wanted, each.reason)
+            _print_outcome(drive, each.name, False, each.found, each.wanted,
+                           _reason(each, result))
     for text in result.steps:
         complain(f'{drive.name}: {text}. Look at it by hand: the drive may still be in '
                  'the mode in which settings are written')
@@ -221,21 +235,28 @@ def _report(args: Namespace, drive: Drive, plan: RestorePlan, result: RestoreRes
             f'{_list(result.stopped)}. Repeat the command to go on')
         return interrupted.exit_code
     if wrong:
-        complain(f'{drive.name}: confirmed: {_list(result.written)}; not as in the '
-                 'file:')
+        confirmed = [name for name in result.written if name not in wrong]
+        complain(f'{drive.name}: confirmed: {_list(confirmed)}; not as in the file:')
         for each in result.wrong:
             found = 'unknown' if each.found is None else _with_unit(plan, each.name, each.found)
-            reason = f': {each.reason}' if each.reason else ''
+            reason = _reason(each, result)
             complain(f'  {each.name}: {found} instead of '
-                     f'{_with_unit(plan, each.name, each.wanted)}{reason}')
+                     f'{_with_unit(plan, each.name, each.wanted)}{reason and f": {reason}"}')
     elif result.trouble is not None:
         complain(f'{drive.name}: written before: {_list(result.written)}')
     if not result.complete:
         return FAILED
     if not args.json:
+        modes = [change.name for change in (*plan.changes, *plan.kept) if change.not_all
+                 and change.wanted is not None and change.left_alone in (None, LeftAlone.MODE)]
         say(f'{drive.name}: {_count(plan.changes)} written, {len(plan.words)} read '
-            'back: as in the file')
+            f'back: as in the file{f", but for the mode in {_list(modes)}" if modes else ""}')
     return 0
+
+
+def _reason(wrong: NotAsInFile, result: RestoreResult) -> str:
+    ignored = wrong.found is not None and wrong.name in result.written
+    return wrong.reason or ('acknowledged, and not taken' if ignored else '')
 
 
 def _is_volatile(drive: Drive, parameter: Parameter) -> bool:

@@ -113,9 +113,9 @@ class TestBackup:
         shop.drives['conveyor'].fault('silent')
         said = command('backup', 'conveyor', '-o', 'b.yaml')
         assert said.code == 1
-        assert 'conveyor: ramp_time could not be read: no answer; drive offline' in said.errors
-        assert said.errors[-1] == ('conveyor: no file was written; --partial writes one without '
-                                   'them')
+        assert said.errors == [
+            'conveyor: nothing could be read: no answer; drive offline',
+            'conveyor: no file was written']
         assert not Path('b.yaml').exists()
         said = command('backup', 'conveyor', '-o', 'b.yaml', '--partial')
         assert said.code == 1
@@ -302,6 +302,19 @@ class TestRestore:
             'drive': 'conveyor', 'parameter': 'ramp_time', 'ok': False, 'found': 1.0,
             'wanted': 5.0, 'reason': 'read back 1 instead of 5'}
 
+    def test_what_the_drive_acknowledges_and_does_not_take(self, shop: Shop,
+                                                           command: Command) -> None:
+        shop.drives['pump'].set_value('general_configuration', 0)
+        shop.drives['pump'].fault('stuck=flc1_ratio')
+        file = shop.write_backup('pump', flc1_ratio=50, flc2_ratio=40)
+        said = command('restore', str(file), '--yes')
+        assert said.code == 1
+        assert said.errors[-2:] == [
+            'pump: confirmed: flc2_ratio; not as in the file:',
+            '  flc1_ratio: 33 % instead of 50 %: acknowledged, and not taken']
+        said = command('restore', str(file), '--yes', '--json')
+        assert said.documents[-1]['reason'] == 'acknowledged, and not taken'
+
     def test_protected_ones(self, shop: Shop, command: Command) -> None:
         file = shop.write_backup('mixer', can_address=7, acceleration_time=1.0)
         said = command('restore', str(file), '--yes')
@@ -320,6 +333,14 @@ class TestRestore:
             'conveyor: ramp_time could not be read: no answer; drive offline',
             'Nothing was written.']
 
+    def test_one_that_is_not_there_is_not_said_to_be_another_one(self, shop: Shop,
+                                                                 command: Command) -> None:
+        command('backup', 'pump', '-o', 'pump.yaml')
+        shop.drives['pump'].fault('off')
+        assert command('restore', 'pump.yaml', '--yes') == (1, [], [
+            'pump: control_register_2 could not be read: no answer; drive offline',
+            'Nothing was written.'])
+
     @pytest.mark.parametrize(('words', 'code', 'error'), [
         (['b.yaml'], 1, 'b.yaml: No such file or directory'),
         (['all_families.yaml'], 1, 'all_families.yaml: is a parameter file of a bridge'),
@@ -335,6 +356,51 @@ class TestRestore:
         assert said.code == code
         assert error in said.errors[0]
         assert all(drive.requests == 0 for drive in shop.drives.values())
+
+
+class TestMode:
+    """An LTMR that somebody has left in its configuration mode."""
+
+    def test_is_a_difference_and_restored(self, shop: Shop, command: Command) -> None:
+        pump = shop.drives['pump']
+        pump.set_value('general_configuration', 0)
+        command('backup', 'pump', '-o', 'b.yaml')
+        pump.set_value('general_configuration', 1)
+        assert command('compare', 'b.yaml', 'pump') == (1, [
+            'parameter              b.yaml  pump', 'general_configuration       0     1'],
+            [])
+        row = ['parameter              drive  file', 'general_configuration      1     0']
+        assert command('restore', 'b.yaml', '--dry-run') == (0, row, [])
+        assert pump.wear == {}
+        said = command('restore', 'b.yaml', '--yes')
+        assert said == (0, [*row, 'pump: 1 setting written, 6 read back: as in the file'], [])
+        assert shop.values('pump', 'general_configuration') == (0,)
+        assert command('compare', 'b.yaml', 'pump') == (0, ['the same'], [])
+
+    def test_a_file_of_it_is_not_said_to_be_restored(self, shop: Shop, command: Command) -> None:
+        pump = shop.drives['pump']
+        pump.set_value('general_configuration', 1)
+        command('backup', 'pump', '-o', 'b.yaml')
+        said = command('restore', 'b.yaml', '--yes')
+        assert said.lines[1].split(maxsplit=3) == [
+            'general_configuration', '1', '1', "becomes 0: the mode that the section 'restore' of "
+            'its profile sets is ended']
+        assert said.lines[2:] == ['pump: 1 setting written, 6 read back: as in the file, but for '
+                                  'the mode in general_configuration']
+        assert command('compare', 'b.yaml', 'pump').code == 1
+        said = command('restore', 'b.yaml', '--yes', '--json')
+        assert (said.code, [(each['wanted'], each['left_alone']) for each in said.documents]) == (
+            0, [(1, 'mode')])
+        said = command('restore', 'b.yaml', '--yes')
+        assert said.lines[-1] == 'pump: nothing to restore, 6 settings are as in b.yaml'
+        assert shop.values('pump', 'general_configuration') == (0,)
+
+    def test_is_told_of_a_file_alone(self, shop: Shop, command: Command) -> None:
+        command('backup', 'pump', '-o', 'a.yaml')
+        text = Path('a.yaml').read_text()
+        Path('b.yaml').write_text(text.replace('general_configuration: 1',
+                                               'general_configuration: 0'))
+        assert command('compare', 'a.yaml', 'b.yaml', direct=False).code == 1
 
 
 class TestCompare:
@@ -356,7 +422,7 @@ class TestCompare:
         shop.drives['conveyor'].fault('silent')
         said = command('compare', 'conveyor', str(file))
         assert said.code == 2
-        assert 'conveyor: ramp_time could not be read: no answer; drive offline' in said.errors
+        assert said.errors == ['conveyor: nothing could be read: no answer; drive offline']
 
     def test_nothing_in_common(self, shop: Shop, command: Command) -> None:
         command('backup', 'mixer', '-o', 'mixer.yaml')

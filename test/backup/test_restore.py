@@ -9,7 +9,7 @@ from backup_builders import Shop
 import pytest
 
 from drive_can_bridge.backup.plan import (
-    LeftAlone, names_to_restore, plan_restore, problems_in, RestorePlan, strangers,
+    LeftAlone, names_to_read, plan_restore, problems_in, RestorePlan, strangers,
 )
 from drive_can_bridge.backup.reader import read_backup
 from drive_can_bridge.backup.restore import Restorer, RestoreResult
@@ -21,7 +21,7 @@ MODE = 0x0001
 def planned(drive: Drive, file: Path, *, include_protected: bool = False) -> RestorePlan:
     backup = read_backup(file)
     assert problems_in(backup, drive) == []
-    return plan_restore(backup, drive, drive.read(*names_to_restore(backup, drive)),
+    return plan_restore(backup, drive, drive.read(*names_to_read(backup, drive)),
                         include_protected=include_protected)
 
 
@@ -62,6 +62,8 @@ class TestSettings:
     ])
     def test_one_that_is_taken_after_another_one(self, shop: Shop, name: str, first: str,
                                                  second: str, value: int) -> None:
+        if name == 'pump':
+            shop.drives[name].set_value('general_configuration', 0)
         shop.drives[name].fault(f'needs={first}:{second}')
         file = shop.write_backup(name, **{first: value, second: value})
         with shop.reached(name) as drive:
@@ -81,6 +83,7 @@ class TestSettings:
         assert 'refused' in wrong.reason
 
     def test_what_is_not_taken_in_silence_is_listed(self, shop: Shop) -> None:
+        shop.drives['pump'].set_value('general_configuration', 0)
         shop.drives['pump'].fault('stuck=network_fallback')     # acknowledged, and nothing happens
         file = shop.write_backup('pump', network_fallback=3, flc2_ratio=40)
         with shop.reached('pump') as drive:
@@ -143,6 +146,44 @@ class TestMode:
         file = shop.write_backup('pump', general_configuration=0x0011, flc1_ratio=33.0)
         with shop.reached('pump') as drive:
             assert planned(drive, file).changes == ()
+
+    @pytest.mark.parametrize(('found', 'values', 'told', 'end'), [
+        (0x0011, {'general_configuration': 0x0010}, '', 0x0010),
+        (0x0011, {'general_configuration': 0x0011}, 'becomes 16: the mode', 0x0010),
+        (0x0011, {'general_configuration': 0x0021}, 'becomes 32: the mode', 0x0020),
+        (0x0011, {}, 'becomes 16: the mode', 0x0010),       # whatever is in the file
+    ])
+    def test_a_drive_that_was_left_in_it_is_taken_out(
+            self, shop: Shop, found: int, values: dict[str, object], told: str, end: int) -> None:
+        pump = shop.drives['pump']
+        pump.set_value('general_configuration', found)
+        file = shop.write_backup('pump', flc1_ratio=33.0, **values)
+        with shop.reached('pump') as drive:
+            change, = planned(drive, file).changes
+            assert (change.name, change.found) == ('general_configuration', found)
+            assert change.wanted == values.get('general_configuration')
+            assert change.note.startswith(told) and bool(change.note) == bool(told)
+            result = restored(drive, file)
+            assert planned(drive, file).changes == ()
+        assert (result.complete, result.written) == (True, ['general_configuration'])
+        assert self.mode(shop) == end
+        assert pump.wear == {'general_configuration': 1}
+
+    def test_that_does_not_end_is_told(self, shop: Shop) -> None:
+        shop.drives['pump'].set_value('general_configuration', 0x0011)
+        shop.drives['pump'].fault('stuck=general_configuration')
+        file = shop.write_backup('pump', flc1_ratio=33.0)
+        with shop.reached('pump') as drive:
+            wrong, = restored(drive, file).wrong
+        assert (wrong.name, wrong.wanted, wrong.found) == ('general_configuration', 0x10, 0x11)
+
+    def test_in_a_file_it_is_left_alone_and_not_as_in_the_file(self, shop: Shop) -> None:
+        file = shop.write_backup('pump', general_configuration=0x0011, flc1_ratio=33.0)
+        with shop.reached('pump') as drive:
+            plan = planned(drive, file)
+        assert [(each.name, each.left_alone) for each in plan.kept] == [
+            ('general_configuration', LeftAlone.MODE)]
+        assert plan.same == ('flc1_ratio',)
 
     def test_that_is_refused(self, shop: Shop) -> None:
         shop.drives['pump'].fault('refuse=general_configuration')
