@@ -3,6 +3,7 @@
 
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
+import re
 
 from drive_can_bridge.cli.command import FAILED, WrongUsage
 from drive_can_bridge.cli.completion import complete_words
@@ -10,10 +11,13 @@ from drive_can_bridge.cli.drives import add_words, opened, source_of, split_word
 from drive_can_bridge.cli.progress import Bar
 from drive_can_bridge.cli.tables import print_json, print_table
 from drive_can_bridge.client.drive import Drive, Drives, WriteOutcome
+from drive_can_bridge.configuration.scalars import read_scalar
 from drive_can_bridge.core.parameters import Parameter, Value, ValueKind
 
 _HEADINGS = ('drive', 'name', 'value', 'unit', 'number', 'storage', 'result')
-_BOOLS = {'true': True, '1': True, 'false': False, '0': False}
+_BITS = {'1': True, '0': False}
+#: octal to parameter files, and decimal to most people
+_AMBIGUOUS = re.compile(r'\s*[+-]?0[0-9]')
 
 
 def define(parser: ArgumentParser) -> None:
@@ -90,13 +94,15 @@ def _write_one(drive: Drive, name: str, text: str,
 
 
 def _value(parameter: Parameter, text: str) -> Value | None:
-    """Read a value as the parameter wants it; None: it is no such thing."""
+    """Read a value as a parameter file would; None: it is none of the parameter's kind."""
+    value = None if _AMBIGUOUS.match(text) else read_scalar(text)
     if parameter.kind is ValueKind.BOOL:
-        return _BOOLS.get(text.lower())
-    try:
-        return float(text) if parameter.kind is ValueKind.DOUBLE else int(text, 0)
-    except ValueError:
+        return value if isinstance(value, bool) else _BITS.get(text)
+    if isinstance(value, (bool, str)):
         return None
+    if parameter.kind is ValueKind.DOUBLE:
+        return None if value is None else float(value)
+    return value if isinstance(value, int) else None
 
 
 def _show(args: Namespace, drives: Drives, wanted: dict[str, str],

@@ -148,6 +148,32 @@ def test_write_tells_each_result(run: Run, world: World) -> None:
             ) == (3.25, 3000.0, True)
 
 
+@pytest.mark.parametrize(('text', 'value'), [
+    ('2', 2.0), ('2.5', 2.5), ('25e-1', 2.5), ('.5', 0.5), ('+1', 1.0), ('0x10', 16.0),
+    ('1_0', None), ('010', None), ('\uff12', None), ('true', None), ('1e400', None), ('2 ', None),
+    ('2,5', None), ('much', None)])
+def test_numbers_are_written_as_in_files(run: Run, world: World, text: str,
+                                         value: float | None) -> None:
+    world.drives['conveyor'].set_value('ramp_time', 3.25)
+    code, lines, _ = run('write', 'conveyor', f'ramp_time={text}')
+    assert (code, world.drives['conveyor'].value('ramp_time')) == (
+        (1, 3.25) if value is None else (0, value))
+    if value is None:
+        assert lines[1].endswith(f'not written: wrong type: {text!r}, expected a number')
+
+
+@pytest.mark.parametrize(('name', 'text', 'value'), [
+    ('p30', '100', 1.0), ('p30', '0x64', 1.0), ('p30', '1_0', None), ('p30', '0o17', None),
+    ('p30', '1.0', None), ('p30', '\u0661', None), ('brake_enabled', 'true', 1),
+    ('brake_enabled', '0', 0), ('brake_enabled', '2', None), ('brake_enabled', 'maybe', None)])
+def test_integers_and_bools_are_written_as_in_files(run: Run, world: World, name: str, text: str,
+                                                    value: float | None) -> None:
+    before = world.drives['conveyor'].value(name)
+    code, _, _ = run('write', 'conveyor', f'{name}={text}')
+    assert (code, world.drives['conveyor'].value(name)) == (
+        (1, before) if value is None else (0, value))
+
+
 def test_write_json(run: Run) -> None:
     code, lines, _ = run('write', 'lift', 'ramp_time=2', '--json')
     assert code == 0
