@@ -84,8 +84,11 @@ class Actions:
         info = next((info for info in drive.parameters if info.name == name), None)
         if not drive.parameters:
             return _said(Outcome(False, f'{drive.label} has not told of its parameters yet'))
-        if info is None or not isinstance(text, str):
+        if info is None:
             raise _Refused(400, f'{drive.label} has no such parameter')
+        if not isinstance(text, str):
+            raise _Refused(400, f'{info.name}: no value, allowed is what a person would type, as a '
+                                'string')
         try:
             value = info.parse(text)
         except ValueRefused as error:

@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 import os
 from pathlib import Path
+import re
 import sys
 import tempfile
 
@@ -23,6 +24,7 @@ TIMEOUT = 300.0
 _AT_ONCE = 2
 _TEXT_MAX = 20_000
 _DIFFERENT = 1
+_OPTION = re.compile(r'(?<!\S)--[a-z][a-z-]*')
 _BUSY = 'others are at it already: try again in a moment'
 
 
@@ -76,9 +78,17 @@ class Backups:
                 if code in fine:
                     made = file.read_bytes() if backup is None else b''
                     return Done(True, text or 'nothing differs', made)
-                return Done(False, text or f'drive_can {command[0]} failed')
+                return Done(False, _for_a_browser(text) or f'drive_can {command[0]} failed')
         finally:
             self._running -= 1
+
+
+def _for_a_browser(text: str) -> str:
+    """Say where options can be given that a command speaks of."""
+    options = dict.fromkeys(_OPTION.findall(text))
+    where = (f'{", ".join(options)}: of the command drive_can in a terminal; there is no such '
+             'thing here')
+    return f'{text}\n({where})' if options else text
 
 
 async def _command(arguments: Sequence[str], directory: str) -> tuple[int, str]:

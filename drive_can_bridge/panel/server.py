@@ -4,6 +4,7 @@
 import asyncio
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+import errno
 import logging
 import math
 import resource
@@ -17,6 +18,8 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.text import printable
 
+#: what is the matter with a port, not with the address
+_OF_THE_PORT = (errno.EADDRINUSE, errno.EACCES, errno.EPERM)
 #: connections at once; a browser takes a handful
 CONNECTIONS_MAX = 200
 #: file descriptors that this takes, beside those of ROS
@@ -117,8 +120,10 @@ def listen(host: str, port: int) -> socket.socket:
         listener.bind(address)
         listener.listen(128)
     except OSError as error:
-        raise DriveCanError(f'drive_can panel: {host}, port {port}: {error.strerror or error}; '
-                            f'--port chooses another') from error
+        advice = '; --port chooses another' if error.errno in _OF_THE_PORT else (
+            ': no address of this machine, --host chooses another')
+        raise DriveCanError(f'drive_can panel: {host}, port {port}: {error.strerror or error}'
+                            f'{advice}') from error
     return listener
 
 

@@ -29,6 +29,20 @@ def test_a_backup_is_made_compared_and_restored(site: Site) -> None:
     assert 'ramp_time' not in same['text']
 
 
+@pytest.mark.parametrize('encoding', ['utf-8', 'utf-8-sig', 'utf-16'])
+def test_of_another_drive_is_refused_in_words_for_a_browser(site: Site, encoding: str) -> None:
+    wait_for(lambda: write(site, 'ramp_time', '1.5'), 'its parameters')
+    text = site.get('/do/backup?drive=/conveyor', 'viewer').text
+    lines = [f'# profile_sha256: {"ab" * 32}' if line.startswith('# profile_sha256') else line
+             for line in text.replace('ramp_time: 1.5', 'ramp_time: 2.5').splitlines()]
+    answer = carry(site, 'restore', 'operator', '\n'.join(lines).encode(encoding))
+    assert answer['success'] is False
+    *_, said, where = str(answer['text']).splitlines()
+    assert said.startswith('Nothing was written')
+    assert where == ('(--force: of the command drive_can in a terminal; there is no such thing '
+                     'here)')
+
+
 @pytest.mark.parametrize('body', [b'', b'\xff\xfe', b'[1, 2]', b'/conveyor: {ros__parameters: 7}'])
 def test_what_is_no_backup_is_refused_in_words(site: Site, body: bytes) -> None:
     answer = carry(site, 'restore', 'operator', body)

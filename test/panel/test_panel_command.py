@@ -66,6 +66,16 @@ def test_a_port_that_is_taken(site: Site, run: Run) -> None:
 
 
 @NEEDS_PANEL
+@pytest.mark.parametrize('host', ['192.0.2.1', 'no.such.host.invalid'])
+def test_an_address_of_another_machine(run: Run, host: str) -> None:
+    panel = run('drive_can', 'panel', '--host', host)
+    assert panel.process.wait(60.0) == 1
+    [line] = panel.errors.splitlines()
+    assert line.startswith(f'drive_can panel: {host}, port 8080: ')
+    assert line.endswith('no address of this machine, --host chooses another')
+
+
+@NEEDS_PANEL
 def test_listening_on_the_network_is_explained(run: Run) -> None:
     panel = run('drive_can', 'panel', '--host', '0.0.0.0', '--port', '0')
     assert f'http://{socket.gethostname()}:' in panel.line('^operator: http')

@@ -177,6 +177,13 @@ def test_nothing_that_moves_can_be_asked_for(site: Site, action: str) -> None:
     assert site.do(action, 'operator', STOP).status == 404
 
 
+@pytest.mark.parametrize('fields', [{}, {'value': None}, {'value': 2.5}])
+def test_a_write_without_a_value_says_so(site: Site, fields: dict[str, object]) -> None:
+    wanted = {'drive': '/conveyor', 'name': 'ramp_time', **fields}
+    wait_for(lambda: 'no value' in site.do('write', 'operator', wanted).said['text'],
+             'its parameters')
+
+
 def test_setpoints_and_control_words_are_no_parameters(site: Site) -> None:
     fields = {'drive': '/lift', 'name': 'nothing', 'value': '1'}
     wait_for(lambda: 'no such parameter' in site.do('write', 'operator', fields).said['text'],
