@@ -4,13 +4,20 @@ The parameters of drives for people and scripts: directly, or through a running 
 
 .. code-block:: python
 
-    from drive_can_bridge.client import open_drives
+    from drive_can_bridge.client import DriveCanError, open_drives
 
-    with open_drives('robot.yaml') as drives:
-        print(drives['conveyor'].read('ramp_time')['ramp_time'].value)
+    try:
+        with open_drives('robot.yaml') as drives:
+            print(drives['conveyor'].read('ramp_time')['ramp_time'].value)
+    except DriveCanError as error:
+        print(error)
 
 See :mod:`drive_can_bridge.client.drive` for what a drive can be asked.
 """
 
-from drive_can_bridge.client.opening import find_source as find_source
-from drive_can_bridge.client.opening import open_drives as open_drives
+from drive_can_bridge.client.drive import Drive, Drives, Enabled, ReadOutcome, WriteOutcome
+from drive_can_bridge.client.opening import find_source, open_drives
+from drive_can_bridge.core.errors import DriveCanError
+
+__all__ = ['Drive', 'DriveCanError', 'Drives', 'Enabled', 'ReadOutcome', 'WriteOutcome',
+           'find_source', 'open_drives']

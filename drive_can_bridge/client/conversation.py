@@ -88,7 +88,13 @@ class BusConversation:
                 self._changed.wait(left)
 
     def submit(self, drive: str, request: Request) -> None:
-        """Hand in a request; :meth:`wait` brings its outcomes."""
+        """
+        Hand in a request; :meth:`wait` brings its outcomes.
+
+        :raises DriveCanError: another master talks to a drive, or the bus is lost or closed.
+        """
+        with self._changed:
+            self._check()
         self._exchange.submit(self.sessions[drive], request)
 
     def wait(self, request: Request) -> tuple[Outcome, ...]:
@@ -115,8 +121,9 @@ class BusConversation:
                 raise BusUnavailable(f'bus {self.bus.name}: {self._exchange.link.last_error}')
 
     def close(self) -> None:
-        """Close the bus. Idempotent."""
+        """Close the bus; whoever asks for anything later is told so. Idempotent."""
         self._exchange.close()
+        self._fail(DriveCanError(f'bus {self.bus.name}: is closed already'))
 
     def _check(self) -> None:
         if self._trouble is not None:

@@ -18,28 +18,32 @@ def find_source(params_file: str | Path | None = None, *, namespace: str | None 
     :param namespace: of the bridge, where several run.
     :param nmt_start: directly: start CANopen nodes before they are asked.
     :raises ConfigurationError: the file is wrong.
-    :raises DriveCanError: no bridge is running, or several in different namespaces.
+    :raises DriveCanError: the file cannot be read, no bridge is running, or several in different namespaces.
     """
     if params_file is not None:
         from drive_can_bridge.client.direct import DirectSource
-        return DirectSource(params_file, nmt_start=nmt_start)
+        try:
+            return DirectSource(params_file, nmt_start=nmt_start)
+        except OSError as error:
+            raise DriveCanError(f'{error.filename or params_file}: '
+                                f'{error.strerror or error}') from error
     from drive_can_bridge.ros.client.bridge import BridgeSource
     return BridgeSource(namespace)
 
 
-def open_drives(params_file: str | Path | None = None, *, only: Sequence[str] = ('*',),
+def open_drives(params_file: str | Path | None = None, *, only: str | Sequence[str] = ('*',),
                 namespace: str | None = None, nmt_start: bool = False) -> Drives:
     """
     Open drives.
 
-    :param only: their names, or shell patterns.
+    :param only: their names, or shell patterns; one, or several.
     :raises DriveCanError: no drive of such a name, and what :func:`find_source` and
         :meth:`.Source.open` raise.
     """
     source = find_source(params_file, namespace=namespace, nmt_start=nmt_start)
     try:
         names: list[str] = []
-        for pattern in only:
+        for pattern in [only] if isinstance(only, str) else only:
             found = [name for name in source.names if fnmatchcase(name, pattern)]
             if not found:
                 raise DriveCanError(f'no drive {pattern!r}; there are: '

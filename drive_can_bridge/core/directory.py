@@ -20,6 +20,8 @@ from drive_can_bridge.core.words import nearest
 # Strictest first: where several listed parameters have one address, a raw name obeys them all.
 _ACCESS = (Access.READ_ONLY, Access.WRITE_ONLY, Access.READ_WRITE)
 _STORAGE = (Storage.EEPROM, None, Storage.RAM)
+#: bits of an integer that are looked at; no type has as many
+_BITS_MAX = 64
 #: characters of a name that nobody knows: it stands beside another in one line
 NAME_SHOWN = 80
 
@@ -84,6 +86,10 @@ class ParameterDirectory:
             right = isinstance(value, (int, float)) and not isinstance(value, bool)
         else:
             right = isinstance(value, int) and not isinstance(value, bool)
+        if right and isinstance(value, int) and value.bit_length() > _BITS_MAX:
+            # neither floats nor texts take what no type can carry by far
+            raise ValueRefused(f'a number of {value.bit_length()} bits is out of range: '
+                               f'{parameter.range_text}')
         if not right:
             raise ValueRefused(f'wrong type: {_type_name(value)}, expected {kind.value}')
         if parameter.listed:

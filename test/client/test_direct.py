@@ -89,6 +89,11 @@ def test_what_cannot_be_written_says_why(drives: Drives, world: World) -> None:
         'control_word': 'control word: only a running bridge sends it',
         'p52': 'control word: only a running bridge sends it'}
     assert conveyor.check('ramp_time', True) == 'wrong type: bool, expected double'
+    for name, range_text in (('ramp_time', '0.01 to 60 s'), ('maximum_speed', '0 to 3000 rpm')):
+        assert conveyor.check(name, 10 ** 5000).endswith(f' bits is out of range: {range_text}')
+    assert reasons(conveyor.write({'p30': -10 ** 400, 'ramp_time': 10 ** 400})) == {
+        'p30': 'a number of 1329 bits is out of range: 0 to 65535',
+        'ramp_time': 'a number of 1329 bits is out of range: 0.01 to 60 s'}
     assert conveyor.role('speed_setpoint') is Role.CYCLIC
     assert [each for each in world.seen()[before:] if each.identifier < 0x700] == []
 
@@ -275,3 +280,26 @@ def test_names(world: World) -> None:
     assert 'ramp_time' in source.parameter_names('conveyor')
     with pytest.raises(DriveCanError, match="^no drive 'x.'; there are: conveyor, lift, mixer"):
         open_drives(world.file, only=['x?'])
+
+
+def test_one_name_is_no_sequence_of_letters(tmp_path: Path) -> None:
+    with a_world(tmp_path, conveyor=CONVEYOR, lift=LIFT) as world:
+        with open_drives(world.file, only='con*') as drives:
+            assert list(drives) == ['conveyor']
+
+
+@pytest.mark.parametrize(('name', 'words'), [
+    ('nothing.yaml', 'No such file or directory'), ('', 'Is a directory')])
+def test_a_file_that_cannot_be_read(tmp_path: Path, name: str, words: str) -> None:
+    with pytest.raises(DriveCanError) as caught:
+        open_drives(tmp_path / name)
+    assert str(caught.value) == f'{tmp_path / name}: {words}'
+
+
+def test_after_the_end(tmp_path: Path) -> None:
+    with a_world(tmp_path, conveyor=CONVEYOR) as world:
+        with open_drives(world.file) as drives:
+            conveyor = drives['conveyor']
+        for ask in (conveyor.read, lambda: conveyor.write({'ramp_time': 1.0})):
+            with pytest.raises(DriveCanError, match='^bus main: is closed already$'):
+                ask()

@@ -117,6 +117,16 @@ def test_what_fails_says_why(bridge: StartBridge) -> None:
         assert conveyor.write({'ramp_time': 2.0})['ramp_time'].reason == 'bridge inactive'
 
 
+def test_after_the_end(bridge: StartBridge) -> None:
+    bridge(parameters()).online()
+    with open_drives() as drives:
+        conveyor = drives['conveyor']
+    for ask in (conveyor.read, conveyor.enabled, conveyor.identity, lambda: conveyor.find('p30'),
+                lambda: conveyor.write({'ramp_time': 1.0})):
+        with pytest.raises(DriveCanError, match='^the way to the bridge is closed already$'):
+            ask()
+
+
 def test_several_bridges_and_none(bridge: StartBridge, tmp_path: Path) -> None:
     with pytest.raises(DriveCanError, match='^no configured bridge is running in namespace /no'):
         open_drives(namespace='no')

@@ -95,7 +95,9 @@ class Graph:
         Call a parameter service of a node.
 
         :raises NoAnswer: nobody answers.
+        :raises DriveCanError: it was closed.
         """
+        self._check()
         client = self._client(node, service)
         self._acquaint(node)
         if not self.wait(client.service_is_ready, _FIND_TIMEOUT):
@@ -120,7 +122,9 @@ class Graph:
         Wait for a diagnostic status.
 
         :param taken: is told each one; True: that was it.
+        :raises DriveCanError: it was closed.
         """
+        self._check()
         done: list[bool] = []
 
         def look(message: DiagnosticArray) -> None:
@@ -132,6 +136,10 @@ class Graph:
             return self.wait(lambda: bool(done), timeout)
         finally:
             self.node.destroy_subscription(subscription)
+
+    def _check(self) -> None:
+        if not self._guest.context.ok():
+            raise DriveCanError('the way to the bridge is closed already')
 
     def _client(self, node: str, service: str) -> Any:
         key = node, service
