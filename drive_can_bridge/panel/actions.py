@@ -87,8 +87,7 @@ class Actions:
         if info is None:
             raise _Refused(400, f'{drive.label} has no such parameter')
         if not isinstance(text, str):
-            raise _Refused(400, f'{info.name}: no value, allowed is what a person would type, as a '
-                                'string')
+            raise _Refused(400, f'{info.name}: no value, allowed is a string: what a person types')
         try:
             value = info.parse(text)
         except ValueRefused as error:
