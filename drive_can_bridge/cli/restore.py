@@ -2,7 +2,7 @@
 """``drive_can restore``: the settings of a backup back into a drive."""
 
 from argparse import ArgumentParser, Namespace
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 import time
 
@@ -22,7 +22,7 @@ from drive_can_bridge.cli.drives import (
 from drive_can_bridge.cli.progress import Bar
 from drive_can_bridge.cli.questions import agreed, must_be_answerable
 from drive_can_bridge.cli.tables import print_json, print_table
-from drive_can_bridge.client.drive import Drive, Enabled, ReadOutcome, Source
+from drive_can_bridge.client.drive import Drive, Enabled, Source
 from drive_can_bridge.core.parameters import Parameter, Storage, Value
 from drive_can_bridge.core.requests import Failure, is_answer
 from drive_can_bridge.core.words import value_text
@@ -104,7 +104,8 @@ def _restore(args: Namespace, backup: Backup, drive: Drive) -> int:
     outcomes = read_all(drive, names)
     plan = plan_restore(backup, drive, outcomes, include_protected=args.include_protected)
     if plan.unread:
-        return _could_not_read(drive, outcomes)
+        complain('\n'.join([*unread(drive, outcomes.values()), f'{_NOTHING}.']))
+        return FAILED
     _show(args, backup, drive, plan)
     if args.dry_run or not plan.changes:
         return 0
@@ -135,10 +136,10 @@ def _may_be(args: Namespace, backup: Backup, drive: Drive) -> bool:
     identity = _identity(backup, drive)
     if backup.head.identity and not identity:
         # maybe it says nothing at all: then nobody knows whether it is another one
-        asked = read_all(drive, names_to_read(backup, drive)[:1])
-        if any(not (each.ok or is_answer(Failure(each.reason))) for each in asked.values()):
-            _could_not_read(drive, asked)
-            return False
+        for asked in read_all(drive, names_to_read(backup, drive)[:1]).values():
+            if not asked.ok and not is_answer(Failure(asked.reason)):
+                complain(f'{drive.name}: nothing could be read: {asked.reason}\n{_NOTHING}.')
+                return False
     differing = strangers(backup, drive, identity)
     for text in differing:
         complain(f'{backup.file}: {text}')
@@ -157,11 +158,6 @@ def _may_be(args: Namespace, backup: Backup, drive: Drive) -> bool:
         _is_enabled(drive)
         return False
     return True
-
-
-def _could_not_read(drive: Drive, outcomes: Mapping[str, ReadOutcome]) -> int:
-    complain('\n'.join([*unread(drive, outcomes.values()), f'{_NOTHING}.']))
-    return FAILED
 
 
 def _identity(backup: Backup, drive: Drive) -> str:

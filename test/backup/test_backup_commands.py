@@ -338,7 +338,7 @@ class TestRestore:
         command('backup', 'pump', '-o', 'pump.yaml')
         shop.drives['pump'].fault('off')
         assert command('restore', 'pump.yaml', '--yes') == (1, [], [
-            'pump: control_register_2 could not be read: no answer; drive offline',
+            'pump: nothing could be read: no answer; drive offline',
             'Nothing was written.'])
 
     @pytest.mark.parametrize(('words', 'code', 'error'), [
