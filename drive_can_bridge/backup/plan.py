@@ -40,7 +40,7 @@ _LEFT_ALONE = {
     LeftAlone.MAP: 'a map: restored with --params-file only',
     LeftAlone.CYCLIC: 'a setpoint: sent cyclically',
     LeftAlone.CONTROL: 'the control word',
-    LeftAlone.MODE: "set by the section 'restore' of its profile",
+    LeftAlone.MODE: "a mode, which the section 'restore' of its profile sets: not restored",
 }
 _ENDED = "becomes {}: the mode that the section 'restore' of its profile sets is ended"
 _NO_MODE = ModeBits(0, 0)

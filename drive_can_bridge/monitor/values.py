@@ -14,6 +14,8 @@ _WIDTH = 8
 #: what a drive says about its states is read in hexadecimal
 _WORD_SUFFIX = 'word'
 _BOOLS = {'true': True, '1': True, 'on': True, 'false': False, '0': False, 'off': False}
+#: of an integer in a message, without its sign
+_BITS_MAX = 63
 _EXAMPLES = {ValueKind.INTEGER: ', such as 12 or 0x0C', ValueKind.DOUBLE: ', such as 12.5'}
 
 
@@ -111,7 +113,10 @@ class ParameterInfo:
             if self.kind is ValueKind.BOOL:
                 return _BOOLS[word.lower()]
             if self.kind is ValueKind.INTEGER:
-                return int(word, 0)
+                number = int(word, 0)
+                if number.bit_length() > _BITS_MAX:
+                    raise ValueError(word)
+                return number
             value = float(word)
         except (KeyError, ValueError):
             value = math.nan
