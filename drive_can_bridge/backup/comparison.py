@@ -6,7 +6,9 @@ from dataclasses import dataclass
 import math
 
 from drive_can_bridge.backup.document import Backup
-from drive_can_bridge.backup.settings import in_order, is_setting, settings_of
+from drive_can_bridge.backup.settings import (
+    in_order, is_setting, mode_bits, modes_of, settings_of,
+)
 from drive_can_bridge.backup.values import raw_in_file
 from drive_can_bridge.client.drive import Drive, ReadOutcome
 from drive_can_bridge.core.errors import ConfigurationError, ValueRefused
@@ -63,9 +65,11 @@ class Side:
     left_out: tuple[str, ...] = ()
 
 
-def side_of_drive(outcomes: Mapping[str, ReadOutcome]) -> Side:
-    """Take the settings of a drive that were read; those that were not are missing."""
-    found = {name: outcome for name, outcome in outcomes.items() if outcome.ok}
+def side_of_drive(drive: Drive, outcomes: Mapping[str, ReadOutcome]) -> Side:
+    """Take the settings of a drive that were read, and a mode that it was left in."""
+    bits = mode_bits(drive.facts.restore)
+    found = {name: outcome for name, outcome in outcomes.items() if outcome.ok and (
+        is_setting(drive, name) or not bits[name].is_over(outcome.raw or 0))}
     return Side({name: Setting(outcome.value, outcome.raw) for name, outcome in found.items()
                  if outcome.value is not None},
                 {name: outcome.parameter for name, outcome in found.items()
@@ -108,8 +112,8 @@ def side_of_file_and_drive(backup: Backup, drive: Drive) -> Side:
 
 
 def names_to_read(drive: Drive, *others: Backup) -> tuple[str, ...]:
-    """Return what to read of a drive: its settings, and what else a file has of them."""
-    names = [*settings_of(drive)]
+    """Return what to read of a drive: settings, its mode, and what else a file has of them."""
+    names = [*settings_of(drive), *modes_of(drive)]
     names += [name for backup in others for name in backup.values
               if name not in names and is_setting(drive, name)]
     return in_order(drive, list(dict.fromkeys(names)))

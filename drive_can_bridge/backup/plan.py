@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 
 from drive_can_bridge.backup.document import Backup, Head
-from drive_can_bridge.backup.settings import in_order, is_setting, mode_bits, ModeBits
+from drive_can_bridge.backup.settings import in_order, is_setting, mode_bits, ModeBits, modes_of
 from drive_can_bridge.backup.values import raw_in_file
 from drive_can_bridge.client.drive import Drive, ReadOutcome
 from drive_can_bridge.core.errors import ValueRefused
@@ -203,12 +203,8 @@ def names_to_restore(backup: Backup, drive: Drive) -> tuple[str, ...]:
 
 def names_to_read(backup: Backup, drive: Drive) -> tuple[str, ...]:
     """Return what to read before: these settings, and what tells the mode of the drive."""
-    modes = [name for name, bits in mode_bits(drive.facts.restore).items() if bits.ended]
-    known = [(name, drive.find(name)) for name in modes]
     return in_order(drive, list(dict.fromkeys([
-        *names_to_restore(backup, drive),
-        *(name for name, parameter in known
-          if parameter is not None and parameter.readable and parameter.writable)])))
+        *names_to_restore(backup, drive), *modes_of(drive)])))
 
 
 def why_left_alone(drive: Drive, name: str, *, include_protected: bool) -> LeftAlone | None:

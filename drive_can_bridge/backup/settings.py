@@ -41,6 +41,10 @@ class ModeBits:
         word = wanted & ~self.mask | self.at_end
         return word if (found ^ word) & (~self.mask | self.ended) else found
 
+    def is_over(self, raw: int) -> bool:
+        """Tell whether a drive is not in the mode."""
+        return not (raw ^ self.at_end) & self.ended
+
 
 def mode_bits(table: RestoreTable | None) -> dict[str, ModeBits]:
     """Return the bits that belong to modes, by parameter."""
@@ -51,6 +55,14 @@ def mode_bits(table: RestoreTable | None) -> dict[str, ModeBits]:
         found[step.parameter] = ModeBits(
             known.mask | step.mask, at_end, known.ended | (known.at_end ^ at_end) & known.mask)
     return found
+
+
+def modes_of(drive: Drive) -> tuple[str, ...]:
+    """Return the names of the parameters that tell whether a drive was left in a mode."""
+    found = [drive.find(name) for name, bits in mode_bits(drive.facts.restore).items()
+             if bits.ended]
+    return tuple(parameter.name for parameter in found
+                 if parameter is not None and parameter.readable and parameter.writable)
 
 
 def is_whole(step: RestoreStep | ModeBits, parameter: Parameter) -> bool:

@@ -113,7 +113,7 @@ def _drive(drive: Drive, files: Sequence[Backup]) -> Side:
     problems = unread(drive, outcomes.values())
     if problems:
         raise DriveCanError('\n'.join(problems))
-    return side_of_drive(outcomes)
+    return side_of_drive(drive, outcomes)
 
 
 def _profile_of(backup: Backup) -> Profile | None:

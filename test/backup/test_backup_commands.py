@@ -395,6 +395,32 @@ class TestMode:
         assert said.lines[-1] == 'pump: nothing to restore, 6 settings are as in b.yaml'
         assert shop.values('pump', 'general_configuration') == (0,)
 
+    def test_that_is_a_whole_parameter(self, shop: Shop, command: Command) -> None:
+        """It is no setting: no file has it."""
+        profile = shop.folder / 'other.yaml'
+        profile.write_text('protocols: [datamodel_extended]\nparameters:\n'
+                           '  ramp_time: {number: 30, type: uint16, scale: 0.01, unit: s}\n'
+                           '  service_mode: {number: 61, type: uint16}\n'
+                           '  actual_speed: {number: 209, type: int16, access: ro}\n'
+                           'restore: {before: {service_mode: 3}, after: {service_mode: 1}}\n')
+        text = shop.file.read_text().replace('profile: datamodel_example', f'profile: {profile}')
+        text = text.replace('[speed_setpoint, torque_limit]', '[]').replace(
+            '[actual_speed, motor_current, status_word]', '[actual_speed]')
+        shop.file.write_text(text)
+        for value in (1, 3):
+            assert command('write', 'conveyor', f'service_mode={value}').code == 0
+            command('backup', 'conveyor', '-o', 'b.yaml', '--yes')
+            assert list(read_backup(Path('b.yaml')).values) == ['ramp_time']
+        assert command('compare', 'b.yaml', 'conveyor') == (1, [
+            'parameter     b.yaml  conveyor', 'service_mode       -         3'], [])
+        said = command('restore', 'b.yaml', '--yes')
+        assert (said.code, said.lines[1].split()[:5]) == (0, [
+            'service_mode', '3', '-', 'becomes', '1:'])
+        assert said.lines[-1] == 'conveyor: 1 setting written, 2 read back: as in the file'
+        assert command('compare', 'b.yaml', 'conveyor') == (0, ['the same'], [])
+        assert command('restore', 'b.yaml', '--yes').lines == [
+            'conveyor: nothing to restore, 1 settings are as in b.yaml']
+
     def test_is_told_of_a_file_alone(self, shop: Shop, command: Command) -> None:
         command('backup', 'pump', '-o', 'a.yaml')
         text = Path('a.yaml').read_text()
