@@ -18,7 +18,8 @@ def find_source(params_file: str | Path | None = None, *, namespace: str | None 
     :param namespace: of the bridge, where several run.
     :param nmt_start: directly: start CANopen nodes before they are asked.
     :raises ConfigurationError: the file is wrong.
-    :raises DriveCanError: the file cannot be read, no bridge is running, or several in different namespaces.
+    :raises DriveCanError: the file cannot be read; no bridge is running, or several in different
+        namespaces.
     """
     if params_file is not None:
         from drive_can_bridge.client.direct import DirectSource
