@@ -8,8 +8,8 @@ import time
 
 from drive_can_bridge.backup.document import Backup
 from drive_can_bridge.backup.plan import (
-    Change, LeftAlone, names_to_read, other_type, plan_restore, problems_in, RestorePlan, says_nothing,
-    strangers, why_left_alone,
+    Change, LeftAlone, names_to_read, other_type, plan_restore, problems_in, RestorePlan,
+    says_nothing, strangers, why_left_alone,
 )
 from drive_can_bridge.backup.reader import read_backup
 from drive_can_bridge.backup.restore import NotAsInFile, Restorer, RestoreResult
