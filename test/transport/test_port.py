@@ -328,21 +328,31 @@ class Adapter:
         self.terminal = FullTerminal()
         os.set_blocking(self.terminal.master, False)
         self.port = open_port(slcan(self.terminal.path))
-        self.answer(b'')
+        while b'O' not in self.lines():
+            pass
 
     def lines(self) -> list[bytes]:
-        try:
-            return [line for line in os.read(self.terminal.master, 65536).split(b'\r') if line]
-        except BlockingIOError:
-            return []
+        """Return the commands that have arrived; wait for one."""
+        text, deadline = b'', time.monotonic() + 10.0
+        while not text.endswith(b'\r'):
+            assert time.monotonic() < deadline, text
+            try:
+                text += os.read(self.terminal.master, 65536)
+            except BlockingIOError:
+                time.sleep(0.001)
+        return [line for line in text.split(b'\r') if line]
 
     def answer(self, text: bytes) -> None:
         """Answer every command so far."""
         for _ in self.lines():
             os.write(self.terminal.master, text)
 
-    def receive(self) -> None:
+    def receive(self, refused: int = 0) -> None:
+        """Have the port take what was answered: so many refusals, for instance."""
+        deadline = time.monotonic() + 10.0
         for _ in range(5):
+            self.port.receive(0.01)
+        while self.port.counts.refused < refused and time.monotonic() < deadline:
             self.port.receive(0.01)
 
     def close(self) -> None:
@@ -361,13 +371,16 @@ STOP = Frame(0x003FFFF0, bytes(8), True)
 
 
 def test_frame_that_an_adapter_refuses_is_counted(adapter: Adapter) -> None:
-    os.write(adapter.terminal.master, b'\a')    # of a command, before there was a frame
-    adapter.receive()
+    # of a command, before there was a frame; behind it somebody's frame, which tells that it came
+    os.write(adapter.terminal.master, b'\at1230\r')
+    deadline = time.monotonic() + 10.0
+    while not adapter.port.receive(0.01):
+        assert time.monotonic() < deadline
     assert adapter.port.counts.refused == 0
-    for taken in (b'\a', b'z\r', b'\a', b'\r', b'\a'):
+    for taken, refused in ((b'\a', 1), (b'z\r', 1), (b'\a', 2), (b'\r', 2), (b'\a', 3)):
         adapter.port.send(STOP, 0.1)
         adapter.answer(taken)
-        adapter.receive()
+        adapter.receive(refused)
     assert adapter.port.counts.refused == 3
 
 
