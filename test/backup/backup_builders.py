@@ -50,6 +50,18 @@ class Shop:
         """Return what stands in registers of a drive."""
         return tuple(self.drives[name].value(parameter) for parameter in parameters)
 
+    def describe_conveyor(self, parameters: str, sections: str = '') -> None:
+        """Give the conveyor another table; it exchanges ``actual_speed`` alone."""
+        profile = self.folder / 'other.yaml'
+        profile.write_text(f'protocols: [datamodel_extended]\nparameters:\n{parameters}'
+                           '  actual_speed: {number: 209, type: int16, access: ro}\n' + sections)
+        text = self.file.read_text()
+        for old, new in (('profile: datamodel_example', f'profile: {profile}'),
+                         ('[speed_setpoint, torque_limit]', '[]'),
+                         ('[actual_speed, motor_current, status_word]', '[actual_speed]')):
+            text = text.replace(old, new)
+        self.file.write_text(text)
+
     @contextmanager
     def reached(self, name: str) -> Iterator[Drive]:
         """Reach a drive directly."""

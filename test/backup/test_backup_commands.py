@@ -124,16 +124,9 @@ class TestBackup:
 
     def test_partial(self, shop: Shop, command: Command) -> None:
         """A table that names what this drive has not."""
-        profile = shop.folder / 'other.yaml'
-        profile.write_text('protocols: [datamodel_extended]\nparameters:\n'
-                           '  ramp_time: {number: 30, type: uint16, scale: 0.01, unit: s}\n'
-                           '  nothing: {number: 999, type: uint16}\n'
-                           '  hot: {number: 31, type: uint16, maximum: 5}\n'
-                           '  actual_speed: {number: 209, type: int16, access: ro}\n')
-        text = shop.file.read_text().replace('profile: datamodel_example', f'profile: {profile}')
-        text = text.replace('[speed_setpoint, torque_limit]', '[]').replace(
-            '[actual_speed, motor_current, status_word]', '[actual_speed]')
-        shop.file.write_text(text)
+        shop.describe_conveyor('  ramp_time: {number: 30, type: uint16, scale: 0.01, unit: s}\n'
+                               '  nothing: {number: 999, type: uint16}\n'
+                               '  hot: {number: 31, type: uint16, maximum: 5}\n')
         said = command('backup', 'conveyor', '-o', 'b.yaml')
         assert (said.code, Path('b.yaml').exists()) == (1, False)
         said = command('backup', 'conveyor', '-o', 'b.yaml', '--partial')
@@ -397,16 +390,9 @@ class TestMode:
 
     def test_that_is_a_whole_parameter(self, shop: Shop, command: Command) -> None:
         """It is no setting: no file has it."""
-        profile = shop.folder / 'other.yaml'
-        profile.write_text('protocols: [datamodel_extended]\nparameters:\n'
-                           '  ramp_time: {number: 30, type: uint16, scale: 0.01, unit: s}\n'
-                           '  service_mode: {number: 61, type: uint16}\n'
-                           '  actual_speed: {number: 209, type: int16, access: ro}\n'
-                           'restore: {before: {service_mode: 3}, after: {service_mode: 1}}\n')
-        text = shop.file.read_text().replace('profile: datamodel_example', f'profile: {profile}')
-        text = text.replace('[speed_setpoint, torque_limit]', '[]').replace(
-            '[actual_speed, motor_current, status_word]', '[actual_speed]')
-        shop.file.write_text(text)
+        shop.describe_conveyor('  ramp_time: {number: 30, type: uint16, scale: 0.01, unit: s}\n'
+                               '  service_mode: {number: 61, type: uint16}\n',
+                               'restore: {before: {service_mode: 3}, after: {service_mode: 1}}\n')
         for value in (1, 3):
             assert command('write', 'conveyor', f'service_mode={value}').code == 0
             command('backup', 'conveyor', '-o', 'b.yaml', '--yes')

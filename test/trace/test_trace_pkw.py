@@ -22,6 +22,13 @@ def starter(**options: object) -> DriveConfiguration:
                  table=(STATUS, CURRENT, COMMAND, TEMPERATURE), request=(), **options)
 
 
+def with_status(name: str, number: int) -> Witness:
+    """Return what watches a device whose rounds read its status and one parameter more."""
+    table = (STATUS, parameter(name, number))
+    return Witness(drive('canopen_pkw', name='pump', station=5, table=table, request=(),
+                         response=table))
+
+
 def test_a_round() -> None:
     witness = Witness(starter())
     assert witness.hears('505#C701002500000000', 0.0) == [
@@ -89,9 +96,7 @@ def test_silence() -> None:
 
 
 def test_a_shared_read_that_is_refused_is_split_from_then_on() -> None:
-    both = (STATUS, parameter('second', 456))
-    witness = Witness(drive('canopen_pkw', name='pump', station=5, table=both, request=(),
-                            response=both))
+    witness = with_status('second', 456)
     witness.hears('505#C701002600000000', 0.0)
     witness.hears('485#C701004E00000206', 0.004)
     witness.hears('505#C70100A500000000', 0.005)
@@ -103,18 +108,14 @@ def test_a_shared_read_that_is_refused_is_split_from_then_on() -> None:
 
 
 def test_a_shared_read_that_is_answered_completes_a_round() -> None:
-    both = (STATUS, parameter('second', 456))
-    witness = Witness(drive('canopen_pkw', name='pump', station=5, table=both, request=(),
-                            response=both))
+    witness = with_status('second', 456)
     witness.hears('505#C701002600000000', 0.0)
     witness.hears('485#C701002683200000', 0.004)
     assert witness.observed('pump').exchanges == 1
 
 
 def test_a_refusal_spoils_the_round_however_it_goes_on() -> None:
-    apart = (STATUS, parameter('other', 500))
-    witness = Witness(drive('canopen_pkw', name='pump', station=5, table=apart, request=(),
-                            response=apart))
+    witness = with_status('other', 500)
     witness.hears('505#C701002500000000', 0.0)
     witness.hears('485#C701004E00000206', 0.004)
     witness.hears('505#F40100A500000000', 0.005)

@@ -23,11 +23,9 @@ from drive_can_bridge.protocols.canopen_pkw.addresses import Placement
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
     Answered, MailboxChannel, Read, Refused, Reply, Silence, Step, Write,
 )
-from drive_can_bridge.protocols.canopen_pkw.procedures import tell
+from drive_can_bridge.protocols.canopen_pkw.procedures import STOP_ATTEMPTS, tell
 from drive_can_bridge.protocols.channel import Lane, STOP_PATIENCE
 
-#: how often a word that stops the drive is written in a row while nobody answers
-STOPS_IN_A_ROW = 3
 #: s until a ``disable`` that was refused is written again
 RETRY_AFTER = 0.25
 
@@ -107,7 +105,7 @@ class ControlWriter:
                     continue
                 word, stopping = self._control.word, self._control.stopping
             # the last has the time that any request has: a slow device is no silent one
-            again = stopping and unanswered < STOPS_IN_A_ROW - 1
+            again = stopping and unanswered < STOP_ATTEMPTS - 1
             timeout = min(STOP_PATIENCE, self._session.retry.timeout) if again else None
             before = self._settled
             if word != before:

@@ -17,6 +17,8 @@ from drive_can_bridge.protocols.canopen_pkw.mailbox import (
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address
 from drive_can_bridge.protocols.safe_stop import StopWrite
 
+#: how often a drive is told to stand still while it does not answer
+STOP_ATTEMPTS = 3
 NOT_TOGETHER = ('cannot be written in one frame, nothing was written: two 16-bit parameters in '
                 'adjacent registers fit, or one of 32 bits')
 

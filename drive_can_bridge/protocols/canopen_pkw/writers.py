@@ -17,14 +17,13 @@ from drive_can_bridge.protocols.canopen_pkw.control_writer import ControlWriter
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
     MailboxChannel, Refused, Reply, Silence, Step, Write,
 )
-from drive_can_bridge.protocols.canopen_pkw.procedures import tell, write_until_answered
+from drive_can_bridge.protocols.canopen_pkw.procedures import (
+    STOP_ATTEMPTS, tell, write_until_answered,
+)
 from drive_can_bridge.protocols.channel import Lane
 from drive_can_bridge.protocols.polling import WriteSchedule
 from drive_can_bridge.protocols.safe_stop import SafeStop
 from drive_can_bridge.protocols.setpoints_first import SetpointsFirst
-
-#: how often a drive is told to stand still
-STOP_ATTEMPTS = 3
 
 
 class Writers:

@@ -354,13 +354,19 @@ def test_enable_waits_for_the_position() -> None:
     assert talk.asks(ControlAction.ENABLE, 10.123) == []
 
 
-def test_position_that_the_setpoint_cannot_carry() -> None:
+def coarse_axis() -> Conversation:
+    """Return an axis whose setpoint carries 32.767 deg at most; its maps have been compared."""
     coarse = parameter('coarse', 60, type=INT16, scale=0.001, unit='deg', storage=RAM,
                        neutral_from='actual_position', arming_tolerance=0.5)
     talk = axis(table=(*TABLE, coarse, MEASURED), request=(WORD, coarse))
     talk.activate(9.99)
     talk.hears(MAPS[0], 9.991)
     talk.hears(MAPS[1], 9.992)
+    return talk
+
+
+def test_position_that_the_setpoint_cannot_carry() -> None:
+    talk = coarse_axis()
     assert talk.hears('10200D41#0190000000000000', 9.993) == []     # 40.0 deg, 32.767 at most
     assert talk.until(10.09) == []
     assert talk.until(10.0931) == [(10.093, ASK_POSITION)]
@@ -369,12 +375,7 @@ def test_position_that_the_setpoint_cannot_carry() -> None:
 
 
 def test_position_is_not_read_again_where_the_maps_differ_meanwhile() -> None:
-    coarse = parameter('coarse', 60, type=INT16, scale=0.001, unit='deg', storage=RAM,
-                       neutral_from='actual_position', arming_tolerance=0.5)
-    talk = axis(table=(*TABLE, coarse, MEASURED), request=(WORD, coarse))
-    talk.activate(9.99)
-    talk.hears(MAPS[0], 9.991)
-    talk.hears(MAPS[1], 9.992)
+    talk = coarse_axis()
     talk.hears('10200D41#0190000000000000', 9.993)      # 40.0 deg, 32.767 at most
     for read in range(1, 10):
         due = 9.993 + 0.1 * read
