@@ -42,6 +42,7 @@ class Setpoints:
     :ivar enabled: commands are taken at all: the drive is online, nothing is stopping, and a drive
         with control is enabled.
     :ivar ignored_at: ``now`` of the last command that came while they were not taken.
+    :ivar expires_at: when to call ``expire``; it may be too early, never too late.
     """
 
     def __init__(self, parameters: tuple[Parameter, ...], *, timeout: float,
@@ -49,13 +50,13 @@ class Setpoints:
                  sent: LastSent | None = None) -> None:
         self.items = tuple(make_setpoint(parameter, sample, sent) for parameter in parameters)
         self.held = tuple(item for item in self.items if isinstance(item, HeldSetpoint))
-        self.timeout = timeout
+        self.expires_at = math.inf
         self.rearm_immediate = rearm_immediate
         self.forgotten = 0
         self.changed = True
         self.enabled = False
         self.ignored_at = -math.inf
-        self._oldest = math.inf
+        self._timeout = timeout
         self._expired: list[Setpoint] = []  # found overdue by a command, not told yet
 
     def command(self, index: int, value: Value, now: float) -> CommandOutcome:
@@ -72,7 +73,7 @@ class Setpoints:
         if self._overdue(setpoint, now):  # however long it takes until the next cycle
             setpoint.disarm()
             self._expired.append(setpoint)
-            self._oldest = -math.inf
+            self.expires_at = now
             self.changed = True
         outcome = CommandOutcome.ACCEPTED
         if not setpoint.armed:
@@ -81,7 +82,7 @@ class Setpoints:
             setpoint.armed = True
             outcome = CommandOutcome.ARMED
         setpoint.commanded_at = now
-        self._oldest = min(self._oldest, now)
+        self.expires_at = min(self.expires_at, self._expiry(setpoint))
         if setpoint.raw != raw:
             setpoint.raw = raw
             self.changed = True
@@ -93,24 +94,38 @@ class Setpoints:
 
         :return: those that went neutral for that reason since the last call.
         """
-        # ``_oldest`` may be older than the truth, never younger: one comparison is all that a
-        # cycle pays while commands are fresh.
-        if self.timeout <= 0 or now - self._oldest <= self.timeout:
+        if now < self.expires_at:   # all that a cycle pays while commands are fresh
             return []
         expired, self._expired = self._expired, []
-        self._oldest = math.inf
         for setpoint in self.items:
             if self._overdue(setpoint, now):
                 setpoint.disarm()
                 expired.append(setpoint)
                 self.changed = True
-            elif setpoint.commanded_at is not None:
-                self._oldest = min(self._oldest, setpoint.commanded_at)
+        self.expires_at = self._soonest()
         return expired
 
+    @property
+    def timeout(self) -> float:
+        """How old a command may become, in s; 0: as old as it likes."""
+        return self._timeout
+
+    @timeout.setter
+    def timeout(self, timeout: float) -> None:
+        self._timeout = timeout
+        self.expires_at = min(self.expires_at, self._soonest())
+
     def _overdue(self, setpoint: Setpoint, now: float) -> bool:
-        return (setpoint.commanded_at is not None
-                and 0.0 < self.timeout < now - setpoint.commanded_at)
+        return now >= self._expiry(setpoint)
+
+    def _expiry(self, setpoint: Setpoint) -> float:
+        """Return when the last command begins to be too old; infinity: never, or there is none."""
+        if setpoint.commanded_at is None or self._timeout <= 0.0:
+            return math.inf
+        return math.nextafter(setpoint.commanded_at + self._timeout, math.inf)
+
+    def _soonest(self) -> float:
+        return min(map(self._expiry, self.items), default=math.inf)
 
     def allow(self, taken: bool) -> None:
         """
@@ -200,7 +215,7 @@ class Setpoints:
         for setpoint in self.items:
             setpoint.disarm()
         self.changed = True
-        self._oldest = math.inf
+        self.expires_at = math.inf
         self._expired.clear()
 
     @property

@@ -93,7 +93,9 @@ class CyclicExchange(Generic[TelegramT]):
 
     def next_timer(self) -> float:
         """Return when :meth:`handle_timer` has something to do."""
-        due = self.timer.due
+        due, expires_at = self.timer.due, self._session.setpoints.expires_at
+        if expires_at < due:
+            due = expires_at
         return due if due < self._answer_due else self._answer_due
 
     def handle_timer(self, now: float) -> None:
@@ -101,6 +103,8 @@ class CyclicExchange(Generic[TelegramT]):
         if now < self.timer.due:
             if now >= self._answer_due:
                 self.settle(now)
+            if self._session.gate.expire(now):
+                self.timer.hurry(now)
             return
         if self._waiting:
             self._end(now)

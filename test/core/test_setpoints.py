@@ -97,7 +97,7 @@ def test_agrees_with_a_simple_model(steps: list[tuple[int, float, float]], immed
         now += pause
         raw = round(value * 10)
         for key, (_, since) in list(model.items()):
-            if 0 < timeout < now - since:
+            if 0 < timeout and now > since + timeout:
                 del model[key]
         outcome = made.command(index, value, now)
         if index in model or immediate or raw <= 1:

@@ -177,7 +177,7 @@ class CannordPartner(Partner):
 
     def enable(self) -> None:
         self.deliver(self.talk.asks(ControlAction.ENABLE, self.now))
-        self.live(0.1)
+        self.live(max(0.1, 2 * self.configuration.period))
         assert self.talk.control_outcomes() == [('enable', True, 'operation enabled')]
 
     def configure(self, **options: Any) -> DriveConfiguration:
@@ -534,6 +534,24 @@ def test_silence_of_the_commander_is_neutral(partner: Partner) -> None:
     assert partner.talk.events(SetpointsExpired) == [SetpointsExpired(('speed_setpoint',))]
     assert partner.talk.commands(0, 100.0, partner.now) is CommandOutcome.NOT_ARMED
     assert math.isnan(partner.talk.session.setpoints.age(partner.now))
+
+
+def test_that_waits_for_no_cycle(make: type[Partner]) -> None:
+    """However long the period is; one of the last command may come between."""
+    partner = make(period=1.0, command_timeout=0.3)
+    partner.start()
+    partner.live(3.0)
+    partner.enable()
+    partner.talk.commands(0, 0.0, partner.now)
+    for _ in range(25):
+        partner.talk.commands(0, 100.0, partner.now)
+        partner.live(0.1)
+    commanded_at = partner.now - 0.1
+    partner.live(0.35)
+    sent = [(at, raw) for at, text in partner.take() for raw in partner.setpoints(text)]
+    assert 1000 in [raw for _, raw in sent]
+    at, raw = sent[-1]
+    assert raw == 0 and at < commanded_at + 0.35
 
 
 @pytest.mark.parametrize('upset', ['loss', 'bus', 'time'])

@@ -5,7 +5,7 @@ Rounds of reads: what they ask for, and what the answers say.
 The status word counts from the moment it was read, before the round is complete.
 """
 
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Sequence
 
 from drive_can_bridge.core.process_image import status_word
 from drive_can_bridge.core.session import Session
@@ -23,14 +23,17 @@ class Rounds:
     """
     The rounds of one drive.
 
+    :param write: writes setpoints; between two reads: commands do not wait for slow rounds.
     :ivar status_known: the status was read just now, or there is none to be read.
     :ivar refusals: the names of what the drive refuses, and why, by what was read.
     """
 
-    def __init__(self, session: Session, channel: MailboxChannel) -> None:
+    def __init__(self, session: Session, channel: MailboxChannel,
+                 write: Callable[[float], None]) -> None:
         drive = self._drive = session.configuration
         self._session = session
         self._channel = channel
+        self._write = write
         self._placement = Placement.of(drive)
         self._spans = [self._placement.span(parameter) for parameter in drive.cyclic_response]
         status = status_word(drive)
@@ -52,6 +55,8 @@ class Rounds:
         pending = list(self._plan)
         while pending:
             span = pending.pop(0)
+            if self._words and self._session.online and self._session.setpoints.changed:
+                self._write(self._channel.now)
             reply = yield Read(span.address, span.count, attempts=1)
             if isinstance(reply, Silence):
                 return None

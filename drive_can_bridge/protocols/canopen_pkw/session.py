@@ -70,7 +70,7 @@ class PkwSession(Session):
             self._send, order=options.abort_code_order, retry=self.retry,
             wrote=lambda write: sent.note(write.span, write.words)))
         self._writers = Writers(self, self._channel, self.stop_ended)
-        self._rounds = Rounds(self, self._channel)
+        self._rounds = Rounds(self, self._channel, self._writers.write_setpoints)
         self._exchange = PolledExchange(
             self, self._channel, self._rounds.read, found=self._found,
             answered=self._rounds.ended, missed=self._missed,
@@ -79,6 +79,7 @@ class PkwSession(Session):
             self, procedures.RegisterAccess(self._channel, self.retry, placement),
             blocked=self._supervision.refusal, control_refusal=self._writers.control_refusal)
         self.look_after(channel=self._channel)
+        self._look_at = math.inf
 
     # -- life cycle -------------------------------------------------------------------------------
 
@@ -221,24 +222,28 @@ class PkwSession(Session):
             if self.gate.expire(now):
                 self._writers.write_setpoints(now)
         self._channel.advance(now)
-        if now >= self._round_due:
+        if now < self._due:
+            return
+        if not self._exchange.reading:
             if self.control is not None and self.control.stopping:
                 self.see_to_control_word(now)   # before setpoints, should it be due again
             if self.online:
                 self._writers.write_setpoints(now)
                 self.see_to_control_word(now)
             self._exchange.begin(now)
+        self._look_at = now + self.configuration.period
 
     @property
-    def _round_due(self) -> float:
-        """When the next round is due; infinity: not before this one has ended."""
-        return math.inf if self._exchange.reading else self._exchange.timer.due
+    def _due(self) -> float:
+        """When the next round is due; while one is under way, when to look for commands."""
+        return self._look_at if self._exchange.reading else self._exchange.timer.due
 
     def next_timer(self) -> float:
         soonest = self._channel.next_timer()
         if self.stage is not Stage.RUNNING:
             return soonest
-        soonest = min(soonest, self._round_due, self._supervision.next_timer())
+        soonest = min(soonest, self._due, self._supervision.next_timer(),
+                      self.setpoints.expires_at)
         return soonest if self.control is None else min(soonest, self.control.next_timer())
 
     # -- state ------------------------------------------------------------------------------------

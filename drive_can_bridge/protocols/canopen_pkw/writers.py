@@ -4,6 +4,8 @@ What a device is told: setpoints and control word while it is online, and the st
 
 Both are written when they change, setpoints also again after a while. Neutral setpoints follow the
 word that stops a drive at once, and so does everything in the stop, whatever is known of the node.
+One that takes back a command stops the drive as that word does: others make room, and it is
+repeated soon while nobody answers.
 """
 
 from collections import Counter
@@ -20,7 +22,7 @@ from drive_can_bridge.protocols.canopen_pkw.mailbox import (
 from drive_can_bridge.protocols.canopen_pkw.procedures import (
     STOP_ATTEMPTS, tell, write_until_answered,
 )
-from drive_can_bridge.protocols.channel import Lane
+from drive_can_bridge.protocols.channel import Lane, STOP_PATIENCE
 from drive_can_bridge.protocols.polling import WriteSchedule
 from drive_can_bridge.protocols.safe_stop import SafeStop
 from drive_can_bridge.protocols.setpoints_first import SetpointsFirst
@@ -50,6 +52,7 @@ class Writers:
         self._failures: dict[str, str] = {}     # of setpoints, by name
         self._warned: dict[str, str] = {}
         self._silences = Counter[int]()         # in a row, by index
+        self._hurried: set[int] = set()         # those that others have made room for
         self._stop: SafeStop[Step, Reply] = SafeStop(session, channel, stop_ended)
 
     def forget(self) -> None:
@@ -58,6 +61,7 @@ class Writers:
         self._failures.clear()
         self._warned.clear()
         self._silences.clear()
+        self._hurried.clear()
         if self.control is not None:
             self.control.forget()
 
@@ -88,32 +92,56 @@ class Writers:
             return
         self._schedule.look([setpoint.raw for setpoint in items], now, hold=[
             index for index, setpoint in enumerate(items) if not setpoint.known])
+        stopping = {index for index, setpoint in enumerate(items) if self._stops(index, setpoint)}
+        if stopping - self._hurried:
+            self._channel.make_room(now)
+        self._hurried = stopping
         if self._schedule.waiting and self._channel.is_idle(Lane.SETPOINTS):
             self._channel.run(self._write_setpoints(), lambda _: None, now, Lane.SETPOINTS)
+
+    def _stops(self, index: int, setpoint: Setpoint) -> bool:
+        """Tell whether a setpoint, as it is now, takes back what the drive was told."""
+        return (setpoint.raw == setpoint.neutral and setpoint not in self._setpoints.held
+                and self._session.told.runs(index))
 
     def _write_setpoints(self) -> Generator[Step, Reply, None]:
         while self._schedule.waiting:
             index = self._schedule.next()
             setpoint = self._setpoints.items[index]
-            raw = setpoint.raw
-            # at once: a look while the answer is awaited must not find it due again
-            self._schedule.written(index, raw, self._channel.now)
-            reply = yield from tell(
-                self._session.told, index, Write.of(self._placement, setpoint.parameter, raw),
-                runs=raw != setpoint.neutral)
+            reply = yield from self._write_setpoint(index, setpoint)
+            neutral = setpoint.raw == setpoint.neutral
             if isinstance(reply, Silence):
                 self._schedule.failed(index)
-                self._silences[index] += reply.sent
                 if self._silences[index] >= self._session.configuration.missed_limit:
-                    self._failed(setpoint, ': no answer', neutral=raw == setpoint.neutral)
+                    self._failed(setpoint, ': no answer', neutral=neutral)
                 continue
             del self._silences[index]
             if isinstance(reply, Refused):
-                self._failed(setpoint, f' {reply.text}', neutral=raw == setpoint.neutral)
+                self._failed(setpoint, f' {reply.text}', neutral=neutral)
                 continue
             self._failures.pop(setpoint.parameter.name, None)
             if self._first.written(index):
                 self._session.see_to_control_word(self._channel.now)
+
+    def _write_setpoint(self, index: int, setpoint: Setpoint) -> Generator[Step, Reply, Reply]:
+        """Write one as it is then; what stops the drive again, soon, while nobody answers."""
+        left = STOP_ATTEMPTS
+        while True:
+            raw, stops = setpoint.raw, self._stops(index, setpoint)
+            left -= 1
+            again = stops and left > 0
+            # at once: a look while the answer is awaited must not find it due again
+            self._schedule.written(index, raw, self._channel.now)
+            reply = yield from tell(
+                self._session.told, index,
+                Write.of(self._placement, setpoint.parameter, raw, blind=stops,
+                         timeout=min(STOP_PATIENCE, self._session.retry.timeout) if again else None),
+                runs=raw != setpoint.neutral)
+            if not isinstance(reply, Silence):
+                return reply
+            self._silences[index] += reply.sent
+            if not again:
+                return reply
 
     def _failed(self, setpoint: Setpoint, why: str, *, neutral: bool) -> None:
         """
@@ -133,6 +161,8 @@ class Writers:
             control.word_refused(control.word, f'not sent: write of {text}', now)
         elif neutral and control.operating:
             control.drop(f'neutral is not taken, write of {text}')
+        else:
+            return
         session.control_changed(now)
 
     # -- stopping ---------------------------------------------------------------------------------

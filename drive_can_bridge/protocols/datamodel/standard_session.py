@@ -109,17 +109,18 @@ class StandardSession(Session):
     # -- the beat ---------------------------------------------------------------------------------
 
     def handle_timer(self, now: float) -> None:
+        if self.gate.expire(now):
+            self._writer.look(now, unanswered=self._exchange.reading)
         if now >= self._timer.due:
             self._tick(now)
         super().handle_timer(now)
 
     def next_timer(self) -> float:
-        return min(self._timer.due, super().next_timer())
+        return min(self._timer.due, self.setpoints.expires_at, super().next_timer())
 
     def _tick(self, now: float) -> None:
         """Begin a period: look what is to be written, then read."""
         if self.online:
-            self.gate.expire(now)
             self._writer.look(now, unanswered=self._exchange.reading)
         if self._exchange.reading:
             self._exchange.wait(now, self._patience)    # somebody may keep disturbing

@@ -6,8 +6,9 @@ from typing import Any
 
 from builders import Conversation, read
 from pkw_builders import (
-    ANSWER_0, BOOT_UP, CLASS, DISABLE_0, DISABLE_1, DISABLED_0, driven, IDLE, IDLE_ANSWER, online,
-    POSITION, READ_0, SPEED, SPEED_0, SPEED_1, START, STILL_0, STILL_1, STOPPED, TORQUE,
+    ANSWER_0, ANSWER_1, BOOT_UP, CLASS, CURRENT, DISABLE_0, DISABLE_1, DISABLED_0, driven, echo,
+    IDLE, IDLE_ANSWER, LEVEL, online, POSITION, READ_0, READ_1, SPEED, SPEED_0, SPEED_1, START,
+    started, STATUS, STILL_0, STILL_1, STOPPED, TORQUE,
 )
 import pytest
 
@@ -114,9 +115,44 @@ def test_neutral_does_not_wait_for_the_next_round() -> None:
     assert cycle(talk, 12.05) == ['C60264000000']
     talk.submits(read(CLASS), 12.5)
     talk.events()
-    assert talk.at(12.6) == [IDLE]
+    assert talk.until(12.6) == [(12.59, STILL_0)], 'whether the mailbox is in step or not'
     assert talk.events(SetpointsExpired) == [SetpointsExpired(('speed',))]
-    assert answered(talk, [IDLE], 12.6) == ['C60200000000']
+
+
+def test_neutral_has_others_make_room() -> None:
+    """Without a control word it is all that stops the drive."""
+    talk = armed(command_timeout=0.5, period=2.0)
+    talk.commands(0, 0.0, 12.04)
+    talk.commands(0, 10.0, 12.04)
+    assert cycle(talk, 12.05) == ['C60264000000']
+    assert talk.submits(read(CLASS), 12.5) == ['505#5E0200A500000000']
+    assert talk.until(12.63) == [(12.59, STILL_0)], '50 ms after the time-out'
+    assert talk.hears('485#C602002A00000000', 12.631) == ['505#5E0200A500000000'], 'again'
+
+
+def test_lost_neutral_is_repeated_soon() -> None:
+    """The last attempt has the time that any request has: a slow device is no silent one."""
+    talk = armed(command_timeout=0.05)
+    assert cycle(talk, 10.07) == ['C60264000000']
+    assert talk.until(10.0901) == [(10.09, READ_1)]
+    assert talk.hears(ANSWER_1, 10.091) == []
+    assert talk.until(10.1101) == [(10.11, READ_0)]
+    assert talk.hears(ANSWER_0, 10.111) == [STILL_1]
+    sent = talk.until(10.71)
+    assert [text for _, text in sent] == [STILL_0, STILL_1]
+    assert [round(at, 4) for at, _ in sent] == [10.161, 10.211]
+    assert talk.until(10.712) == [(10.711, IDLE)]
+
+
+def test_lost_neutral_that_is_commanded_is_repeated_as_soon() -> None:
+    talk = armed(command_timeout=0.0)
+    assert cycle(talk, 10.07) == ['C60264000000']
+    assert talk.commands(0, 0.0, 10.08) is CommandOutcome.ACCEPTED
+    assert talk.until(10.13) == [(10.09, STILL_1)]
+    assert talk.until(10.141) == [(10.14, STILL_0)]
+    assert talk.commands(0, 10.0, 10.145) is CommandOutcome.ACCEPTED
+    assert talk.until(10.191) == [(10.19, IDLE)], 'what starts it is not sent blindly'
+    assert answered(talk, [IDLE], 10.192) == ['C60264000000']
 
 
 def test_setpoints_go_out_although_a_parameter_is_silent() -> None:
@@ -126,6 +162,32 @@ def test_setpoints_go_out_although_a_parameter_is_silent() -> None:
     (_, text), = talk.until(10.162)
     assert text == IDLE
     assert talk.hears(IDLE_ANSWER, 10.162) == [SPEED_0], 'before anything else'
+
+
+def test_commands_do_not_wait_for_a_round() -> None:
+    """Of three reads, between which users ask for what nobody answers."""
+    talk = started(request=(SPEED,), response=(STATUS, LEVEL, CURRENT), command_timeout=0.0,
+                   parameter_timeout=0.2, parameter_retries=0, rearm_immediate=True,
+                   refresh_interval=0.0)
+    sent: list[tuple[float, str]] = []
+    looked_at = talk.now
+    todo = [*[(10.5, lambda: talk.submits(read(CLASS), 10.5))] * 6,
+            (10.9, lambda: talk.commands(0, 20.0, 10.9))]
+    while talk.now < 12.0:
+        now = max(talk.now, talk.session.next_timer())
+        if talk.session.online:
+            assert now <= looked_at + 0.0401, 'commands that wait are looked for all the time'
+        looked_at = now
+        while todo and now >= todo[0][0]:
+            todo.pop(0)[1]()
+        asked = talk.at(now)
+        while asked:
+            sent.append((talk.now, asked[0]))
+            silent = asked[0][4:8] == '5E02'
+            asked = [] if silent else talk.hears(echo(asked[0]), talk.now + 0.001)
+    at, = [at for at, text in sent if text[4:8] == 'C602' and text[12:16] == 'C800']
+    assert at < 10.9 + 0.25
+    assert len([text for _, text in sent if text[4:8] == '5E02']) > 3
 
 
 # -- lost and refused -----------------------------------------------------------------------------

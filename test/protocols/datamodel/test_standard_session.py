@@ -34,7 +34,7 @@ def test_answer_to_an_older_question_does_not_show_that_a_stop_arrived() -> None
     talk = online(rearm_immediate=True, command_timeout=0.05)
     talk.commands(0, 100.0, 10.01)
     assert talk.until(10.0215) == [(10.02, '3F1#063200E803000000'), (10.021, ASK)]
-    assert talk.until(10.09) == [(10.08, SPEED_ZERO)]
+    assert talk.until(10.09) == [(10.06, SPEED_ZERO)]
     assert talk.hears(ANSWER, 10.091) == []
     assert talk.session.told.ran
     assert talk.until(10.105) == [(10.1, ASK)]
