@@ -11,13 +11,14 @@ What a request does:
     ENABLE       disable                          ready, not enabled, no fault: goes on
                  enable                           enabled: success, the word stays
     DISABLE      disable                          not enabled: success
-    QUICK_STOP   quick_stop                       not enabled: success, disable
+    QUICK_STOP   quick_stop                       not enabled: success, disable (*)
     RESET_FAULT  disable (sent once: a new edge)  fault: goes on; no fault: success
                  reset_fault, a pulse             goes on when it has left often enough
                  disable                          no fault: success
 
 Every other end of a request (time-out, fault, withdrawal, replacement) is a failure and leaves
-``disable``. So ``enable`` is on the bus only for the sake of an ENABLE that nothing has ended
+``disable``; but (*) a quick stop that is not confirmed in time is answered, and its word stays
+until the drive lets go: ``disable`` may let a motor coast that still brakes. So ``enable`` is on the bus only for the sake of an ENABLE that nothing has ended
 since; a fault, or a drive that drops out of ``enabled`` by itself, ends it like a stop does.
 
 *Which status counts.* A status word confirms something only if it arrived after the current
@@ -57,7 +58,7 @@ pulse is the same whether or not the fault goes meanwhile; what counts is the st
 *A drive that takes no notice.* A word that is written when it changes may get lost on the way.
 :attr:`.ControlMachine.unconfirmed` tells the session that the drive, by what it reports since,
 does not do as the word says: then the word is written again. A drive that goes on running under
-``disable`` for longer than a request may take is told of (:attr:`.ControlMachine.disregard`). One
+a word that stops it for longer than a request may take is told of (:attr:`.ControlMachine.disregard`). One
 that says that it refuses the word (:meth:`.ControlMachine.word_refused`) ends what is under way,
 with its reason.
 """

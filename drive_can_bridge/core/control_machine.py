@@ -48,11 +48,9 @@ class ControlMachine:
         self._timeout = timeout
         self._pulse = pulse
         self._pulses_left = 0
-        words = {
-            ControlAction.DISABLE: table.disable, ControlAction.ENABLE: table.enable,
-            ControlAction.QUICK_STOP: table.quick_stop,
-            ControlAction.RESET_FAULT: table.reset_fault}
-        self._words = {action: word for action, word in words.items() if word is not None}
+        self._words: dict[ControlAction, int] = {
+            action: word for action in ControlAction
+            if (word := getattr(table, action.value)) is not None}
         self._reports = StatusReports(table, members)
         self._unheard = unheard
         self._wording = wording
@@ -148,10 +146,6 @@ class ControlMachine:
         """Take a request; its outcome may be there when this returns."""
         self.handle_timer(now)
         action = request.action
-        missing = self._reports.missing if action is ControlAction.ENABLE else ()
-        if missing:
-            self._answers.complete(request, False, f'{", ".join(missing)} offline')
-            return
         if action not in self._words and self._nothing_to_do(action):
             under_way = self._operation
             if action is ControlAction.QUICK_STOP and under_way is not None and (
@@ -170,6 +164,8 @@ class ControlMachine:
                 self._answers.complete(request, True, self.state)
                 return
             may_run = self._may_run
+            if action in _STOPS and self.unconfirmed:
+                self._sent = False  # whoever asks again has it written again
             if under_way is not None:
                 self._end(False, f'replaced by {action.value}')
             under_way = self._operation = Operation(action, now + self._timeout)
@@ -178,6 +174,7 @@ class ControlMachine:
             elif action is not ControlAction.ENABLE:    # of an enabled drive: nothing to do
                 self._send(ControlAction.DISABLE)
         under_way.requests.append(request)
+        under_way.deadline = min(under_way.deadline, now + self._timeout)
         self._advance()
 
     def word_sent(self, now: float) -> None:
@@ -235,8 +232,18 @@ class ControlMachine:
 
     def handle_timer(self, now: float) -> None:
         """End what is overdue. Calling it early or late does no harm."""
-        if now >= self.next_timer():
-            self._end(False, self._overdue_text())
+        under_way = self._operation
+        if under_way is None or now < under_way.deadline:
+            return
+        text = stuck_text(
+            self._reports, self._table, self._wording, self.state, self._timeout, self._sending,
+            self.word, sent=self._sent, pulsed=under_way.pulsed,
+            acknowledged=self._pulse < RESET_CYCLES)
+        if self._sending is ControlAction.QUICK_STOP and self._table.enabled is not None:
+            under_way.deadline = math.inf   # `disable` would end the braking
+            self._answers.answer(under_way, False, text)
+        else:
+            self._end(False, text)
 
     def next_timer(self) -> float:
         """Return when :meth:`handle_timer` has something to do; ``math.inf`` if never."""
@@ -259,8 +266,7 @@ class ControlMachine:
         self._sent = False
         self._reports.forget()
         self._disregard.forget()
-        if not self._fault:         # a known fault stands until the drive says otherwise
-            self._fault = None
+        self._fault = self._fault or None   # a known one stands until the drive says otherwise
 
     # -- rules ------------------------------------------------------------------------------------
 
@@ -274,6 +280,8 @@ class ControlMachine:
         """Return why a request cannot be taken, in words."""
         if action not in self._words:
             return no_word_text(action)
+        if action is ControlAction.ENABLE and self._reports.missing:
+            return f'{", ".join(self._reports.missing)} offline'
         if action is ControlAction.ENABLE and self._fault:
             return 'fault: reset it first'
         under_way = self._operation
@@ -346,12 +354,11 @@ class ControlMachine:
             self._end(False, text)
 
     def _watch_disabled(self, now: float) -> None:
-        """Tell of a drive that runs on although its control word is ``disable``."""
-        if (self._sending is not ControlAction.DISABLE or not self._sent or self._fault
-                or not self._reports.running_on):
-            self._disregard.forget()
-        elif self._disregard.lasts(now):
-            self._disregard.text = disregard_text(self._reports, self.state, self.word)
+        """Tell of a drive that runs on although its control word is there to stop it."""
+        if self._disregard.lasts(now, so=self._sending in _STOPS and self._sent and (
+                not self._fault and self._reports.running_on)):
+            self._disregard.text = disregard_text(
+                self._reports, self.state, self._sending, self.word)
             self._notes.append(self._disregard.text)
 
     @property
@@ -389,12 +396,3 @@ class ControlMachine:
             if success and under_way.action is ControlAction.ENABLE:
                 return
         self._send(ControlAction.DISABLE)
-
-    def _overdue_text(self) -> str:
-        """Say where the drive is stuck, and what usually keeps one there."""
-        under_way, raw = self._operation, self._reports.telling
-        hint = '' if self._wording is None or raw is None else self._wording.hint(raw)
-        pulsed = under_way is not None and under_way.pulsed
-        return stuck_text(self._reports, self._table, self.state, self._timeout,
-                          f'control word {self.word:04X}h', sent=self._sent, pulsed=pulsed,
-                          acknowledged=self._pulse < RESET_CYCLES) + hint

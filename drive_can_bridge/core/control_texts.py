@@ -35,25 +35,30 @@ def state_text(reports: StatusReports, table: ControlTable, wording: Wording | N
     return f'{sending.value} sent' if sent else 'unknown'
 
 
-def stuck_text(reports: StatusReports, table: ControlTable, state: str, timeout: float,
-               word: str, *, sent: bool, pulsed: bool, acknowledged: bool) -> str:
+def stuck_text(reports: StatusReports, table: ControlTable, wording: Wording | None, state: str,
+               timeout: float, sending: ControlAction, word: int, *, sent: bool, pulsed: bool,
+               acknowledged: bool) -> str:
     """
     Say that nothing was confirmed in time, and as much as is known of the reason.
 
+    :param sending: what the current control word is for.
     :param pulsed: the pulse that resets a fault has left.
     :param acknowledged: ``sent`` says that the drive has acknowledged the word.
     """
     if pulsed and reports.answered:
         return f'fault still present after {timeout:g} s ({reports.text})'
     text = f'no confirmation in {timeout:g} s: stuck in state {state} ({reports.text})'
+    name = f'control word {word:04X}h'
     if not sent:
-        why = 'was not acknowledged' if acknowledged else 'could not be sent'
-        return f'{text}; {word} {why}'
-    if not reports.answered:
-        return f'{text}; no status word since {word}'
-    if reports.says(table.enabled):
-        return f'{text}; it does not follow {word}'
-    return text
+        text += f'; {name} ' + ('was not acknowledged' if acknowledged else 'could not be sent')
+    elif not reports.answered:
+        text += f'; no status word since {name}'
+    elif reports.says(table.enabled):
+        text += f'; it does not follow {name}'
+    if sending is ControlAction.QUICK_STOP:     # which is what keeps it there
+        return f'{text}; the word stays'
+    return text if wording is None or reports.telling is None else (
+        text + wording.hint(reports.telling))
 
 
 def no_word_text(action: ControlAction) -> str:
@@ -71,7 +76,9 @@ def success_text(table: ControlTable, sending: ControlAction, state: str) -> str
     return state
 
 
-def disregard_text(reports: StatusReports, state: str, word: int) -> str:
+def disregard_text(reports: StatusReports, state: str, sending: ControlAction,
+                   word: int) -> str:
     """Say that a drive runs on although it shall not, and what to do."""
-    return (f'still {state} ({reports.text}) although its control word is disable ({word:04X}h): '
-            f'stop it by other means, or set a control_timeout longer than its ramp')
+    return (f'still {state} ({reports.text}) although its control word is {sending.value} '
+            f'({word:04X}h): stop it by other means, or set a control_timeout longer than its '
+            f'ramp')

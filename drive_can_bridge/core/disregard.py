@@ -20,8 +20,11 @@ class Disregard:
         self._longest = max(RUNNING_ON_MAX, timeout)
         self._since = math.inf
 
-    def lasts(self, now: float) -> bool:
-        """Take note that it is so now; tell whether it is to be told."""
+    def lasts(self, now: float, *, so: bool) -> bool:
+        """Take note whether it is so now; tell whether it is to be told."""
+        if not so:
+            self.forget()
+            return False
         self._since = min(self._since, now)
         return not self.text and now - self._since > self._longest
 

@@ -735,15 +735,36 @@ def test_quick_stop_of_a_drive_nobody_knows_brakes() -> None:
     assert outcomes(control) == [(QUICK_STOP, True, 'ready')]
 
 
-def test_quick_stop_that_is_not_confirmed_fails_and_disables() -> None:
+def test_quick_stop_that_is_not_confirmed_fails_and_its_word_stays() -> None:
+    """The motor may brake for longer, and coast under ``disable``."""
     control = enabled()
     control.request(ControlRequest(QUICK_STOP), 1.0)
     cycle(control, ENABLED, 1.02)
     control.handle_timer(3.0)
     assert outcomes(control) == [(
         QUICK_STOP, False, 'no confirmation in 2 s: stuck in state enabled (status word 0003h); '
-        'it does not follow control word 0002h')]
+        'it does not follow control word 0002h; the word stays')]
+    assert (control.word, control.pending) == (STOP, True)
+    assert control.next_timer() == math.inf
+    cycle(control, ENABLED, 3.1)
+    assert control.disregard.startswith(
+        'still enabled (status word 0003h) although its control word is quick_stop (0002h)')
+    control.request(ControlRequest(ENABLE), 3.2)
+    assert outcomes(control)[0][:2] == (ENABLE, False)
+    again = ControlRequest(QUICK_STOP)
+    control.request(again, 3.3)
+    assert control.next_timer() == 5.3
+    cycle(control, READY, 4.0)
+    assert outcomes(control) == [(QUICK_STOP, True, 'ready')]
     assert (control.word, control.pending) == (OFF, False)
+
+
+def test_disable_takes_the_place_of_a_quick_stop_that_is_not_confirmed() -> None:
+    control = enabled()
+    control.request(ControlRequest(QUICK_STOP), 1.0)
+    cycle(control, ENABLED, 3.1)
+    control.request(ControlRequest(DISABLE), 3.2)
+    assert control.word == OFF
 
 
 def test_fault_during_a_quick_stop_disables_and_the_stop_is_still_watched() -> None:

@@ -25,6 +25,7 @@ from drive_can_bridge.protocols.canopen_pkw.mailbox import (
 )
 from drive_can_bridge.protocols.canopen_pkw.procedures import STOP_ATTEMPTS, tell
 from drive_can_bridge.protocols.channel import Lane, STOP_PATIENCE
+from drive_can_bridge.protocols.word_repetition import WordRepetition
 
 #: s until a ``disable`` that was refused is written again
 RETRY_AFTER = 0.25
@@ -52,6 +53,7 @@ class ControlWriter:
         self._span = self._placement.span(self._parameter)
         self._refresh: float = (
             drive.options.refresh_interval if self._parameter in drive.cyclic_request else 0.0)
+        self._repetition = WordRepetition(control, acknowledged=True)
         self._settled: int | None = None    # the drive has it, or has refused it
         self._settled_at = -math.inf
         self._retry_at = math.inf           # a refused disable
@@ -62,6 +64,7 @@ class ControlWriter:
         """Take note that nothing is known of the drive."""
         self._settled = self._doubtful = self._hurried = None
         self._retry_at = math.inf
+        self._repetition.forget()
         self.refusal = ''
 
     def update(self, now: float, *, known: bool) -> None:
@@ -74,7 +77,8 @@ class ControlWriter:
         word = self._control.word
         fresh = now < self._retry_at and (
             self._refresh <= 0.0 or now < self._settled_at + self._refresh)
-        if self._settled == word and fresh:
+        if self._settled == word and fresh and (
+                self.refusal or not self._repetition.due(now)):
             return
         repeated = self._settled == word or self._control.operating
         if repeated and not known and word != self._disable:
@@ -108,6 +112,7 @@ class ControlWriter:
             again = stopping and unanswered < STOP_ATTEMPTS - 1
             timeout = min(STOP_PATIENCE, self._session.retry.timeout) if again else None
             before = self._settled
+            self._repetition.begun(word)
             if word != before:
                 self._settled = None    # from now on nobody knows: a stop does not rely on it
             reply = yield from tell(
@@ -168,6 +173,7 @@ class ControlWriter:
         """Take note that the drive has a word."""
         self._doubtful = None
         self._settled, self._settled_at = word, self._channel.now
+        self._repetition.left(self._channel.now)
         if word == self._control.word:
             self._control.word_sent(self._channel.now)
             self._session.control_changed(self._channel.now)

@@ -132,11 +132,11 @@ class Writers:
             again = stops and left > 0
             # at once: a look while the answer is awaited must not find it due again
             self._schedule.written(index, raw, self._channel.now)
+            timeout = min(STOP_PATIENCE, self._session.retry.timeout) if again else None
+            write = Write.of(
+                self._placement, setpoint.parameter, raw, blind=stops, timeout=timeout)
             reply = yield from tell(
-                self._session.told, index,
-                Write.of(self._placement, setpoint.parameter, raw, blind=stops,
-                         timeout=min(STOP_PATIENCE, self._session.retry.timeout) if again else None),
-                runs=raw != setpoint.neutral)
+                self._session.told, index, write, runs=raw != setpoint.neutral)
             if not isinstance(reply, Silence):
                 return reply
             self._silences[index] += reply.sent

@@ -22,17 +22,11 @@ from drive_can_bridge.protocols.datamodel.channel import (
     AcyclicChannel, ParameterCourier, Procedure,
 )
 from drive_can_bridge.protocols.datamodel.numbers import Numbers
+from drive_can_bridge.protocols.word_repetition import WordRepetition
 
 #: s between two looks at the status word, while a request is under way and otherwise
 STATUS_PERIOD_PENDING = 0.05
 STATUS_PERIOD = 0.5
-#: s until a word that the drive takes no notice of is written again: at first, and at most
-REPEAT_FIRST = 0.2
-REPEAT_LAST = 2.0
-#: how often at most where each write wears an EEPROM
-EEPROM_REPEATS = 3
-#: how often to a drive at fault: whether it got the word is not to be seen
-FAULT_REPEATS = 3
 #: s until a word that the bus refused is written again
 REFUSED_PAUSE = 0.02
 
@@ -58,18 +52,15 @@ class AcyclicControl:
         self._status = status
         self._spacing = stop_spacing(session.configuration.period)
         self._numbers = numbers
-        self._written: int | None = None
-        self._ran = False       # the word before was enable
-        self._repeat_at = math.inf
-        self._repeats = 0
+        self._repetition = WordRepetition(
+            control, wears=word is not None and word.storage is not Storage.RAM)
         self._reading = False
         self._outdated = False  # what is being read was asked before the word left
         self._watching = False
 
     def begin(self, now: float) -> None:
         """Handle a drive that was found: it gets its word, and its status is looked at."""
-        self._written = None
-        self._ran = False
+        self._repetition.forget()
         self._watching = True
         if self._status is not None:
             self._look_at = now
@@ -86,19 +77,11 @@ class AcyclicControl:
 
     def update(self, now: float) -> None:
         """Write the control word if it changed, or if the drive takes no notice of it."""
-        word = self._control.word
-        if self._word is None:
+        word, repetition = self._control.word, self._repetition
+        if self._word is None or word == repetition.word and not repetition.due(now):
             return
-        if word != self._written:
-            self._repeats = 0
-            if self._written is not None:
-                self._ran = self._written == self._control.table.enable
-        elif self._may_repeat(self._word, now):
-            self._repeats += 1
-        else:
-            return
-        self._written = word
-        self._repeat_at = self._retry_at = math.inf      # until it left
+        repetition.begun(word)
+        self._retry_at = math.inf
         write = (self._courier.write_now if self._control.stopping
                  else self._courier.write_first)
         runs = not self._control.at_rest
@@ -129,30 +112,21 @@ class AcyclicControl:
             self._outdated = False
             self._channel.run(self._read(self._status), self._received, now)
 
-    def _may_repeat(self, parameter: Parameter, now: float) -> bool:
-        if now < self._repeat_at:
-            return False
-        if self._control.pulsing:
-            return True
-        if parameter.storage is Storage.RAM:
-            # rid of its fault, it would run by itself, had it missed the word
-            return self._control.unconfirmed or (
-                self._ran and self._control.fault and self._repeats < FAULT_REPEATS)
-        return self._control.disregard != '' and self._repeats < EEPROM_REPEATS
-
     def _left(self, word: int, sent: bool, now: float, *, runs: bool) -> None:
         if not sent:
-            if word == self._written:
-                self._written = None
+            if word == self._repetition.word:
+                self._repetition.word = None
                 self._retry_at = now + REFUSED_PAUSE
             return
         self._session.told.note_unacknowledged(CONTROL_WORD, runs=runs)
         self._outdated = self._reading
-        self._repeat_at = now + min(REPEAT_FIRST * 2 ** min(self._repeats, 10), REPEAT_LAST)
+        if self._watching:  # else others see to the stop
+            self._repetition.left(now)
         if word == self._control.word:
             self._control.word_sent(now)
             if self._control.pulsing:
-                self._repeat_at = self._retry_at = now + self._spacing
+                self._repetition.left(now, self._spacing)
+                self._retry_at = now + self._spacing
         self._session.control_changed(now)
 
     def _read(self, status: Parameter) -> Procedure:

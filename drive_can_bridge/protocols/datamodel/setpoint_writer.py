@@ -15,6 +15,7 @@ from drive_can_bridge.protocols.datamodel.channel import Reply, Step, Write
 from drive_can_bridge.protocols.polled_exchange import PolledExchange
 from drive_can_bridge.protocols.polling import WriteSchedule
 from drive_can_bridge.protocols.setpoints_first import SetpointsFirst
+from drive_can_bridge.protocols.word_repetition import WordRepetition
 
 Rounds = PolledExchange[Step, Reply]
 
@@ -39,11 +40,15 @@ class SetpointWriter:
         self._first = SetpointsFirst(session, self._schedule, [
             index for index in range(len(drive.cyclic_request)) if index != self._slot])
         self._spacing = stop_spacing(drive.period)
+        self._repetition = None if session.control is None or self._slot is None else (
+            WordRepetition(session.control))
         self._pulse_at = math.inf  # when the control word is due again, whatever it was
 
     def stop(self) -> None:
         """Plan nothing any more: nothing is known of the drive."""
         self._schedule.forget()
+        if self._repetition is not None:
+            self._repetition.forget()
         self._pulse_at = math.inf
 
     def look(self, now: float, *, unanswered: bool = False) -> None:
@@ -52,20 +57,22 @@ class SetpointWriter:
 
         :param unanswered: what was asked a period ago still waits for its answer.
         """
-        control = self._session.control
+        control, slot = self._session.control, self._slot
+        if slot is not None and self._repetition is not None and self._repetition.due(now):
+            self._schedule.failed(slot)
         # when a read goes unanswered, nobody knows whether the drive was off meanwhile: it is not
         # started by a repetition
         doubt = (self._exchange.silent or unanswered) and control is not None and not (
             control.at_rest or control.stopping)
-        hold = [self._slot] if doubt or self.holds_word else []
+        hold = [slot] if doubt or self.holds_word else []
         unknown = self._session.setpoints.unknown
         if unknown:
             hold += [index for index, parameter in enumerate(self._parameters)
                      if parameter.name in unknown]
         self._schedule.look(self._raws(), now, hold=hold)
-        if self._slot is not None and control is not None:
+        if slot is not None and control is not None:
             # a word that starts the drive behind setpoints, also when all are only refreshed
-            self._schedule.order(self._slot, first=control.stopping or control.pulsing)
+            self._schedule.order(slot, first=control.stopping or control.pulsing)
 
     @property
     def holds_word(self) -> bool:
@@ -85,6 +92,8 @@ class SetpointWriter:
             Write(self._numbers.number(parameter), self._numbers.words(parameter, raw),
                   eeprom=False),
             lambda sent, then: self._left(index, raw, sent, then, runs=runs), now)
+        if index == self._slot and self._repetition is not None:
+            self._repetition.begun(raw)
         self._schedule.written(index, raw, now)  # at once: a look meanwhile must not find it due
 
     def write_word(self, now: float) -> None:
@@ -120,11 +129,12 @@ class SetpointWriter:
             return
         self._session.told.note_unacknowledged(index, runs=runs)
         control = self._session.control
-        if index != self._slot or control is None:
+        if index != self._slot or control is None or self._repetition is None:
             if self._first.written(index):
                 self._session.see_to_control_word(now)
             return
         self.word_written_at = now
+        self._repetition.left(now)
         if raw == control.word:
             control.word_sent(now)
             if control.pulsing:

@@ -289,7 +289,15 @@ def test_a_drive_that_runs_on_under_disable_is_told_of() -> None:
     talk = running()
     assert talk.asks(ControlAction.DISABLE, 10.095) == ['505#C002002A00000000']
     talk.hears('485#C002002A00000000', 10.096)
-    assert rounds(talk, 10.1, 12.09, '81000000') == []
+    again = []
+    now = 10.1
+    while written := rounds(talk, now, 12.09, '81000000'):
+        (now, text), = written
+        assert text[:10] + text[12:] == '505#C0020000000000', 'it may have taken no notice'
+        settle(talk, text.replace('505#', '485#'), now + 0.001, '81000000')
+        again.append(round(now, 1))
+        now += 0.003
+    assert again == [10.3, 10.7, 11.5]
     assert talk.session.control is not None
     assert talk.session.control.disregard == ''
     rounds(talk, 12.09, 12.3, '81000000')
@@ -297,7 +305,10 @@ def test_a_drive_that_runs_on_under_disable_is_told_of() -> None:
     assert text.startswith(
         'still enabled (status word 0081h) although its control word is disable (0000h)')
     assert Noted(text, warning=True) in talk.events(Noted)
-    rounds(talk, 12.3, 12.4, '41000000')
+    asked, = talk.asks(ControlAction.DISABLE, 12.302)
+    assert asked[4:8] + asked[12:] == 'C00200000000', 'at once for who asks again'
+    settle(talk, asked.replace('505#', '485#'), 12.303, '81000000')
+    rounds(talk, 12.305, 12.4, '41000000')
     assert talk.session.control.disregard == ''
 
 

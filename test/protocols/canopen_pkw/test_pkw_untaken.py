@@ -65,6 +65,18 @@ def test_drive_that_refuses_neutral_is_not_enabled() -> None:
                        '08000022h (data cannot be stored in the present state of the device)')
 
 
+def test_drive_that_refused_neutral_once_can_be_enabled_and_disabled() -> None:
+    talk = online(request=(SPEED,), control=CONTROL)
+    talk.until(10.0701)
+    talk.hears(echo(READ_0, '4100'), 10.071)
+    sent = enabling(talk, 10.5, refused=True)
+    assert set(words(sent)) == {'0000'}, 'enable is withdrawn'
+    talk.control_outcomes()
+    asked = talk.asks(ControlAction.DISABLE, talk.now)
+    sent = answers(talk, 11.0, status='4100') if not asked else asked
+    assert talk.control_outcomes() == [('disable', True, 'ready')]
+
+
 def test_drive_that_does_not_answer_to_neutral_is_not_enabled() -> None:
     talk = online(request=(SPEED,), control=CONTROL, control_timeout=4.0)
     talk.until(10.0701)
@@ -81,7 +93,7 @@ def test_enabled_drive_that_does_not_take_neutral_is_disabled() -> None:
     """Nobody commands it any more, and it would run on with what it was told last."""
     talk = driven(control_timeout=4.0)
     sent = answers(talk, 13.0)
-    assert words(sent) == ['0000']
+    assert words(sent) == ['0000'] * 3, 'it says that it runs on'
     assert len([text for text in sent if text.startswith(SPEEDS)]) >= 3
     assert ('enable withdrawn: neutral is not taken, write of speed: no answer; only ~/enable '
             'starts the drive again') in notes(talk)

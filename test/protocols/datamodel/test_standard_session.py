@@ -686,6 +686,25 @@ def test_a_status_asked_for_before_the_word_left_confirms_nothing() -> None:
     assert talk.control_outcomes() == [('disable', True, 'ready')]
 
 
+def test_a_word_of_which_no_notice_is_taken_is_written_again() -> None:
+    """Nobody acknowledges it: it may have been lost. Nothing else would write it."""
+    talk = controlled(refresh_interval=0.0)
+    talk.asks(ControlAction.ENABLE, 10.01)
+    round_of(talk, 10.02, READY)
+    talk.until(10.03)
+    round_of(talk, 10.04, ENABLED)
+    assert talk.asks(ControlAction.DISABLE, 10.045) == [DISABLE_WORD]
+    again = []
+    for beat in range(1, 60):
+        sent = [text for _, text in talk.until(10.0425 + 0.02 * beat)]
+        assert set(sent) <= {DISABLE_WORD, SPEED_ZERO, ASK}
+        if DISABLE_WORD in sent:
+            again.append(round(10.04 + 0.02 * beat, 2))
+        talk.hears(ENABLED, 10.044 + 0.02 * beat)
+    assert again == [10.26, 10.68]
+    assert DISABLE_WORD in talk.asks(ControlAction.DISABLE, 12.05), 'at once for who asks again'
+
+
 def test_a_fault_puts_the_word_back() -> None:
     talk = controlled()
     talk.asks(ControlAction.ENABLE, 10.01)
