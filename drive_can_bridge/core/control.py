@@ -17,9 +17,10 @@ What a request does:
                  disable                          no fault: success
 
 Every other end of a request (time-out, fault, withdrawal, replacement) is a failure and leaves
-``disable``; but (*) a quick stop that is not confirmed in time is answered, and its word stays
-until the drive lets go: ``disable`` may let a motor coast that still brakes. So ``enable`` is on the bus only for the sake of an ENABLE that nothing has ended
-since; a fault, or a drive that drops out of ``enabled`` by itself, ends it like a stop does.
+``disable``; but (*) a drive that says that it still brakes when the time is over keeps its quick
+stop until it lets go: ``disable`` may let it coast. So ``enable`` is on the bus only for the sake
+of an ENABLE that nothing has ended since; a fault, or a drive that drops out of ``enabled`` by
+itself, ends it like a stop does.
 
 *Which status counts.* A status word confirms something only if it arrived after the current
 control word had left; what was on its way before that tells of older times. A fault counts
@@ -58,7 +59,8 @@ pulse is the same whether or not the fault goes meanwhile; what counts is the st
 *A drive that takes no notice.* A word that is written when it changes may get lost on the way.
 :attr:`.ControlMachine.unconfirmed` tells the session that the drive, by what it reports since,
 does not do as the word says: then the word is written again. A drive that goes on running under
-a word that stops it for longer than a request may take is told of (:attr:`.ControlMachine.disregard`). One
+a word that stops it for longer than a request may take is told of
+(:attr:`.ControlMachine.disregard`). One
 that says that it refuses the word (:meth:`.ControlMachine.word_refused`) ends what is under way,
 with its reason.
 """

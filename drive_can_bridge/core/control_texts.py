@@ -56,7 +56,7 @@ def stuck_text(reports: StatusReports, table: ControlTable, wording: Wording | N
     elif reports.says(table.enabled):
         text += f'; it does not follow {name}'
     if sending is ControlAction.QUICK_STOP:     # which is what keeps it there
-        return f'{text}; the word stays'
+        return text + ('; the word stays' if reports.says(table.braking) else '; now disable')
     return text if wording is None or reports.telling is None else (
         text + wording.hint(reports.telling))
 

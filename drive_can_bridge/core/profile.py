@@ -31,6 +31,7 @@ class ControlTable:
     :param status_parameter: name of the parameter that carries the status word, or None.
     :param running: the drive does not stand still yet; None: the same as ``enabled``.
     :param reaction: there is a fault, but it cannot be reset yet; None: it always can.
+    :param braking: a quick stop is under way; None: the status word does not say.
     """
 
     parameter: str
@@ -44,6 +45,7 @@ class ControlTable:
     fault: StatusPattern | None = None
     running: StatusPattern | None = None
     reaction: StatusPattern | None = None
+    braking: StatusPattern | None = None
 
 
 @dataclass(frozen=True, slots=True)

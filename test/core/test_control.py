@@ -735,34 +735,59 @@ def test_quick_stop_of_a_drive_nobody_knows_brakes() -> None:
     assert outcomes(control) == [(QUICK_STOP, True, 'ready')]
 
 
-def test_quick_stop_that_is_not_confirmed_fails_and_its_word_stays() -> None:
-    """The motor may brake for longer, and coast under ``disable``."""
+def test_quick_stop_that_is_not_confirmed_fails_and_disables() -> None:
     control = enabled()
     control.request(ControlRequest(QUICK_STOP), 1.0)
     cycle(control, ENABLED, 1.02)
     control.handle_timer(3.0)
     assert outcomes(control) == [(
         QUICK_STOP, False, 'no confirmation in 2 s: stuck in state enabled (status word 0003h); '
+        'it does not follow control word 0002h; now disable')]
+    assert (control.word, control.pending) == (OFF, False)
+
+
+BRAKES = ENABLED | 0x0040
+
+
+def braking() -> ControlMachine:
+    """Return the machine of a drive whose quick stop has taken longer than was waited for."""
+    control = enabled(replace(FULL, braking=StatusPattern(0x0042, 0x0042)))
+    control.request(ControlRequest(QUICK_STOP), 1.0)
+    cycle(control, BRAKES, 1.02)
+    control.handle_timer(3.0)
+    assert outcomes(control) == [(
+        QUICK_STOP, False, 'no confirmation in 2 s: stuck in state enabled (status word 0043h); '
         'it does not follow control word 0002h; the word stays')]
-    assert (control.word, control.pending) == (STOP, True)
-    assert control.next_timer() == math.inf
-    cycle(control, ENABLED, 3.1)
+    return control
+
+
+def test_quick_stop_goes_on_while_the_drive_says_that_it_brakes() -> None:
+    """Under ``disable`` the motor may coast."""
+    control = braking()
+    assert (control.word, control.pending, control.next_timer()) == (STOP, True, 5.0)
+    cycle(control, BRAKES, 3.1)
     assert control.disregard.startswith(
-        'still enabled (status word 0003h) although its control word is quick_stop (0002h)')
+        'still enabled (status word 0043h) although its control word is quick_stop (0002h)')
     control.request(ControlRequest(ENABLE), 3.2)
     assert outcomes(control)[0][:2] == (ENABLE, False)
-    again = ControlRequest(QUICK_STOP)
-    control.request(again, 3.3)
-    assert control.next_timer() == 5.3
-    cycle(control, READY, 4.0)
+    cycle(control, BRAKES, 5.1)
+    assert (control.word, outcomes(control)) == (STOP, [])
+    control.request(ControlRequest(QUICK_STOP), 5.3)
+    assert control.next_timer() == 7.1
+    cycle(control, READY, 6.0)
     assert outcomes(control) == [(QUICK_STOP, True, 'ready')]
     assert (control.word, control.pending) == (OFF, False)
 
 
-def test_disable_takes_the_place_of_a_quick_stop_that_is_not_confirmed() -> None:
-    control = enabled()
-    control.request(ControlRequest(QUICK_STOP), 1.0)
+def test_quick_stop_that_a_drive_breaks_off_is_followed_by_disable() -> None:
+    control = braking()
     cycle(control, ENABLED, 3.1)
+    control.handle_timer(5.0)
+    assert control.word == OFF
+
+
+def test_disable_takes_the_place_of_a_quick_stop_that_goes_on() -> None:
+    control = braking()
     control.request(ControlRequest(DISABLE), 3.2)
     assert control.word == OFF
 

@@ -40,7 +40,7 @@ def control_table(parameter_set: int) -> ControlTable:
         status_parameter=STATUS_WORD,
         ready=StatusPattern(0x007F, 0x0031), enabled=StatusPattern(0x007F, 0x0037),
         fault=StatusPattern(0x0008, 0x0008), running=StatusPattern(OUTPUT_ON, OUTPUT_ON),
-        reaction=StatusPattern(0x004F, 0x000F))
+        reaction=StatusPattern(0x004F, 0x000F), braking=StatusPattern(0x007F, 0x0017))
 
 
 def make_control(*, parameter_set: int, timeout: float,

@@ -231,6 +231,8 @@ class PkwSession(Session):
                 self._writers.write_setpoints(now)
                 self.see_to_control_word(now)
             self._exchange.begin(now)
+        elif self.online:
+            self._writers.write_stops(now)
         self._look_at = now + self.configuration.period
 
     @property

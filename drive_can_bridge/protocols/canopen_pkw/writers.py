@@ -99,6 +99,12 @@ class Writers:
         if self._schedule.waiting and self._channel.is_idle(Lane.SETPOINTS):
             self._channel.run(self._write_setpoints(), lambda _: None, now, Lane.SETPOINTS)
 
+    def write_stops(self, now: float) -> None:
+        """Write what takes back a command at once; everything else has its turn."""
+        if any(index not in self._hurried and self._stops(index, setpoint)
+               for index, setpoint in enumerate(self._setpoints.items)):
+            self.write_setpoints(now)
+
     def _stops(self, index: int, setpoint: Setpoint) -> bool:
         """Tell whether a setpoint, as it is now, takes back what the drive was told."""
         return (setpoint.raw == setpoint.neutral and setpoint not in self._setpoints.held

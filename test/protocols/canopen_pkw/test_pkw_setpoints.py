@@ -130,6 +130,15 @@ def test_neutral_has_others_make_room() -> None:
     assert talk.hears('485#C602002A00000000', 12.631) == ['505#5E0200A500000000'], 'again'
 
 
+def test_neutral_that_is_commanded_does_not_wait_for_a_slow_round() -> None:
+    talk = armed(command_timeout=0.0)
+    assert cycle(talk, 10.07) == ['C60264000000']
+    assert talk.until(10.0901) == [(10.09, READ_1)]
+    assert talk.commands(0, 0.0, 10.1) is CommandOutcome.ACCEPTED
+    (at, text), = talk.until(10.17)
+    assert (round(at, 4), text) == (10.16, STILL_0), 'looked for at 10.11; 50 ms for the read'
+
+
 def test_lost_neutral_is_repeated_soon() -> None:
     """The last attempt has the time that any request has: a slow device is no silent one."""
     talk = armed(command_timeout=0.05)

@@ -423,13 +423,11 @@ def test_late_answer_to_a_stop_word_is_as_good_as_that_to_its_repetition() -> No
 
 
 def test_word_that_changes_while_a_stop_is_repeated() -> None:
-    """What is repeated is the newest word."""
+    """A quick stop gives up after 0.2 s: what is repeated is the newest word."""
     talk = driven(control=replace(CONTROL, quick_stop=0x0002), control_timeout=0.07)
     assert talk.asks(ControlAction.QUICK_STOP, 10.115) == ['505#C002002A02000000']
     assert talk.until(10.164) == []
-    assert talk.until(10.19) == [(10.165, '505#C00200AA02000000')]
-    assert talk.control_outcomes()[0][:2] == ('quick_stop', False), 'but its word stays'
-    assert talk.asks(ControlAction.DISABLE, 10.191) == []
+    assert talk.until(10.166) == [(10.165, '505#C00200AA02000000')]
     assert [text for _, text in talk.until(10.24)] == [DISABLE_0], 'no more quick stop'
 
 
