@@ -38,6 +38,8 @@ PASS_PERIOD = 0.25
 LOST_TIME = 1.0
 #: s by which a pass may be late until commands that wait are not believed any more
 LATENESS_MAX = 0.25
+#: s that a command waits at most until it is looked at, however seldom its drive is served
+LOOK_PERIOD = 0.05
 #: s until what was last sent is told again
 REQUEST_PERIOD = 1.0
 #: s that a stop may take beyond its neutral cycles
@@ -51,14 +53,16 @@ class Member:
     :ivar partners: drives that share frames with this one: what happens to it may concern them.
     :ivar due: when the session wants to be called; kept here, so that a pass over all drives costs
         a comparison each.
+    :ivar look_at: when its commands are to be looked at.
     :ivar told: what the listener knows to have been sent.
     """
 
-    __slots__ = ('due', 'listener', 'partners', 'session', 'told')
+    __slots__ = ('due', 'listener', 'look_at', 'partners', 'session', 'told')
 
     def __init__(self, session: Session, listener: DriveListener) -> None:
         self.session = session
         self.listener = listener
+        self.look_at = -math.inf
         self.partners: list[Member] = []
         self.due = session.next_timer()
         self.told = session.sent.raws
@@ -271,14 +275,16 @@ class BusExchange:
             self._tell_again(now)
         soonest = min(now + PASS_PERIOD, self._tell_at)
         for member in self._members:
-            if member.due <= now:
+            if member.due <= now or member.look_at <= now and self.active:
                 now = self._clock()  # the drives before took their time
+                member.look_at = now + LOOK_PERIOD
                 member.listener.take_commands(now)
                 member.session.handle_timer(now)
                 self._pump(member)
         for member in self._members:  # a partner's timer may have changed after its turn
-            if member.due < soonest:
-                soonest = member.due
+            due = member.look_at if member.look_at < member.due and self.active else member.due
+            if due < soonest:
+                soonest = due
         self._meant_at = soonest
         return soonest
 

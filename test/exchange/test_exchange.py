@@ -13,10 +13,12 @@ from waiting import wait_for
 
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
-from drive_can_bridge.core.events import Noted, RequestCompleted, StationFound, StationLost
+from drive_can_bridge.core.events import (
+    Noted, RequestCompleted, SetpointsExpired, StationFound, StationLost,
+)
 from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.core.requests import Failure, ReadValue
-from drive_can_bridge.exchange.exchange import BusExchange, PASS_PERIOD
+from drive_can_bridge.exchange.exchange import BusExchange, LOOK_PERIOD, PASS_PERIOD
 
 ZEROS = '0000000000000000'
 NEUTRAL = f'003FFFF0#{ZEROS}'
@@ -149,6 +151,24 @@ def test_pass_says_when_the_next_is_due() -> None:
     assert bench.exchange._pass() == pytest.approx(10.04)
     idle = Bench()
     assert idle.exchange._pass() == pytest.approx(10.0 + PASS_PERIOD)
+
+
+def test_commands_do_not_wait_for_a_slow_drive() -> None:
+    """How old a command is counts from when it came: it is never far from when it is taken."""
+    bench = Bench(drive(rearm_immediate=True, period=0.8, command_timeout=0.3, mapping='assume'))
+    bench.exchange.bus_opened()
+    bench.exchange.activate()
+    while not bench.sessions[0].online:
+        now = bench.exchange._pass()
+        bench.at(now)
+        bench.hears(ANSWER, now + 0.001)
+    begin = bench.now
+    bench.notes[0].commands.append((0, 100.0))
+    while bench.now < begin + 0.7:
+        bench.at(bench.exchange._pass())
+        assert not bench.notes[0].commands or bench.now < begin + LOOK_PERIOD
+    assert not any(setpoint.armed for setpoint in bench.sessions[0].setpoints.items)
+    assert [event for event in bench.notes[0].events if isinstance(event, SetpointsExpired)]
 
 
 def test_lost_time_is_noticed_by_the_timer() -> None:
@@ -509,7 +529,8 @@ def test_frames_that_nobody_else_should_send_are_counted() -> None:
 
 
 def test_whatever_is_due_sooner_wakes_the_timer() -> None:
-    bench = Bench(drive(period=5.0, mapping='assume', parameter_retries=0))
+    bench = Bench(drive(period=5.0, mapping='assume', parameter_retries=0,
+                        parameter_timeout=0.02))
     bench.exchange.bus_opened()
     bench.exchange.activate()
     bench.at(10.0)

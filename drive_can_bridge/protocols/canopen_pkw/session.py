@@ -79,7 +79,6 @@ class PkwSession(Session):
             self, procedures.RegisterAccess(self._channel, self.retry, placement),
             blocked=self._supervision.refusal, control_refusal=self._writers.control_refusal)
         self.look_after(channel=self._channel)
-        self._look_at = math.inf
 
     # -- life cycle -------------------------------------------------------------------------------
 
@@ -222,29 +221,27 @@ class PkwSession(Session):
             if self.gate.expire(now):
                 self._writers.write_setpoints(now)
         self._channel.advance(now)
-        if now < self._due:
-            return
-        if not self._exchange.reading:
+        if self._exchange.reading:
+            if self.online and self.setpoints.changed:
+                self._writers.write_stops(now)
+        elif now >= self._exchange.timer.due:
             if self.control is not None and self.control.stopping:
                 self.see_to_control_word(now)   # before setpoints, should it be due again
             if self.online:
                 self._writers.write_setpoints(now)
                 self.see_to_control_word(now)
             self._exchange.begin(now)
-        elif self.online:
-            self._writers.write_stops(now)
-        self._look_at = now + self.configuration.period
 
     @property
-    def _due(self) -> float:
-        """When the next round is due; while one is under way, when to look for commands."""
-        return self._look_at if self._exchange.reading else self._exchange.timer.due
+    def _round_due(self) -> float:
+        """When the next round is due; infinity: not before this one has ended."""
+        return math.inf if self._exchange.reading else self._exchange.timer.due
 
     def next_timer(self) -> float:
         soonest = self._channel.next_timer()
         if self.stage is not Stage.RUNNING:
             return soonest
-        soonest = min(soonest, self._due, self._supervision.next_timer(),
+        soonest = min(soonest, self._round_due, self._supervision.next_timer(),
                       self.setpoints.expires_at)
         return soonest if self.control is None else min(soonest, self.control.next_timer())
 
