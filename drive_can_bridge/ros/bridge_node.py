@@ -21,6 +21,7 @@ from typing import Any
 
 from rclpy.context import Context
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.service import Service
 
 from drive_can_bridge.configuration.load import configuration_from_overrides
 from drive_can_bridge.configuration.parameter_file import unseen_problems
@@ -29,6 +30,7 @@ from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.errors import ConfigurationError
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.process.scheduling import raise_priority
+from drive_can_bridge.ros.answers import Answers
 from drive_can_bridge.ros.diagnostics import Diagnostics
 from drive_can_bridge.ros.drive_node import DriveNode
 from drive_can_bridge.ros.executor_thread import ExecutorThread
@@ -57,8 +59,11 @@ class BridgeNode(LifecycleNode):
     def __init__(self, spinner: ExecutorThread, fatal: Callable[[str], None], *,
                  context: Context | None = None, files: Sequence[str] = (),
                  **options: Any) -> None:
+        self._answers = Answers(lambda topic, text: self.log.speaker('').warn(topic, text),
+                                lambda text: self.log.info(text))
         super().__init__(NODE_NAME, context=context, enable_logger_service=True,
                          start_parameter_services=False, **options)  # NodeParameters has them
+        self._answers.adopt(self.services)  # not all of them are made by create_service
         self.log = Log(self.get_logger())
         self._spinner = spinner
         self._fatal = fatal
@@ -66,8 +71,10 @@ class BridgeNode(LifecycleNode):
         self._unseen = unseen_problems(map(Path, files), self.get_fully_qualified_name())
         self._transition_lock = threading.RLock()
         self._control_thread = ServiceThread('control', self.context, self.log.error,
-                                             raise_priority, share=1.0)
-        self._parameter_thread = ServiceThread('parameters', self.context, self.log.error)
+                                             raise_priority, share=1.0,
+                                             send=self._answers.send)
+        self._parameter_thread = ServiceThread('parameters', self.context, self.log.error,
+                                               send=self._answers.send)
         self._ending = False
         self._leaving: list[DriveNode] = []
         self._fleet: Fleet | None = None
@@ -76,6 +83,12 @@ class BridgeNode(LifecycleNode):
         guard_transitions(self, self.log.warning, self._transition_lock,
                           lambda: 'the bridge is being stopped' if self._ending else '')
         spinner.executor.add_node(self)
+
+    def create_service(self, *arguments: Any, **options: Any) -> Service:
+        """Create a service whose answers hold up nobody else."""
+        service = super().create_service(*arguments, **options)
+        self._answers.adopt([service])
+        return service
 
     # -- parameters -------------------------------------------------------------------------------
 
@@ -236,6 +249,7 @@ class BridgeNode(LifecycleNode):
             self._leaving.pop().destroy()
         self._control_thread.stop()
         self._parameter_thread.stop()
+        self._answers.stop()
 
     def destroy_node(self) -> None:
         """Take the node out of the graph, when everything is written that it had to say."""

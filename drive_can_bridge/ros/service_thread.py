@@ -7,7 +7,7 @@ between: several times for each call that has to wait for its drive, and whoever
 thousand parameters is served before the one who wants it to stop. So services of drives are taken
 by threads that have nothing else to do, straight from a wait set of their own; those that stop
 machines by one of theirs. Answers are sent by another one: where a caller has been discovered only
-halfway, sending takes the middleware a tenth of a second.
+halfway, sending takes the middleware a tenth of a second (:mod:`.answers`).
 """
 
 from collections.abc import Callable
@@ -37,6 +37,8 @@ TAKE_MAX = 8
 Answer = Callable[[Any], None]
 #: takes a request, and whatever is to be called with the response
 Callback = Callable[[Any, Answer], None]
+#: takes service, response and the header of the request
+Send = Callable[[Service, Any, Any], None]
 
 
 class ServiceThread:
@@ -48,12 +50,14 @@ class ServiceThread:
     :param report: takes one line about an exception that a callback let escape.
     :param prepare_thread: called first in the thread that takes requests.
     :param share: of the processor's time that each of its two threads may use; 1: all of it.
+    :param send: sends an answer.
     """
 
     def __init__(self, name: str, context: Context, report: Callable[[str], None],
                  prepare_thread: Callable[[], object] = lambda: None, *,
-                 share: float = MODEST) -> None:
+                 share: float = MODEST, send: Send = Service.send_response) -> None:
         self._name = name
+        self._send_response = send
         self._share = share
         self._context = context
         self._report = report
@@ -172,10 +176,10 @@ class ServiceThread:
         """Have an answer sent. From any thread."""
         self._jobs.put(partial(self._send, service, header, answered, message))
 
-    @staticmethod
-    def _send(service: Service, header: Any, answered: Callable[[], None], message: Any) -> None:
+    def _send(self, service: Service, header: Any, answered: Callable[[], None],
+              message: Any) -> None:
         try:
-            service.send_response(message, header)
+            self._send_response(service, message, header)
         except GONE:   # service or context are gone
             pass
         finally:

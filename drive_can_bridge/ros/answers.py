@@ -1,0 +1,160 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+Answers to callers, whether they can be reached or not.
+
+Sending takes the middleware a tenth of a second where it has discovered a caller only halfway, or
+where caller and service do not match, which nobody tells the caller. The interpreter is not held
+meanwhile (:mod:`.rcl_response`). The thread that answers is, once for each such client: what is
+for it afterwards is left to a thread of their own, until one of them arrives.
+"""
+
+from collections.abc import Callable, Iterable
+from functools import partial
+import queue
+import threading
+from typing import Any
+import warnings
+
+from rclpy.service import Service
+
+from drive_can_bridge.ros.gone import GONE
+from drive_can_bridge.ros.rcl_response import RclResponses, Response, Unfit, Unreachable
+
+#: clients that are remembered as out of reach
+CALLERS_MAX = 50
+#: answers for one of them that wait; any others are not sent
+WAITING_MAX = 2
+
+
+class Answers:
+    """
+    Sends answers. From any thread.
+
+    :param warn: takes topic and text of a warning for the log, which may come again and again.
+    :param info: takes one line for the log.
+    """
+
+    def __init__(self, warn: Callable[[str, str], None], info: Callable[[str], None]) -> None:
+        self._warn = warn
+        self._info = info
+        self._rcl: RclResponses | None = None
+        self._unfit = False
+        self._lock = threading.Lock()
+        #: clients out of reach: how many answers for them wait
+        self._waiting: dict[bytes, int] = {}
+        self._late: queue.SimpleQueue[Callable[[], None] | None] = queue.SimpleQueue()
+        self._thread: threading.Thread | None = None
+        self._ending = False
+
+    def adopt(self, services: Iterable[Service]) -> None:
+        """Have executors answer through this: they call ``send_response`` of the service."""
+        for service in services:
+            service.send_response = partial(self.send, service)  # type: ignore[method-assign]
+
+    def send(self, service: Service, message: Any, header: Any) -> None:
+        """
+        Send an answer, in place of ``Service.send_response``.
+
+        :raises TypeError: the message is none of its answers.
+        :raises InvalidHandle: the service is gone.
+        :raises RCLError: the context is gone.
+        """
+        kind: Any = service.srv_type
+        if not isinstance(message, kind.Response):
+            raise TypeError(f'{service.srv_name}: {type(message).__name__} is no answer')
+        if not self._unfit:
+            try:
+                rcl = self._rcl = self._rcl or RclResponses()
+                response = rcl.prepare(service, message, header)
+            except Unfit as error:
+                self._leave_to_rclpy(error)
+            else:
+                if response.caller in self._waiting:
+                    self._defer(rcl, response)
+                else:
+                    self._deliver(rcl, response)
+                return
+        Service.send_response(service, message, header)
+
+    def stop(self) -> None:
+        """End; what waits for clients out of reach is not sent."""
+        with self._lock:
+            self._ending = True
+        self._late.put(None)
+        if self._thread is not None:
+            self._thread.join(timeout=5.0)
+
+    def _leave_to_rclpy(self, reason: Unfit) -> None:
+        with self._lock:
+            known, self._unfit = self._unfit, True
+        if not known:
+            # it tells of callers out of reach by a warning of Python's, with a line of its source
+            warnings.filterwarnings('ignore', 'failed to send response', RuntimeWarning)
+            self._info(f'answers hold up the whole process while they wait for a caller that DDS '
+                       f'has not found yet: rclpy sends them ({reason})')
+
+    def _defer(self, rcl: RclResponses, response: Response) -> None:
+        """Leave an answer to the thread that may wait; enough wait there: it is lost."""
+        caller = response.caller
+        with self._lock:
+            waiting = self._waiting.get(caller, 0)
+            room = waiting < WAITING_MAX and not self._ending
+            if room:
+                self._waiting[caller] = waiting + 1
+                if self._thread is None:
+                    self._thread = threading.Thread(target=self._run,
+                                                    name='late answers', daemon=True)
+                    self._thread.start()
+        if room:
+            self._late.put(partial(self._deliver_late, rcl, response))
+        else:
+            self._tell(response.service)
+
+    def _deliver(self, rcl: RclResponses, response: Response) -> None:
+        caller = response.caller
+        try:
+            rcl.send(response)
+        except Unreachable:
+            with self._lock:
+                self._waiting.setdefault(caller, 0)
+                if len(self._waiting) > CALLERS_MAX:
+                    del self._waiting[next(iter(self._waiting))]
+            self._tell(response.service)
+        else:
+            if caller in self._waiting:
+                with self._lock:
+                    self._waiting.pop(caller, None)
+
+    def _tell(self, service: Service) -> None:
+        try:
+            name = service.service_name
+        except GONE:    # meanwhile; nobody misses the answer
+            return
+        self._warn(f'answer of {name}',
+                   f'an answer of {name} could not be delivered: its caller takes none (another '
+                   f'QoS, or DDS has not found all of it)')
+
+    # -- the thread that waits for clients out of reach -------------------------------------------
+
+    def _run(self) -> None:
+        while self._do_one_job():
+            pass
+
+    def _do_one_job(self) -> bool:
+        """Do what comes next, and forget it then."""
+        job = self._late.get()
+        if job is None or self._ending:
+            return False
+        job()
+        return True
+
+    def _deliver_late(self, rcl: RclResponses, response: Response) -> None:
+        with self._lock:
+            if response.caller in self._waiting:
+                self._waiting[response.caller] -= 1
+        try:
+            self._deliver(rcl, response)
+        except GONE:    # service or context are gone
+            pass
+        except Exception as error:  # noqa: BLE001  outermost call of a thread
+            self._warn('answer', f'internal error in an answer: {type(error).__name__}: {error}')

@@ -1,0 +1,338 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Answers to callers that the middleware does not reach, and to all others."""
+
+from collections.abc import Callable, Iterator
+import struct
+import threading
+import time
+from typing import Any
+
+from bridges import Bridge, LIFT, parameters, StartBridge
+from clients import Client, ClientContext, LATCHED, wait_until
+import pytest
+from rclpy.qos import qos_profile_parameters
+from rclpy.service import Service
+from std_srvs.srv import Trigger
+
+from drive_can_bridge.ros import answers as answers_module, rcl_response
+from drive_can_bridge.ros.answers import Answers, WAITING_MAX
+from drive_can_bridge.ros.polled_group import PolledGroup
+from drive_can_bridge.ros.rcl_response import RclResponses, Response, Unfit, Unreachable
+from drive_can_bridge.ros.service_thread import ServiceThread
+
+#: a hundred of them would fit into the wait of the middleware
+TICK = 0.001
+#: so many show that the interpreter was not held
+TICKS = 5
+#: s between two calls of somebody who is never answered
+AGAIN = 0.3
+
+
+class Ticks:
+    """What another thread gets done."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self._ending = threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def _run(self) -> None:
+        while not self._ending.wait(TICK):
+            self.count += 1
+
+    def stop(self) -> None:
+        """End."""
+        self._ending.set()
+        self._thread.join()
+
+
+@pytest.fixture(name='ticks')
+def _ticks() -> Iterator[Ticks]:
+    ticks = Ticks()
+    yield ticks
+    ticks.stop()
+
+
+@pytest.fixture(name='told')
+def _told() -> list[str]:
+    return []
+
+
+@pytest.fixture(name='answers')
+def _answers(told: list[str]) -> Iterator[Answers]:
+    answers = Answers(lambda topic, text: told.append(text), told.append)
+    yield answers
+    answers.stop()
+
+
+def _services(bridge: Bridge) -> list[Service]:
+    """Return all services of a bridge's process."""
+    return [service for node in (bridge.node, *(drive.node for drive in
+                                                bridge.node.drives.values()))
+            for service in node.services]
+
+
+def _call_until(caller: Any, kind: Any, condition: Callable[[], Any]) -> None:
+    """Call a service that never answers, again and again: nobody says when it is found."""
+    due = 0.0
+
+    def look() -> Any:
+        nonlocal due
+        if time.monotonic() >= due:
+            caller.call_async(kind.Request())
+            due = time.monotonic() + AGAIN
+        return condition()
+    wait_until(look, what=f'{caller.srv_name} to be called')
+
+
+def _warnings(recwarn: pytest.WarningsRecorder) -> list[str]:
+    return [str(warning.message) for warning in recwarn
+            if issubclass(warning.category, RuntimeWarning)]
+
+
+def test_no_answer_of_the_process_holds_the_interpreter_for_a_caller_out_of_reach(
+        bridge: StartBridge, client: Client, ticks: Ticks, monkeypatch: pytest.MonkeyPatch,
+        recwarn: pytest.WarningsRecorder, capfd: pytest.CaptureFixture[str]) -> None:
+    missed: dict[str, int] = {}
+    send = RclResponses.send
+
+    def watched(self: RclResponses, response: Response) -> None:
+        before = ticks.count
+        try:
+            send(self, response)
+        except Unreachable:
+            missed[response.service.service_name] = ticks.count - before
+            raise
+    monkeypatch.setattr(RclResponses, 'send', watched)
+    one = bridge(parameters(lift=LIFT))
+    client.listen()
+    services = _services(one)
+    names = {service.service_name for service in services}
+    assert {'/lift/get_parameters', '/lift/set_parameters', '/lift/quick_stop', '/lift/enable',
+            '/drive_can_bridge/change_state', '/drive_can_bridge/get_state',
+            '/drive_can_bridge/get_transition_graph', '/drive_can_bridge/set_parameters',
+            '/drive_can_bridge/set_logger_levels', '/drive_can_bridge/save_trace'} <= names
+    callers = [(client.node.create_client(service.srv_type, service.service_name,
+                                          qos_profile=LATCHED), service) for service in services]
+    for caller, service in callers:
+        _call_until(caller, service.srv_type, lambda name=service.service_name: name in missed)
+    assert missed.keys() == names
+    assert all(count >= TICKS for count in missed.values()), missed
+    client.wait_logged('an answer of /lift/quick_stop could not be delivered')
+    assert not _warnings(recwarn)
+    shown = capfd.readouterr().err
+    assert not any(word in shown for word in ('Traceback', 'Warning', 'error_handling')), shown
+
+
+def test_others_are_answered_as_ever_and_as_by_rclpy(
+        bridge: StartBridge, client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    one = bridge(parameters(lift=LIFT))
+    sent: list[str] = []
+    send = RclResponses.send
+    monkeypatch.setattr(RclResponses, 'send', lambda self, response: (
+        send(self, response), sent.append(response.service.service_name)))
+    kinds = {service.service_name: service.srv_type for service in _services(one)}
+    ours = {name: client.call(name, kind) for name, kind in kinds.items()}
+    assert set(sent) == kinds.keys()
+    assert client.transition(label='deactivate') and client.state() == 'inactive'
+    assert client.transition(label='activate') and client.state() == 'active'
+    one.online()
+
+    def refuse(*_: Any) -> None:
+        raise Unfit('for a test')
+    monkeypatch.setattr(RclResponses, 'prepare', refuse)
+    sent.clear()
+    assert {name: client.call(name, kind) for name, kind in kinds.items()} == ours
+    assert not sent
+
+
+class Caller:
+    """A service in a thread of its own, and somebody who calls it."""
+
+    def __init__(self, client: Client, context: ClientContext, answers: Answers) -> None:
+        self.client = client
+        self.errors: list[str] = []
+        self.service = client.node.create_service(
+            Trigger, '~/asked', lambda *_: None, callback_group=PolledGroup(),
+            qos_profile=qos_profile_parameters)
+        self.thread = ServiceThread('control', context.context, self.errors.append,
+                                    send=answers.send)
+        self.thread.serve(self.service, lambda _, answer: answer(
+            Trigger.Response(success=True, message='an answer')))
+
+    def ask(self) -> str:
+        """Return the answer."""
+        name = self.service.service_name
+        # it is in this process: discovery is complete when both ends have met
+        caller = self.client.node.create_client(Trigger, name, qos_profile=qos_profile_parameters)
+        wait_until(caller.service_is_ready)
+        future = caller.call_async(Trigger.Request())
+        wait_until(future.done)
+        return str(future.result().message)
+
+
+@pytest.fixture(name='caller')
+def _caller(client: Client, _client_context: ClientContext, answers: Answers) -> Iterator[Caller]:
+    caller = Caller(client, _client_context, answers)
+    yield caller
+    caller.thread.stop()
+    assert not caller.errors
+
+
+def _other_place(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rcl_response, '_HEAD', rcl_response._HEAD + 8)
+
+
+def _no_address(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rcl_response, '_HEAD', 0)
+
+
+def _too_small(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rcl_response, '_HEAD', 1 << 40)
+
+
+def _other_fields(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rcl_response, '_INFO', struct.Struct('qqq16s'))
+
+
+def _no_library(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rcl_response.rclpy_implementation, '__file__', '/no/such.so')
+
+
+def _no_function(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rcl_response.rclpy_implementation, '__file__', 'libc.so.6')
+
+
+def _no_capsule(monkeypatch: pytest.MonkeyPatch) -> None:
+    functions = rcl_response._functions_of
+    monkeypatch.setattr(rcl_response, '_functions_of', lambda kind: functions(int))
+
+
+@pytest.mark.parametrize('unfit', [
+    _other_place, _no_address, _too_small, _other_fields, _no_library, _no_function, _no_capsule])
+def test_rclpy_answers_where_anything_is_other_than_expected(
+        caller: Caller, told: list[str], unfit: Callable[[pytest.MonkeyPatch], None],
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    unfit(monkeypatch)
+    assert [caller.ask(), caller.ask()] == ['an answer'] * 2
+    assert len(told) == 1 and told[0].startswith('answers hold up the whole process')
+
+
+def test_python_does_not_warn_where_rclpy_answers(
+        caller: Caller, client: Client, answers: Answers, monkeypatch: pytest.MonkeyPatch,
+        recwarn: pytest.WarningsRecorder) -> None:
+    _no_library(monkeypatch)
+    sent: list[int] = []
+    send = Service.send_response
+    monkeypatch.setattr(Service, 'send_response',
+                        lambda *arguments: (send(*arguments), sent.append(1)))
+    lost = client.node.create_client(Trigger, caller.service.service_name, qos_profile=LATCHED)
+    _call_until(lost, Trigger, lambda: sent)
+    assert not _warnings(recwarn)
+
+
+def test_a_service_may_be_destroyed_while_its_answer_is_sent(
+        caller: Caller, client: Client, told: list[str], ticks: Ticks,
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    over: list[bool] = []
+    send = RclResponses.send
+
+    def watched(self: RclResponses, response: Response) -> None:
+        def destroy() -> None:
+            before = ticks.count
+            while ticks.count < before + TICKS:
+                pass
+            client.node.destroy_service(response.service)
+            over.append(False)
+        thread = threading.Thread(target=destroy)
+        thread.start()
+        try:
+            send(self, response)
+        finally:
+            over.append(True)
+            thread.join()
+    monkeypatch.setattr(RclResponses, 'send', watched)
+    name = caller.service.service_name
+    lost = client.node.create_client(Trigger, name, qos_profile=LATCHED)
+    _call_until(lost, Trigger, lambda: len(over) == 2)
+    assert over == [False, True]
+    caller.thread.forget([caller.service])
+    wait_until(lambda: not client.node.count_services(name))
+    assert not told     # nobody misses that answer
+
+
+class FakeRcl:
+    """Reaches some callers only."""
+
+    def __init__(self) -> None:
+        self.lost = {b'lost'}
+        self.go_on = threading.Event()
+        self.sent: list[tuple[bytes, Any, str]] = []
+
+    def prepare(self, service: Any, message: Any, header: bytes) -> Any:
+        """Return something with a caller."""
+        return Response(service, message, None, 0, None, header)    # type: ignore[arg-type]
+
+    def send(self, response: Response) -> None:
+        """Wait for callers out of reach, but for the first time."""
+        late = threading.current_thread().name == 'late answers'
+        if late:
+            assert self.go_on.wait(60.0)
+        if response.caller in self.lost:
+            raise Unreachable
+        self.sent.append((response.caller, response.message, 'late' if late else 'at once'))
+
+
+class FakeService:
+    """Says who it is."""
+
+    srv_name = service_name = '/lift/get_parameters'
+
+    class srv_type:  # noqa: N801  as in rclpy
+        """Its answers are numbers."""
+
+        Response = int
+
+
+def test_a_client_out_of_reach_delays_others_once(
+        answers: Answers, told: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    rcl = FakeRcl()
+    monkeypatch.setattr(answers_module, 'RclResponses', lambda: rcl)
+    service: Any = FakeService()
+    answers.send(service, 0, b'lost')
+    assert told == ['an answer of /lift/get_parameters could not be delivered: its caller takes '
+                    'none (another QoS, or DDS has not found all of it)']
+    for number in range(WAITING_MAX + 1):   # another thread waits with the first of them
+        answers.send(service, number, b'lost')
+    answers.send(service, 7, b'other')
+    assert rcl.sent == [(b'other', 7, 'at once')]
+    for number in range(WAITING_MAX + 2):   # more than that are not kept
+        answers.send(service, number, b'lost')
+    assert len(told) >= 2 and len(set(told)) == 1
+    rcl.lost.clear()                        # it was discovered only halfway
+    rcl.go_on.set()
+    wait_until(lambda: (b'lost', 0, 'late') in rcl.sent)
+    wait_until(lambda: b'lost' not in answers._waiting)
+    answers.send(service, 8, b'lost')
+    assert (b'lost', 8, 'at once') in rcl.sent
+    with pytest.raises(TypeError):
+        answers.send(service, 'no number', b'other')
+
+
+def test_what_waits_for_clients_out_of_reach_does_not_outlast_the_end(
+        answers: Answers, monkeypatch: pytest.MonkeyPatch) -> None:
+    rcl = FakeRcl()
+    monkeypatch.setattr(answers_module, 'RclResponses', lambda: rcl)
+    service: Any = FakeService()
+    for number in range(3):
+        answers.send(service, number, b'lost')
+    rcl.lost.clear()
+    ending = threading.Thread(target=answers.stop)
+    ending.start()
+    wait_until(lambda: answers._ending)
+    rcl.go_on.set()
+    ending.join(60.0)
+    assert not ending.is_alive() and len(rcl.sent) <= 1
+    answers.send(service, 4, b'other')      # who is in reach is answered to the end
+    assert rcl.sent[-1] == (b'other', 4, 'at once')
