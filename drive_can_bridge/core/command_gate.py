@@ -83,7 +83,8 @@ class CommandGate:
         """Go neutral, and back to ``disable``."""
         self._setpoints.allow(False)
         if self._control is not None:
-            self._control.withdraw(reason, now)
+            # of a drive that is only being stopped the last status is still known
+            self._control.withdraw(reason, now, lost=self._presence.active)
             self.follow()
 
     def status(self, raw: int | None, now: float) -> None:
@@ -108,7 +109,7 @@ class CommandGate:
         control = self._control
         # once the word may have started the drive, only a status as new as the position tells
         free = control is not None and control.off and (
-            control.at_rest or self._status_in_sample)
+            control.at_rest and self._presence.active or self._status_in_sample)
         if self._setpoints.measure(raws, driven=not free):
             self._allow()
 

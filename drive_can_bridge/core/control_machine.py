@@ -255,16 +255,16 @@ class ControlMachine:
             self._notes.append(f'enable withdrawn: {reason}; only ~/enable starts {whom} again')
         self._end(False, reason)
 
-    def withdraw(self, reason: str, now: float) -> None:
+    def withdraw(self, reason: str, now: float, *, lost: bool = True) -> None:
         """
         Go back to ``disable``: the drive went offline or restarted, or the bridge stops.
 
-        Open requests fail with the reason; nothing is known, and the word is :attr:`word_due`.
+        Open requests fail, the word is :attr:`word_due`; of one that is ``lost`` nothing is known.
         """
         self.handle_timer(now)
         self.drop(reason)
         self._sent = False
-        self._reports.forget()
+        self._reports.forget_answers() if not lost else self._reports.forget()
         self._disregard.forget()
         self._fault = self._fault or None   # a known one stands until the drive says otherwise
 

@@ -47,7 +47,7 @@ from drive_can_bridge.core.retry import RetryPolicy
 from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.setpoints import Setpoints
 from drive_can_bridge.core.statistics import DriveStatistics
-from drive_can_bridge.core.told import Told
+from drive_can_bridge.core.told import Told, UNHEARD_STOP
 from drive_can_bridge.core.users import Users
 
 #: advice until more is known
@@ -172,7 +172,7 @@ class Session(ABC):
 
     def stop_left(self) -> None:
         """End a stop that nobody acknowledges: send nothing more."""
-        self._leave_owing('told to stop, but it does not answer')
+        self._leave_owing(UNHEARD_STOP)
         self.go_idle('deactivated')
 
     def stop_ended(self) -> None:

@@ -9,12 +9,14 @@ whether it still owes the drive a stop.
 
 from collections.abc import Hashable
 
+#: what is said of a drive that was told so, and does not answer
+UNHEARD_STOP = 'told to stop, but it does not answer'
 MAY_RUN = 'it may still be running'
 #: what a control word is among the things that travel separately, where it does
 CONTROL_WORD = 'control word'
 #: what a drive that does not answer was told
-_UNHEARD = object()
-_NOTHING_ELSE = frozenset([_UNHEARD])
+UNHEARD = 'whatever it has not heard'
+_NOTHING_ELSE = frozenset([UNHEARD])
 
 
 class Told:
@@ -58,7 +60,7 @@ class Told:
     def doubt(self) -> bool:
         """Take note that the drive does not answer; tell whether it may run for that reason."""
         if self.ran:
-            self.note(_UNHEARD, runs=True)
+            self.note(UNHEARD, runs=True)
         return self.ran
 
     def answered(self) -> None:

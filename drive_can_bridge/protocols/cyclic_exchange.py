@@ -19,6 +19,7 @@ from typing import Generic, TypeVar
 
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.session import Session, Stage
+from drive_can_bridge.core.told import UNHEARD_STOP
 from drive_can_bridge.protocols.exchange_book import ExchangeBook
 
 #: cyclic frames with neutral setpoints that are sent before a drive is left alone
@@ -259,9 +260,12 @@ class CyclicExchange(Generic[TelegramT]):
     def _lose(self, reason: str, now: float) -> None:
         if reason:
             self.forget()
-            if self._session.online:
-                self._session.lose(reason, now)
-            self._session.report.advice = f'{self._silence}: {self._advice}'
+            session = self._session
+            if session.online:
+                session.lose(reason, now)
+            elif not session.told.owed and session.told.doubt():
+                session.report.warn(UNHEARD_STOP, may_run=True)
+            session.report.advice = f'{self._silence}: {self._advice}'
 
     # -- the end ----------------------------------------------------------------------------------
 

@@ -3,11 +3,12 @@
 The stop of a drive by acyclic writes, whatever its family: what has to be told, and what follows.
 
 How that is written and confirmed, and how often it is tried, is a procedure of the family, in the
-lane that comes first.
+lane that comes first. At the end of the bridge, a drive that has confirmed it is asked once for
+its status: what it was told is not what it does.
 """
 
 from collections.abc import Callable, Generator
-from typing import Generic, NamedTuple
+from typing import Generic, NamedTuple, Union
 
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.process_image import control_word
@@ -15,6 +16,9 @@ from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.told import CONTROL_WORD
 from drive_can_bridge.protocols.channel import Channel, Lane
 from drive_can_bridge.protocols.courier import ReplyT, StepT
+
+#: reads one word: the raw integer, or None
+StatusRead = Generator[StepT, ReplyT, Union[int, None]]
 
 
 class StopWrite(NamedTuple):
@@ -30,12 +34,16 @@ class SafeStop(Generic[StepT, ReplyT]):
     The acyclic stop of one drive.
 
     :param ended: called when it has run its course.
+    :param read_status: reads the status word, once, for a short time (None: no answer); None:
+        there is none to be read, or it comes by itself.
     :ivar running: it is under way.
     """
 
     def __init__(self, session: Session, channel: Channel[StepT, ReplyT],
-                 ended: Callable[[], None]) -> None:
+                 ended: Callable[[], None],
+                 read_status: Callable[[], StatusRead[StepT, ReplyT]] | None = None) -> None:
         self.running = False
+        self._read_status = read_status
         self._session = session
         self._channel = channel
         self._ended = ended
@@ -75,11 +83,36 @@ class SafeStop(Generic[StepT, ReplyT]):
         self.running = True
         self._owed, self._insisting = session.told.owed, insist
         self._whole = setpoints and not session.gate.mute
-        self._channel.run(procedure, self._done, now, Lane.STOP)
+        self._channel.run(self._then_look(procedure), self._done, now, Lane.STOP)
+
+    def look(self, now: float) -> None:
+        """Read the status at the end of a stop by other means, if it does not come by itself."""
+        if self._read_status is not None and not self.running:
+            self.running = True
+            self._channel.run(self._look(), self._looked, now, Lane.STOP)
 
     def forget(self) -> None:
         """Take note that the channel was cleared."""
         self.running = False
+
+    def _then_look(self, procedure: Generator[StepT, ReplyT, list[str]],
+                   ) -> Generator[StepT, ReplyT, list[str]]:
+        failed = yield from procedure
+        if not failed:
+            yield from self._look()
+        return failed
+
+    def _look(self) -> Generator[StepT, ReplyT, None]:
+        session = self._session
+        if self._read_status is None or session.active or not session.online:
+            return
+        raw = yield from self._read_status()
+        if raw is not None:
+            session.gate.status(raw, self._channel.now)
+
+    def _looked(self, _: None) -> None:
+        self.running = False
+        self._ended()
 
     def _done(self, failed: list[str]) -> None:
         self.running = False

@@ -125,7 +125,8 @@ class DriveReporter:
             command_age = session.setpoints.age(now)
             more = session.facts()
             if session.control is not None:
-                more = {'control_state': session.control.state, **more}
+                known = session.control.state if session.active else 'unknown'
+                more = {'control_state': known, **more}
         self._latencies = statistics.latency.count, statistics.latency.total
         self._requests = statistics.requests_ok + statistics.requests_failed
         facts = {

@@ -257,7 +257,8 @@ class DriveNode(DriveListener):
     def _tell_stopped(self) -> None:
         """Say how the drive is left: it was told to stop, and has answered."""
         control = self.session.control
-        if control is not None and control.unconfirmed:     # its status may lag, or it runs down
+        if control is not None and control.table.enabled is not None and not control.off:
+            # it may lag, or the drive runs down
             self._log.warning(f'told to stop, and answers, but its last status word does not say '
                               f'so: {control.state}')
         else:

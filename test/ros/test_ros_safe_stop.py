@@ -75,11 +75,13 @@ def test_a_dead_timer_thread_ends_the_bridge_safely(bridge: StartBridge, client:
     client.wait_logged('internal error: RuntimeError: a defect', ERROR)
 
 
+@pytest.mark.parametrize('more', [
+    {}, {'cyclic_request': ['speed_setpoint']}, {'protocol': 'datamodel_standard'}])
 def test_a_drive_that_says_enabled_to_the_end_is_not_called_stopped(
-        bridge: StartBridge, client: Client) -> None:
-    one = run(bridge, client)
+        bridge: StartBridge, client: Client, more: dict[str, object]) -> None:
+    one = run(bridge, client, parameters(lift={**LIFT, **more}))
     client.listen()
-    one.played['lift'].fault('stuck=control_word')
+    one.played['lift'].fault(f'set=status_word:{one.played["lift"].value("status_word"):g}')
     one.node.stop()
     client.wait_logged('lift: told to stop, and answers, but its last status word does not say '
                        'so: enabled', WARN)

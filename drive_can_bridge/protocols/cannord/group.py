@@ -125,13 +125,13 @@ class Group:
 
     def member_lost(self, member: CannordSession) -> None:
         """Take note that an inverter of the group is offline."""
-        self.control.member_lost(member.configuration.name)
-        if member.active:       # else the bridge ends, which the leader tells
+        if member.active:       # else the bridge ends: what it reported last is to be told
+            self.control.member_lost(member.configuration.name)
             self.leader.gate.follow()
 
     def end(self, now: float) -> None:
         """Take note that the bridge ends: that, and no member that goes, takes the enable back."""
-        self.control.withdraw(BRIDGE_INACTIVE, now)
+        self.control.withdraw(BRIDGE_INACTIVE, now, lost=False)
 
     def member_status(self, member: CannordSession, word: int, now: float) -> None:
         """Take the status word of an inverter that is led."""

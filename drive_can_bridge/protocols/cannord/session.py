@@ -116,6 +116,8 @@ class CannordSession(Session):
     def begin(self, now: float) -> None:
         self.exchange.stop()
         self._forget_samples()
+        if self._group is not None:     # what it reported before the bridge ended is outdated
+            self._group.control.member_lost(self.configuration.name)
         self.exchange.start(math.inf if self._led else now)     # those of the leader are for all
         if self.told.owed:
             self.exchange.timer.hurry(now)

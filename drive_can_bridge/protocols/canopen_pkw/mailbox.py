@@ -48,11 +48,13 @@ class Read:
     Read one register, or two adjacent ones.
 
     :param attempts: None: as configured.
+    :param timeout: s to wait for the answer; None: as configured.
     """
 
     address: Address
     count: int = 1
     attempts: int | None = None
+    timeout: float | None = None
 
 
 @dataclass(frozen=True)
@@ -246,12 +248,12 @@ class MailboxCourier(Courier[Step, Reply]):
     def _send_step(self, step: Step, now: float) -> None:
         # inverted after function 00h, too: a late answer to the request before never fits
         self._toggle = not self._toggle
-        timeout, left = self.retry.timeout, self._left
+        timeout = self.retry.timeout if step.timeout is None else step.timeout
+        left = self._left
         if isinstance(step, Read):
             self._request = pkw.read_request(step.address, step.count, self._toggle)
         else:
             self._request = pkw.write_request(step.address, step.words, self._toggle)
-            timeout = timeout if step.timeout is None else step.timeout
             left = partial(self._write_left, step)
         self._patience = timeout
         self.deadline = self._until = now + timeout

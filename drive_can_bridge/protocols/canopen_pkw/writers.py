@@ -10,22 +10,28 @@ repeated soon while nobody answers.
 
 from collections import Counter
 from collections.abc import Callable, Generator
+from functools import partial
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.holding import Setpoint
+from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.process_image import status_word
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement
 from drive_can_bridge.protocols.canopen_pkw.control_writer import ControlWriter
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
-    MailboxChannel, Refused, Reply, Silence, Step, Write,
+    Answered, MailboxChannel, Read, Refused, Reply, Silence, Step, Write,
 )
 from drive_can_bridge.protocols.canopen_pkw.procedures import (
     STOP_ATTEMPTS, tell, write_until_answered,
 )
 from drive_can_bridge.protocols.channel import Lane, STOP_PATIENCE
 from drive_can_bridge.protocols.polling import WriteSchedule
-from drive_can_bridge.protocols.safe_stop import SafeStop
+from drive_can_bridge.protocols.safe_stop import SafeStop, StatusRead
 from drive_can_bridge.protocols.setpoints_first import SetpointsFirst
+
+#: s that the status is waited for at the end of a stop
+STATUS_TIME = 0.1
 
 
 class Writers:
@@ -53,7 +59,10 @@ class Writers:
         self._warned: dict[str, str] = {}
         self._silences = Counter[int]()         # in a row, by index
         self._hurried: set[int] = set()         # those that others have made room for
-        self._stop: SafeStop[Step, Reply] = SafeStop(session, channel, stop_ended)
+        status = status_word(drive)
+        self._stop: SafeStop[Step, Reply] = SafeStop(
+            session, channel, stop_ended,
+            None if status is None else partial(self._read_status, status))
 
     def forget(self) -> None:
         """Take note that nothing is known of the drive."""
@@ -191,6 +200,12 @@ class Writers:
             write_until_answered(
                 writes, self._placement, STOP_ATTEMPTS, timeout, max(timeout, in_the_end)),
             now, insist=insist)
+
+    def _read_status(self, status: Parameter) -> StatusRead[Step, Reply]:
+        span = self._placement.span(status)
+        reply = yield Read(span.address, span.count, attempts=1,
+                           timeout=min(STATUS_TIME, self._session.retry.timeout))
+        return self._placement.raw(status, reply.words) if isinstance(reply, Answered) else None
 
     # -- what the drive refuses -------------------------------------------------------------------
 

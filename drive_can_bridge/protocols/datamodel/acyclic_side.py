@@ -6,6 +6,7 @@ Requests of users, a control or status word without a slot in cyclic telegrams, 
 """
 
 from collections.abc import Callable, Generator, Sequence
+from functools import partial
 import math
 from typing import Union
 
@@ -27,7 +28,7 @@ from drive_can_bridge.protocols.datamodel.extended import PAYLOAD, SLOTS
 from drive_can_bridge.protocols.datamodel.numbers import Numbers
 from drive_can_bridge.protocols.datamodel.options import DataModelOptions
 from drive_can_bridge.protocols.placement import SentWrites
-from drive_can_bridge.protocols.safe_stop import SafeStop
+from drive_can_bridge.protocols.safe_stop import SafeStop, StatusRead
 
 #: how often everything is written at most that makes a drive stand still
 ATTEMPTS = 3
@@ -75,12 +76,16 @@ class AcyclicSide:
         self.control_slot = _slot(drive.cyclic_request, word)
         self.status_slot = _slot(drive.cyclic_response, status)
         word = word if self.control_slot is None else None
+        # where rounds are read, it does not come by itself in the end
+        at_end = status if self.courier.anonymous or self.status_slot is None else None
         status = status if self.status_slot is None else None
         self.control_writer = None if session.control is None or not (word or status) else (
             AcyclicControl(session, session.control, self.channel, self.courier, self.numbers,
                            word=word, status=status))
         self.parts = () if self.control_writer is None else (self.control_writer,)
-        self.stop: SafeStop[Step, Reply] = SafeStop(session, self.channel, stop_ended)
+        self.stop: SafeStop[Step, Reply] = SafeStop(
+            session, self.channel, stop_ended,
+            None if at_end is None else partial(self._read_status, at_end))
 
     def clear(self) -> None:
         """Forget everything acyclic, and whatever waits for its outcome."""
@@ -146,6 +151,11 @@ class AcyclicSide:
             self.courier.write_now(write, lambda sent, then: None, now)
         timeout = min(self._session.retry.timeout, ANSWER_TIME)
         stop.begin(confirm(writes, timeout), now, setpoints=setpoints)
+
+    def _read_status(self, status: Parameter) -> StatusRead[Step, Reply]:
+        words = yield Read(self.numbers.number(status), attempts=1, late_will_do=True,
+                           timeout=min(self._session.retry.timeout, ANSWER_TIME))
+        return None if words is None else status.raw_from_word(words[0])
 
 
 def confirm(writes: Sequence[tuple[Parameter, Write]], timeout: float,

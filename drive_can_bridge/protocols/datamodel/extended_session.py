@@ -15,8 +15,9 @@ next.
 
 A drive reads cyclic words by *its own* maps. So the maps are read before the first cyclic frame,
 every second while cycling, and again after each loss; a drive that does not answer gets no cyclic
-frames beyond three with neutral setpoints, in case it only lost its voice. With
-``mapping: assume`` there is neither CHECKING nor LEAVING: cycling never stops.
+frames beyond three with neutral setpoints, in case it only lost its voice. One that was told to
+run and has not answered those either is told to stop by number, and again when it shows a sign of
+life. With ``mapping: assume`` there is neither CHECKING nor LEAVING: cycling never stops.
 """
 
 from enum import Enum
@@ -29,6 +30,7 @@ from drive_can_bridge.core.events import Event, MappingDiffered, ProcessDataRece
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.session import Session, Stage
+from drive_can_bridge.core.told import UNHEARD
 from drive_can_bridge.protocols.cyclic_exchange import CYCLE, CyclicExchange
 from drive_can_bridge.protocols.datamodel import extended
 from drive_can_bridge.protocols.datamodel.acyclic_side import (
@@ -144,7 +146,9 @@ class ExtendedSession(Session):
     def _maps_judged(self, verdict: Verdict, text: str, now: float) -> None:
         if verdict is Verdict.AGREE:
             self._differs = False
-            if self._phase is not Phase.CYCLIC:
+            if self._phase is Phase.CHECKING and self.told.owed and self._maps.silent_looks:
+                self.begin(now)     # it has not heard the last stop, but may hear one now
+            elif self._phase is not Phase.CYCLIC:
                 self._begin_cycles(now)
             elif self.online:
                 self.told.answered()
@@ -156,7 +160,8 @@ class ExtendedSession(Session):
             owed = self.told.owed
             self.lose(f'mapping differs: {text}', now)
             # a request map that is right still takes neutral cycles, unless it is to be rewritten
-            by_cycles = owed and self._maps.request_agrees and not self.gate.mute
+            by_cycles = owed and self._maps.request_agrees and not (
+                self.gate.mute or self.told.runs(UNHEARD))
             if owed:
                 self._side.begin_stop(now, setpoints=not by_cycles)
             if by_cycles:
@@ -217,6 +222,8 @@ class ExtendedSession(Session):
     def _last_cycle_left(self, now: float) -> None:
         if self.stage is Stage.STOPPING:
             self._exchange.timer.stop()
+            if self._side.control_slot is not None and not self._exchange.book.missed_in_row:
+                self._side.stop.look(now)
             self._stop_ended()
         elif self._differs:
             self._exchange.stop()
@@ -231,6 +238,7 @@ class ExtendedSession(Session):
     def _missed(self, reason: str, now: float) -> None:
         if self._phase is Phase.LEAVING:
             if self._exchange.cycles_left == 0:
+                self.told.doubt()   # if nobody answers any more: next it is told by number
                 self.start_over(now)
             return
         if not reason:
@@ -240,9 +248,11 @@ class ExtendedSession(Session):
             self.start_over(now)
             return
         owed = self.told.owed or self.told.ran
+        # the neutral cycles since it was lost were not answered either
+        unheard = not self.online and not self.told.owed and self.told.doubt()
         self.lose(reason, now)
         if owed:  # of the word that has no slot; setpoints go neutral with the next cycles
-            self._side.begin_stop(now, setpoints=False)
+            self._side.begin_stop(now, setpoints=unheard)
         if self.gate.mute:
             self.start_over(now)
         elif self._verify:  # it may still be listening, before it is left alone
@@ -278,6 +288,7 @@ class ExtendedSession(Session):
                     self.start_over(now)
                 return
             self.be_online()
+            self.told.answered()    # a neutral cycle, right after a look at its maps
             self._side.found(now)
         slot = self._side.status_slot
         if self.control is not None and slot is not None:

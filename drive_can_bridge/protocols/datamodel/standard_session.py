@@ -71,7 +71,8 @@ class StandardSession(Session):
 
     @property
     def longest_stop(self) -> float:
-        return ATTEMPTS * (ANSWER_TIME + float(self.configuration.options.quarantine))
+        # one more: the read of the status
+        return (ATTEMPTS + 1) * (ANSWER_TIME + float(self.configuration.options.quarantine))
 
     def time_lost(self, now: float) -> None:
         self._expected = self._expected or self._side.courier.outstanding is not None

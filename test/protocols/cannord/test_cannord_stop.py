@@ -437,3 +437,26 @@ def test_a_drive_that_comes_and_goes_is_asked_once_for_its_time_out() -> None:
     assert sent == ['202#9B11000000000000']
     talk.hears('203#9B11000000000700', 15.001)
     assert talk.outcomes() == [[7]]
+
+
+# -- silent while it runs -------------------------------------------------------------------------
+
+
+def test_inverter_that_falls_silent_while_it_runs_is_warned_about_once() -> None:
+    talk = running()
+    talk.until(10.13)
+    assert not talk.session.online
+    assert warnings(talk) == [], 'it may have heard those that are not neutral'
+    assert {text for _, text in talk.until(10.18 + TICK)} == {READY_FRAME}
+    assert warnings(talk) == ['told to stop, but it does not answer: it may still be running']
+    talk.until(20.0)
+    assert warnings(talk) == []
+    talk.hears(READY, 20.001)
+    assert talk.session.online
+    assert not talk.session.told.owed
+
+
+def test_inverter_that_falls_silent_at_rest_is_no_worry() -> None:
+    talk = online()
+    talk.until(12.0)
+    assert warnings(talk) == []

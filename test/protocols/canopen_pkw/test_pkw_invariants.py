@@ -114,7 +114,7 @@ class PkwObserver(Observer):
         self.toggle = toggle
         if code in READS:
             assert data[4:] == bytes(4)
-            assert self.active
+            assert self.active or (code, data[0] | data[1] << 8) == (0x25, STATUS.number)
             return
         number = data[0] | data[1] << 8
         word = data[4] | data[5] << 8

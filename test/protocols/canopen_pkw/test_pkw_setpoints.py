@@ -277,8 +277,12 @@ def test_stop_is_acknowledged_and_then_silent() -> None:
     assert talk.deactivate(10.115) == [DISABLE_0]
     assert not talk.session.stopped
     assert talk.hears(DISABLED_0, 10.116) == [STILL_1]
-    assert talk.hears('485#C60200AA00000000', 10.117) == []
+    assert talk.hears('485#C60200AA00000000', 10.117) == ['505#C701002500000000']
+    assert not talk.session.stopped
+    assert talk.hears('485#C701002541000000', 10.118) == []
     assert talk.session.stopped
+    assert talk.session.control is not None
+    assert talk.session.control.off
     assert talk.session.next_timer() == math.inf
     assert talk.events(StationLost) == [StationLost('deactivated')]
     assert talk.hears(BOOT_UP, 11.0) == []
@@ -317,8 +321,12 @@ def test_slow_device_acknowledges_each_stop_once() -> None:
     assert talk.until(10.414) == []
     assert talk.hears(DISABLED_0, 10.415) == [STILL_1]
     assert talk.until(10.714) == []
-    assert talk.hears('485#C60200AA00000000', 10.715) == []
+    assert talk.hears('485#C60200AA00000000', 10.715) == ['505#C701002500000000']
+    assert talk.until(10.814) == []
+    assert talk.until(10.816) == [], 'nobody waits longer for its status'
     assert talk.session.stopped
+    assert talk.session.control is not None
+    assert not talk.session.control.off, 'it was enabled when it was last asked'
     assert talk.events(Noted) == [WITHDRAWN]
 
 

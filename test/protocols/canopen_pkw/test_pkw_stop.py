@@ -201,8 +201,12 @@ def test_refused_stop_is_tried_until_the_bus_takes_it() -> None:
     accept(talk)
     assert talk.until(10.2) == [(10.14, DISABLE_0)], 'every 10 ms'
     assert not talk.session.stopped
-    assert talk.hears(DISABLED_0, 10.201) == []
+    assert talk.hears(DISABLED_0, 10.201) == ['505#C70100A500000000']
+    assert talk.hears('485#C70100A5C3000000', 10.202) == []
     assert talk.session.stopped
+    assert talk.session.control is not None
+    assert talk.session.control.state == 'enabled', 'that is what it says, and nobody else'
+    assert not talk.session.control.off
     assert worries(talk) == []
 
 

@@ -477,9 +477,9 @@ def test_a_silent_drive_that_ran_is_told_again_after_as_many_cycles() -> None:
     talk.asks(ControlAction.ENABLE, 10.003)
     assert at_once(talk, 10.02, READY) == [NEUTRAL, ENABLE]
     assert at_once(talk, 10.04, ENABLED) == [NEUTRAL]
-    # with the loss, then as nobody confirms it; and all of it anew after 25 more
+    # with the loss, then as nobody confirms it; and, with all setpoints, anew after 25 more
     assert [round(now, 3) for now, text in talk.until(11.5) if text == DISABLE] == [
-        10.56, 10.561, 10.662, 10.763, 11.06, 11.161, 11.262]
+        10.56, 10.561, 10.662, 10.763, 11.06, 11.163, 11.266]
 
 
 # -- a status word without a slot -----------------------------------------------------------------

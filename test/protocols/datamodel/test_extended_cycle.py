@@ -14,7 +14,7 @@ import pytest
 
 from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import (
-    ForeignMasterSeen, FrameRejected, ProcessDataReceived, StationFound, StationLost,
+    ForeignMasterSeen, FrameRejected, Noted, ProcessDataReceived, StationFound, StationLost,
 )
 
 # -- pace -----------------------------------------------------------------------------------------
@@ -301,9 +301,18 @@ def test_offline_at_the_limit_three_neutral_cycles_then_silence() -> None:
     assert not talk.session.online
     assert talk.session.offline_advice == 'no cyclic response for 3 cycles'
 
-    assert talk.until(10.14 + TICK) == [
-        (10.1, NEUTRAL), (10.12, NEUTRAL), (10.14, ASK_REQUEST_MAP)]
-    assert {text for _, text in talk.until(11.0)} == {ASK_REQUEST_MAP}
+    assert talk.until(10.1421) == [
+        (10.1, NEUTRAL), (10.12, NEUTRAL),
+        # by number, as nobody has answered those
+        (10.14, '00300321#0000000000000000'), (10.141, '00300331#0000000000000000'),
+        (10.142, '00200321#0000000000000000')]
+    assert talk.events() == []
+    assert talk.until(10.45)[-1][1] == ASK_REQUEST_MAP
+    assert talk.events() == [Noted(
+        'told to stop, but speed_setpoint (P50): no answer; torque_limit (P51): no answer: '
+        'it may still be running', warning=True, danger=True)]
+    assert {text for _, text in talk.until(20.0)} == {ASK_REQUEST_MAP}
+    assert talk.events() == [], 'once'
 
 
 def test_drive_that_answers_again_while_it_is_left_is_checked_first() -> None:

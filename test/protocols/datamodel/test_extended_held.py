@@ -261,7 +261,8 @@ def test_lost_with_control_it_is_read_anew() -> None:
     talk.events()
     while (now := talk.session.next_timer()) < 10.3:
         sent = talk.at(now)
-    assert sent == ASK_MAPS[:1]
+    assert sent == ['00200341#0000000000000000'], 'disable, and no position'
+    assert talk.hears('10200341#0000000000000000', 10.3) == ASK_MAPS[:1]
     assert talk.hears(MAPS[0], 10.31) == ASK_MAPS[1:]
     assert talk.hears(MAPS[1], 10.311) == [ASK_POSITION]
     assert talk.until(10.35) == []

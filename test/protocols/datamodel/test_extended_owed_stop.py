@@ -335,7 +335,7 @@ def test_drive_that_was_deaf_comes_back_with_another_map() -> None:
     last = [text for _, text in talk.until(12.0)]
     assert last.count(NEUTRAL) == 3
     assert last[-1] == ASK_REQUEST_MAP
-    assert not talk.session.told.owed
+    assert talk.session.told.owed
     assert talk.hears(OTHER_REQUEST, 12.001) == [ASK_RESPONSE_MAP]
     assert talk.hears(RESPONSE_MAP, 12.002) == [SPEED_ZERO]
     assert [text for _, text in talk.until(12.005)] == [LIMIT_ZERO, ASK_SPEED]
@@ -518,4 +518,76 @@ def test_neutral_by_command_is_a_stop() -> None:
 def test_cycling_that_begins_again_makes_writes_needless() -> None:
     talk = cycling()
     assert talk.at(10.0) == [NEUTRAL]
+    assert not talk.session.told.owed
+
+
+# -- the drive falls silent -----------------------------------------------------------------------
+
+UNHEARD = ('told to stop, but speed_setpoint (P50): no answer; torque_limit (P51): no answer: '
+           f'{MAY_RUN}')
+
+
+def left_alone() -> Conversation:
+    """Return a drive that was told to run, and has answered nothing since; 10.162 s."""
+    talk = running()
+    sent = talk.until(10.1621)
+    assert [text for _, text in sent[-5:]] == [NEUTRAL, NEUTRAL, *STOPPED_BY_NUMBER]
+    assert not talk.session.online
+    return talk
+
+
+def test_drive_whose_cycles_alone_are_dead_is_stopped_by_number() -> None:
+    talk = left_alone()
+    assert confirmed(talk, 10.163) == [ASK_REQUEST_MAP]
+    assert not talk.session.told.owed
+    checked(talk, 10.164)
+    assert {text for _, text in talk.until(10.22)} == {NEUTRAL}, 'and is looked for'
+    assert warnings(talk) == []
+
+
+def test_silent_drive_is_warned_about_once_and_stopped_when_it_shows_a_sign_of_life() -> None:
+    talk = left_alone()
+    assert {text for _, text in talk.until(12.0)} >= {ASK_REQUEST_MAP}
+    assert warnings(talk) == [UNHEARD]
+    assert talk.until(20.0)[-1][1] == ASK_REQUEST_MAP
+    assert warnings(talk) == [], 'once'
+    assert talk.session.told.owed
+    now = talk.now
+    assert talk.hears(REQUEST_MAP, now + 0.001) == [ASK_RESPONSE_MAP]
+    assert talk.hears(RESPONSE_MAP, now + 0.002) == [SPEED_ZERO]
+    assert [text for _, text in talk.until(now + 0.005)] == [LIMIT_ZERO, ASK_SPEED]
+    assert confirmed(talk, now + 0.006) == [ASK_REQUEST_MAP]
+    assert not talk.session.told.owed
+    checked(talk, now + 0.007)
+    assert [text for _, text in talk.until(now + 0.02)] == [NEUTRAL]
+    assert talk.hears(ANSWER, now + 0.021) == []
+    assert talk.session.online
+    assert warnings(talk) == []
+
+
+def test_drive_that_answers_again_was_told_by_its_first_cycle() -> None:
+    talk = running()
+    talk.until(10.101)
+    assert not talk.session.online
+    assert talk.hears(ANSWER, 10.102) == []
+    assert talk.until(10.1101) == [(10.11, ASK_REQUEST_MAP)]
+    checked(talk, 10.11)
+    assert talk.until(10.1201) == [(10.12, NEUTRAL)]
+    assert talk.session.told.ran
+    talk.hears(ANSWER, 10.122)
+    assert not talk.session.told.ran
+    assert warnings(talk) == []
+
+
+def test_silent_drive_with_assumed_maps_is_told_by_number_when_neutral_cycles_are_unanswered(
+        ) -> None:
+    talk = running(mapping='assume')
+    sent = [text for _, text in talk.until(10.1621)]
+    assert sent[-7:] == [NEUTRAL] * 3 + [SPEED_ZERO, NEUTRAL, LIMIT_ZERO, ASK_SPEED]
+    assert {text for _, text in talk.until(12.0)} <= {
+        NEUTRAL, *STOPPED_BY_NUMBER}, 'it is looked for by cycles'
+    assert warnings(talk) == [UNHEARD]
+    assert talk.session.told.owed
+    talk.hears(ANSWER, 12.001)
+    assert talk.session.online
     assert not talk.session.told.owed

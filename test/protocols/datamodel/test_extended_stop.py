@@ -327,6 +327,42 @@ def test_only_the_status_is_acyclic() -> None:
     silent(talk, 13.0)
 
 
+@pytest.mark.parametrize('status, state, off', [(3, 'enabled', False), (1, 'ready', True)])
+def test_last_status_word_of_a_stop_is_known_after_it(status: int, state: str, off: bool) -> None:
+    """Also where the word that stops has no slot."""
+    talk, now = written_word()
+    assert talk.deactivate(now) == [DISABLE]
+    assert [text for _, text in talk.until(now + 0.001 + TICK)] == [NEUTRAL, ASK_WORD]
+    talk.hears(f'103FFFF0#000000000{status:03X}0000', now + 0.002)
+    talk.hears('10200341#0000000000000000', now + 0.003)
+    talk.until(now + 5.0)
+    assert talk.session.stopped
+    assert talk.session.control is not None
+    assert (talk.session.control.state, talk.session.control.off) == (state, off)
+
+
+@pytest.mark.parametrize('answer, state, off', [
+    ('10200D31#0003000000000000', 'enabled', False), ('10200D31#0001000000000000', 'ready', True),
+    ('', 'enabled', False)])
+def test_status_without_slot_is_read_after_the_last_cycle(
+        answer: str, state: str, off: bool) -> None:
+    talk = online(control=CONTROL, request=(WORD, SPEED), response=(CURRENT,), mapping='assume')
+    assert talk.until(10.003) == [(10.002, '00200D31#0000000000000000')]
+    assert talk.hears('10200D31#0003000000000000', 10.004) == []
+    talk.deactivate(10.01)
+    assert exchange(talk, 10.02) == NEUTRAL
+    assert exchange(talk, 10.04) == NEUTRAL
+    assert talk.until(10.0605) == [(10.06, NEUTRAL), (10.06, '00200D31#0000000000000000')]
+    assert not talk.session.stopped
+    if answer:
+        assert talk.hears(answer, 10.062) == []
+    else:
+        assert talk.until(10.161) == [], 'it is waited for 0.1 s'
+    silent(talk, 10.17)
+    assert talk.session.control is not None
+    assert (talk.session.control.state, talk.session.control.off) == (state, off)
+
+
 def test_nothing_is_left_of_an_enabled_drive_after_a_restart() -> None:
     talk = enabled()
     talk.deactivate(12.0)

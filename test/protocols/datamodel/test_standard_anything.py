@@ -41,7 +41,7 @@ WRITABLE = (GAIN, DAMPING, FLAG, RAMP, MAXIMUM, ORDER, KEY, KEY, RAW)
 EEPROMS = {30, 31, 44, 600}
 RAMS = {40, 41, 42, 43}
 SETPOINTS = (50, 51)
-CONTROL_WORD = 52
+CONTROL_WORD, STATUS_WORD = 52, 211
 REGISTERS = (30, 31, 40, 41, 42, 43, 44, 50, 51, 52, 209, 210, 211, 300, 600)
 
 
@@ -181,7 +181,8 @@ class StandardObserver(Observer):
             self.sees_write(number, data[3] + 256 * data[4], now)
 
     def sees_read(self, number: int, count: int, now: float) -> None:
-        assert self.active or count == 1 and number in (*SETPOINTS, CONTROL_WORD), 'after the stop'
+        assert self.active or count == 1 and number in (
+            *SETPOINTS, CONTROL_WORD, STATUS_WORD), 'after the stop'
         assert 1 <= count <= 4
         assert number + count <= 0x10000
         assert self.asked is None or now >= self.asked.at + TIMEOUT - SLACK, 'one read at a time'

@@ -811,6 +811,33 @@ def test_the_stop_disables() -> None:
     assert talk.session.stopped
 
 
+@pytest.mark.parametrize('answer, state, off', [
+    ('7F1#0300000000000000', 'enabled', False), ('7F1#0100000000000000', 'ready', True),
+    ('', 'enabled', False)])
+def test_stop_ends_with_a_look_at_the_status(answer: str, state: str, off: bool) -> None:
+    """What it has in its registers is not what it does."""
+    talk = controlled()
+    talk.asks(ControlAction.ENABLE, 10.01)
+    round_of(talk, 10.02, READY)
+    talk.until(10.03)
+    round_of(talk, 10.04, ENABLED)
+    assert talk.deactivate(10.05) == [DISABLE_WORD]
+    assert talk.until(10.0525) == [(10.051, SPEED_ZERO), (10.052, '3F1#0334000100000000')]
+    assert talk.hears('7F1#0000000000000000', 10.053) == []
+    assert talk.until(10.0545) == [(10.054, ASK_SPEED)]
+    assert talk.hears('7F1#0000000000000000', 10.055) == []
+    assert talk.until(10.0565) == [(10.056, '3F1#03D3000100000000')]
+    assert not talk.session.stopped
+    if answer:
+        assert talk.hears(answer, 10.057) == []
+    else:
+        assert talk.until(10.157) == [], 'it is waited for 0.1 s'
+    assert talk.session.stopped
+    assert talk.session.control is not None
+    assert (talk.session.control.state, talk.session.control.off) == (state, off)
+    assert warnings(talk) == []
+
+
 def test_commands_are_taken_while_it_is_enabled_only() -> None:
     talk = controlled(rearm_immediate=True)
     assert talk.session.state is DriveState.DISABLED
