@@ -264,7 +264,10 @@ class ControlMachine:
         self.handle_timer(now)
         self.drop(reason)
         self._sent = False
-        self._reports.forget_answers() if not lost else self._reports.forget()
+        if lost:
+            self._reports.forget()
+        else:
+            self._reports.forget_answers()
         self._disregard.forget()
         self._fault = self._fault or None   # a known one stands until the drive says otherwise
 
