@@ -12,7 +12,7 @@ from typing import Union
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.events import ForeignMasterSeen
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.parameters import Parameter, Storage
 from drive_can_bridge.core.process_image import control_word, status_word
 from drive_can_bridge.core.roles import Cells
 from drive_can_bridge.core.session import Session
@@ -28,6 +28,7 @@ from drive_can_bridge.protocols.datamodel.numbers import Numbers
 from drive_can_bridge.protocols.datamodel.options import DataModelOptions
 from drive_can_bridge.protocols.placement import SentWrites
 from drive_can_bridge.protocols.safe_stop import SafeStop
+from drive_can_bridge.protocols.stop_again import StopAgain
 
 #: how often everything is written at most that makes a drive stand still
 ATTEMPTS = 3
@@ -51,6 +52,7 @@ class AcyclicSide:
     :ivar status_slot: of the status word in ``cyclic_response``, or None.
     :ivar control_writer: looks after words that have no slot, or None.
     :ivar parts: what acts at times of its own.
+    :ivar again: tells a drive to stop again that is offline and shows up.
     """
 
     def __init__(self, session: Session, *, encode_read: Callable[[int, int], Frame],
@@ -81,6 +83,9 @@ class AcyclicSide:
                            word=word, status=status))
         self.parts = () if self.control_writer is None else (self.control_writer,)
         self.stop: SafeStop[Step, Reply] = SafeStop(session, self.channel, stop_ended)
+        self.again = StopAgain(
+            session, self.channel, self.stop, lambda now: self.begin_stop(now, again=True),
+            wears=word is not None and word.storage is not Storage.RAM)
 
     def clear(self) -> None:
         """Forget everything acyclic, and whatever waits for its outcome."""
@@ -125,7 +130,7 @@ class AcyclicSide:
 
     # -- stopping by acyclic writes ---------------------------------------------------------------
 
-    def begin_stop(self, now: float, *, setpoints: bool = True) -> None:
+    def begin_stop(self, now: float, *, setpoints: bool = True, again: bool = False) -> None:
         """
         Write ``disable`` and neutral setpoints by their numbers, which no map can misroute.
 
@@ -133,6 +138,7 @@ class AcyclicSide:
         stop that is under way goes on as it is.
 
         :param setpoints: False: what is in ``cyclic_request`` is stopped by cyclic frames.
+        :param again: a stop before this one has failed, which was told.
         """
         stop = self.stop
         told = stop.writes(word=setpoints or self.control_slot is None, setpoints=setpoints)
@@ -145,7 +151,7 @@ class AcyclicSide:
         for _, write in writes:
             self.courier.write_now(write, lambda sent, then: None, now)
         timeout = min(self._session.retry.timeout, ANSWER_TIME)
-        stop.begin(confirm(writes, timeout), now, setpoints=setpoints)
+        stop.begin(confirm(writes, timeout), now, setpoints=setpoints, again=again)
 
 
 def confirm(writes: Sequence[tuple[Parameter, Write]], timeout: float,

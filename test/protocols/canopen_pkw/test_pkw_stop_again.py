@@ -1,11 +1,9 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """A drive that ran, fell silent, and shows up again without being online, is told to stop again."""
 
-from collections.abc import Callable
-
 from builders import Conversation, read
 from pkw_builders import (
-    BOOT_UP, CLASS, CONTROL, CURRENT, DISABLE_0, DISABLE_1, DISABLED_0, DISABLED_1, driven, echo,
+    BOOT_UP, CLASS, CONTROL, CURRENT, DISABLE_0, DISABLE_1, DISABLED_0, DISABLED_1, echo,
     ENABLE_0, ENABLE_1, OPERATIONAL, PRE_OPERATIONAL, READ_0, READ_1, RUNS_0, RUNS_1, SPEED, STATUS, STATUS_2,
     running, started,
 )
@@ -15,7 +13,6 @@ from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import Noted
 from drive_can_bridge.core.setpoints import CommandOutcome
 
-Answers = Callable[[str], str | None]
 STOPS = (DISABLE_0, DISABLE_1)
 CONFIRMED = 'told to stop once more, which it has confirmed'
 FAILED = ('told to stop, but control_register_1 0000h not acknowledged in 3 attempts: '
@@ -27,27 +24,6 @@ def half(text: str) -> str | None:
     if not text.startswith('505#') or text[4:8] == 'F401':
         return None
     return echo(text)
-
-
-def serve(talk: Conversation, end: float, answer: Answers = half, delay: float = 0.002,
-          ) -> list[tuple[float, str]]:
-    """Let the drive answer as it does until ``end``; return what was sent."""
-    sent: list[tuple[float, str]] = []
-    waiting: list[tuple[float, str]] = []
-    while True:
-        due = talk.session.next_timer()
-        if waiting and waiting[0][0] <= min(due, end):
-            now, reply = waiting.pop(0)
-            new = [(now, text) for text in talk.hears(reply, now)]
-        elif due <= end:
-            new = [(due, text) for text in talk.at(due)]
-        else:
-            return sent
-        for now, text in new:
-            sent.append((round(now, 6), text))
-            reply = answer(text)
-            if reply is not None:
-                waiting.append((now + delay, reply))
 
 
 def stops(sent: list[tuple[float, str]]) -> list[float]:
@@ -65,11 +41,11 @@ def still(text: str) -> str | None:
 def runs_in_two_reads() -> Conversation:
     """Return a drive that was enabled, whose rounds read 455 and 456, then 500 and 501."""
     talk = started(response=(STATUS, STATUS_2, CURRENT), control=CONTROL, period=0.1)
-    serve(talk, 10.2, still)
+    talk.served(10.2, still)
     enable, = talk.asks(ControlAction.ENABLE, 10.201)
     assert enable in (ENABLE_0, ENABLE_1)
     assert talk.hears(echo(enable), 10.203) == []
-    serve(talk, 10.6, well)
+    talk.served(10.6, well)
     assert talk.control_outcomes() == [('enable', True, 'enabled')]
     talk.events()
     return talk
@@ -86,7 +62,7 @@ def silent(talk: Conversation, end: float) -> Conversation:
 
 def test_one_register_unanswered_when_it_is_back() -> None:
     talk = silent(runs_in_two_reads(), 14.0)
-    sent = serve(talk, 16.0)
+    sent = talk.served(16.0, half)
     assert not talk.session.online
     first, = stops(sent)
     place = sent.index((first, DISABLE_0) if (first, DISABLE_0) in sent else (first, DISABLE_1))
@@ -104,17 +80,17 @@ def test_drive_that_is_deaf_first_and_answers_later() -> None:
 
     def deaf(text: str) -> str | None:
         return None if text[10:12] in ('2A', 'AA') else half(text)
-    sent = serve(talk, 22.0, deaf)
+    sent = talk.served(22.0, deaf)
     times = stops(sent)
     bursts = [now for before, now in zip([0.0, *times], times) if now - before > 0.9]
     assert len(bursts) in (5, 6)
     assert len(times) <= 3 * len(bursts)
     assert [text[4:8] for _, text in sent].count('F401') > len(bursts), 'rounds go on'
     assert talk.events(Noted) == []
-    heard = stops(serve(talk, 24.0))
+    heard = stops(talk.served(24.0, half))
     assert len(heard) == 1
     assert [note.text for note in talk.events(Noted)] == [CONFIRMED]
-    assert stops(serve(talk, 30.0)) == []
+    assert stops(talk.served(30.0, half)) == []
 
 
 def test_complete_round_of_a_slow_drive_is_not_held_up() -> None:
@@ -123,7 +99,7 @@ def test_complete_round_of_a_slow_drive_is_not_held_up() -> None:
 
     def deaf(text: str) -> str | None:
         return None if text[10:12] in ('2A', 'AA') else echo(text)
-    serve(talk, 20.0, deaf, 0.3)
+    talk.served(20.0, deaf, 0.3)
     assert talk.session.online
 
 
@@ -139,7 +115,7 @@ def test_any_sign_of_life(sign: str) -> None:
 def test_answer_to_a_user() -> None:
     talk = silent(running(), 14.0)
     assert talk.submits(read(CLASS), 14.001) == [], 'a read of the round is under way'
-    sent = serve(talk, 17.0, lambda text: echo(text) if text[4:8] == '5E02' else None)
+    sent = talk.served(17.0, lambda text: echo(text) if text[4:8] == '5E02' else None)
     place = next(place for place, (_, text) in enumerate(sent) if text[4:8] == '5E02')
     assert sent[place + 1][1] in STOPS
     assert sent[place + 1][0] == pytest.approx(sent[place][0] + 0.002)
@@ -150,7 +126,7 @@ def test_complete_rounds_of_a_node_whose_heartbeats_have_ceased() -> None:
     talk = running(heartbeat_timeout=0.5)
     talk.hears(OPERATIONAL, 10.095)
     silent(talk, 14.0)
-    sent = serve(talk, 14.6, well)
+    sent = talk.served(14.6, well)
     assert not talk.session.online
     assert len(stops(sent)) == 1
     assert not talk.session.told.owed
@@ -173,14 +149,14 @@ def test_node_that_is_held_back_and_says_so() -> None:
 def test_drive_without_control() -> None:
     talk = started(request=(SPEED,), response=(STATUS, STATUS_2, CURRENT), command_timeout=0.0,
                    period=0.1)
-    serve(talk, 10.2, well)
+    talk.served(10.2, well)
     assert talk.commands(0, 0.0, 10.21) is CommandOutcome.ARMED
     assert talk.commands(0, 10.0, 10.21) is CommandOutcome.ACCEPTED
-    serve(talk, 10.6, well)
+    talk.served(10.6, well)
     talk.until(14.0)
     assert not talk.session.online
     assert talk.session.told.owed
-    sent = serve(talk, 16.0)
+    sent = talk.served(16.0, half)
     told = [text for _, text in sent if text[4:8] == 'C602']
     assert len(told) == 1
     assert told[0][12:] == '00000000'
@@ -189,12 +165,12 @@ def test_drive_without_control() -> None:
 
 def test_drive_that_was_told_nothing_but_disable_is_left_alone() -> None:
     talk = started(response=(STATUS, STATUS_2, CURRENT), control=CONTROL, period=0.1)
-    assert stops(serve(talk, 16.0)) == []
+    assert stops(talk.served(16.0, half)) == []
 
 
 def test_services_refuse_while_it_is_offline() -> None:
     talk = silent(runs_in_two_reads(), 14.0)
-    serve(talk, 14.5)
+    talk.served(14.5, half)
     for action in (ControlAction.DISABLE, ControlAction.QUICK_STOP):
         assert talk.session.users.control_refusal(action) == 'drive offline'
 
@@ -202,7 +178,7 @@ def test_services_refuse_while_it_is_offline() -> None:
 def test_complete_round_finds_it_as_ever() -> None:
     """One read a round: what answers that is online, and gets the word with everything else."""
     talk = silent(running(), 14.0)
-    sent = serve(talk, 15.0, well)
+    sent = talk.served(15.0, well)
     assert talk.session.online
     assert len(stops(sent)) == 1
 
