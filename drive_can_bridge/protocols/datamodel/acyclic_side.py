@@ -52,6 +52,7 @@ class AcyclicSide:
     :ivar status_slot: of the status word in ``cyclic_response``, or None.
     :ivar control_writer: looks after words that have no slot, or None.
     :ivar parts: what acts at times of its own.
+    :ivar shows_up: something has arrived since whoever wants to know reset this.
     :ivar again: tells a drive to stop again that is offline and shows up.
     """
 
@@ -83,6 +84,7 @@ class AcyclicSide:
                            word=word, status=status))
         self.parts = () if self.control_writer is None else (self.control_writer,)
         self.stop: SafeStop[Step, Reply] = SafeStop(session, self.channel, stop_ended)
+        self.shows_up = False
         self.again = StopAgain(
             session, self.channel, self.stop, lambda now: self.begin_stop(now, again=True),
             wears=word is not None and word.storage is not Storage.RAM)
@@ -99,7 +101,7 @@ class AcyclicSide:
 
     def receive(self, frame: Frame, now: float) -> None:
         """Take an answer: to the outstanding read, or to nothing."""
-        session = self._session
+        session, self.shows_up = self._session, True
         try:
             words = self._decode(frame, self.courier.outstanding)
         except RemoteProtocolError as error:
