@@ -1,7 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Find the owner of a frame by identifier *and* frame format, in a dictionary look-up or two."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Generic, TypeVar
 
 from drive_can_bridge.core.frame import Frame, Route
@@ -42,3 +42,19 @@ class Router(Generic[Owner]):
         table = {}
         self._tables.append((extended, mask, table))
         return table
+
+
+class Hearers(Generic[Owner]):
+    """Who hears of an identifier that several share; each route is of one identifier."""
+
+    def __init__(self) -> None:
+        self._table: dict[tuple[int, bool], list[Owner]] = {}
+
+    def add(self, routes: Iterable[Route], owner: Owner) -> None:
+        """Let ``owner`` hear of the frames of these routes, too."""
+        for route in routes:
+            self._table.setdefault((route.identifier, route.extended), []).append(owner)
+
+    def find(self, frame: Frame) -> Sequence[Owner]:
+        """Return who hears of a frame, which may be nobody."""
+        return self._table.get((frame[0], frame[2]), ())
