@@ -37,12 +37,21 @@ class StopAgain:
         self._tell = tell
         self._longest = PAUSE_MAX if wears else PAUSE
         self._pause = PAUSE
+        self._first = True
 
-    def heard(self, now: float) -> None:
-        """Take note of a sign of life, before an answer is taken that it may be."""
+    def heard(self, now: float, *, hurry: bool = False) -> None:
+        """
+        Take note of a sign of life, before an answer is taken that it may be.
+
+        :param hurry: it is no answer, and for that to what is under way a moment will do; once,
+            for a slow drive would never be found.
+        """
         if not self._wanted:
-            self._pause = PAUSE
+            self._pause, self._first = PAUSE, True
         elif now >= self._stop.ended_at + self._pause and self._channel.is_idle(Lane.STOP):
+            if hurry and self._first:
+                self._channel.make_room(now)
+            self._first = False
             self._channel.run(self._begin(), lambda _: None, now, Lane.STOP)
 
     @property

@@ -94,7 +94,8 @@ class CannordSession(Session):
                 Frame(self._task_identifier, payload, self._extended), left), self.retry))
         access = procedures.TaskAccess(
             self._channel, self.retry, last_value=self._samples.last,
-            persist=options.persist_writes)
+            persist=options.persist_writes,
+            signed=procedures.signed_cells(drive.profile.parameters.values()))
         # what only a master sends
         self._masters = self.request_identifier, self._task_identifier
         self._broadcasts = broadcasts(drive.station, extended=self._extended)

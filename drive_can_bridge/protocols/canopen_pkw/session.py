@@ -221,7 +221,7 @@ class PkwSession(Session):
                     self.report.reject(f'PKW response that nobody asked for: {message}')
             elif self._supervision.receive(identifier, data, now):
                 self._end_futile_stop(now)
-                self._again.heard(now)
+                self._again.heard(now, hurry=True)
             elif identifier == options.request_cob_id:
                 self.report.note(ForeignMasterSeen(
                     f'another master sends PKW requests to node {self.configuration.station}: '

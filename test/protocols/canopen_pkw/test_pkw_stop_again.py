@@ -1,11 +1,11 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""A drive that ran, fell silent, and shows up again without being online, is told to stop again."""
+"""A drive that ran, fell silent, and shows up without being online, is told to stop again."""
 
 from builders import Conversation, read
 from pkw_builders import (
-    BOOT_UP, CLASS, CONTROL, CURRENT, DISABLE_0, DISABLE_1, DISABLED_0, DISABLED_1, echo,
-    ENABLE_0, ENABLE_1, OPERATIONAL, PRE_OPERATIONAL, READ_0, READ_1, RUNS_0, RUNS_1, SPEED, STATUS, STATUS_2,
-    running, started,
+    BOOT_UP, CLASS, CONTROL, CURRENT, DISABLE_0, DISABLE_1, DISABLED_0, echo, ENABLE_0,
+    ENABLE_1, IDLE, OPERATIONAL, PRE_OPERATIONAL, READ_1, running, SPEED, START, started, STATUS,
+    STATUS_2,
 )
 import pytest
 
@@ -64,10 +64,9 @@ def test_one_register_unanswered_when_it_is_back() -> None:
     talk = silent(runs_in_two_reads(), 14.0)
     sent = talk.served(16.0, half)
     assert not talk.session.online
-    first, = stops(sent)
-    place = sent.index((first, DISABLE_0) if (first, DISABLE_0) in sent else (first, DISABLE_1))
+    place, = (place for place, (_, text) in enumerate(sent) if text in STOPS)
     assert sent[place - 1][1][4:8] == 'C701', 'right behind the first answer'
-    assert first == pytest.approx(sent[place - 1][0] + 0.002)
+    assert sent[place][0] == pytest.approx(sent[place - 1][0] + 0.002)
     assert not talk.session.told.owed
     assert [note.text for note in talk.events(Noted)] == [CONFIRMED]
     assert [text[4:8] for _, text in sent].count('C701') > 2, 'rounds go on'
@@ -101,6 +100,26 @@ def test_complete_round_of_a_slow_drive_is_not_held_up() -> None:
         return None if text[10:12] in ('2A', 'AA') else echo(text)
     talk.served(20.0, deaf, 0.3)
     assert talk.session.online
+
+
+def test_heartbeat() -> None:
+    """What is under way was asked when nobody was there: 50 ms more will do for its answer."""
+    talk = silent(running(), 13.2)
+    assert talk.hears(OPERATIONAL, 13.21) == []
+    assert talk.until(13.8) == [
+        (13.26, DISABLE_1), (13.31, DISABLE_0), (13.36, DISABLE_1)]
+    assert talk.until(13.9)[:2] == [(13.81, START), (13.86, IDLE)], 'the drive is looked for'
+    talk.until(14.69)
+    assert talk.hears(OPERATIONAL, 14.7) == []
+    assert not stops(talk.until(14.85)), 'less than a second after the last'
+    assert talk.hears(OPERATIONAL, 14.9) == []
+    assert talk.until(14.9) == []
+    assert talk.until(15.07) == [(15.06, DISABLE_0)], 'no room is made any more'
+    assert talk.hears(DISABLED_0, 15.07) == [READ_1], 'which has synchronised the mailbox'
+    assert not talk.session.told.owed
+    assert [note.text for note in talk.events(Noted)] == [CONFIRMED]
+    assert talk.hears(OPERATIONAL, 17.0) == []
+    assert not stops(talk.until(20.0))
 
 
 @pytest.mark.parametrize('sign', [OPERATIONAL, '085#1023020A00000000', '485#5E02002507000000'])

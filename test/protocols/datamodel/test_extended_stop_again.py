@@ -1,5 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""A drive that ran, fell silent, and answers a part of what is asked only, is told to stop again."""
+"""A drive that ran, fell silent, and answers only a part of what is asked, is told again."""
 
 from builders import Conversation
 from extended_builders import (
