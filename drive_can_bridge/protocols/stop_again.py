@@ -39,12 +39,13 @@ class StopAgain:
         self._pause = PAUSE
         self._first = True
 
-    def heard(self, now: float, *, hurry: bool = False) -> None:
+    def heard(self, now: float, *, hurry: bool = False, answered: bool = False) -> None:
         """
         Take note of a sign of life, before an answer is taken that it may be.
 
         :param hurry: it is no answer, and for that to what is under way a moment will do; once,
             for a slow drive would never be found.
+        :param answered: the answer that it may be has been taken.
         """
         if not self._wanted:
             self._pause, self._first = PAUSE, True
@@ -52,7 +53,10 @@ class StopAgain:
             if hurry and self._first:
                 self._channel.make_room(now)
             self._first = False
-            self._channel.run(self._begin(), lambda _: None, now, Lane.STOP)
+            if answered:
+                self._again(now)
+            else:
+                self._channel.run(self._begin(), lambda _: None, now, Lane.STOP)
 
     @property
     def _wanted(self) -> bool:
@@ -62,7 +66,10 @@ class StopAgain:
     def _begin(self) -> Generator[Any, Any, None]:
         """Begin when the exchange under way has ended, unless that has found the drive."""
         if self._wanted:
-            self._pause = min(2 * self._pause, self._longest)
-            self._session.told.doubt()
-            self._tell(self._channel.now)
+            self._again(self._channel.now)
         yield from ()
+
+    def _again(self, now: float) -> None:
+        self._pause = min(2 * self._pause, self._longest)
+        self._session.told.doubt()
+        self._tell(now)

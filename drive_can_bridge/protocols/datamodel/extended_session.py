@@ -180,7 +180,7 @@ class ExtendedSession(Session):
             self._maps.look_at = now  # paced by the time-out of the read
             if self._side.shows_up:   # and answers a part of what it is asked
                 self._side.shows_up = False
-                self._side.again.heard(now)
+                self._side.again.heard(now, answered=True)
 
     def _maps_reported(self, event: Event) -> None:
         if isinstance(event, MappingDiffered):
@@ -208,7 +208,7 @@ class ExtendedSession(Session):
 
     def _axes_unknown(self, now: float) -> None:
         """Handle a drive whose maps agree, but that does not say where its axes are."""
-        self._side.again.heard(now)
+        self._side.again.heard(now, answered=True)
         self._maps.look_afresh(now)
 
     def _start_cycling(self, now: float) -> None:

@@ -33,6 +33,7 @@ def test_a_drive_that_answers_one_map_only_is_told_to_stop_by_number() -> None:
     sent = [text for _, text in talk.served(14.0, HALF.get)]
     assert sent.count(SPEED_ZERO) == 1
     assert sent.count(LIMIT_ZERO) == 1
+    assert sent.index(SPEED_ZERO) < sent.index(LIMIT_ZERO) < sent.index(ASK_SPEED)
     assert NEUTRAL not in sent
     assert not (talk.session.told.owed or talk.session.told.ran)
     assert [note.text for note in talk.events(Noted)] == [
