@@ -152,6 +152,31 @@ class Conversation:
         self.session.receive_frame(frame(text), now)
         return self.sent()
 
+    def served(self, end: float, answer: Callable[[str], str | None], delay: float = 0.002,
+               ) -> list[tuple[float, str]]:
+        """
+        Serve every timer up to ``end``, and have a drive answer.
+
+        :param answer: makes it of each frame sent; None: there is none.
+        :param delay: s until it arrives. What has not arrived by the end does not.
+        """
+        found: list[tuple[float, str]] = []
+        coming: list[tuple[float, str]] = []
+        while True:
+            due = self.session.next_timer()
+            if coming and coming[0][0] <= min(due, end):
+                now, reply = coming.pop(0)
+                sent = self.hears(reply, now)
+            elif due <= end:
+                now, sent = due, self.at(due)
+            else:
+                return found
+            for text in sent:
+                found.append((round(now, 6), text))
+                reply_to = answer(text)
+                if reply_to is not None:
+                    coming.append((now + delay, reply_to))
+
     def bus_up(self, now: float) -> list[str]:
         self.now = now
         self.session.bus_up(now)

@@ -264,10 +264,9 @@ class ControlMachine:
         self.handle_timer(now)
         self.drop(reason)
         self._sent = False
+        self._reports.forget_answers()
         if lost:
             self._reports.forget()
-        else:
-            self._reports.forget_answers()
         self._disregard.forget()
         self._fault = self._fault or None   # a known one stands until the drive says otherwise
 

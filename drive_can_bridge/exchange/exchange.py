@@ -14,6 +14,7 @@ outs, EEPROM gaps) instead of one period. Drives of equal periods take turns (:m
 """
 
 from collections.abc import Callable, Sequence
+from itertools import chain, zip_longest
 import math
 import threading
 import time
@@ -74,6 +75,7 @@ class BusExchange:
 
     :param routes: for each session, in the same order, the identifiers it wants to see.
     :param counted: further identifiers, on which nobody else should send.
+    :param overheard: for each session those on which another master tells several drives at once.
     :param prepare_thread: called first in each of the two threads.
     :param note: sees every frame that was sent or received: (frame, time, sent).
     :ivar errand: what its timer thread sees to beside its drives; to be set before ``open``.
@@ -81,7 +83,7 @@ class BusExchange:
 
     def __init__(self, bus: BusConfiguration, sessions: Sequence[Session],
                  routes: Sequence[Sequence[Route]], listener: BusListener, *,
-                 counted: Sequence[Route] = (),
+                 counted: Sequence[Route] = (), overheard: Sequence[Sequence[Route]] = (),
                  clock: Callable[[], float] = steady_now,
                  prepare_thread: Callable[[], object] = lambda: None,
                  note: Callable[[Frame, float, bool], object] | None = None) -> None:
@@ -94,12 +96,11 @@ class BusExchange:
         self._members: list[Member] = []
         self._sessions = list(sessions)
         self._router: Router[Member] = Router()
-        self._routes = [list(entries) for entries in routes]
+        self._routes = list(zip_longest(routes, overheard, fillvalue=()))
         # a send may hold up every drive of the bus: never for more than half a cycle
         periods = [session.configuration.period for session in sessions]
         shortest = min(periods, default=0.1)
-        filters = [*(route for entries in routes for route in entries), *counted]
-        self.link = Link(bus, filters, self,
+        self.link = Link(bus, list(dict.fromkeys(chain(*routes, counted, *overheard))), self,
                          send_timeout=min(0.5 * shortest, 0.05), stations=len(self._sessions),
                          prepare_thread=prepare_thread)
         for session, phase in zip(sessions, spread(periods)):
@@ -130,7 +131,8 @@ class BusExchange:
                 other.partners.append(member)
                 member.partners.append(other)
         self._members.append(member)
-        self._router.add(self._routes[self._sessions.index(session)], member)
+        own, overheard = self._routes[self._sessions.index(session)]
+        self._router.add(own, member, overheard)
 
     def open(self) -> None:
         """Start both threads; the bus opens in the background. Nothing is sent."""
@@ -321,7 +323,10 @@ class BusExchange:
                 self._note(frame, arrived, False)
             member = self._router.find(frame)
             if member is None:
-                self.frames_rejected += 1
+                for hearer in (hearers := self._router.hearers(frame)):
+                    hearer.session.receive_frame(frame, now, now - arrived)
+                    self._pump(hearer)
+                self.frames_rejected += not hearers
                 return
             member.session.receive_frame(frame, now, now - arrived)
             self._pump(member)

@@ -142,6 +142,14 @@ class Family(ABC):
         """Return identifiers that others must keep off, though the bridge does not use them."""
         return []
 
+    def overheard(self, drive: DriveConfiguration) -> list[Route]:
+        """
+        Return identifiers, each alone, on which another master may tell several drives at once.
+
+        The drive may obey, so that its session hears what others send there; no drive claims them.
+        """
+        return []
+
     @abstractmethod
     def bits_per_second(self, drive: DriveConfiguration) -> float:
         """Return the worst-case bus load of the drive's exchange (maximal bit stuffing)."""

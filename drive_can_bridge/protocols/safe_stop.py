@@ -8,8 +8,10 @@ its status: what it was told is not what it does.
 """
 
 from collections.abc import Callable, Generator
+import math
 from typing import Generic, NamedTuple, Union
 
+from drive_can_bridge.core.events import Noted
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.process_image import control_word
 from drive_can_bridge.core.session import Session
@@ -37,6 +39,7 @@ class SafeStop(Generic[StepT, ReplyT]):
     :param read_status: reads the status word, once, for a short time (None: no answer); None:
         there is none to be read, or it comes by itself.
     :ivar running: it is under way.
+    :ivar ended_at: when it had run its course, the last time.
     """
 
     def __init__(self, session: Session, channel: Channel[StepT, ReplyT],
@@ -44,13 +47,14 @@ class SafeStop(Generic[StepT, ReplyT]):
                  read_status: Callable[[], StatusRead[StepT, ReplyT]] | None = None) -> None:
         self.running = False
         self._read_status = read_status
+        self.ended_at = -math.inf
         self._session = session
         self._channel = channel
         self._ended = ended
         self._word = control_word(
             session.configuration, controlled=session.control is not None)
         self._owed = False          # there was something to be stopped when it began
-        self._insisting = False
+        self._insisting = self._again = False
         self._whole = False         # all that the drive can be told is in it
 
     def writes(self, *, word: bool = True, setpoints: bool = True) -> list[StopWrite]:
@@ -71,17 +75,19 @@ class SafeStop(Generic[StepT, ReplyT]):
         return found
 
     def begin(self, procedure: Generator[StepT, ReplyT, list[str]], now: float, *,
-              setpoints: bool = True, insist: bool = False) -> None:
+              setpoints: bool = True, insist: bool = False, again: bool = False) -> None:
         """
         Begin.
 
         :param procedure: returns what failed, in words; nothing: the drive has confirmed it all.
         :param setpoints: False: they are stopped in another way.
         :param insist: what failed is told even if the drive was not told to run.
+        :param again: that it failed before was told: what is new is that it does not.
         """
         session = self._session
         self.running = True
-        self._owed, self._insisting = session.told.owed, insist
+        self._owed, self._insisting = session.told.owed and not again, insist
+        self._again = again
         self._whole = setpoints and not session.gate.mute
         self._channel.run(self._then_look(procedure), self._done, now, Lane.STOP)
 
@@ -115,7 +121,7 @@ class SafeStop(Generic[StepT, ReplyT]):
         self._ended()
 
     def _done(self, failed: list[str]) -> None:
-        self.running = False
+        self.running, self.ended_at = False, self._channel.now
         session = self._session
         if not failed:
             if self._whole:
@@ -124,6 +130,8 @@ class SafeStop(Generic[StepT, ReplyT]):
                 session.told.note(CONTROL_WORD, runs=False)
                 if not session.active:  # in its end, to be disabled is enough
                     session.told.answered()
+            if self._again and not session.told.owed:
+                session.report.note(Noted('told to stop once more, which it has confirmed'))
         elif self._owed or self._insisting:
             session.report.warn(f'told to stop, but {"; ".join(failed)}', may_run=self._owed)
             if not session.active:      # which ends with it: there is no more to be said

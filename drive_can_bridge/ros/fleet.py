@@ -105,6 +105,7 @@ class Fleet:
             bus, sessions,
             [[claim.route for claim in entries if claim.heard] for entries in claims], self,
             counted=[claim.route for entries in claims for claim in entries if not claim.heard],
+            overheard=[FAMILIES[drive.protocol].overheard(drive) for drive in drives],
             prepare_thread=self._prepare_thread, note=self._flight.note_of(bus.name))
         self._flight.attach(exchange)
         for drive, session in zip(drives, sessions):

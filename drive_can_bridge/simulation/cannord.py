@@ -69,9 +69,8 @@ class SimulatedCannordInverter(SimulatedDrive):
         found, options = super().find_routes()[:len(MessageObject)], self.configuration.options
         extended, station = options.extended_identifiers, self.configuration.station
         if options.broadcast != 'none':
-            found += [identifiers.route(each, extended=extended) for each in (
-                identifiers.group_identifier(station, extended=extended),
-                identifiers.all_identifier(extended=extended))]
+            found += [identifiers.route(each, extended=extended)
+                      for each in identifiers.broadcasts(station, extended=extended)]
         return found
 
     def choose_plant(self) -> PlantFactory:

@@ -298,3 +298,13 @@ def test_raw_names(tmp_path: Path, name: str, number: int, subindex: int | None)
 def test_no_raw_names(tmp_path: Path, name: str) -> None:
     lift = load(tmp_path, FILE, PROFILE).drives['lift']
     assert FAMILY.raw_parameter(lift, name) is None
+
+
+def test_broadcasts_that_an_inverter_may_obey_are_claimed_by_nobody(tmp_path: Path) -> None:
+    """Another drive may use 400h or 408h: what is only overheard collides with nothing."""
+    lift = load(tmp_path, FILE, PROFILE).drives['lift']
+    assert lift.options.broadcast == 'none'
+    claimed = [claim.route.identifier for claim in FAMILIES['cannord'].claims(lift)]
+    heard = [route.identifier for route in FAMILIES['cannord'].overheard(lift)]
+    assert heard == [0x400, 0x408]
+    assert not set(heard) & set(claimed)

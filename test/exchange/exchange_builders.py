@@ -104,6 +104,7 @@ class Bench:
         self.bus_notes = BusNotes()
         self.exchange = BusExchange(
             BusConfiguration('main', 'virtual', 'x'), self.sessions, self.routes, self.bus_notes,
+            overheard=[FAMILIES[entry.protocol].overheard(entry) for entry in drives],
             clock=time.monotonic if real_time else self.clock)
         self.link = FakeLink()
         self.exchange.link = self.link  # type: ignore[assignment]

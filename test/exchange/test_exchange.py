@@ -14,7 +14,7 @@ from waiting import wait_for
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
 from drive_can_bridge.core.events import (
-    Noted, RequestCompleted, SetpointsExpired, StationFound, StationLost,
+    ForeignMasterSeen, Noted, RequestCompleted, SetpointsExpired, StationFound, StationLost,
 )
 from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.core.requests import Failure, ReadValue
@@ -67,6 +67,23 @@ def test_rejected_frames_of_a_drive_are_its_own() -> None:
     bench.hears('104001E0#0000000000000000', 10.0)
     assert bench.exchange.frames_rejected == 0
     assert [session.statistics.rejected for session in bench.sessions] == [0, 1]
+
+
+@pytest.mark.parametrize('broadcast', ['none', 'group', 'all'])
+@pytest.mark.parametrize(('text', 'hearers'), [
+    ('408#7F040020', [0, 1, 2]), ('400#7F040020', [0, 1]), ('401#7F040020', [2]),
+    ('402#7F040020', []), ('10200000#7F040020', [3]), ('10000000#7F040020', [3])])
+def test_a_foreign_broadcast_is_told_of_each_drive_that_would_obey(
+        broadcast: str, text: str, hearers: list[int]) -> None:
+    bench = Bench(*[drive(
+        'cannord', name=name, station=station, request=(), response=(), broadcast=broadcast,
+        extended_identifiers=name == 'four')
+        for name, station in (('one', 1), ('two', 31), ('three', 32), ('four', 1))])
+    bench.hears(text, 10.0)
+    assert [[type(event) for event in notes.events] for notes in bench.notes] == [
+        [ForeignMasterSeen] if index in hearers else [] for index in range(4)]
+    assert bench.exchange.frames_rejected == (not hearers)
+    assert [session.statistics.rejected for session in bench.sessions] == [0] * 4
 
 
 def test_eleven_bit_twin_of_a_response_reaches_nobody() -> None:

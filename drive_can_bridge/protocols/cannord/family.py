@@ -5,12 +5,12 @@ from collections.abc import Iterator, Sequence
 import re
 
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.frame import worst_bits
+from drive_can_bridge.core.frame import Route, worst_bits
 from drive_can_bridge.core.parameters import Parameter, ParameterType, Storage
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.cannord.broadcast import broadcast_identifier, groups
 from drive_can_bridge.protocols.cannord.identifiers import (
-    ADDRESS_MAX, identifier, MessageObject, route,
+    ADDRESS_MAX, broadcasts, identifier, MessageObject, route,
 )
 from drive_can_bridge.protocols.cannord.monitoring import TIMEOUT_NUMBER, timeout_parameter
 from drive_can_bridge.protocols.cannord.options import CannordOptions
@@ -84,8 +84,14 @@ class Cannord(Family):
         broadcast = broadcast_identifier(drive)
         if broadcast is not None:
             found.append(Claim(route(broadcast, extended=extended), 'broadcast process data',
-                               shared='cannord broadcast'))
+                               shared='cannord broadcast', heard=False))
         return found
+
+    def overheard(self, drive: DriveConfiguration) -> list[Route]:
+        """Return both broadcasts: an inverter that is set to listen obeys both."""
+        extended = drive.options.extended_identifiers
+        return [route(each, extended=extended) for each in broadcasts(
+            drive.station, extended=extended)]
 
     def bits_per_second(self, drive: DriveConfiguration) -> float:
         """Return the worst-case load of an exchange of its own every period."""

@@ -64,6 +64,11 @@ def all_identifier(*, extended: bool = False) -> int:
     return _formed(BROADCAST_ALL, extended)
 
 
+def broadcasts(address: int, *, extended: bool = False) -> tuple[int, int]:
+    """Return the broadcast identifiers that an inverter may listen to: of its group, of all."""
+    return group_identifier(address, extended=extended), all_identifier(extended=extended)
+
+
 def decode_identifier(value: int) -> tuple[MessageObject, int] | None:
     """Return what 11 bits mean, and the address of the inverter; None: it is none's own."""
     if value >= BROADCAST_BASE:

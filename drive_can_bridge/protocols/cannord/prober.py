@@ -14,7 +14,7 @@ from typing import NamedTuple
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.protocols.cannord.identifiers import (
-    all_identifier, group_identifier, identifier, MessageObject, route,
+    broadcasts, identifier, MessageObject, route,
 )
 from drive_can_bridge.protocols.cannord.parameter_frame import (
     error_text, ERRORS, NUMBER_MAX, ParameterLayout, Response, RESPONSES, Task,
@@ -75,8 +75,7 @@ class CannordProber(Prober):
                 MessageObject.PARAMETER_TASK, MessageObject.PARAMETER_RESPONSE,
                 MessageObject.PROCESS_REQUEST))
         super().__init__(drive, [route(each, extended=extended) for each in (
-            self._task, process_request, group_identifier(station, extended=extended),
-            all_identifier(extended=extended))])
+            self._task, process_request, *broadcasts(station, extended=extended))])
         self._extended: bool = extended
 
     def converse(self) -> Conversation:

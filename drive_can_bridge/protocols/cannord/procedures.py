@@ -5,9 +5,9 @@ Reading and writing parameters of an inverter, in words that users understand.
 Every generator here is for :class:`.channel.TaskChannel`.
 """
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterable, Sequence
 
-from drive_can_bridge.core.parameters import Parameter, Storage
+from drive_can_bridge.core.parameters import Parameter, ParameterType, Storage
 from drive_can_bridge.core.requests import (
     Failure, NOT_SENT, Outcome, Outcomes, ReadValue, Written,
 )
@@ -32,6 +32,12 @@ def cells(parameter: Parameter) -> Cells:
             else frozenset([(parameter.number, parameter.subindex or 0)]))
 
 
+def signed_cells(parameters: Iterable[Parameter]) -> Cells:
+    """Return where these have words with a sign."""
+    return frozenset().union(*(
+        cells(parameter) for parameter in parameters if parameter.type is ParameterType.INT16))
+
+
 def write_refusal(parameter: Parameter) -> str:
     """Say why no task writes a parameter; '' if one can."""
     return PROCESS_DATA_ONLY if parameter.number is None else ''
@@ -43,13 +49,15 @@ class TaskAccess(Access[Parameter, Ask, Reply]):
 
     :param last_value: (parameter name) -> raw integer last received in process data, or None.
     :param persist: write to EEPROM where the profile does not say where.
+    :param signed: where the profile lists words with a sign, which raw names do not have.
     """
 
     def __init__(self, channel: TaskChannel, retry: RetryPolicy, *,
-                 last_value: Callable[[str], int | None], persist: bool) -> None:
+                 last_value: Callable[[str], int | None], persist: bool, signed: Cells) -> None:
         super().__init__(channel, retry, OneByOne())
         self._last_value = last_value
         self._persist = persist
+        self._signed = signed
 
     def read(self, span: Parameter) -> Generator[Ask, Reply, Found]:
         answer = yield from self._ask(span)
@@ -92,6 +100,8 @@ class TaskAccess(Access[Parameter, Ask, Reply]):
             double = answer.identifier in DOUBLE_RESPONSES
             if not double and not -0x8000 <= raw <= 0xFFFF:
                 return Failure(f'{raw} is not representable in 16 bits: -32768 to 65535')
+        if not double and cells(parameter) & self._signed:
+            raw = (raw + 0x8000 & 0xFFFF) - 0x8000
         array = parameter.subindex is not None
         persistent = (self._persist if parameter.storage is None
                       else parameter.storage is Storage.EEPROM)
@@ -116,7 +126,10 @@ class TaskAccess(Access[Parameter, Ask, Reply]):
         if not reply.sent:
             return Failure(NOT_SENT)
         if reply.contrary is not None:
-            return read_back(parameter, parameter.raw_from_word(reply.contrary.answered), value)
+            # without its sign where users see none
+            wrote = parameter.raw_from_word(parameter.word_from_raw(value)) if (
+                parameter.width_known) else value
+            return read_back(parameter, parameter.raw_from_word(reply.contrary.answered), wrote)
         return self.retry.unanswered(attempts)
 
 

@@ -33,7 +33,9 @@ from drive_can_bridge.core.users import Users
 from drive_can_bridge.protocols.cannord import procedures
 from drive_can_bridge.protocols.cannord.channel import TaskChannel, TaskCourier
 from drive_can_bridge.protocols.cannord.control import make_control
-from drive_can_bridge.protocols.cannord.identifiers import identifier, MessageObject
+from drive_can_bridge.protocols.cannord.identifiers import (
+    broadcasts, identifier, MessageObject,
+)
 from drive_can_bridge.protocols.cannord.monitoring import TimeoutWatch
 from drive_can_bridge.protocols.cannord.parameter_frame import ParameterLayout
 from drive_can_bridge.protocols.cannord.process_data import (
@@ -92,10 +94,11 @@ class CannordSession(Session):
                 Frame(self._task_identifier, payload, self._extended), left), self.retry))
         access = procedures.TaskAccess(
             self._channel, self.retry, last_value=self._samples.last,
-            persist=options.persist_writes)
+            persist=options.persist_writes,
+            signed=procedures.signed_cells(drive.profile.parameters.values()))
         # what only a master sends
-        self._masters = {self.request_identifier, self._task_identifier,
-                         group and group.broadcast}
+        self._masters = self.request_identifier, self._task_identifier
+        self._broadcasts = broadcasts(drive.station, extended=self._extended)
         self._timeout = TimeoutWatch(drive, access, self.report.note)
         self.users = Users(
             self, access, control_refusal=self._control_refusal,
@@ -206,6 +209,10 @@ class CannordSession(Session):
             elif received in self._masters:
                 self.report.note(ForeignMasterSeen(
                     f'another master sends to station {self.configuration.station}: {frame}'))
+            elif received in self._broadcasts:
+                self.report.note(ForeignMasterSeen(
+                    f'another master sends broadcasts, which station '
+                    f'{self.configuration.station} obeys if it is set to listen (P509): {frame}'))
             else:
                 self.report.reject(f'{frame}: not of this drive')
         except RemoteProtocolError as error:

@@ -25,6 +25,7 @@ class Rounds:
 
     :param write: writes setpoints; between two reads: commands do not wait for slow rounds.
     :ivar status_known: the status was read just now, or there is none to be read.
+    :ivar gap: what the last one asked for in vain, though others were answered, in words.
     :ivar refusals: the names of what the drive refuses, and why, by what was read.
     """
 
@@ -39,6 +40,7 @@ class Rounds:
         status = status_word(drive)
         self._status = None if status is None else (status, self._placement.span(status))
         self.status_known = status is None
+        self.gap = ''
         self.refusals: dict[Span, str] = {}
         self._words: dict[Address, int] = {}    # those of refused registers are missing
         self._plan: list[Span] = []
@@ -46,6 +48,7 @@ class Rounds:
 
     def start_over(self) -> None:
         """Forget what was refused."""
+        self.gap = ''
         self.refusals.clear()
         self._plan = round_plan(self._drive)
 
@@ -59,6 +62,9 @@ class Rounds:
                 self._write(self._channel.now)
             reply = yield Read(span.address, span.count, attempts=1)
             if isinstance(reply, Silence):
+                self.gap = '' if not self._words else (
+                    f'no answer to the read of {self._names(span)}, though others are answered: '
+                    f'does this drive have it')
                 return None
             if isinstance(reply, Refused):
                 pending[:0] = self._instead(span, reply)
@@ -98,12 +104,17 @@ class Rounds:
             place = self._plan.index(span)
             self._plan[place:place + 1] = parts
             return parts
-        names = ', '.join(parameter.name for parameter, own in zip(
-            self._drive.cyclic_response, self._spans) if own == span)
+        names = self._names(span)
         if span not in self.refusals:
-            self._session.report.warn(f'read {names or span.address}: {refused.text}')
-        self.refusals[span] = f'{names or span.address} {refused.text}'
+            self._session.report.warn(f'read {names}: {refused.text}')
+        self.refusals[span] = f'{names} {refused.text}'
         return parts
+
+    def _names(self, span: Span) -> str:
+        """Name what a read is for."""
+        return ', '.join(parameter.name for parameter, own in zip(
+            self._drive.cyclic_response, self._spans)
+            if set(own.addresses) <= set(span.addresses)) or str(span.address)
 
     def warnings(self) -> list[str]:
         """Say what the drive refuses, and what to do."""

@@ -13,7 +13,7 @@ from typing import Union
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.events import ForeignMasterSeen
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.parameters import Parameter, Storage
 from drive_can_bridge.core.process_image import control_word, status_word
 from drive_can_bridge.core.roles import Cells
 from drive_can_bridge.core.session import Session
@@ -29,6 +29,7 @@ from drive_can_bridge.protocols.datamodel.numbers import Numbers
 from drive_can_bridge.protocols.datamodel.options import DataModelOptions
 from drive_can_bridge.protocols.placement import SentWrites
 from drive_can_bridge.protocols.safe_stop import SafeStop, StatusRead
+from drive_can_bridge.protocols.stop_again import StopAgain
 
 #: how often everything is written at most that makes a drive stand still
 ATTEMPTS = 3
@@ -52,6 +53,8 @@ class AcyclicSide:
     :ivar status_slot: of the status word in ``cyclic_response``, or None.
     :ivar control_writer: looks after words that have no slot, or None.
     :ivar parts: what acts at times of its own.
+    :ivar shows_up: something has arrived since whoever wants to know reset this.
+    :ivar again: tells a drive to stop again that is offline and shows up.
     """
 
     def __init__(self, session: Session, *, encode_read: Callable[[int, int], Frame],
@@ -86,6 +89,10 @@ class AcyclicSide:
         self.stop: SafeStop[Step, Reply] = SafeStop(
             session, self.channel, stop_ended,
             None if at_end is None else partial(self._read_status, at_end))
+        self.shows_up = False
+        self.again = StopAgain(
+            session, self.channel, self.stop, lambda now: self.begin_stop(now, again=True),
+            wears=word is not None and word.storage is not Storage.RAM)
 
     def clear(self) -> None:
         """Forget everything acyclic, and whatever waits for its outcome."""
@@ -99,7 +106,7 @@ class AcyclicSide:
 
     def receive(self, frame: Frame, now: float) -> None:
         """Take an answer: to the outstanding read, or to nothing."""
-        session = self._session
+        session, self.shows_up = self._session, True
         try:
             words = self._decode(frame, self.courier.outstanding)
         except RemoteProtocolError as error:
@@ -130,7 +137,7 @@ class AcyclicSide:
 
     # -- stopping by acyclic writes ---------------------------------------------------------------
 
-    def begin_stop(self, now: float, *, setpoints: bool = True) -> None:
+    def begin_stop(self, now: float, *, setpoints: bool = True, again: bool = False) -> None:
         """
         Write ``disable`` and neutral setpoints by their numbers, which no map can misroute.
 
@@ -138,6 +145,7 @@ class AcyclicSide:
         stop that is under way goes on as it is.
 
         :param setpoints: False: what is in ``cyclic_request`` is stopped by cyclic frames.
+        :param again: a stop before this one has failed, which was told.
         """
         stop = self.stop
         told = stop.writes(word=setpoints or self.control_slot is None, setpoints=setpoints)
@@ -150,7 +158,7 @@ class AcyclicSide:
         for _, write in writes:
             self.courier.write_now(write, lambda sent, then: None, now)
         timeout = min(self._session.retry.timeout, ANSWER_TIME)
-        stop.begin(confirm(writes, timeout), now, setpoints=setpoints)
+        stop.begin(confirm(writes, timeout), now, setpoints=setpoints, again=again)
 
     def _read_status(self, status: Parameter) -> StatusRead[Step, Reply]:
         words = yield Read(self.numbers.number(status), attempts=1, late_will_do=True,

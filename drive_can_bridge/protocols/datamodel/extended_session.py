@@ -92,7 +92,7 @@ class ExtendedSession(Session):
         self._positions = Positions(
             self, self._channel, numbers, known=self._start_cycling, again=self._look_again,
             # it may have started anew meanwhile, with other maps
-            silent=self._maps.look_afresh if self._verify else None)
+            silent=self._axes_unknown if self._verify else None)
         self._exchange = CyclicExchange(
             self, self._codec.encode_request, self._send_cycle, slot=self._side.control_slot,
             silence='no cyclic response', missed=self._missed, ended=self._last_cycle_left,
@@ -126,7 +126,7 @@ class ExtendedSession(Session):
 
     def begin(self, now: float) -> None:
         self._exchange.stop()
-        self._differs = False
+        self._differs = self._side.shows_up = False
         if self.told.owed:
             self._side.begin_stop(now, setpoints=self._verify)
         if self._verify:
@@ -146,9 +146,7 @@ class ExtendedSession(Session):
     def _maps_judged(self, verdict: Verdict, text: str, now: float) -> None:
         if verdict is Verdict.AGREE:
             self._differs = False
-            if self._phase is Phase.CHECKING and self.told.owed and self._maps.silent_looks:
-                self.begin(now)     # it has not heard the last stop, but may hear one now
-            elif self._phase is not Phase.CYCLIC:
+            if self._phase is not Phase.CYCLIC:
                 self._begin_cycles(now)
             elif self.online:
                 self.told.answered()
@@ -183,6 +181,9 @@ class ExtendedSession(Session):
             self.report.advice = ('no answer to mapping read: drive silent, wrong station, bit '
                                   'rate or identifier mode')
             self._maps.look_at = now  # paced by the time-out of the read
+            if self._side.shows_up:   # and answers a part of what it is asked
+                self._side.shows_up = False
+                self._side.again.heard(now, answered=True)
 
     def _maps_reported(self, event: Event) -> None:
         if isinstance(event, MappingDiffered):
@@ -207,6 +208,11 @@ class ExtendedSession(Session):
     def _look_again(self, now: float) -> None:
         if self._phase is Phase.CHECKING:
             self._begin_cycles(now)
+
+    def _axes_unknown(self, now: float) -> None:
+        """Handle a drive whose maps agree, but that does not say where its axes are."""
+        self._side.again.heard(now, answered=True)
+        self._maps.look_afresh(now)
 
     def _start_cycling(self, now: float) -> None:
         self._phase = Phase.CYCLIC

@@ -46,7 +46,7 @@ class MapSupervision:
     :ivar look_at: when the next look is due; infinity: none is planned.
     :ivar request_agrees: the last look found the request map to be right, and it stays: cyclic
         requests reach the parameters that they are meant for.
-    :ivar silent_looks: so many in a row went unanswered; when one is ``judged``, those before it.
+    :ivar silent_looks: so many in a row went unanswered.
     """
 
     def __init__(self, channel: AcyclicChannel, *, request_base: int, response_base: int,
@@ -120,15 +120,14 @@ class MapSupervision:
             self.silent_looks += 1
             self._judged(Verdict.SILENT, '', now)
             return
+        self.silent_looks = 0
         self._agreed = not found
         if not found:
             self._told = ''
             if now - self._rewritten_at > REWRITE_PAUSE_MAX:
                 self._pause = MAPPING_PERIOD
             self._judged(Verdict.AGREE, '', now)
-            self.silent_looks = 0
             return
-        self.silent_looks = 0
         self._judged(Verdict.DIFFER, found, now)
         if not self._rewrite:
             self._tell(found)

@@ -187,6 +187,7 @@ class StandardSession(Session):
         if frame.identifier == self._request_identifier:
             self._side.foreign_master(frame)
             return
+        self._side.again.heard(now)
         courier = self._side.courier
         # it may have come before the question
         if courier.outstanding is None or now - age < courier.asked_at:

@@ -286,6 +286,25 @@ def test_foreign_master() -> None:
         ForeignMasterSeen('another master sends to station 1: 202#6610000000000000')]
 
 
+@pytest.mark.parametrize(('options', 'obeyed', 'others'), [
+    ({}, ['400#7F040040', '408#7F040040'], ['401#7F040040', '10200000#7F040040']),
+    ({'station': 100}, ['403#7F040040', '408#7F040040'], ['400#7F040040']),
+    ({'broadcast': 'group'}, ['400#7F040040', '408#7F040040'], ['401#7F040040']),
+    ({'broadcast': 'all'}, ['400#7F040040', '408#7F040040'], ['401#7F040040']),
+    ({'extended_identifiers': True}, ['10000000#7F040040', '10200000#7F040040'],
+     ['400#7F040040', '10040000#7F040040', '10000001#7F040040'])])
+def test_foreign_broadcasts(options: dict[str, object], obeyed: list[str],
+                            others: list[str]) -> None:
+    talk = started(**options)
+    for text in (*obeyed, *others):
+        talk.hears(text, 10.003)
+    station = options.get('station', 1)
+    assert talk.events() == [
+        *(ForeignMasterSeen(f'another master sends broadcasts, which station {station} obeys if '
+                            f'it is set to listen (P509): {text}') for text in obeyed),
+        *(FrameRejected(f'{text}: not of this drive') for text in others)]
+
+
 # -- faults told unasked --------------------------------------------------------------------------
 
 

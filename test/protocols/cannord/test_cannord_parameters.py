@@ -415,8 +415,15 @@ def test_raw_names_of_listed_parameters_obey_their_rules() -> None:
     # P613.21 is listed as int32 in EEPROM: nothing has to be asked
     assert asked(online(), write(user_value('p613.21', 100000)),
                  ('658215000100A086', '655215000100A086')) == ['written']
-    assert asked(online(), write(user_value('p411', -5)),
-                 ('9BE100000000FBFF', '9B110000FFFFFBFF')) == ['written']
+    # P411 is listed as int16: a negative one has FFFFh in PWE1, by whatever name
+    for value in (-5, 65531):
+        assert asked(online(), write(user_value('p411', value)),
+                     ('9BE10000FFFFFBFF', '9B110000FFFFFBFF')) == ['written']
+    assert asked(online(), write(user_value('p411', 32767)),
+                 ('9BE100000000FF7F', '9B1100000000FF7F')) == ['written']
+    # P102 as uint16, in EEPROM
+    assert asked(online(), write(user_value('p102', 65531)),
+                 ('662000000000FBFF', '661000000000FBFF')) == ['written']
     with pytest.raises(ValueRefused, match='read-only'):
         user_value('p700.0', 1)
     # a task without sub-index acts on the first element
@@ -445,6 +452,20 @@ def test_telegram_time_out(period: float, deciseconds: str, tight: bool) -> None
     talk.hears(f'203#01120000{high}{deciseconds}', 10.005)
     assert bool(talk.session.warning) is tight
     assert len(talk.events(Noted)) == int(tight)
+
+
+@pytest.mark.parametrize('raw_value', [-1, 65535])
+def test_telegram_time_out_that_is_negative(raw_value: int) -> None:
+    """-0.1 s: errors of the bus do not stop the drive. By its number too, whatever a user says."""
+    talk, _ = monitored()
+    drive = talk.session.configuration
+    found = ParameterDirectory(
+        drive.profile.parameters,
+        lambda name: FAMILIES['cannord'].raw_parameter(drive, name)).find('p513')
+    assert found is not None
+    talk.hears('203#0112000000000000', 10.005)
+    item = (MONITORING, -1) if raw_value == -1 else (found, raw_value)
+    assert talk.submits(write(item), 10.006) == ['202#01220000FFFFFFFF']
 
 
 def test_telegram_time_out_in_words() -> None:

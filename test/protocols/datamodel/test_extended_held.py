@@ -412,3 +412,18 @@ def test_status_by_hand_latches_with_the_word() -> None:
     assert sent[:4] == [request(0, 70), request(0, 69), request(0, 68), request(0, 67)]
     assert len(set(sent[4:])) == 1
     assert sent[4] == request(1, 66)
+
+
+def test_axis_that_ran_and_does_not_say_where_it_is_is_disabled_by_number() -> None:
+    """It was silent when it was told so; then its maps are answered, but not its position."""
+    talk = enabled()
+    talk.until(12.0)
+    assert not talk.session.online
+    talk.events()
+    disable, ask = f'00300341#{ZEROS}', f'00200341#{ZEROS}'
+    sent = [text for _, text in talk.served(14.0, {
+        **dict(zip(ASK_MAPS, MAPS)), ask: f'10200341#{ZEROS}'}.get)]
+    assert sent.count(disable) == 1
+    assert not any(text.startswith('003FFFF0') for text in sent)
+    assert [note.text for note in talk.events(Noted)] == [
+        'told to stop once more, which it has confirmed']
