@@ -55,7 +55,7 @@ class ControlMachine:
         self._unheard = unheard
         self._wording = wording
         self._sending = ControlAction.DISABLE   # by name: two words may have the same bits
-        self._sent = False                      # the current word left at least once
+        self._sent = self._again = False        # the current word left; is to leave once more
         self._fault: bool | None = None         # None: not known
         self._reached = False                   # enabled was confirmed for this enable word
         self._disregard = Disregard(timeout)
@@ -100,8 +100,8 @@ class ControlMachine:
 
     @property
     def word_due(self) -> bool:
-        """The current word has not left since it changed, or since :meth:`withdraw`."""
-        return not self._sent
+        """The current word has not left since it changed, :meth:`withdraw`, or a new stop."""
+        return not self._sent or self._again
 
     @property
     def state(self) -> str:
@@ -164,8 +164,6 @@ class ControlMachine:
                 self._answers.complete(request, True, self.state)
                 return
             may_run = self._may_run
-            if action in _STOPS and self.unconfirmed:
-                self._sent = False  # whoever asks again has it written again
             if under_way is not None:
                 self._end(False, f'replaced by {action.value}')
             under_way = self._operation = Operation(action, now + self._timeout)
@@ -173,8 +171,10 @@ class ControlMachine:
                 self._send(ControlAction.QUICK_STOP)
             elif action is not ControlAction.ENABLE:    # of an enabled drive: nothing to do
                 self._send(ControlAction.DISABLE)
+        self._again = action in _STOPS and self.unconfirmed
+        if not under_way.requests and self._table.enabled is not None:
+            under_way.deadline = now + self._timeout
         under_way.requests.append(request)
-        under_way.deadline = min(under_way.deadline, now + self._timeout)
         self._advance()
 
     def word_sent(self, now: float) -> None:
@@ -185,7 +185,7 @@ class ControlMachine:
         is acknowledged, at the acknowledgement. A word that meanwhile is not the current one any
         more does not count.
         """
-        self._sent = True           # before the timer, which may change the word
+        self._sent, self._again = True, False   # before the timer, which may change the word
         if self.pulsing:
             self._pulses_left -= 1
         self.handle_timer(now)

@@ -99,9 +99,9 @@ class Setpoints:
         expired, self._expired = self._expired, []
         for setpoint in self.items:
             if self._overdue(setpoint, now):
+                self.changed |= setpoint.raw != setpoint.neutral
                 setpoint.disarm()
                 expired.append(setpoint)
-                self.changed = True
         self.expires_at = self._soonest()
         return expired
 

@@ -26,6 +26,8 @@ from drive_can_bridge.protocols.exchange_book import ExchangeBook
 STOP_CYCLES = 3
 #: s that an answer to the cycles of a stop is waited for, where none has come
 LAST_ANSWER = 0.1
+#: s between a cycle and one that is brought forward because commands are too old
+EXPIRY_SPACING = 0.05
 #: what the drive is told by cycles, for the books of what it was told
 CYCLE = 'cycle'
 
@@ -104,8 +106,9 @@ class CyclicExchange(Generic[TelegramT]):
         if now < self.timer.due:
             if now >= self._answer_due:
                 self.settle(now)
-            if self._session.gate.expire(now):
-                self.timer.hurry(now)
+            if self._session.gate.expire(now) and self._session.setpoints.changed:
+                # a drive has that long for its answer
+                self.timer.no_later(max(now, self.timer.began_at + EXPIRY_SPACING))
             return
         if self._waiting:
             self._end(now)

@@ -122,9 +122,9 @@ class WriteSchedule:
             self._due.insert(0 if first else len(self._due), index)
 
     @property
-    def waiting(self) -> bool:
-        """Something is due."""
-        return bool(self._due)
+    def waiting(self) -> int:
+        """How many are due."""
+        return len(self._due)
 
     def next(self) -> int:
         """Return the index of the setpoint to be written next, which is due no more."""

@@ -77,8 +77,7 @@ class ControlWriter:
         word = self._control.word
         fresh = now < self._retry_at and (
             self._refresh <= 0.0 or now < self._settled_at + self._refresh)
-        if self._settled == word and fresh and (
-                self.refusal or not self._repetition.due(now)):
+        if self._settled == word and fresh and not self._repetition.due(now):
             return
         repeated = self._settled == word or self._control.operating
         if repeated and not known and word != self._disable:
@@ -124,6 +123,8 @@ class ControlWriter:
                 self._settled = None if reply.sent else before
                 if reply.sent:
                     self._doubtful = word
+                else:   # as if it had not been begun
+                    self._repetition.left(self._channel.now)
                 if word == self._control.word and not again:
                     if stopping:
                         self._tell_silence(word)

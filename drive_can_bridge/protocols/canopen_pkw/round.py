@@ -58,7 +58,7 @@ class Rounds:
         pending = list(self._plan)
         while pending:
             span = pending.pop(0)
-            if self._words and self._session.online and self._session.setpoints.changed:
+            if self._words and self._session.online:
                 self._write(self._channel.now)
             reply = yield Read(span.address, span.count, attempts=1)
             if isinstance(reply, Silence):

@@ -86,6 +86,7 @@ class PkwSession(Session):
         self._stop: SafeStop[Step, Reply] = SafeStop(self, self._channel, self.stop_ended)
         self._again = StopAgain(self, self._channel, self._stop, self._tell_again)
         self.look_after(channel=self._channel)
+        self._made_room = False     # for setpoints, in this round
 
     # -- life cycle -------------------------------------------------------------------------------
 
@@ -237,12 +238,13 @@ class PkwSession(Session):
                 self.control.handle_timer(now)
                 self.control_changed(now)
             if self.gate.expire(now):
+                if not self._made_room:     # once a round: a slow drive has to be read, too
+                    self._made_room = True
+                    self._channel.make_room(now)
                 self._writers.write_setpoints(now)
         self._channel.advance(now)
-        if self._exchange.reading:
-            if self.online and self.setpoints.changed:
-                self._writers.write_stops(now)
-        elif now >= self._exchange.timer.due:
+        if now >= self._round_due:
+            self._made_room = False
             if self.control is not None and self.control.stopping:
                 self.see_to_control_word(now)   # before setpoints, should it be due again
             if self.online:

@@ -4,8 +4,7 @@ What a device is told: setpoints and control word while it is online, and the st
 
 Both are written when they change, setpoints also again after a while. Neutral setpoints follow the
 word that stops a drive at once, and so does everything in the stop, whatever is known of the node.
-One that takes back a command stops the drive as that word does: others make room, and it is
-repeated soon while nobody answers.
+One that takes back a command is repeated soon, as that word is, while nobody answers.
 """
 
 from collections import Counter
@@ -58,7 +57,6 @@ class Writers:
         self._failures: dict[str, str] = {}     # of setpoints, by name
         self._warned: dict[str, str] = {}
         self._silences = Counter[int]()         # in a row, by index
-        self._hurried: set[int] = set()         # those that others have made room for
         status = status_word(drive)
         self._stop: SafeStop[Step, Reply] = SafeStop(
             session, channel, stop_ended,
@@ -70,7 +68,6 @@ class Writers:
         self._failures.clear()
         self._warned.clear()
         self._silences.clear()
-        self._hurried.clear()
         if self.control is not None:
             self.control.forget()
 
@@ -101,18 +98,8 @@ class Writers:
             return
         self._schedule.look([setpoint.raw for setpoint in items], now, hold=[
             index for index, setpoint in enumerate(items) if not setpoint.known])
-        stopping = {index for index, setpoint in enumerate(items) if self._stops(index, setpoint)}
-        if stopping - self._hurried:
-            self._channel.make_room(now)
-        self._hurried = stopping
         if self._schedule.waiting and self._channel.is_idle(Lane.SETPOINTS):
             self._channel.run(self._write_setpoints(), lambda _: None, now, Lane.SETPOINTS)
-
-    def write_stops(self, now: float) -> None:
-        """Write what takes back a command at once; everything else has its turn."""
-        if any(index not in self._hurried and self._stops(index, setpoint)
-               for index, setpoint in enumerate(self._setpoints.items)):
-            self.write_setpoints(now)
 
     def _stops(self, index: int, setpoint: Setpoint) -> bool:
         """Tell whether a setpoint, as it is now, takes back what the drive was told."""
@@ -120,11 +107,12 @@ class Writers:
                 and self._session.told.runs(index))
 
     def _write_setpoints(self) -> Generator[Step, Reply, None]:
-        while self._schedule.waiting:
+        """Write what is due; what becomes due meanwhile waits, for others have their turn first."""
+        for _ in range(self._schedule.waiting):
             index = self._schedule.next()
             setpoint = self._setpoints.items[index]
-            reply = yield from self._write_setpoint(index, setpoint)
-            neutral = setpoint.raw == setpoint.neutral
+            raw, reply = yield from self._write_setpoint(index, setpoint)
+            neutral = raw == setpoint.neutral
             if isinstance(reply, Silence):
                 self._schedule.failed(index)
                 if self._silences[index] >= self._session.configuration.missed_limit:
@@ -138,25 +126,24 @@ class Writers:
             if self._first.written(index):
                 self._session.see_to_control_word(self._channel.now)
 
-    def _write_setpoint(self, index: int, setpoint: Setpoint) -> Generator[Step, Reply, Reply]:
+    def _write_setpoint(self, index: int, setpoint: Setpoint,
+                        ) -> Generator[Step, Reply, tuple[int, Reply]]:
         """Write one as it is then; what stops the drive again, soon, while nobody answers."""
-        left = STOP_ATTEMPTS
-        while True:
+        for left in range(STOP_ATTEMPTS - 1, -1, -1):
             raw, stops = setpoint.raw, self._stops(index, setpoint)
-            left -= 1
-            again = stops and left > 0
+            short = stops and left > 0
             # at once: a look while the answer is awaited must not find it due again
             self._schedule.written(index, raw, self._channel.now)
-            timeout = min(STOP_PATIENCE, self._session.retry.timeout) if again else None
             write = Write.of(
-                self._placement, setpoint.parameter, raw, blind=stops, timeout=timeout)
+                self._placement, setpoint.parameter, raw, blind=stops,
+                timeout=min(STOP_PATIENCE, self._session.retry.timeout) if short else None)
             reply = yield from tell(
                 self._session.told, index, write, runs=raw != setpoint.neutral)
-            if not isinstance(reply, Silence):
-                return reply
-            self._silences[index] += reply.sent
-            if not again:
-                return reply
+            if isinstance(reply, Silence):      # a slow drive is no silent one
+                self._silences[index] += reply.sent and not short
+            if not isinstance(reply, Silence) or not self._stops(index, setpoint):
+                break
+        return raw, reply
 
     def _failed(self, setpoint: Setpoint, why: str, *, neutral: bool) -> None:
         """

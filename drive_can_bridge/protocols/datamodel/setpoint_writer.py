@@ -58,7 +58,8 @@ class SetpointWriter:
         :param unanswered: what was asked a period ago still waits for its answer.
         """
         control, slot = self._session.control, self._slot
-        if slot is not None and self._repetition is not None and self._repetition.due(now):
+        if slot is not None and self._repetition is not None and control is not None and (
+                control.stopping or not self._exchange.reading) and self._repetition.due(now):
             self._schedule.failed(slot)
         # when a read goes unanswered, nobody knows whether the drive was off meanwhile: it is not
         # started by a repetition

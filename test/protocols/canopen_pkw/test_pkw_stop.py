@@ -456,8 +456,9 @@ def test_enable_that_the_bus_refused_leaves_the_drive_with_what_it_had() -> None
     refuse(talk)
     assert talk.asks(ControlAction.ENABLE, 10.075) == []
     accept(talk)
-    assert talk.asks(ControlAction.DISABLE, 10.08) == [], 'it was never told anything else'
-    assert talk.until(10.0901) == [(10.09, READ_0)]
+    assert talk.asks(ControlAction.DISABLE, 10.08) == [DISABLE_0], 'whoever asks gets a frame'
+    assert talk.hears(DISABLED_0, 10.081) == []
+    assert talk.until(10.0901) == [(10.09, READ_1)]
 
 
 def test_short_time_outs_make_short_attempts() -> None:

@@ -93,7 +93,7 @@ def test_enabled_drive_that_does_not_take_neutral_is_disabled() -> None:
     """Nobody commands it any more, and it would run on with what it was told last."""
     talk = driven(control_timeout=4.0)
     sent = answers(talk, 13.0)
-    assert words(sent) == ['0000'] * 3, 'it says that it runs on'
+    assert words(sent) == ['0000'] * 2, 'it says that it runs on'
     assert len([text for text in sent if text.startswith(SPEEDS)]) >= 3
     assert ('enable withdrawn: neutral is not taken, write of speed: no answer; only ~/enable '
             'starts the drive again') in notes(talk)
