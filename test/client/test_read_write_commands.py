@@ -228,7 +228,7 @@ def completions(line: str) -> list[str]:
         **os.environ, '_ARGCOMPLETE': '1', 'COMP_LINE': line, 'COMP_POINT': str(len(line)),
         '_ARGCOMPLETE_IFS': '\n', '_ARGCOMPLETE_SUPPRESS_SPACE': '1'}
     script = ('import os; os.dup2({far}, 8); os.dup2(2, 9); '
-              'from drive_can_bridge.cli.main import main; main()').format(far=far)
+              'from drive_can_bridge.cli.start import main; main()').format(far=far)
     process = subprocess.run([sys.executable, '-c', script], env=environment, pass_fds=[far],
                              capture_output=True, timeout=60)
     os.close(far)
