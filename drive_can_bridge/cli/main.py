@@ -19,7 +19,7 @@ from typing import Any
 
 from drive_can_bridge import __version__
 from drive_can_bridge.cli.argcomplete_hook import complete, typed
-from drive_can_bridge.cli.command import complain, FAILED, WRONG_USAGE, WrongUsage
+from drive_can_bridge.cli.command import complain, FAILED, Parser, WRONG_USAGE, WrongUsage
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.process.beginning import let_signals_in
 
@@ -136,7 +136,7 @@ def understood(arguments: list[str]) -> tuple[Any, argparse.Namespace]:
     """
     completing = typed()
     wanted = _wanted(arguments if completing is None else completing)
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog=PROGRAM, description='Tools of drive_can_bridge, the bridge from motor drives on '
                                   'CAN buses to ROS 2.')
     parser.add_argument('--version', action='version', version=f'{PROGRAM} {__version__}')
@@ -153,7 +153,7 @@ def understood(arguments: list[str]) -> tuple[Any, argparse.Namespace]:
         args.words += [word for word in rest if not word.startswith('-')]
         rest = [word for word in rest if word.startswith('-')]
     if rest:
-        parser.error(f'unrecognized arguments: {" ".join(rest)}')
+        parsers.get(wanted, parser).error(f'unrecognized arguments: {" ".join(rest)}')
     return module, args
 
 
