@@ -100,8 +100,8 @@ setup(
     },
     entry_points={
         'console_scripts': [
-            f'drive_can_bridge = {PACKAGE}.ros.main:main',
-            f'drive_can = {PACKAGE}.cli.main:main',
+            f'drive_can_bridge = {PACKAGE}.ros.start:main',
+            f'drive_can = {PACKAGE}.cli.start:main',
         ],
     },
 )

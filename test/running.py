@@ -16,8 +16,8 @@ from typing import Any
 from middleware import as_users_have_it
 from waiting import wait_for
 
-MODULES = {'drive_can': 'drive_can_bridge.cli.main',
-           'drive_can_bridge': 'drive_can_bridge.ros.main'}
+MODULES = {'drive_can': 'drive_can_bridge.cli.start',
+           'drive_can_bridge': 'drive_can_bridge.ros.start'}
 _COLOUR = re.compile(r'\x1b\[[0-9;]*m')
 JOB = (sys.executable, str(Path(__file__).parents[1] / '.ci' / 'foreground'))
 

@@ -6,6 +6,8 @@ import importlib.util
 from pathlib import Path
 import re
 import runpy
+import subprocess
+import sys
 from types import ModuleType
 from typing import Any
 from unittest import mock
@@ -118,6 +120,34 @@ def test_executables_have_a_function_behind_them(arguments: dict[str, Any]) -> N
         tree = ast.parse(source.read_text(encoding='utf-8'))
         names = [node.name for node in tree.body if isinstance(node, ast.FunctionDef)]
         assert function in names
+
+
+#: as pip writes an executable; the user presses Ctrl-C while it is being loaded
+EARLY_INTERRUPT = """
+import os, signal, sys
+class Keyboard:
+    def find_spec(self, name, path, target=None):
+        if name == 'drive_can_bridge.core':
+            os.kill(os.getpid(), signal.SIGINT)
+sys.meta_path.insert(0, Keyboard())
+from {module} import {function}
+sys.exit({function}())
+"""
+
+
+@pytest.mark.parametrize(('name', 'words', 'code', 'errors'), [
+    ('drive_can', ['validate', 'nothing.yaml'], 130, 'drive_can: interrupted\n'),
+    ('drive_can', ['monitor'], 0, ''), ('drive_can_bridge', ['--help'], 0, '')])
+def test_interrupt_while_it_is_loaded(arguments: dict[str, Any], name: str, words: list[str],
+                                      code: int, errors: str) -> None:
+    if name == 'drive_can_bridge':
+        pytest.importorskip('rclpy')
+    scripts = dict(each.split(' = ') for each in arguments['entry_points']['console_scripts'])
+    module, function = scripts[name].split(':')
+    done = subprocess.run(
+        [sys.executable, '-c', EARLY_INTERRUPT.format(module=module, function=function), *words],
+        capture_output=True, text=True, check=False, timeout=60)
+    assert (done.returncode, done.stderr) == (code, errors)
 
 
 def test_pip_and_rosdep_bring_the_same(

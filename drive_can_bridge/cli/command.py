@@ -6,7 +6,9 @@ A subcommand is a module of its name with ``define(parser)`` and ``run(args) -> 
 Whatever it raises, :mod:`.main` says in one line.
 """
 
+import argparse
 import sys
+from typing import NoReturn
 
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.text import printable
@@ -20,6 +22,19 @@ _NO_ROS = ('{command}: needs ROS 2 (Python module {module}): source your install
 
 class WrongUsage(DriveCanError):
     """The command line cannot be obeyed, nothing was sent or written: exit code 2."""
+
+
+class Parser(argparse.ArgumentParser):
+    """Says what is wrong with a command line as everything is said: in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        """
+        End the process.
+
+        :raises SystemExit: always.
+        """
+        complain(printable(f'{self.prog}: {message}; see {self.prog} --help', None))
+        raise SystemExit(WRONG_USAGE)
 
 
 def say(text: str) -> None:

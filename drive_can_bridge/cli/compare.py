@@ -55,12 +55,15 @@ def run(args: Namespace) -> int:
     """
     first, second = _sides_of(args)
     found = differences(first, second)
-    if min(len(first.settings), len(second.settings)) > _FEW and not (
-            first.settings.keys() & second.settings.keys() or args.json):
-        say(f'{" and ".join(args.words)} have no setting in common '
-            f'({len(first.settings)} and {len(second.settings)}): they are of different drive '
-            'types')
-    else:
+    counts = [len(side.settings) for side in (first, second)]
+    alien = min(counts) > 0 and not (
+        first.settings.keys() & second.settings.keys() or args.json)
+    few = min(counts) <= _FEW
+    if alien:
+        say(f'{" and ".join(args.words)} have no setting in common ({counts[0]} and {counts[1]}): '
+            'they are of different drive types'
+            + (', or all names of one are misspelt' if few else ''))
+    if few or not alien:
         _show(args, found)
     return DIFFERENT if found else SAME
 

@@ -1,5 +1,4 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-# PYTHON_ARGCOMPLETE_OK
 """
 The command ``drive_can``: everything that a person runs by hand.
 
@@ -20,8 +19,9 @@ from typing import Any
 
 from drive_can_bridge import __version__
 from drive_can_bridge.cli.argcomplete_hook import complete, typed
-from drive_can_bridge.cli.command import complain, FAILED, WRONG_USAGE, WrongUsage
+from drive_can_bridge.cli.command import complain, FAILED, Parser, WRONG_USAGE, WrongUsage
 from drive_can_bridge.core.errors import DriveCanError
+from drive_can_bridge.process.beginning import let_signals_in
 
 PROGRAM = 'drive_can'
 
@@ -74,6 +74,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     if argv is None and endless:  # until the subcommand looks after signals itself
         signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
+        if argv is None:
+            let_signals_in()
         code = _run(arguments)
         sys.stdout.flush()
         return code
@@ -134,7 +136,7 @@ def understood(arguments: list[str]) -> tuple[Any, argparse.Namespace]:
     """
     completing = typed()
     wanted = _wanted(arguments if completing is None else completing)
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog=PROGRAM, description='Tools of drive_can_bridge, the bridge from motor drives on '
                                   'CAN buses to ROS 2.')
     parser.add_argument('--version', action='version', version=f'{PROGRAM} {__version__}')
@@ -151,7 +153,7 @@ def understood(arguments: list[str]) -> tuple[Any, argparse.Namespace]:
         args.words += [word for word in rest if not word.startswith('-')]
         rest = [word for word in rest if word.startswith('-')]
     if rest:
-        parser.error(f'unrecognized arguments: {" ".join(rest)}')
+        parsers.get(wanted, parser).error(f'unrecognized arguments: {" ".join(rest)}')
     return module, args
 
 

@@ -15,7 +15,6 @@ from drive_can_bridge.configuration.scalars import read_scalar
 from drive_can_bridge.core.parameters import Parameter, Value, ValueKind
 
 _HEADINGS = ('drive', 'name', 'value', 'unit', 'number', 'storage', 'result')
-_BITS = {'1': True, '0': False}
 #: octal to parameter files, and decimal to most people
 _AMBIGUOUS = re.compile(r'\s*[+-]?0[0-9]')
 
@@ -97,7 +96,7 @@ def _value(parameter: Parameter, text: str) -> Value | None:
     """Read a value as a parameter file would; None: it is none of the parameter's kind."""
     value = None if _AMBIGUOUS.match(text) else read_scalar(text)
     if parameter.kind is ValueKind.BOOL:
-        return value if isinstance(value, bool) else _BITS.get(text)
+        return value if isinstance(value, bool) else None
     if isinstance(value, (bool, str)):
         return None
     if parameter.kind is ValueKind.DOUBLE:

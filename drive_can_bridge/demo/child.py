@@ -17,8 +17,8 @@ from typing import IO
 
 #: what can be run: module with ``main()``
 PROGRAMS = {
-    'drive_can_bridge': 'drive_can_bridge.ros.main',
-    'drive_can': 'drive_can_bridge.cli.main',
+    'drive_can_bridge': 'drive_can_bridge.ros.start',
+    'drive_can': 'drive_can_bridge.cli.start',
     'commander': 'drive_can_bridge.ros.demo.commander',
 }
 #: how a child begins: not as with -m, which imports from the working directory first; there a

@@ -13,7 +13,7 @@ _DECIMALS_MAX = 6
 _WIDTH = 8
 #: what a drive says about its states is read in hexadecimal
 _WORD_SUFFIX = 'word'
-_BOOLS = {'true': True, '1': True, 'on': True, 'false': False, '0': False, 'off': False}
+_BOOLS = {'true': True, 'on': True, 'false': False, 'off': False}
 #: of an integer in a message, without its sign
 _BITS_MAX = 63
 _EXAMPLES = {ValueKind.INTEGER: ', such as 12 or 0x0C', ValueKind.DOUBLE: ', such as 12.5'}

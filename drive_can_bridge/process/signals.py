@@ -22,6 +22,8 @@ import time
 from types import TracebackType
 from typing import NoReturn
 
+from drive_can_bridge.process.beginning import let_signals_in, SIGNALS
+
 #: s after the first signal that the drives have to come to a stop, whatever follows. Who stops a
 #: process group, or a service with all its processes, reaches the bridge directly and once more
 #: through the launch that started it: without this grace the second signal would end the process
@@ -30,7 +32,6 @@ GRACE = 0.3
 #: s within which the same signal counts once: timeout(1), for one, sends it to its child and, in
 #: the next breath, to its whole process group
 SAME_BREATH = 0.05
-SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class SignalWatcher:
@@ -59,6 +60,7 @@ class SignalWatcher:
         self._old = [(number, signal.signal(number, _ignore)) for number in SIGNALS
                      if number != signal.SIGHUP
                      or signal.getsignal(number) is not signal.SIG_IGN]
+        let_signals_in()
         threading.Thread(target=self._watch, name='signals', daemon=True).start()
         return self
 

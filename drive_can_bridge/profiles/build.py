@@ -52,24 +52,29 @@ def build_profile(found: Found, source: str, *, description: str = '',
     :param found: its ``left_out`` gets what does not pass.
     :param source: name of the file.
     :param protocols: families that the drive speaks; none: all that can carry the table.
-    :raises ImportFailed: nothing is left.
+    :raises ImportFailed: nothing is left, or more than a bridge reads.
     """
     entries = len(found.drafts) + len(found.left_out)
     drafts = _narrowed(_without_doubles(sorted(found.drafts, key=_address), found), found)
     taken = frozenset[str]().union(*(FAMILIES[name].builtin_names for name in protocols))
-    named = _sound(_named(drafts, taken), found, protocols or tuple(FAMILIES))
+    named = _named(drafts, taken)
+    possible = tuple(protocols) or tuple(FAMILIES)
+
+    def text(families: Sequence[str]) -> str:
+        return _text(named, entries, source, description or found.description, families,
+                     said=bool(protocols))
+    # first, because the checks take long; what they leave out makes it no longer
+    if len(text(possible).encode('utf-8')) > SIZE_MAX << 20:
+        raise ImportFailed(f'the profile of its {len(named)} entries would be larger than '
+                           f'{SIZE_MAX} MiB, which no bridge reads')
+    named = _sound(named, found, possible)
     spoken = tuple(protocols) or _carriers(named)
     named = _carried(named, found, spoken)
     if not named:
         raise ImportFailed(_nothing(found))
     # names once more: of what was left out none is taken
     named = _named(list(named.values()), taken)
-    text = _text(named, entries, source, description or found.description, spoken,
-                 said=bool(protocols))
-    if len(text.encode('utf-8')) > SIZE_MAX << 20:
-        raise ImportFailed(f'the profile of its {len(named)} entries would be larger than '
-                           f'{SIZE_MAX} MiB, which no bridge reads')
-    return Built(text, tuple(named), spoken, entries,
+    return Built(text(spoken), tuple(named), spoken, entries,
                  sum(bool(draft.remarks) for draft in named.values()))
 
 

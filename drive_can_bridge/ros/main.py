@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-The executable ``drive_can_bridge``.
+What the executable ``drive_can_bridge`` does.
 
 All executors run in threads; the main thread waits for a signal or a fatal error, and then: stops
 the drives, publishes a last diagnostic message, stops the executor, closes the buses, shuts down.

@@ -13,7 +13,6 @@ set, ends at the first line that is none of its own, and knows the screen not at
 """
 
 from datetime import datetime
-import math
 import re
 
 from drive_can_bridge.core.frame import EXTENDED_IDENTIFIER_MAX, STANDARD_IDENTIFIER_MAX
@@ -25,7 +24,8 @@ _CLASSICAL_MAX = 8
 _LENGTH_MAX = 64
 #: the highest identifiers as they are written; lower ones come before them in the alphabet, too
 _EXTENDED_DIGITS, _STANDARD_DIGITS = '1FFFFFFF', '7FF'
-_TIME_MAX = 1e18
+#: s since 1970: the end of the year 9999. Beyond, a float soon tells no two frames apart
+_TIME_MAX = 253_402_300_800.0
 _DATE = re.compile(r'\([0-9]{4}-[0-9]{2}-[0-9]{2} [0-9]{2}:[0-9]{2}:[0-9]{2}\.[0-9]{6}\)')
 _DIRECTIONS = {'R': False, 'T': True, 'RX': False, 'TX': True}
 #: characters of a line of eight bytes, with room to spare; a longer one is no frame
@@ -175,6 +175,6 @@ def checked(record: Record) -> Record:
     highest = EXTENDED_IDENTIFIER_MAX if record.extended else STANDARD_IDENTIFIER_MAX
     if record.kind is not RecordKind.ERROR and not 0 <= record.identifier <= highest:
         raise ValueError(f'identifier {record.identifier:X}h')
-    if not math.isfinite(record.time):
+    if not -_TIME_MAX < record.time < _TIME_MAX:    # nor NaN
         raise ValueError(f'time {record.time}')
     return record

@@ -446,7 +446,11 @@ class TestCompare:
         assert said.lines[0].endswith('): they are of different drive types')
         assert len(command('compare', 'mixer.yaml', 'pump', '--json').documents) > count
         shop.write_backup('few', acceleration_time=1.0, braking_time=1.0, torque=1)
-        assert command('compare', 'few.yaml', 'pump').lines[0].startswith('parameter')
+        lines = command('compare', 'few.yaml', 'pump').lines
+        assert lines[0].startswith('few.yaml and pump have no setting in common (3 and ')
+        assert lines[0].endswith('): they are of different drive types, or all names of one are '
+                                 'misspelt')
+        assert lines[1].startswith('parameter') and len(lines) > 2 + 3
         shop.write_backup('both', acceleration_time=1.0, braking_time=1.0, torque=1,
                           flc1_ratio=50.0)
         assert command('compare', 'both.yaml', 'pump').lines[0].startswith('parameter')

@@ -165,7 +165,8 @@ def test_numbers_are_written_as_in_files(run: Run, world: World, text: str,
 @pytest.mark.parametrize(('name', 'text', 'value'), [
     ('p30', '100', 1.0), ('p30', '0x64', 1.0), ('p30', '1_0', None), ('p30', '0o17', None),
     ('p30', '1.0', None), ('p30', '\u0661', None), ('brake_enabled', 'true', 1),
-    ('brake_enabled', '0', 0), ('brake_enabled', '2', None), ('brake_enabled', 'maybe', None)])
+    ('brake_enabled', 'false', 0), ('brake_enabled', '1', None), ('brake_enabled', '0', None),
+    ('brake_enabled', 'maybe', None)])
 def test_integers_and_bools_are_written_as_in_files(run: Run, world: World, name: str, text: str,
                                                     value: float | None) -> None:
     before = world.drives['conveyor'].value(name)
@@ -228,7 +229,7 @@ def completions(line: str) -> list[str]:
         **os.environ, '_ARGCOMPLETE': '1', 'COMP_LINE': line, 'COMP_POINT': str(len(line)),
         '_ARGCOMPLETE_IFS': '\n', '_ARGCOMPLETE_SUPPRESS_SPACE': '1'}
     script = ('import os; os.dup2({far}, 8); os.dup2(2, 9); '
-              'from drive_can_bridge.cli.main import main; main()').format(far=far)
+              'from drive_can_bridge.cli.start import main; main()').format(far=far)
     process = subprocess.run([sys.executable, '-c', script], env=environment, pass_fds=[far],
                              capture_output=True, timeout=60)
     os.close(far)

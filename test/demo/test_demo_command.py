@@ -172,7 +172,8 @@ def test_a_mistake_is_one_line(start: Start, arguments: list[str], code: int, wo
 def test_wrong_usage(start: Start, arguments: list[str]) -> None:
     demo = start(*arguments)
     assert demo.process.wait(60.0) == 2
-    assert demo.errors.startswith('usage: ')
+    assert demo.errors.startswith('drive_can demo: ')
+    assert len(demo.errors.splitlines()) == 1
 
 
 def test_the_problems_of_a_parameter_file_have_lines(start: Start, tmp_path: Path) -> None:

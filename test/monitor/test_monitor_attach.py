@@ -151,7 +151,8 @@ def stopped(process: Running) -> bool:
 def test_wrong_usage(run: Run, arguments: list[str]) -> None:
     monitor = run('drive_can', 'monitor', *arguments)
     assert monitor.process.wait(60.0) == 2
-    assert monitor.errors.startswith('usage: ')
+    assert monitor.errors.startswith('drive_can monitor: ')
+    assert len(monitor.errors.splitlines()) == 1
 
 
 def test_without_ros_it_says_what_to_install(run: Run, tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ import math
 from monitor_builders import info, seen, three_drives
 import pytest
 
+from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import Value, ValueKind
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.monitor.hints import hints
@@ -49,6 +50,14 @@ def test_there_is_room_for_the_longest_value(told: ParameterInfo, width: int) ->
     ({'number': '455', 'index': '0x2004', 'subindex': '0x06'}, 'P455'), ({}, '')])
 def test_parameters_are_named_as_in_manuals(facts: dict[str, str], address: str) -> None:
     assert ParameterInfo('x', facts=facts).address == address
+
+
+@pytest.mark.parametrize('text', ['1', '0', '2', 'maybe', ''])
+def test_a_bool_is_made_of_nothing_else(text: str) -> None:
+    flag = ParameterInfo('flag', ValueKind.BOOL)
+    assert (flag.parse('true'), flag.parse('off')) == (True, False)
+    with pytest.raises(ValueRefused, match=f"^'{text}' is no value: write true or false$"):
+        flag.parse(text)
 
 
 def test_text_is_printable_and_short() -> None:

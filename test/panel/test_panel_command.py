@@ -17,7 +17,8 @@ pytest.importorskip('rclpy')
 def test_wrong_usage(run: Run, arguments: list[str]) -> None:
     panel = run('drive_can', 'panel', *arguments)
     assert panel.process.wait(60.0) == 2
-    assert panel.errors.startswith('usage: ')
+    assert panel.errors.startswith('drive_can panel: ')
+    assert len(panel.errors.splitlines()) == 1
 
 
 @pytest.mark.parametrize(('missing', 'words'), [

@@ -25,8 +25,8 @@ from waiting import DEADLINE, wait_for
 _STAMP = re.compile(r'\[(\d+\.\d+)\]')
 ROOT = Path(__file__).resolve().parents[2]
 #: executable -> module, for trees that are not installed
-EXECUTABLES = {'drive_can_bridge': 'drive_can_bridge.ros.main',
-               'drive_can': 'drive_can_bridge.cli.main'}
+EXECUTABLES = {'drive_can_bridge': 'drive_can_bridge.ros.start',
+               'drive_can': 'drive_can_bridge.cli.start'}
 
 
 def command_line(name: str) -> list[str]:

@@ -54,5 +54,5 @@ def test_wrong_usage(processes: Processes) -> None:
     command = processes.start([*command_line('drive_can'), 'validate'], 'command')
     assert command.wait() == 2
     assert command.lines == []
-    assert command.errors[0].startswith('usage: drive_can')
-    assert 'error: ' in command.errors[-1]
+    assert command.errors == ['drive_can validate: the following arguments are required: FILE; '
+                              'see drive_can validate --help']
