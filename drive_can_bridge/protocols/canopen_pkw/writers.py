@@ -109,6 +109,8 @@ class Writers:
     def _write_setpoints(self) -> Generator[Step, Reply, None]:
         """Write what is due; what becomes due meanwhile waits: others have their turn first."""
         for _ in range(self._schedule.waiting):
+            if not self._schedule.waiting:  # they have to be held back since
+                return
             index = self._schedule.next()
             setpoint = self._setpoints.items[index]
             raw, reply = yield from self._write_setpoint(index, setpoint)
