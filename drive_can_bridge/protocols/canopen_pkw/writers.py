@@ -107,7 +107,7 @@ class Writers:
                 and self._session.told.runs(index))
 
     def _write_setpoints(self) -> Generator[Step, Reply, None]:
-        """Write what is due; what becomes due meanwhile waits, for others have their turn first."""
+        """Write what is due; what becomes due meanwhile waits: others have their turn first."""
         for _ in range(self._schedule.waiting):
             index = self._schedule.next()
             setpoint = self._setpoints.items[index]
