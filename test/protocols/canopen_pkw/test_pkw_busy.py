@@ -65,6 +65,24 @@ def test_a_deaf_drive_is_lost(every: float, delay: float) -> None:
     assert len(drive.talk.events(StationLost)) == 1
 
 
+def expiring(every: float, delay: float) -> Timeline:
+    """Return the same, with commands that are too old after 10 ms; any value arms."""
+    drive = swapping(every, delay)
+    drive.talk.session.setpoints.timeout = 0.01
+    drive.talk.session.setpoints.rearm_immediate = True
+    return drive
+
+
+@pytest.mark.parametrize(('delay', 'every'), [
+    (0.01, 0.02), (0.06, 0.02), (0.02, 0.05), (0.002, 0.08)])
+def test_a_deaf_drive_whose_setpoints_expire_is_lost(delay: float, every: float) -> None:
+    drive = expiring(every, delay)
+    drive.live(12.0)
+    drive.answer = deaf
+    drive.live(40.0)
+    assert len(drive.talk.events(StationLost)) == 1
+
+
 @pytest.mark.parametrize('every', [0.1, 0.2, 0.4])
 def test_a_drive_that_answers_no_reads_is_lost(every: float) -> None:
     drive = swapping(every, 0.002)
@@ -74,9 +92,12 @@ def test_a_drive_that_answers_no_reads_is_lost(every: float) -> None:
 
 
 @pytest.mark.parametrize(('delay', 'every'), [
-    (0.01, 0.02), (0.03, 0.02), (0.06, 0.08), (0.06, 0.1), (0.06, 0.12), (0.06, 0.15)])
-def test_rounds_and_users_have_their_turn(delay: float, every: float) -> None:
-    drive = swapping(every, delay)
+    (0.01, 0.02), (0.03, 0.02), (0.06, 0.08), (0.06, 0.1), (0.06, 0.12), (0.06, 0.15),
+    (0.1, 0.02)])
+@pytest.mark.parametrize('begin', [swapping, expiring])
+def test_rounds_and_users_have_their_turn(
+        delay: float, every: float, begin: Callable[[float, float], Timeline]) -> None:
+    drive = begin(every, delay)
     drive.live(12.0)
     drive.talk.events()
     drive.took(drive.talk.submits(read(FLC), 12.0))
