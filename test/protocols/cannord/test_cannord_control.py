@@ -2,7 +2,7 @@
 """Control word and status word of one inverter: every way through the states."""
 
 from builders import Conversation
-from cannord_session_builders import exchange, FAULT, online, READY, RUNNING
+from cannord_session_builders import enabled, exchange, FAULT, online, READY, RUNNING, TICK
 import pytest
 
 from drive_can_bridge.core.control import ControlAction
@@ -224,3 +224,39 @@ def test_refused_while_offline_or_inactive() -> None:
     assert talk.session.users.control_refusal(ENABLE) == 'drive offline'
     talk.deactivate(10.2)
     assert talk.session.users.control_refusal(ENABLE) == 'bridge inactive'
+
+
+# -- asked again for a stop -----------------------------------------------------------------------
+
+
+def test_the_error_of_a_drive_that_runs_on_stands_while_somebody_asks_again() -> None:
+    """It takes no notice of 047Eh; every 1.1 s somebody asks, between a cycle and its answer."""
+    talk = enabled(control_timeout=1.0)
+    control = talk.session.control
+    assert control is not None
+    hidden, asks_at = [], 10.041
+    for cycle in range(500):
+        now = round(10.04 + 0.02 * cycle, 6)
+        talk.until(now + TICK)
+        if asks_at < now + 0.002:
+            talk.asks(DISABLE, now + 0.001)
+            asks_at = round(asks_at + 1.1, 6)
+        talk.hears(RUNNING, now + 0.002)
+        if now > 11.3 and not control.disregard:    # told to stop 1.2 s ago
+            hidden.append(now)
+    assert hidden == []
+
+
+def test_a_quick_stop_that_is_asked_for_again_has_its_time() -> None:
+    """The inverter brakes for 2.2 s; control_timeout is 1 s."""
+    talk = enabled(control_timeout=1.0)
+    outcomes = []
+    for cycle in range(160):
+        now = round(10.04 + 0.02 * cycle, 6)
+        talk.until(now + TICK)
+        talk.hears(BRAKING if now < 12.25 else DISABLED, now + 0.002)
+        if now in (10.06, 12.0):
+            talk.asks(QUICK_STOP, now + 0.003)
+        outcomes += [(now, action, success) for action, success, _ in talk.control_outcomes()]
+    assert [outcome[1:] for outcome in outcomes] == [
+        ('quick_stop', False), ('quick_stop', True)], outcomes

@@ -312,6 +312,18 @@ def test_a_drive_that_runs_on_under_disable_is_told_of() -> None:
     assert talk.session.control.disregard == ''
 
 
+def test_a_stop_that_is_asked_for_again_while_it_is_under_way_is_written_at_once() -> None:
+    talk = running()
+    text, = talk.asks(ControlAction.DISABLE, 10.1)
+    assert talk.hears(echo(text), 10.101) == []
+    text, = talk.at(10.11)
+    assert talk.hears(echo(text), 10.111) == [], 'runs on, says the status'
+    assert talk.session.control is not None
+    assert talk.session.control.unconfirmed
+    text, = talk.asks(ControlAction.DISABLE, 10.115)
+    assert text[4:10] == 'C00200'
+
+
 # -- restart and loss -----------------------------------------------------------------------------
 
 

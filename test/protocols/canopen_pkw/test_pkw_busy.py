@@ -1,0 +1,197 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Slow, deaf and busy devices: everybody has a turn at the mailbox, and all is judged rightly."""
+
+from collections.abc import Callable
+
+from builders import Conversation, read, write
+from pkw_builders import (
+    CLASS, DISABLE_0, DISABLE_1, driven, echo, FLC, running, SPEED, TORQUE,
+)
+import pytest
+from timeline import Timeline
+
+from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.events import (
+    Noted, ProcessDataReceived, RequestCompleted, StationLost,
+)
+
+DISABLE = ControlAction.DISABLE
+#: function bytes of reads
+READS = ('26', 'A6', '25', 'A5')
+
+
+def after(delay: float) -> Callable[[str], tuple[float, str]]:
+    """Answer everything so many s later; the motor runs, whatever it is told."""
+    return lambda text: (delay, echo(text))
+
+
+def deaf(text: str) -> None:
+    """Answer nothing."""
+
+
+def operating(talk: Conversation) -> bool:
+    assert talk.session.control is not None
+    return talk.session.control.operating
+
+
+# -- setpoints that change places -----------------------------------------------------------------
+
+
+def swapping(every: float, delay: float) -> Timeline:
+    """Return a drive that is commanded 10 Hz and 0, then 0 and 5, and so on; it answers later."""
+    talk = driven((SPEED, TORQUE), command_timeout=0.0)
+    talk.commands(1, 0, 10.13)
+    drive = Timeline(talk, after(delay))
+    places = [(10.0, 0), (0.0, 5)]
+
+    def swap(now: float) -> list[str]:
+        places.reverse()
+        for index, value in enumerate(places[1]):
+            talk.commands(index, value, now)
+        drive.plan(now + every, swap)
+        return talk.at(now)
+
+    drive.plan(10.2, swap)
+    return drive
+
+
+@pytest.mark.parametrize('every', [0.02, 0.1, 0.2])
+@pytest.mark.parametrize('delay', [0.002, 0.01, 0.02, 0.06])
+def test_a_deaf_drive_is_lost(every: float, delay: float) -> None:
+    drive = swapping(every, delay)
+    drive.live(12.0)
+    drive.answer = deaf
+    drive.live(40.0)
+    assert len(drive.talk.events(StationLost)) == 1
+
+
+def expiring(every: float, delay: float) -> Timeline:
+    """Return the same, with commands that are too old after 10 ms; any value arms."""
+    drive = swapping(every, delay)
+    drive.talk.session.setpoints.timeout = 0.01
+    drive.talk.session.setpoints.rearm_immediate = True
+    return drive
+
+
+@pytest.mark.parametrize(('delay', 'every'), [
+    (0.01, 0.02), (0.06, 0.02), (0.02, 0.05), (0.002, 0.08)])
+def test_a_deaf_drive_whose_setpoints_expire_is_lost(delay: float, every: float) -> None:
+    drive = expiring(every, delay)
+    drive.live(12.0)
+    drive.answer = deaf
+    drive.live(40.0)
+    assert len(drive.talk.events(StationLost)) == 1
+
+
+@pytest.mark.parametrize('every', [0.1, 0.2, 0.4])
+def test_a_drive_that_answers_no_reads_is_lost(every: float) -> None:
+    drive = swapping(every, 0.002)
+    drive.answer = lambda text: None if text[10:12] in READS else (0.002, echo(text))
+    drive.live(40.0)
+    assert len(drive.talk.events(StationLost)) == 1
+
+
+@pytest.mark.parametrize(('delay', 'every'), [
+    (0.01, 0.02), (0.03, 0.02), (0.06, 0.08), (0.06, 0.1), (0.06, 0.12), (0.06, 0.15),
+    (0.1, 0.02)])
+@pytest.mark.parametrize('begin', [swapping, expiring])
+def test_rounds_and_users_have_their_turn(
+        delay: float, every: float, begin: Callable[[float, float], Timeline]) -> None:
+    drive = begin(every, delay)
+    drive.live(12.0)
+    drive.talk.events()
+    drive.took(drive.talk.submits(read(FLC), 12.0))
+    drive.live(17.0)
+    events = drive.talk.events()
+    assert any(isinstance(event, ProcessDataReceived) for event in events)
+    assert any(isinstance(event, RequestCompleted) for event in events)
+
+
+@pytest.mark.parametrize(('delay', 'every'), [(0.06, 0.05), (0.2, 0.05), (0.08, 0.05)])
+def test_a_drive_that_answers_everything_goes_on(delay: float, every: float) -> None:
+    """It answers in time (0.5 s), if not to the first attempts at neutral, of 50 ms each."""
+    drive = swapping(every, delay)
+    drive.live(20.0)
+    assert [note.text for note in drive.talk.events(Noted) if note.warning] == []
+    assert operating(drive.talk)
+
+
+def test_a_users_write_is_answered_although_a_setpoint_passes_zero() -> None:
+    """An EEPROM takes 0.2 s: only what has expired has others make room."""
+    talk = driven()
+    text, = talk.submits(write((CLASS, 20)), 10.113)
+    assert text == f'505#5E0200{text[10:12]}14000000'
+    drive = Timeline(talk, after(0.2))
+    drive.took([text])
+    drive.answer = after(0.001)
+    drive.live(10.149)
+    assert drive.log == [(10.113, text)], 'the round waits for the mailbox'
+    talk.commands(0, 0.0, 10.15)
+    assert talk.at(10.15) == []
+    drive.live(10.6)
+    assert talk.outcomes() == [['written']], drive.log
+
+
+# -- what was refused -----------------------------------------------------------------------------
+
+
+def out_of_range(text: str) -> str:
+    """Return the refusal of a write: 06090030h."""
+    function = '4E' if text[10] == '2' else 'CE'
+    return f'485#{text[4:10]}{function}00000602'
+
+
+def test_a_refused_setpoint_is_no_refused_neutral() -> None:
+    """20 Hz is refused; meanwhile somebody commands 0, which the drive would take."""
+    talk = driven()
+    talk.commands(0, 20.0, 10.125)
+    text, = talk.at(10.13)
+    assert text[12:16] == 'C800', '20 Hz'
+    talk.commands(0, 0.0, 10.131)
+    talk.hears(out_of_range(text), 10.132)
+    assert operating(talk), talk.events()
+
+
+def test_a_refused_neutral_disables_whatever_is_commanded_meanwhile() -> None:
+    talk = driven()
+    talk.commands(0, 0.0, 10.125)
+    text, = talk.at(10.13)
+    assert text[4:10] == 'C60200'
+    assert text[12:] == '00000000'
+    talk.commands(0, 10.0, 10.131)
+    talk.hears(out_of_range(text), 10.132)
+    assert not operating(talk)
+
+
+# -- a bus that takes nothing ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('asked', [False, True])
+def test_a_repetition_that_the_bus_refused_is_made_up_for(asked: bool) -> None:
+    """The motor runs on, whatever it is told."""
+    talk = running(control_timeout=1.0, parameter_timeout=0.1)
+    control = talk.session.control
+    assert control is not None
+    drive = Timeline(talk, after(0.001))
+    drive.took(talk.asks(DISABLE, 10.1))
+    drive.live(12.0)
+    assert len(drive.when(DISABLE_0, DISABLE_1)) >= 3, 'it is repeated'
+    assert control.disregard
+    since: list[float] = []
+
+    def refusing(text: str) -> bool:
+        """Take nothing for 0.25 s, from the next repetition on: too short to lose the drive."""
+        if not since and text in (DISABLE_0, DISABLE_1):
+            since.append(talk.now)
+        return bool(since) and talk.now < since[0] + 0.25
+
+    talk.refusing = refusing
+    drive.live(14.5)
+    assert since
+    assert talk.session.online
+    drive.log.clear()
+    if asked:
+        drive.took(talk.asks(DISABLE, 14.5))
+    drive.live(24.5)
+    assert drive.when(DISABLE_0, DISABLE_1)
+    assert control.disregard, 'it still runs, and diagnostics say so'
