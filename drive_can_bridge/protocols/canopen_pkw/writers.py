@@ -31,6 +31,8 @@ from drive_can_bridge.protocols.setpoints_first import SetpointsFirst
 
 #: s that the status is waited for at the end of a stop
 STATUS_TIME = 0.1
+#: s by which sums of times are wrong
+TOLERANCE = 1e-6
 
 
 class Writers:
@@ -132,17 +134,18 @@ class Writers:
                         ) -> Generator[Step, Reply, tuple[int, Reply]]:
         """Write one as it is then; what stops the drive again, soon, while nobody answers."""
         for left in range(STOP_ATTEMPTS - 1, -1, -1):
-            raw, stops = setpoint.raw, self._stops(index, setpoint)
-            short = stops and left > 0
+            raw, stops, begun_at = setpoint.raw, self._stops(index, setpoint), self._channel.now
+            timeout = self._session.retry.timeout
             # at once: a look while the answer is awaited must not find it due again
             self._schedule.written(index, raw, self._channel.now)
             write = Write.of(
                 self._placement, setpoint.parameter, raw, blind=stops,
-                timeout=min(STOP_PATIENCE, self._session.retry.timeout) if short else None)
+                timeout=min(STOP_PATIENCE, timeout) if stops and left > 0 else timeout)
             reply = yield from tell(
                 self._session.told, index, write, runs=raw != setpoint.neutral)
             if isinstance(reply, Silence):      # a slow drive is no silent one
-                self._silences[index] += reply.sent and not short
+                full = self._channel.now >= begun_at + timeout - TOLERANCE
+                self._silences[index] += reply.sent and full
             if not isinstance(reply, Silence) or not self._stops(index, setpoint):
                 break
         return raw, reply

@@ -116,6 +116,16 @@ def test_a_drive_that_answers_everything_goes_on(delay: float, every: float) -> 
     assert operating(drive.talk)
 
 
+def test_one_whose_setpoints_expire_goes_on_as_well() -> None:
+    """What had to make room was not waited for as long as a slow device may take."""
+    drive = swapping(0.08, 0.1)
+    drive.talk.session.setpoints.timeout = 0.06
+    drive.talk.session.setpoints.rearm_immediate = True
+    drive.live(20.0)
+    assert [note.text for note in drive.talk.events(Noted) if note.warning] == []
+    assert operating(drive.talk)
+
+
 def test_a_users_write_is_answered_although_a_setpoint_passes_zero() -> None:
     """An EEPROM takes 0.2 s: only what has expired has others make room."""
     talk = driven()
