@@ -80,15 +80,21 @@ class Child:
                 return
             time.sleep(_MOMENT)
 
-    def wait(self, timeout: float) -> bool:
-        """Wait for its end, and then end it; return whether it ended by itself."""
+    def ends(self, timeout: float) -> bool:
+        """Wait for its end; tell whether it has come."""
         try:
             self.process.wait(timeout)
         except subprocess.TimeoutExpired:
-            self.process.kill()
-            self.process.wait()
             return False
         return True
+
+    def wait(self, timeout: float) -> bool:
+        """Wait for its end, and then end it; return whether it ended by itself."""
+        if self.ends(timeout):
+            return True
+        self.process.kill()
+        self.process.wait()
+        return False
 
     def errors(self) -> str:
         """Return what it wrote to standard error and nobody has seen."""

@@ -35,6 +35,8 @@ _DRIVES_TIMEOUT = 60.0
 #: s that each process gets for its end. A bridge that has lost its drives tries for a while.
 _BRIDGE_PATIENCE = 10.0
 _PATIENCE = 5.0
+#: s that the view gets to end of its own accord, when all others have ended
+_VIEW_PATIENCE = 2.0
 #: leaves the view's screen, shows the cursor
 _RESTORE = '\x1b[?1049l\x1b[?25h'
 
@@ -136,11 +138,16 @@ class Demo:
             if duration is not None and time.monotonic() >= begun + duration:
                 return 0
 
-    def stop(self) -> None:
-        """End everything, the drives last."""
-        bridge, drives = self._bridge, self._drives
+    def stop(self, *, view_knows: bool) -> None:
+        """
+        End everything, the drives after the bridge.
+
+        :param view_knows: it has got Ctrl-C itself: another signal would end it before it has
+            given the terminal back.
+        """
+        bridge, drives, view = self._bridge, self._drives, self._view
         for child in self._children:
-            if child is not bridge and child is not drives:
+            if child is not bridge and child is not drives and not (view_knows and child is view):
                 child.ask_to_end()
         for process, signum, patience in ((bridge, signal.SIGINT, _BRIDGE_PATIENCE),
                                           (drives, signal.SIGTERM, _PATIENCE)):
@@ -148,6 +155,8 @@ class Demo:
                 process.ask_to_end(signum)
                 if not process.wait(patience):
                     self._say(f'{process.what} did not end in {patience:g} s and was killed')
+        if view is not None and not view.ends(_VIEW_PATIENCE):
+            view.ask_to_end()
         for child in self._children:
             child.wait(_PATIENCE)
 
@@ -223,7 +232,7 @@ def run(options: Options, watcher: SignalWatcher) -> int:
             try:
                 code = demo.watch(watcher) if demo.start(watcher) else 0
             finally:
-                demo.stop()
+                demo.stop(view_knows=watcher.interrupted)
         finally:
             demo.conclude(code)
     return code

@@ -52,8 +52,7 @@ class SignalWatcher:
         self._reasons: queue.SimpleQueue[str] = queue.SimpleQueue()
         self._read, self._write = socket.socketpair()
         self._write.setblocking(False)
-        self._signalled = False
-        self._second = 0
+        self._first = self._second = 0
 
     def __enter__(self) -> 'SignalWatcher':
         self._old_fd = signal.set_wakeup_fd(self._write.fileno(), warn_on_full_buffer=False)
@@ -76,7 +75,12 @@ class SignalWatcher:
     @property
     def signalled(self) -> bool:
         """A signal has come."""
-        return self._signalled
+        return self._first != 0
+
+    @property
+    def interrupted(self) -> bool:
+        """The first signal was SIGINT: at a terminal, others there have got it as well."""
+        return self._first == signal.SIGINT
 
     def exit_code(self, code: int) -> int:
         """Return what the process ends with: ``code``, or 128 + n after a second signal."""
@@ -98,7 +102,7 @@ class SignalWatcher:
             return None
 
     def _watch(self) -> None:
-        first, first_number = 0.0, 0
+        first = 0.0
         while True:
             received = self._read.recv(1)
             if not received:
@@ -106,8 +110,8 @@ class SignalWatcher:
             number = received[0]
             if number not in SIGNALS:
                 continue
-            if self._signalled:
-                if number == first_number and time.monotonic() - first < SAME_BREATH:
+            if self._first:
+                if number == self._first and time.monotonic() - first < SAME_BREATH:
                     continue
                 self._second = number
                 time.sleep(max(0.0, first + GRACE - time.monotonic()))
@@ -117,8 +121,7 @@ class SignalWatcher:
                     except Exception:  # noqa: BLE001  the process ends, whatever happens
                         pass
                 os._exit(128 + number)
-            first, first_number = time.monotonic(), number
-            self._signalled = True
+            first, self._first = time.monotonic(), number
             self._reasons.put('')
 
 

@@ -134,6 +134,8 @@ class WriteSchedule:
         """Take note of what the drive was told (and, where it acknowledges, has confirmed)."""
         self._written[index] = raw
         self._written_at[index] = now
+        if index in self._due:
+            self._due.remove(index)
 
     def failed(self, index: int) -> None:
         """Take note that nobody knows what the drive has: it is due at the next look."""

@@ -14,6 +14,8 @@ from drive_can_bridge.view.screen import Screen
 FRAME_PERIOD = 0.25
 _FRAME_SHARE = 0.04
 _FRAME_PERIOD_MAX = 1.0
+#: s between two looks whether it has ended, however seldom it is drawn
+_LOOK_PERIOD = 0.1
 
 
 def show(source: Source, model: Model, setting: Setting, *, ended: Callable[[], bool],
@@ -36,11 +38,15 @@ def show(source: Source, model: Model, setting: Setting, *, ended: Callable[[], 
             screen.draw(page(snapshot, choice, setting, width=size[0], height=size[1]))
             cost = (time.thread_time() - begun) / _FRAME_SHARE
             due = max(due, now) + min(max(FRAME_PERIOD, cost), _FRAME_PERIOD_MAX)
-            for key in screen.wait(max(0.0, due - time.monotonic())):
-                if key is Key.QUIT:
-                    return quit_code
-                choice = choice.press(key, drives)
-                due = now  # whoever presses a key wants to see what it does
+            while True:
+                left = max(0.0, due - time.monotonic())
+                for key in screen.wait(min(left, _LOOK_PERIOD)):
+                    if key is Key.QUIT:
+                        return quit_code
+                    choice = choice.press(key, drives)
+                    due = now  # whoever presses a key wants to see what it does
+                if ended() or screen.gone or time.monotonic() >= due:
+                    break
     return 0
 
 

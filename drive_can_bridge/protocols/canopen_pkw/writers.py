@@ -4,7 +4,7 @@ What a device is told: setpoints and control word while it is online, and the st
 
 Both are written when they change, setpoints also again after a while. Neutral setpoints follow the
 word that stops a drive at once, and so does everything in the stop, whatever is known of the node.
-One that takes back a command is repeated soon, as that word is, while nobody answers.
+One that takes back a command is repeated soon while nobody answers where there is no such word.
 """
 
 from collections import Counter
@@ -59,6 +59,7 @@ class Writers:
         self._failures: dict[str, str] = {}     # of setpoints, by name
         self._warned: dict[str, str] = {}
         self._silences = Counter[int]()         # in a row, by index
+        self._patience = STOP_PATIENCE          # s until a stop is written again
         status = status_word(drive)
         self._stop: SafeStop[Step, Reply] = SafeStop(
             session, channel, stop_ended,
@@ -109,44 +110,67 @@ class Writers:
                 and self._session.told.runs(index))
 
     def _write_setpoints(self) -> Generator[Step, Reply, None]:
-        """Write what is due; what becomes due meanwhile waits: others have their turn first."""
+        """
+        Write what is due; what becomes due meanwhile waits: others have their turn first.
+
+        But for what takes back a command, each once.
+        """
+        stopped: set[int] = set()
         for _ in range(self._schedule.waiting):
             if not self._schedule.waiting:  # they have to be held back since
-                return
+                break
             index = self._schedule.next()
-            setpoint = self._setpoints.items[index]
-            raw, reply = yield from self._write_setpoint(index, setpoint)
-            neutral = raw == setpoint.neutral
-            if isinstance(reply, Silence):
-                self._schedule.failed(index)
-                if self._silences[index] >= self._session.configuration.missed_limit:
-                    self._failed(setpoint, ': no answer', neutral=neutral)
-                continue
-            del self._silences[index]
-            if isinstance(reply, Refused):
-                self._failed(setpoint, f' {reply.text}', neutral=neutral)
-                continue
-            self._failures.pop(setpoint.parameter.name, None)
-            if self._first.written(index):
-                self._session.see_to_control_word(self._channel.now)
+            if (yield from self._write_setpoint(index)):
+                stopped.add(index)
+        for index, setpoint in enumerate(self._setpoints.items):
+            if index not in stopped and self._stops(index, setpoint):
+                yield from self._write_setpoint(index)
 
-    def _write_setpoint(self, index: int, setpoint: Setpoint,
-                        ) -> Generator[Step, Reply, tuple[int, Reply]]:
-        """Write one as it is then; what stops the drive again, soon, while nobody answers."""
+    def _write_setpoint(self, index: int) -> Generator[Step, Reply, bool]:
+        """Write one as it is then; tell whether it was neutral."""
+        setpoint = self._setpoints.items[index]
+        raw, reply = yield from self._tell_setpoint(index, setpoint)
+        neutral = raw == setpoint.neutral
+        if isinstance(reply, Silence):
+            self._schedule.failed(index)
+            if self._silences[index] >= self._session.configuration.missed_limit:
+                self._failed(setpoint, ': no answer', neutral=neutral)
+            return neutral
+        del self._silences[index]
+        if isinstance(reply, Refused):
+            self._failed(setpoint, f' {reply.text}', neutral=neutral)
+            return neutral
+        self._failures.pop(setpoint.parameter.name, None)
+        if self._first.written(index):
+            self._session.see_to_control_word(self._channel.now)
+        return neutral
+
+    def _tell_setpoint(self, index: int, setpoint: Setpoint,
+                       ) -> Generator[Step, Reply, tuple[int, Reply]]:
+        """
+        Write one until it is answered, or is not to be repeated.
+
+        Where no control word stops the drive, what takes back a command is written again soon: as
+        soon as an answer can be there, for requests must not pile up in a slow device.
+        """
+        since, timeout = self._channel.now, self._session.retry.timeout
         for left in range(STOP_ATTEMPTS - 1, -1, -1):
-            raw, stops, begun_at = setpoint.raw, self._stops(index, setpoint), self._channel.now
-            timeout = self._session.retry.timeout
+            raw, begun_at = setpoint.raw, self._channel.now
+            alone = self.control is None and self._stops(index, setpoint)
             # at once: a look while the answer is awaited must not find it due again
-            self._schedule.written(index, raw, self._channel.now)
+            self._schedule.written(index, raw, begun_at)
             write = Write.of(
-                self._placement, setpoint.parameter, raw, blind=stops,
-                timeout=min(STOP_PATIENCE, timeout) if stops and left > 0 else timeout)
+                self._placement, setpoint.parameter, raw, blind=alone,
+                timeout=min(self._patience, timeout) if alone and left > 0 else timeout)
             reply = yield from tell(
                 self._session.told, index, write, runs=raw != setpoint.neutral)
-            if isinstance(reply, Silence):      # a slow drive is no silent one
-                full = self._channel.now >= begun_at + timeout - TOLERANCE
-                self._silences[index] += reply.sent and full
-            if not isinstance(reply, Silence) or not self._stops(index, setpoint):
+            if not isinstance(reply, Silence):
+                self._patience = max(STOP_PATIENCE, 2.0 * (self._channel.now - since))
+                break
+            # what had less time than a slow device may take was no silence
+            self._silences[index] += reply.sent and (
+                self._channel.now >= begun_at + timeout - TOLERANCE)
+            if self.control is not None or not self._stops(index, setpoint):
                 break
         return raw, reply
 
