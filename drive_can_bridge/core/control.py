@@ -60,9 +60,8 @@ pulse is the same whether or not the fault goes meanwhile; what counts is the st
 :attr:`.ControlMachine.unconfirmed` tells the session that the drive, by what it reports since,
 does not do as the word says: then the word is written again. A drive that goes on running under
 a word that stops it for longer than a request may take is told of
-(:attr:`.ControlMachine.disregard`). One
-that says that it refuses the word (:meth:`.ControlMachine.word_refused`) ends what is under way,
-with its reason.
+(:attr:`.ControlMachine.disregard`). One that says that it refuses the word
+(:meth:`.ControlMachine.word_refused`) ends what is under way, with its reason.
 """
 
 from dataclasses import dataclass

@@ -13,8 +13,8 @@ from collections.abc import Container, Iterable, Sequence
 import math
 from typing import NamedTuple
 
-#: s by which sums of periods are wrong
-_TOLERANCE = 1e-6
+#: s by which sums of times are wrong
+TOLERANCE = 1e-6
 #: s that a drive is given for each request of a round, beside the time of the frames
 REQUEST_TIME = 0.001
 
@@ -112,7 +112,7 @@ class WriteSchedule:
         for index, raw in enumerate(raws):
             if index not in self._due and index not in hold and (
                     raw != self._written[index]
-                    or 0.0 < self._refresh <= now - self._written_at[index] + _TOLERANCE):
+                    or 0.0 < self._refresh <= now - self._written_at[index] + TOLERANCE):
                 self._due.append(index)
 
     def order(self, index: int, *, first: bool) -> None:

@@ -25,14 +25,12 @@ from drive_can_bridge.protocols.canopen_pkw.procedures import (
     STOP_ATTEMPTS, tell, write_until_answered,
 )
 from drive_can_bridge.protocols.channel import Lane, STOP_PATIENCE
-from drive_can_bridge.protocols.polling import WriteSchedule
+from drive_can_bridge.protocols.polling import TOLERANCE, WriteSchedule
 from drive_can_bridge.protocols.safe_stop import SafeStop, StatusRead
 from drive_can_bridge.protocols.setpoints_first import SetpointsFirst
 
 #: s that the status is waited for at the end of a stop
 STATUS_TIME = 0.1
-#: s by which sums of times are wrong
-TOLERANCE = 1e-6
 
 
 class Writers:

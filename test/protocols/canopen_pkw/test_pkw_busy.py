@@ -55,14 +55,18 @@ def swapping(every: float, delay: float) -> Timeline:
     return drive
 
 
-@pytest.mark.parametrize('every', [0.02, 0.1, 0.2])
-@pytest.mark.parametrize('delay', [0.002, 0.01, 0.02, 0.06])
-def test_a_deaf_drive_is_lost(every: float, delay: float) -> None:
-    drive = swapping(every, delay)
+def lost_when_deaf(drive: Timeline) -> bool:
+    """Tell whether a drive is lost, once, that answers nothing any more."""
     drive.live(12.0)
     drive.answer = deaf
     drive.live(40.0)
-    assert len(drive.talk.events(StationLost)) == 1
+    return len(drive.talk.events(StationLost)) == 1
+
+
+@pytest.mark.parametrize('every', [0.02, 0.1, 0.2])
+@pytest.mark.parametrize('delay', [0.002, 0.01, 0.02, 0.06])
+def test_a_deaf_drive_is_lost(every: float, delay: float) -> None:
+    assert lost_when_deaf(swapping(every, delay))
 
 
 def expiring(every: float, delay: float) -> Timeline:
@@ -76,11 +80,7 @@ def expiring(every: float, delay: float) -> Timeline:
 @pytest.mark.parametrize(('delay', 'every'), [
     (0.01, 0.02), (0.06, 0.02), (0.02, 0.05), (0.002, 0.08)])
 def test_a_deaf_drive_whose_setpoints_expire_is_lost(delay: float, every: float) -> None:
-    drive = expiring(every, delay)
-    drive.live(12.0)
-    drive.answer = deaf
-    drive.live(40.0)
-    assert len(drive.talk.events(StationLost)) == 1
+    assert lost_when_deaf(expiring(every, delay))
 
 
 @pytest.mark.parametrize('every', [0.1, 0.2, 0.4])

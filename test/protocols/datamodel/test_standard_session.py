@@ -660,6 +660,16 @@ def controlled(**options: object) -> Conversation:
     return talk
 
 
+def enabled(**options: object) -> Conversation:
+    """Return a drive that was enabled; the next round is due at 10.06 s."""
+    talk = controlled(**options)
+    talk.asks(ControlAction.ENABLE, 10.01)
+    round_of(talk, 10.02, READY)
+    talk.until(10.03)
+    round_of(talk, 10.04, ENABLED)
+    return talk
+
+
 def test_enable_with_the_word_among_the_setpoints() -> None:
     talk = controlled()
     talk.asks(ControlAction.ENABLE, 10.01)
@@ -688,11 +698,7 @@ def test_a_status_asked_for_before_the_word_left_confirms_nothing() -> None:
 
 def test_a_word_of_which_no_notice_is_taken_is_written_again() -> None:
     """Nobody acknowledges it: it may have been lost. Nothing else would write it."""
-    talk = controlled(refresh_interval=0.0)
-    talk.asks(ControlAction.ENABLE, 10.01)
-    round_of(talk, 10.02, READY)
-    talk.until(10.03)
-    round_of(talk, 10.04, ENABLED)
+    talk = enabled(refresh_interval=0.0)
     assert talk.asks(ControlAction.DISABLE, 10.045) == [DISABLE_WORD]
     again = []
     for beat in range(1, 60):
@@ -706,11 +712,7 @@ def test_a_word_of_which_no_notice_is_taken_is_written_again() -> None:
 
 
 def test_a_fault_puts_the_word_back() -> None:
-    talk = controlled()
-    talk.asks(ControlAction.ENABLE, 10.01)
-    round_of(talk, 10.02, READY)
-    talk.until(10.03)
-    round_of(talk, 10.04, ENABLED)
+    talk = enabled()
     talk.until(10.0605)
     talk.hears(FAULT, 10.062)
     assert talk.session.state is DriveState.FAULT
@@ -799,11 +801,7 @@ def test_nothing_is_left_of_a_pulse_that_the_bus_cut_short() -> None:
 
 
 def test_the_stop_disables() -> None:
-    talk = controlled()
-    talk.asks(ControlAction.ENABLE, 10.01)
-    round_of(talk, 10.02, READY)
-    talk.until(10.03)
-    round_of(talk, 10.04, ENABLED)
+    talk = enabled()
     assert talk.deactivate(10.05) == [DISABLE_WORD]
     sent = [text for _, text in talk.until(11.0)]
     assert sent[:2] == [SPEED_ZERO, '3F1#0334000100000000']
@@ -816,11 +814,7 @@ def test_the_stop_disables() -> None:
     ('', 'enabled', False)])
 def test_stop_ends_with_a_look_at_the_status(answer: str, state: str, off: bool) -> None:
     """What it has in its registers is not what it does."""
-    talk = controlled()
-    talk.asks(ControlAction.ENABLE, 10.01)
-    round_of(talk, 10.02, READY)
-    talk.until(10.03)
-    round_of(talk, 10.04, ENABLED)
+    talk = enabled()
     assert talk.deactivate(10.05) == [DISABLE_WORD]
     assert talk.until(10.0525) == [(10.051, SPEED_ZERO), (10.052, '3F1#0334000100000000')]
     assert talk.hears('7F1#0000000000000000', 10.053) == []
@@ -877,11 +871,7 @@ def test_setpoints_stop_with_the_word(request_: tuple[Parameter, ...],
 
 def test_enable_is_not_repeated_before_the_status_was_read() -> None:
     """A restart that nobody saw: one read goes unanswered, the device has forgotten its word."""
-    talk = controlled(refresh_interval=0.1)
-    talk.asks(ControlAction.ENABLE, 10.01)
-    round_of(talk, 10.02, READY)
-    talk.until(10.03)
-    round_of(talk, 10.04, ENABLED)
+    talk = enabled(refresh_interval=0.1)
     assert talk.control_outcomes() == [('enable', True, 'enabled')]
     sent = []
     for begin in (10.06, 10.08, 10.1):
