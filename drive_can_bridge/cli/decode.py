@@ -7,7 +7,6 @@ from contextlib import closing, ExitStack
 import json
 from pathlib import Path
 import sys
-import time
 
 from drive_can_bridge.cli.arguments import add_params_file, add_seconds
 from drive_can_bridge.cli.command import complain, FAILED, WrongUsage
@@ -27,7 +26,7 @@ from drive_can_bridge.trace.tracer import Sink, Tracer
 
 #: complaints about a file that are shown one by one
 _COMPLAINTS_MAX = 5
-#: s that a frame may take from the bus to here before it counts as missing
+#: s that a frame may take from the bus to its adapter's queue before it counts as missing
 _DELIVERY_TIME = 0.05
 
 
@@ -169,15 +168,12 @@ def _run_through(records: Iterable[Record], tracer: Tracer) -> bool:
 
 def _live(args: Namespace, configuration: BridgeConfiguration, tracer: Tracer) -> int:
     with closing(Taps(configuration)) as taps:
-        looked_at = None
         try:
             for record in taps.records(args.seconds):
-                if record is not None:
+                if isinstance(record, float):
+                    tracer.advance(record - _DELIVERY_TIME)
+                else:
                     tracer.take(record)
-                elif looked_at is not None:
-                    # of the look before: this one may have come late, with nothing read yet
-                    tracer.advance(looked_at - _DELIVERY_TIME)
-                looked_at = time.time()
         except KeyboardInterrupt:
             pass
     return 0

@@ -37,14 +37,16 @@ class Taps:
             self.close()
             raise
 
-    def records(self, seconds: float) -> Iterator[Record | None]:
-        """Yield entries for so long, and None now and then while there are none."""
+    def records(self, seconds: float) -> Iterator[Record | float]:
+        """Yield entries for so long; now and then, while there are none, until when there are."""
         end = time.monotonic() + seconds
         while time.monotonic() < end:
+            # asked before the queue: what was heard until then is in it, or was taken out of it
+            heard_until = min((tap.heard_until for tap in self.taps), default=time.time())
             try:
                 yield self._queue.get(timeout=_PATIENCE)
             except queue.Empty:
-                yield None
+                yield heard_until
         while True:     # what arrived in time
             try:
                 yield self._queue.get_nowait()

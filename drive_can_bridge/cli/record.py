@@ -2,6 +2,7 @@
 """``drive_can record``: everything on the buses of a parameter file, in a trace file."""
 
 from argparse import ArgumentParser, Namespace
+from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 import sys
@@ -84,13 +85,13 @@ def run(args: Namespace) -> int:
     return 0
 
 
-def _record(records: Any, output: '_Rotating', counters: dict[str, '_Counter'],
+def _record(records: Iterator[Record | float], output: '_Rotating', counters: dict[str, '_Counter'],
             status: '_Status') -> None:
     look_at = time.monotonic() + _LOOK_PERIOD
     for record in records:
-        if record is not None:
+        if not isinstance(record, float):
             output.write(record)
-            counters[record.channel].take(record)
+            counters[str(record.channel)].take(record)
         now = time.monotonic()
         if now >= look_at:
             look_at = now + _LOOK_PERIOD

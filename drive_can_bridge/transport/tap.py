@@ -36,6 +36,8 @@ class Tap:
     :param records: takes the entries.
     :param complain: takes a line when the bus is lost, and when it is back.
     :ivar lost: entries that nobody took in time.
+    :ivar heard_until: until when everything that was on the bus is among the entries, s by the
+        clock of this machine. That nobody put an entry there does not say that there was none.
     :raises BusUnavailable: the bus cannot be opened now.
     :raises BusMisconfigured: it never can.
     """
@@ -45,6 +47,8 @@ class Tap:
         self.bus = bus
         self.label = label
         self.lost = 0
+        self.heard_until = time.time()
+        self._heard = False
         self._records = records
         self._complain = complain
         self._closing = threading.Event()
@@ -63,6 +67,7 @@ class Tap:
         return port
 
     def _take(self, message: can.Message) -> None:
+        self._heard = True
         now = time.time()
         record = record_of(message, self.label)
         if not abs(now - record.time) <= _STAMP_AGE_MAX:   # counted from power-up, or no stamp
@@ -79,14 +84,22 @@ class Tap:
                     self._port = self._open()
                     self._complain(f'bus {self.bus.name}: open again')
                 while not self._closing.is_set():
-                    self._port.receive(_PATIENCE)
+                    self._listen(self._port)
             except BusUnavailable as error:
                 if self._port is not None:
                     self._complain(f'bus {self.bus.name}: {in_words(error)}; tried again every '
                                    f'{self.bus.reconnect_period:g} s')
                 self._close_port()
+                self.heard_until = time.time()  # nothing will be
                 self._closing.wait(self.bus.reconnect_period)
         self._close_port()
+
+    def _listen(self, port: Port) -> None:
+        began = time.time()
+        self._heard = False
+        port.receive(_PATIENCE)
+        if not self._heard:
+            self.heard_until = began
 
     def _close_port(self) -> None:
         port, self._port = self._port, None

@@ -6,6 +6,7 @@ Whoever waits here waits for a condition, with a deadline that only a hang excee
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from functools import cache
 import json
 import os
@@ -24,6 +25,8 @@ from waiting import DEADLINE, wait_for
 #: of a line of the log, s
 _STAMP = re.compile(r'\[(\d+\.\d+)\]')
 ROOT = Path(__file__).resolve().parents[2]
+#: lines of an output that are shown of a process when a test fails
+SHOWN = 40
 #: executable -> module, for trees that are not installed
 EXECUTABLES = {'drive_can_bridge': 'drive_can_bridge.ros.start',
                'drive_can': 'drive_can_bridge.cli.start'}
@@ -40,8 +43,9 @@ def command_line(name: str) -> list[str]:
 def environment() -> dict[str, str]:
     """Return the environment of started processes: this tree, English, unbuffered."""
     paths = [str(ROOT), str(ROOT / 'test'), *filter(None, [os.environ.get('PYTHONPATH')])]
+    # SIGABRT: what a process that hangs is doing
     return {**as_users_have_it(), 'PYTHONPATH': os.pathsep.join(paths), 'PYTHONUNBUFFERED': '1',
-            'LC_ALL': 'C.UTF-8', 'COLUMNS': '99'}
+            'PYTHONFAULTHANDLER': '1', 'LC_ALL': 'C.UTF-8', 'COLUMNS': '99'}
 
 
 class Witness:
@@ -163,6 +167,10 @@ class Process:
         try:
             return self.process.wait(timeout)
         except subprocess.TimeoutExpired:
+            # so that its standard error tells what it is doing instead
+            self.send(signal.SIGABRT)
+            with suppress(subprocess.TimeoutExpired):
+                self.process.wait(10.0)
             raise AssertionError(f'{self.name} did not end in {timeout:g} s') from None
 
     def end(self, number: int = signal.SIGTERM, timeout: float = DEADLINE) -> int:
@@ -184,11 +192,11 @@ class Process:
     def dump(self) -> str:
         """Return the command, the exit code and the end of both outputs."""
         texts = [f'{" ".join(self.command)}\nexit code: {self.process.poll()}']
-        for title, path in (('standard output', self.out), ('standard error', self.err)):
+        for title, path in (('standard error', self.err), ('standard output', self.out)):
             lines = path.read_text(encoding='utf-8', errors='replace').splitlines()
-            left_out = len(lines) - 100
+            left_out = len(lines) - SHOWN
             note = f' (without the first {left_out} lines)' if left_out > 0 else ''
-            texts += [f'--- {title}{note}', *lines[-100:]]
+            texts += [f'--- {title}{note}', *lines[-SHOWN:]]
         return '\n'.join(texts)
 
 
@@ -247,9 +255,11 @@ class Processes:
                 if b'Traceback' in process.out.read_bytes() + process.err.read_bytes()]
 
     def dump(self) -> str:
-        """Return all outputs."""
-        return '\n\n'.join(f'=== {process.name}: {process.dump()}'
-                           for process in (*self.started, *self.guests))
+        """Return all outputs; frames, which are many and say little, come last."""
+        return '\n\n'.join(
+            f'=== {process.name}: {process.dump()}'
+            for process in sorted((*self.started, *self.guests),
+                                  key=lambda process: isinstance(process, Simulator)))
 
 
 class Simulator(Process):
