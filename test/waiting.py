@@ -9,7 +9,7 @@ from typing import Any
 #: how much slower this machine is than one of today: what .ci/socketcan/run boots says so
 SLOWNESS = float(os.environ.get('DRIVE_CAN_EMULATED') or 1.0)
 #: s after which a thing that has not happened never will
-DEADLINE = 60.0 * SLOWNESS
+DEADLINE = 120.0 * SLOWNESS
 #: s between two looks: soon at first, and at last so that looking takes nothing from others
 SHORTEST, LONGEST = 0.002, 0.02
 

@@ -143,6 +143,18 @@ def test_a_broadcast_group() -> None:
     assert witness.observed('second').missed == 1
 
 
+def test_broadcasts_of_another_master() -> None:
+    # the first drive would obey the second one's broadcast, too; both obey the one to all
+    witness = Witness(inverter('alone', 1), inverter('leader', 0, broadcast='group'))
+    telegram, = witness.hears('400#7E040000', 0.0)
+    assert 'main leader > broadcast' in telegram and 'another' not in telegram
+    telegram, = witness.hears('408#7F040020', 0.01)
+    assert telegram.endswith(
+        'main alone > broadcast: control_word 1151, frequency_setpoint 50 %: SUSPICIOUS: of '
+        'another master: the file has no drive with this broadcast')
+    assert witness.observed('alone').period.count == 0
+
+
 @given(st.lists(st.tuples(st.sampled_from([0xC8, 0xC9, 0x2C8, 0x2C9, 0x403]),
                           st.binary(max_size=8), st.floats(0, 10))))
 def test_anything(frames: list[tuple[int, bytes, float]]) -> None:

@@ -141,7 +141,11 @@ class Cannord(Family):
         """Make what watches inverters; of a broadcast group, the leader's watches broadcasts."""
         from drive_can_bridge.protocols.cannord.observer import CannordObserver
         leaders = {group[0].name for group in groups(drives)}
-        return [CannordObserver(drive, emit, leads=drive.name in leaders) for drive in drives]
+        own = {broadcast_identifier(drive) for drive in drives}
+        return [CannordObserver(
+            drive, emit, leads=drive.name in leaders,
+            foreign={route.identifier for route in self.overheard(drive)} - own)
+            for drive in drives]
 
     # -- parts ------------------------------------------------------------------------------------
 

@@ -6,6 +6,7 @@ An answer to process data counts for the last frame that the inverter was sent. 
 group that is the individual frame of its turn; nobody answers the broadcast.
 """
 
+from collections.abc import Collection
 from functools import partial
 from typing import TypeVar
 
@@ -43,9 +44,11 @@ class CannordObserver(DriveObserver):
     Watches one inverter.
 
     :param leads: the inverter takes the commands for its broadcast group.
+    :param foreign: broadcast identifiers that it may obey, and on which the bridge sends nothing.
     """
 
-    def __init__(self, drive: DriveConfiguration, emit: Emit, *, leads: bool = False) -> None:
+    def __init__(self, drive: DriveConfiguration, emit: Emit, *, leads: bool = False,
+                 foreign: Collection[int] = ()) -> None:
         options = drive.options
         extended: bool = options.extended_identifiers
         super().__init__(drive.name, emit, extended=extended)
@@ -61,6 +64,7 @@ class CannordObserver(DriveObserver):
         self._paced_by_broadcast = leads and broadcast is not None
         if leads and broadcast is not None:
             self.handlers[broadcast] = self._take_broadcast
+        self.handlers |= dict.fromkeys(foreign, self._take_foreign)
         self._decode_main = partial(decode_main, swap=options.swap_setpoints_2_3)
         self._layout = ParameterLayout(options.value_order, options.index_byte)
         #: of main frames, and of extra ones
@@ -84,15 +88,21 @@ class CannordObserver(DriveObserver):
             self._cycle.begin_cycle(now)
         self._show_request(data, now, 'broadcast')
 
+    def _take_foreign(self, data: bytes, now: float) -> None:
+        self._show_request(data, now, 'broadcast', Verdict.SUSPICIOUS,
+                           'of another master: the file has no drive with this broadcast')
+
     def _take_request(self, data: bytes, now: float) -> None:
         if len(data) != EXTRA_LENGTH:
             self._cycle.ask(now, begins_cycle=not self._paced_by_broadcast)
         self._show_request(data, now, 'cyclic request')
 
-    def _show_request(self, data: bytes, now: float, title: str) -> None:
+    def _show_request(self, data: bytes, now: float, title: str,
+                      verdict: Verdict = Verdict.NORMAL, remark: str = '') -> None:
         raws = self._main(data, now, _REQUEST, title)
         if raws:
-            self.tell(now, _REQUEST, _CYCLIC, title, self._parameters[_REQUEST][0], raws)
+            self.tell(now, _REQUEST, _CYCLIC, title, self._parameters[_REQUEST][0], raws,
+                      verdict=verdict, remark=remark)
 
     def _main(self, data: bytes, now: float, direction: Direction, title: str) -> list[int]:
         """Return what a main frame holds; nothing: it is an extra one, or malformed, and told."""
