@@ -227,10 +227,12 @@ class Tracer:
 
     def _expire(self, bus: BusTrace, now: float) -> None:
         self._sent = None
-        due = [observer for observer in bus.observers if observer.deadline <= now]
-        for observer in sorted(due, key=lambda each: each.deadline):
-            observer.expire(now)
-        bus.deadline = min([observer.deadline for observer in bus.observers], default=math.inf)
+        while bus.observers:
+            observer = min(bus.observers, key=lambda each: each.deadline)
+            bus.deadline = due = observer.deadline
+            if not due <= now < math.inf:
+                return
+            observer.expire(due)    # no further: what is due next may be another drive's
 
     def _take_other(self, bus: BusTrace, record: Record) -> None:
         if record.kind is RecordKind.ERROR:

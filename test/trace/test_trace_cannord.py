@@ -127,6 +127,20 @@ def test_what_is_remembered_of_tasks_has_an_end_but_for_those_under_way() -> Non
     assert '< read: acceleration_time_set_2' in witness.hears('2C9#6640010000006400', 30.0)[0]
 
 
+def test_what_is_missing_is_told_in_the_order_of_time() -> None:
+    witness = Witness(inverter('first', 0), inverter('second', 1))
+    # answers may take 0.1 s, and 0.04 s in a cycle
+    witness.hears('200#6610000000000000', 0.0)
+    witness.hears('002#7E040000', 0.04)
+    witness.hears('000#7E040000', 0.07)
+    lost = witness.waits(10.0)
+    assert [(line.split()[3], line.split(':')[0].split('<')[1].strip()) for line in lost] == [
+        ('second', 'cyclic response'), ('first', 'parameter response'),
+        ('first', 'cyclic response')]
+    assert [telegram.time for telegram in witness.telegrams] == sorted(
+        telegram.time for telegram in witness.telegrams)
+
+
 def test_a_broadcast_group() -> None:
     witness = Witness(inverter('first', 0, broadcast='group'),
                       inverter('second', 1, broadcast='group'))
@@ -150,8 +164,8 @@ def test_broadcasts_of_another_master() -> None:
     assert 'main leader > broadcast' in telegram and 'another' not in telegram
     telegram, = witness.hears('408#7F040020', 0.01)
     assert telegram.endswith(
-        'main alone > broadcast: control_word 1151, frequency_setpoint 50 %: SUSPICIOUS: of '
-        'another master: the file has no drive with this broadcast')
+        'main alone > broadcast: control_word 1151, frequency_setpoint 50.0000 %: SUSPICIOUS: '
+        'of another master: the file has no drive with this broadcast')
     assert witness.observed('alone').period.count == 0
 
 
