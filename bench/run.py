@@ -12,6 +12,7 @@ import os
 from pathlib import Path
 import platform
 import sys
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import plots
@@ -98,6 +99,8 @@ def main(arguments: list[str] | None = None) -> int:
     if unknown:
         parser.error(f'{", ".join(unknown)}: allowed are {", ".join(planned)}')
     begun = machine()
+    logs = TemporaryDirectory(prefix='drive_can_bridge_bench_log_')
+    os.environ.setdefault('ROS_LOG_DIR', logs.name)     # nobody wants them later
     results: dict[str, list[Any]] = {}
     names = options.scenarios or [each for each in planned if each not in NAMED_ONLY]
     try:

@@ -2,12 +2,9 @@
 """The topics of a drive of the benches, as the bridge has them."""
 
 import os
-from tempfile import TemporaryDirectory
 from typing import Any
 
-# before rclpy is imported: nothing leaves this machine, nor stays on it
-_LOGS = TemporaryDirectory(prefix='drive_can_bridge_bench_log_')
-os.environ.setdefault('ROS_LOG_DIR', _LOGS.name)
+# before rclpy is imported: nothing leaves this machine
 os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
 os.environ.setdefault('ROS_DOMAIN_ID', '97')
 

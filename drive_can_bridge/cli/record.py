@@ -85,8 +85,8 @@ def run(args: Namespace) -> int:
     return 0
 
 
-def _record(records: Iterator[Record | float], output: '_Rotating', counters: dict[str, '_Counter'],
-            status: '_Status') -> None:
+def _record(records: Iterator[Record | float], output: '_Rotating',
+            counters: dict[str, '_Counter'], status: '_Status') -> None:
     look_at = time.monotonic() + _LOOK_PERIOD
     for record in records:
         if not isinstance(record, float):
