@@ -15,12 +15,11 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.protocols.datamodel import standard
-from drive_can_bridge.protocols.datamodel.acyclic_side import (
-    AcyclicSide, ANSWER_TIME, ATTEMPTS, map_cells,
-)
+from drive_can_bridge.protocols.datamodel.acyclic_side import AcyclicSide, ATTEMPTS, map_cells
 from drive_can_bridge.protocols.datamodel.setpoint_writer import SetpointWriter
 from drive_can_bridge.protocols.datamodel.standard_round import StandardRound
 from drive_can_bridge.protocols.polled_exchange import PolledExchange, Raws
+from drive_can_bridge.protocols.safe_stop import ANSWER_TIME
 
 SILENT = 'no answer to reads: drive silent, wrong station, bit rate or identifier mode'
 
