@@ -19,6 +19,8 @@ from drive_can_bridge.core.told import CONTROL_WORD
 from drive_can_bridge.protocols.channel import Channel, Lane
 from drive_can_bridge.protocols.courier import ReplyT, StepT
 
+#: how often a drive is told to stand still by writes, at most, until it has confirmed that
+STOP_ATTEMPTS = 3
 #: s that an answer is waited for at most where a stop is read back, and for the status then
 ANSWER_TIME = 0.1
 

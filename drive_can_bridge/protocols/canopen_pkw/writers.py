@@ -20,12 +20,10 @@ from drive_can_bridge.protocols.canopen_pkw.control_writer import ControlWriter
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
     Answered, MailboxChannel, Read, Refused, Reply, Silence, Step, Write,
 )
-from drive_can_bridge.protocols.canopen_pkw.procedures import (
-    STOP_ATTEMPTS, tell, write_until_answered,
-)
+from drive_can_bridge.protocols.canopen_pkw.procedures import tell, write_until_answered
 from drive_can_bridge.protocols.channel import Lane, STOP_PATIENCE
 from drive_can_bridge.protocols.polling import TOLERANCE, WriteSchedule
-from drive_can_bridge.protocols.safe_stop import SafeStop, StatusRead
+from drive_can_bridge.protocols.safe_stop import SafeStop, StatusRead, STOP_ATTEMPTS
 from drive_can_bridge.protocols.setpoints_first import SetpointsFirst
 from drive_can_bridge.protocols.stop_again import StopAgain
 
@@ -214,7 +212,7 @@ class Writers:
         :param again: a stop before this one has failed, which was told, and the drive has shown
             up. What looks for it goes on, so that nothing makes room; no other stop is under way.
         """
-        writes, patience = self._stop.writes(), self._session.configuration.parameter_timeout
+        writes, patience = self._stop.writes(), self._session.retry.timeout
         if not again:
             self._channel.cancel(Lane.STOP)
             self._channel.make_room(now)
@@ -222,8 +220,8 @@ class Writers:
             self.stop_time / (STOP_ATTEMPTS * max(1, len(writes)))))
         ends = not self._session.active
         self._stop.begin(
-            write_until_answered(writes, self._placement, STOP_ATTEMPTS, timeout,
-                                 timeout if ends else patience),
+            write_until_answered(
+                writes, self._placement, timeout, timeout if ends else patience),
             now, insist=ends, again=again)
 
     def _read_status(self, status: Parameter, timeout: float) -> StatusRead[Step, Reply]:

@@ -27,11 +27,8 @@ from drive_can_bridge.protocols.datamodel.extended import PAYLOAD, SLOTS
 from drive_can_bridge.protocols.datamodel.numbers import Numbers
 from drive_can_bridge.protocols.datamodel.options import DataModelOptions
 from drive_can_bridge.protocols.placement import SentWrites
-from drive_can_bridge.protocols.safe_stop import ANSWER_TIME, SafeStop, StatusRead
+from drive_can_bridge.protocols.safe_stop import ANSWER_TIME, SafeStop, StatusRead, STOP_ATTEMPTS
 from drive_can_bridge.protocols.stop_again import StopAgain
-
-#: how often everything is written at most that makes a drive stand still
-ATTEMPTS = 3
 
 
 class AcyclicSide:
@@ -173,7 +170,7 @@ def confirm(writes: Sequence[tuple[Parameter, Write]], timeout: float,
     blind = [each for each in writes if not each[0].readable]
     wrong = [each for each in writes if each[0].readable]
     failed: list[str] = []
-    for attempt in range(ATTEMPTS):
+    for attempt in range(STOP_ATTEMPTS):
         for each in (*blind, *wrong) if attempt else ():
             yield each[1]
         doubtful, failed, silent = wrong, [], False
