@@ -19,6 +19,11 @@ from drive_can_bridge.core.told import CONTROL_WORD
 from drive_can_bridge.protocols.channel import Channel, Lane
 from drive_can_bridge.protocols.courier import ReplyT, StepT
 
+#: how often a drive is told to stand still by writes, at most, until it has confirmed that
+STOP_ATTEMPTS = 3
+#: s that an answer is waited for at most where a stop is read back, and for the status then
+ANSWER_TIME = 0.1
+
 #: reads one word: the raw integer, or None
 StatusRead = Generator[StepT, ReplyT, Union[int, None]]
 
@@ -36,18 +41,18 @@ class SafeStop(Generic[StepT, ReplyT]):
     The acyclic stop of one drive.
 
     :param ended: called when it has run its course.
-    :param read_status: reads the status word, once, for a short time (None: no answer); None:
-        there is none to be read, or it comes by itself.
+    :param status: the word to be read in the end; None: there is none, or it comes by itself.
+    :param read: (word, s to wait for the answer): reads it once; None: no answer.
     :ivar running: it is under way.
-    :ivar ended_at: when it had run its course, the last time.
+    :ivar again_at: when one that was told again had run its course, the last time.
     """
 
     def __init__(self, session: Session, channel: Channel[StepT, ReplyT],
-                 ended: Callable[[], None],
-                 read_status: Callable[[], StatusRead[StepT, ReplyT]] | None = None) -> None:
+                 ended: Callable[[], None], status: Parameter | None,
+                 read: Callable[[Parameter, float], StatusRead[StepT, ReplyT]]) -> None:
         self.running = False
-        self._read_status = read_status
-        self.ended_at = -math.inf
+        self.again_at = -math.inf
+        self._status, self._read = status, read
         self._session = session
         self._channel = channel
         self._ended = ended
@@ -93,7 +98,7 @@ class SafeStop(Generic[StepT, ReplyT]):
 
     def look(self, now: float) -> None:
         """Read the status at the end of a stop by other means, if it does not come by itself."""
-        if self._read_status is not None and not self.running:
+        if self._status is not None and not self.running:
             self.running = True
             self._channel.run(self._look(), self._looked, now, Lane.STOP)
 
@@ -110,9 +115,9 @@ class SafeStop(Generic[StepT, ReplyT]):
 
     def _look(self) -> Generator[StepT, ReplyT, None]:
         session = self._session
-        if self._read_status is None or session.active or not session.online:
+        if self._status is None or session.active or not session.online:
             return
-        raw = yield from self._read_status()
+        raw = yield from self._read(self._status, min(ANSWER_TIME, session.retry.timeout))
         if raw is not None:
             session.gate.status(raw, self._channel.now)
 
@@ -121,8 +126,9 @@ class SafeStop(Generic[StepT, ReplyT]):
         self._ended()
 
     def _done(self, failed: list[str]) -> None:
-        self.running, self.ended_at = False, self._channel.now
-        session = self._session
+        session, self.running = self._session, False
+        if self._again:
+            self.again_at = self._channel.now
         if not failed:
             if self._whole:
                 session.told.stopped()

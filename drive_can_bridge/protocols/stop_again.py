@@ -4,7 +4,7 @@ The stop of a drive that may run on although it is offline: told again to whoeve
 
 A drive that falls silent is told to stop, and may not hear it. When it is back, it is told with
 the first exchange that is complete. Until then, and that may be for ever if it answers a part
-only, any sign of life has it told again.
+only, any sign of life has it told again: at once, and then with pauses.
 """
 
 from collections.abc import Callable, Generator
@@ -14,7 +14,7 @@ from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.protocols.channel import Channel, Lane
 from drive_can_bridge.protocols.safe_stop import SafeStop
 
-#: s after a stop until the next one: what looks for the drive goes on meanwhile
+#: s after one that was told again until the next: what looks for the drive goes on meanwhile
 PAUSE = 1.0
 #: longest such pause where each stop wears an EEPROM: they double
 PAUSE_MAX = 60.0
@@ -49,7 +49,7 @@ class StopAgain:
         """
         if not self._wanted:
             self._pause, self._first = PAUSE, True
-        elif now >= self._stop.ended_at + self._pause and self._channel.is_idle(Lane.STOP):
+        elif now >= self._stop.again_at + self._pause and self._channel.is_idle(Lane.STOP):
             if hurry and self._first:
                 self._channel.make_room(now)
             self._first = False

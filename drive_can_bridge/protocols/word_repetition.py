@@ -24,12 +24,13 @@ class WordRepetition:
     """
     The control words of one drive.
 
+    :param control: None: there are none, and nothing is ever due.
     :param wears: each write wears an EEPROM.
     :param acknowledged: the drive has what was written: what starts it is not repeated.
     :ivar word: what was written last; None: nobody knows, or the bus refused it.
     """
 
-    def __init__(self, control: ControlMachine, *, wears: bool = False,
+    def __init__(self, control: ControlMachine | None, *, wears: bool = False,
                  acknowledged: bool = False) -> None:
         self._control = control
         self._wears = wears
@@ -49,7 +50,7 @@ class WordRepetition:
             self._repeats += 1
         else:
             self._repeats = 0
-            if self.word is not None:
+            if self.word is not None and self._control is not None:
                 self._ran = self.word == self._control.table.enable
         self.word = word
         self._due_at = math.inf     # until it left
@@ -66,7 +67,7 @@ class WordRepetition:
     def due(self, now: float) -> bool:
         """Tell whether the word that has left, and is still the current one, is due again."""
         control = self._control
-        if self._due_at == math.inf:
+        if control is None or self._due_at == math.inf:
             return False
         if control.word_due:    # another one was to follow, and never left
             return True

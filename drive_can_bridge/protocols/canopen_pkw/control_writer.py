@@ -23,8 +23,9 @@ from drive_can_bridge.protocols.canopen_pkw.addresses import Placement
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
     Answered, MailboxChannel, Read, Refused, Reply, Silence, Step, Write,
 )
-from drive_can_bridge.protocols.canopen_pkw.procedures import STOP_ATTEMPTS, tell
+from drive_can_bridge.protocols.canopen_pkw.procedures import tell
 from drive_can_bridge.protocols.channel import Lane, STOP_PATIENCE
+from drive_can_bridge.protocols.safe_stop import STOP_ATTEMPTS
 from drive_can_bridge.protocols.word_repetition import WordRepetition
 
 #: s until a ``disable`` that was refused is written again

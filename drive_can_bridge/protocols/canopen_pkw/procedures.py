@@ -15,10 +15,8 @@ from drive_can_bridge.protocols.canopen_pkw.mailbox import (
     Answered, Read, Refused, Reply, Silence, Step, Write,
 )
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address
-from drive_can_bridge.protocols.safe_stop import StopWrite
+from drive_can_bridge.protocols.safe_stop import STOP_ATTEMPTS, StopWrite
 
-#: how often a drive is told to stand still while it does not answer
-STOP_ATTEMPTS = 3
 NOT_TOGETHER = ('cannot be written in one frame, nothing was written: two 16-bit parameters in '
                 'adjacent registers fit, or one of 32 bits')
 
@@ -102,10 +100,10 @@ def tell(told: Told, what: Hashable, write: Write, *, runs: bool,
 StopProcedure = Generator[Step, Reply, list[str]]
 
 
-def write_until_answered(writes: Sequence[StopWrite], placement: Placement, attempts: int,
-                         timeout: float, last: float) -> StopProcedure:
+def write_until_answered(writes: Sequence[StopWrite], placement: Placement, timeout: float,
+                         last: float) -> StopProcedure:
     """
-    Tell a drive to stand still, each thing until it is answered or was tried ``attempts`` times.
+    Tell a drive to stand still, each thing until it is answered or was tried three times.
 
     It may be executed twice: that does no harm. As the toggle is inverted with every attempt, not
     even an unknown function byte of the device keeps it from taking notice.
@@ -118,14 +116,14 @@ def write_until_answered(writes: Sequence[StopWrite], placement: Placement, atte
     for parameter, raw, is_word in writes:
         name = f'{parameter.name} {raw:04X}h' if is_word else parameter.name
         reply: Reply = Silence()
-        for attempt in range(1, attempts + 1):
+        for attempt in range(1, STOP_ATTEMPTS + 1):
             reply = yield Write.of(placement, parameter, raw, blind=True,
-                                   timeout=last if attempt == attempts else timeout)
+                                   timeout=last if attempt == STOP_ATTEMPTS else timeout)
             if not isinstance(reply, Silence):
                 break
         if isinstance(reply, Refused):
             failed.append(f'{name} {reply.text}')
         elif isinstance(reply, Silence):
             failed.append(f'{name} not taken by the bus' if reply.refused else
-                          f'{name} not acknowledged in {attempts} attempts')
+                          f'{name} not acknowledged in {STOP_ATTEMPTS} attempts')
     return failed

@@ -34,24 +34,16 @@ from drive_can_bridge.core.session import LOOKING, Session, Stage
 from drive_can_bridge.core.users import Users
 from drive_can_bridge.protocols.canopen.supervision import Supervision
 from drive_can_bridge.protocols.canopen_pkw import addresses, pkw, procedures
-from drive_can_bridge.protocols.canopen_pkw.mailbox import (
-    MailboxChannel, MailboxCourier, Reply, Step,
-)
+from drive_can_bridge.protocols.canopen_pkw.mailbox import MailboxChannel, MailboxCourier
 from drive_can_bridge.protocols.canopen_pkw.pkw import Layout, Message
 from drive_can_bridge.protocols.canopen_pkw.round import Rounds
 from drive_can_bridge.protocols.canopen_pkw.writers import Writers
-from drive_can_bridge.protocols.channel import Lane, STOP_PATIENCE
+from drive_can_bridge.protocols.channel import Lane
 from drive_can_bridge.protocols.placement import SentWrites
 from drive_can_bridge.protocols.polled_exchange import PolledExchange
-from drive_can_bridge.protocols.safe_stop import SafeStop
-from drive_can_bridge.protocols.stop_again import StopAgain
 
 SILENT = ('no complete round of reads: drive silent, not operational, or other COB-IDs than '
           'configured')
-
-#: s that a stop may take all together: of a drive that answers, and of one that has fallen silent
-STOP_TIME = 3.0
-STOP_TIME_SILENT = 0.4
 
 
 class PkwSession(Session):
@@ -66,7 +58,6 @@ class PkwSession(Session):
             drive, controlled=control is not None, cells=addresses.keys,
             refusal=lambda parameter: addresses.half_refusal(parameter, drive.profile)))
         options, placement = drive.options, addresses.Placement.of(drive)
-        self._placement = placement
         self._layout = Layout(options.layout)
         self._supervision = Supervision(self)
         self._node = self._supervision.node
@@ -83,8 +74,6 @@ class PkwSession(Session):
         self.users = Users(
             self, procedures.RegisterAccess(self._channel, self.retry, placement),
             blocked=self._supervision.refusal, control_refusal=self._writers.control_refusal)
-        self._stop: SafeStop[Step, Reply] = SafeStop(self, self._channel, self.stop_ended)
-        self._again = StopAgain(self, self._channel, self._stop, self._tell_again)
         self.look_after(channel=self._channel)
         self._made_room = False     # for setpoints, in this round
 
@@ -98,16 +87,12 @@ class PkwSession(Session):
         self._supervision.stop()
         self._exchange.stop()
         self._channel.drop(now)
-        self._writers.stop(self._stop_time, now, insist=True)
+        self._writers.stop(now)
         return True
 
     @property
     def longest_stop(self) -> float:
-        return self._stop_time if self.stage is Stage.STOPPING else 0.0
-
-    @property
-    def _stop_time(self) -> float:
-        return STOP_TIME if self.online else STOP_TIME_SILENT
+        return self._writers.stop_time if self.stage is Stage.STOPPING else 0.0
 
     def bus_down(self, now: float, reason: str) -> None:
         self._node.forget()
@@ -162,8 +147,7 @@ class PkwSession(Session):
         self._channel.advance(now)
 
     def node_silent(self, now: float) -> None:
-        self._writers.stop(
-            STOP_TIME_SILENT, now, in_the_end=self.configuration.parameter_timeout)
+        self._writers.stop(now)
 
     def node_closed(self, now: float) -> None:
         # a stop takes its course: however often a node starts anew, they do not pile up
@@ -175,15 +159,6 @@ class PkwSession(Session):
         """Have a drive stand still of which nobody knows whether it listens."""
         if self.told.owed:
             self.node_silent(now)
-
-    def _tell_again(self, now: float) -> None:
-        """Have a drive stand still that shows up but is not online; nothing makes room for it."""
-        writes = self._stop.writes()
-        if writes:
-            patience = self.configuration.parameter_timeout
-            self._stop.begin(procedures.write_until_answered(
-                writes, self._placement, procedures.STOP_ATTEMPTS,
-                min(patience, STOP_PATIENCE), patience), now, again=True)
 
     def _end_futile_stop(self, now: float) -> None:
         """End a stop that was for safety only, of a node that takes no PDOs any more."""
@@ -214,14 +189,14 @@ class PkwSession(Session):
         options = self.configuration.options
         try:
             if identifier == options.response_cob_id:
-                self._again.heard(now)
+                self._writers.again.heard(now)
                 self._exchange.received_at = now - age
                 message = pkw.decode(data, self._layout)
                 if not self._channel.receive(message, now):
                     self.report.reject(f'PKW response that nobody asked for: {message}')
             elif self._supervision.receive(identifier, data, now):
                 self._end_futile_stop(now)
-                self._again.heard(now, hurry=True)
+                self._writers.again.heard(now, hurry=True)
             elif identifier == options.request_cob_id:
                 self.report.note(ForeignMasterSeen(
                     f'another master sends PKW requests to node {self.configuration.station}: '

@@ -9,7 +9,6 @@ One that takes back a command is repeated soon while nobody answers where there 
 
 from collections import Counter
 from collections.abc import Callable, Generator
-from functools import partial
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.holding import Setpoint
@@ -21,16 +20,16 @@ from drive_can_bridge.protocols.canopen_pkw.control_writer import ControlWriter
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
     Answered, MailboxChannel, Read, Refused, Reply, Silence, Step, Write,
 )
-from drive_can_bridge.protocols.canopen_pkw.procedures import (
-    STOP_ATTEMPTS, tell, write_until_answered,
-)
+from drive_can_bridge.protocols.canopen_pkw.procedures import tell, write_until_answered
 from drive_can_bridge.protocols.channel import Lane, STOP_PATIENCE
 from drive_can_bridge.protocols.polling import TOLERANCE, WriteSchedule
-from drive_can_bridge.protocols.safe_stop import SafeStop, StatusRead
+from drive_can_bridge.protocols.safe_stop import SafeStop, StatusRead, STOP_ATTEMPTS
 from drive_can_bridge.protocols.setpoints_first import SetpointsFirst
+from drive_can_bridge.protocols.stop_again import StopAgain
 
-#: s that the status is waited for at the end of a stop
-STATUS_TIME = 0.1
+#: s that a stop may take all together: of a drive that answers, and of one that has fallen silent
+STOP_TIME = 3.0
+STOP_TIME_SILENT = 0.4
 
 
 class Writers:
@@ -39,6 +38,7 @@ class Writers:
 
     :param stop_ended: called when a stop has run its course.
     :ivar control: writes the control word; None: there is none.
+    :ivar again: tells a drive to stop again that is offline and shows up.
     """
 
     def __init__(self, session: Session, channel: MailboxChannel,
@@ -58,10 +58,10 @@ class Writers:
         self._warned: dict[str, str] = {}
         self._silences = Counter[int]()         # in a row, by index
         self._patience = STOP_PATIENCE          # s until a stop is written again
-        status = status_word(drive)
         self._stop: SafeStop[Step, Reply] = SafeStop(
-            session, channel, stop_ended,
-            None if status is None else partial(self._read_status, status))
+            session, channel, stop_ended, status_word(drive), self._read_status)
+        self.again = StopAgain(
+            session, channel, self._stop, lambda now: self.stop(now, again=True))
 
     def forget(self) -> None:
         """Take note that nothing is known of the drive."""
@@ -196,29 +196,37 @@ class Writers:
 
     # -- stopping ---------------------------------------------------------------------------------
 
-    def stop(self, time: float, now: float, *, in_the_end: float = 0.0,
-             insist: bool = False) -> None:
-        """
-        Tell the drive to stand still, within so many s.
+    @property
+    def stop_time(self) -> float:
+        """How many s a stop may take that somebody waits for."""
+        return STOP_TIME if self._session.online else STOP_TIME_SILENT
 
-        :param in_the_end: s that the answer to the last attempt is waited for at least: a device
-            may be slow, and nobody waits for the end of this stop.
-        :param insist: what failed is told even if the drive was not told to run.
+    def stop(self, now: float, *, again: bool = False) -> None:
         """
-        writes = self._stop.writes()
-        self._channel.cancel(Lane.STOP)
-        self._channel.make_room(now)
-        timeout = min(self._session.configuration.parameter_timeout,
-                      time / (STOP_ATTEMPTS * max(1, len(writes))))
+        Tell the drive to stand still: in the end, or because it is offline.
+
+        In the end, what failed is told even if the drive was not told to run. Otherwise nobody
+        waits for the end of the stop: the last attempt has the time that any request has, for a
+        device may be slow.
+
+        :param again: a stop before this one has failed, which was told, and the drive has shown
+            up. What looks for it goes on, so that nothing makes room; no other stop is under way.
+        """
+        writes, patience = self._stop.writes(), self._session.retry.timeout
+        if not again:
+            self._channel.cancel(Lane.STOP)
+            self._channel.make_room(now)
+        timeout = min(patience, STOP_PATIENCE if again else (
+            self.stop_time / (STOP_ATTEMPTS * max(1, len(writes)))))
+        ends = not self._session.active
         self._stop.begin(
             write_until_answered(
-                writes, self._placement, STOP_ATTEMPTS, timeout, max(timeout, in_the_end)),
-            now, insist=insist)
+                writes, self._placement, timeout, timeout if ends else patience),
+            now, insist=ends, again=again)
 
-    def _read_status(self, status: Parameter) -> StatusRead[Step, Reply]:
+    def _read_status(self, status: Parameter, timeout: float) -> StatusRead[Step, Reply]:
         span = self._placement.span(status)
-        reply = yield Read(span.address, span.count, attempts=1,
-                           timeout=min(STATUS_TIME, self._session.retry.timeout))
+        reply = yield Read(span.address, span.count, attempts=1, timeout=timeout)
         return self._placement.raw(status, reply.words) if isinstance(reply, Answered) else None
 
     # -- what the drive refuses -------------------------------------------------------------------

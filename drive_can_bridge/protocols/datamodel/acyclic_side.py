@@ -6,7 +6,6 @@ Requests of users, a control or status word without a slot in cyclic telegrams, 
 """
 
 from collections.abc import Callable, Generator, Sequence
-from functools import partial
 import math
 from typing import Union
 
@@ -28,13 +27,8 @@ from drive_can_bridge.protocols.datamodel.extended import PAYLOAD, SLOTS
 from drive_can_bridge.protocols.datamodel.numbers import Numbers
 from drive_can_bridge.protocols.datamodel.options import DataModelOptions
 from drive_can_bridge.protocols.placement import SentWrites
-from drive_can_bridge.protocols.safe_stop import SafeStop, StatusRead
+from drive_can_bridge.protocols.safe_stop import ANSWER_TIME, SafeStop, StatusRead, STOP_ATTEMPTS
 from drive_can_bridge.protocols.stop_again import StopAgain
-
-#: how often everything is written at most that makes a drive stand still
-ATTEMPTS = 3
-#: s that an answer is waited for then, at most
-ANSWER_TIME = 0.1
 
 
 class AcyclicSide:
@@ -87,8 +81,7 @@ class AcyclicSide:
                            word=word, status=status))
         self.parts = () if self.control_writer is None else (self.control_writer,)
         self.stop: SafeStop[Step, Reply] = SafeStop(
-            session, self.channel, stop_ended,
-            None if at_end is None else partial(self._read_status, at_end))
+            session, self.channel, stop_ended, at_end, self._read_status)
         self.shows_up = False
         self.again = StopAgain(
             session, self.channel, self.stop, lambda now: self.begin_stop(now, again=True),
@@ -160,9 +153,9 @@ class AcyclicSide:
         timeout = min(self._session.retry.timeout, ANSWER_TIME)
         stop.begin(confirm(writes, timeout), now, setpoints=setpoints, again=again)
 
-    def _read_status(self, status: Parameter) -> StatusRead[Step, Reply]:
-        words = yield Read(self.numbers.number(status), attempts=1, late_will_do=True,
-                           timeout=min(self._session.retry.timeout, ANSWER_TIME))
+    def _read_status(self, status: Parameter, timeout: float) -> StatusRead[Step, Reply]:
+        words = yield Read(
+            self.numbers.number(status), attempts=1, late_will_do=True, timeout=timeout)
         return None if words is None else status.raw_from_word(words[0])
 
 
@@ -177,7 +170,7 @@ def confirm(writes: Sequence[tuple[Parameter, Write]], timeout: float,
     blind = [each for each in writes if not each[0].readable]
     wrong = [each for each in writes if each[0].readable]
     failed: list[str] = []
-    for attempt in range(ATTEMPTS):
+    for attempt in range(STOP_ATTEMPTS):
         for each in (*blind, *wrong) if attempt else ():
             yield each[1]
         doubtful, failed, silent = wrong, [], False

@@ -33,14 +33,13 @@ from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.told import UNHEARD
 from drive_can_bridge.protocols.cyclic_exchange import CYCLE, CyclicExchange
 from drive_can_bridge.protocols.datamodel import extended
-from drive_can_bridge.protocols.datamodel.acyclic_side import (
-    AcyclicSide, ANSWER_TIME, ATTEMPTS, map_cells,
-)
+from drive_can_bridge.protocols.datamodel.acyclic_side import AcyclicSide, map_cells
 from drive_can_bridge.protocols.datamodel.map_supervision import (
     MapSupervision, SILENT_LOOKS, Verdict,
 )
 from drive_can_bridge.protocols.datamodel.positions import Positions
 from drive_can_bridge.protocols.datamodel.process_words import CyclicCodec
+from drive_can_bridge.protocols.safe_stop import ANSWER_TIME, STOP_ATTEMPTS
 
 #: direction and station of an identifier
 FROM_WHOM = extended.DIR | extended.STATION_MASK
@@ -122,7 +121,7 @@ class ExtendedSession(Session):
 
     @property
     def longest_stop(self) -> float:
-        return self._exchange.longest_stop + ATTEMPTS * ANSWER_TIME
+        return self._exchange.longest_stop + STOP_ATTEMPTS * ANSWER_TIME
 
     def begin(self, now: float) -> None:
         self._exchange.stop()

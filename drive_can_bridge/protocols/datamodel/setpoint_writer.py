@@ -40,15 +40,13 @@ class SetpointWriter:
         self._first = SetpointsFirst(session, self._schedule, [
             index for index in range(len(drive.cyclic_request)) if index != self._slot])
         self._spacing = stop_spacing(drive.period)
-        self._repetition = None if session.control is None or self._slot is None else (
-            WordRepetition(session.control))
+        self._repetition = WordRepetition(session.control)
         self._pulse_at = math.inf  # when the control word is due again, whatever it was
 
     def stop(self) -> None:
         """Plan nothing any more: nothing is known of the drive."""
         self._schedule.forget()
-        if self._repetition is not None:
-            self._repetition.forget()
+        self._repetition.forget()
         self._pulse_at = math.inf
 
     def look(self, now: float, *, unanswered: bool = False) -> None:
@@ -58,13 +56,14 @@ class SetpointWriter:
         :param unanswered: what was asked a period ago still waits for its answer.
         """
         control, slot = self._session.control, self._slot
-        if slot is not None and self._repetition is not None and control is not None and (
-                control.stopping or not self._exchange.reading) and self._repetition.due(now):
+        stopping = control is not None and control.stopping
+        if slot is not None and self._repetition.due(now) and (
+                stopping or not self._exchange.reading):
             self._schedule.failed(slot)
         # when a read goes unanswered, nobody knows whether the drive was off meanwhile: it is not
         # started by a repetition
         doubt = (self._exchange.silent or unanswered) and control is not None and not (
-            control.at_rest or control.stopping)
+            control.at_rest or stopping)
         hold = [slot] if doubt or self.holds_word else []
         unknown = self._session.setpoints.unknown
         if unknown:
@@ -73,7 +72,7 @@ class SetpointWriter:
         self._schedule.look(self._raws(), now, hold=hold)
         if slot is not None and control is not None:
             # a word that starts the drive behind setpoints, also when all are only refreshed
-            self._schedule.order(slot, first=control.stopping or control.pulsing)
+            self._schedule.order(slot, first=stopping or control.pulsing)
 
     @property
     def holds_word(self) -> bool:
@@ -93,7 +92,7 @@ class SetpointWriter:
             Write(self._numbers.number(parameter), self._numbers.words(parameter, raw),
                   eeprom=False),
             lambda sent, then: self._left(index, raw, sent, then, runs=runs), now)
-        if index == self._slot and self._repetition is not None:
+        if index == self._slot:
             self._repetition.begun(raw)
         self._schedule.written(index, raw, now)  # at once: a look meanwhile must not find it due
 
@@ -130,7 +129,7 @@ class SetpointWriter:
             return
         self._session.told.note_unacknowledged(index, runs=runs)
         control = self._session.control
-        if index != self._slot or control is None or self._repetition is None:
+        if index != self._slot or control is None:
             if self._first.written(index):
                 self._session.see_to_control_word(now)
             return

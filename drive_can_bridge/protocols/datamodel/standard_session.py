@@ -15,12 +15,11 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.protocols.datamodel import standard
-from drive_can_bridge.protocols.datamodel.acyclic_side import (
-    AcyclicSide, ANSWER_TIME, ATTEMPTS, map_cells,
-)
+from drive_can_bridge.protocols.datamodel.acyclic_side import AcyclicSide, map_cells
 from drive_can_bridge.protocols.datamodel.setpoint_writer import SetpointWriter
 from drive_can_bridge.protocols.datamodel.standard_round import StandardRound
 from drive_can_bridge.protocols.polled_exchange import PolledExchange, Raws
+from drive_can_bridge.protocols.safe_stop import ANSWER_TIME, STOP_ATTEMPTS
 
 SILENT = 'no answer to reads: drive silent, wrong station, bit rate or identifier mode'
 
@@ -72,7 +71,8 @@ class StandardSession(Session):
     @property
     def longest_stop(self) -> float:
         # one more: the read of the status
-        return (ATTEMPTS + 1) * (ANSWER_TIME + float(self.configuration.options.quarantine))
+        return (STOP_ATTEMPTS + 1) * (
+            ANSWER_TIME + float(self.configuration.options.quarantine))
 
     def time_lost(self, now: float) -> None:
         self._expected = self._expected or self._side.courier.outstanding is not None

@@ -73,6 +73,18 @@ def test_one_register_unanswered_when_it_is_back() -> None:
     assert 'average_current' in talk.session.offline_advice
 
 
+def test_one_that_is_back_right_after_the_stop_it_has_not_heard_is_told_at_once() -> None:
+    """Only what is told again is told with pauses."""
+    talk = runs_in_two_reads()
+    while FAILED not in [note.text for note in talk.events(Noted)]:
+        talk.at(talk.session.next_timer())
+        assert talk.now < 14.0
+    sent = talk.served(talk.now + 0.9, half)
+    assert not talk.session.online
+    assert len(stops(sent)) == 1
+    assert not talk.session.told.owed
+
+
 def test_drive_that_is_deaf_first_and_answers_later() -> None:
     """Its reads are answered, its writes not: attempts a second apart, and one warning in all."""
     talk = silent(runs_in_two_reads(), 14.0)

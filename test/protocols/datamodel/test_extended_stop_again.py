@@ -40,6 +40,19 @@ def test_a_drive_that_answers_one_map_only_is_told_to_stop_by_number() -> None:
         'told to stop once more, which it has confirmed']
 
 
+def test_one_that_is_back_right_after_the_stop_it_has_not_heard_is_told_at_once() -> None:
+    """Only what is told again is told with pauses."""
+    talk = online(rearm_immediate=True)
+    talk.commands(0, 100.0, 10.003)
+    assert exchange(talk, 10.02) == RUNNING
+    while not [note for note in talk.events(Noted) if note.danger]:
+        talk.at(talk.session.next_timer())
+        assert talk.now < 12.0
+    sent = [text for _, text in talk.served(talk.now + 0.9, HALF.get)]
+    assert sent.count(SPEED_ZERO) == 1
+    assert not (talk.session.told.owed or talk.session.told.ran)
+
+
 def test_one_that_never_confirms_is_told_about_once_a_second() -> None:
     talk = silent()
     sent = talk.served(22.0, {ASK_REQUEST_MAP: REQUEST_MAP}.get)

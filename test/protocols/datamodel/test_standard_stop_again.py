@@ -40,8 +40,12 @@ def bursts(times: list[float]) -> list[float]:
     return [now for before, now in zip([0.0, *times], times) if now - before > 0.9]
 
 
-def lost(word: Parameter = WORD, **options: object) -> Conversation:
-    """Return a drive that ran, and was told to stop in vain until 12 s; two reads a round."""
+def lost(word: Parameter = WORD, *, end: float = 12.0, **options: object) -> Conversation:
+    """
+    Return a drive that ran, and was told to stop in vain; two reads a round.
+
+    :param end: until when nothing happens then, in s.
+    """
     table = tuple(word if entry is WORD else entry for entry in TABLE)
     talk = Conversation(drive(
         'datamodel_standard', response=(GAIN, ACTUAL, CURRENT, STATUS), rearm_immediate=True,
@@ -58,10 +62,13 @@ def lost(word: Parameter = WORD, **options: object) -> Conversation:
         assert talk.control_outcomes() == [('enable', True, 'enabled')]
     talk.commands(0, 150.0, 10.5)
     talk.events()
-    talk.until(12.0)
+    while not [note for note in talk.events(Noted) if note.danger]:
+        talk.at(talk.session.next_timer())
+        assert talk.now < 12.0
+    talk.until(end)
     assert not talk.session.online
     assert talk.session.told.owed
-    assert len([note for note in talk.events(Noted) if note.danger]) == 1
+    assert talk.events(Noted) == []
     return talk
 
 
@@ -79,9 +86,21 @@ def test_a_drive_that_answers_a_part_of_its_round_is_told_again() -> None:
         talk.session.offline_advice)
 
 
+def test_one_that_is_back_right_after_the_stop_it_has_not_heard_is_told_at_once() -> None:
+    """Only what is told again is told with pauses."""
+    talk = lost(end=0.0, request=(SPEED, LIMIT))
+    since = talk.now
+    sent = talk.served(since + 0.9, half)
+    assert len(told(sent)) == 1
+    place = sent.index((told(sent)[0], SPEED_ZERO))
+    assert [text for _, text in sent[:place]].count(ASK_GAIN) == 1, 'right behind the first answer'
+    assert not talk.session.told.owed
+    assert [note.text for note in talk.events(Noted)] == [CONFIRMED]
+
+
 def test_one_that_never_confirms_is_told_about_once_a_second() -> None:
     talk = lost(request=(SPEED, LIMIT))
-    sent = talk.served(22.0, {ASK_GAIN: GAIN_IS}.get)
+    sent = talk.served(22.5, {ASK_GAIN: GAIN_IS}.get)
     times = told(sent)
     begun = bursts(times)
     assert len(begun) in (6, 7)
