@@ -49,22 +49,23 @@ class SetpointWriter:
         self._repetition.forget()
         self._pulse_at = math.inf
 
-    def look(self, now: float, *, unanswered: bool = False) -> None:
+    def look(self, now: float, *, unanswered: bool = False, known: bool = False) -> None:
         """
         Find out what is to be written.
 
         :param unanswered: what was asked a period ago still waits for its answer.
+        :param known: the status was read just now, or there is none. A word that starts the drive
+            is repeated only then: one that was off meanwhile, unseen, must not start by that.
         """
         control, slot = self._session.control, self._slot
         stopping = control is not None and control.stopping
+        starts = control is not None and not (control.at_rest or stopping)
         if slot is not None and self._repetition.due(now) and (
                 stopping or not self._exchange.reading):
             self._schedule.failed(slot)
-        # when a read goes unanswered, nobody knows whether the drive was off meanwhile: it is not
-        # started by a repetition
-        doubt = (self._exchange.silent or unanswered) and control is not None and not (
-            control.at_rest or stopping)
-        hold = [slot] if doubt or self.holds_word else []
+        doubt = starts and (self._exchange.silent or unanswered)
+        repeated = starts and control is not None and not (control.word_due or control.pulsing)
+        hold = [slot] if doubt or repeated and not known or self.holds_word else []
         unknown = self._session.setpoints.unknown
         if unknown:
             hold += [index for index, parameter in enumerate(self._parameters)
@@ -96,9 +97,13 @@ class SetpointWriter:
             self._repetition.begun(raw)
         self._schedule.written(index, raw, now)  # at once: a look meanwhile must not find it due
 
-    def write_word(self, now: float) -> None:
-        """Write a control word that is due, or what it waits for, without waiting for a period."""
-        self.look(now)
+    def write_word(self, now: float, *, known: bool = False) -> None:
+        """
+        Write a control word that is due, or what it waits for, without waiting for a period.
+
+        :param known: see :meth:`look`.
+        """
+        self.look(now, known=known)
         self.write(now)
 
     def handle_timer(self, now: float) -> None:

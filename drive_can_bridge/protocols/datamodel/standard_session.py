@@ -19,6 +19,7 @@ from drive_can_bridge.protocols.datamodel.acyclic_side import AcyclicSide, map_c
 from drive_can_bridge.protocols.datamodel.setpoint_writer import SetpointWriter
 from drive_can_bridge.protocols.datamodel.standard_round import StandardRound
 from drive_can_bridge.protocols.polled_exchange import PolledExchange, Raws
+from drive_can_bridge.protocols.polling import TOLERANCE
 from drive_can_bridge.protocols.safe_stop import ANSWER_TIME, STOP_ATTEMPTS
 
 SILENT = 'no answer to reads: drive silent, wrong station, bit rate or identifier mode'
@@ -157,11 +158,17 @@ class StandardSession(Session):
         courier = self._side.courier
         if self.told.ran and not found and courier.asked_at > courier.wrote_at:
             self.told.answered()
+        if self.control is None:
+            return
+        known, asked_at = self._status_slot is None, self._round.status_asked_at
         # a status that was asked for before the word left says nothing about the word
-        if (self.control is not None and self._status_slot is not None
-                and self._round.status_asked_at > self._writer.word_written_at):
+        if self._status_slot is not None and asked_at > self._writer.word_written_at:
+            # an answer that has waited here for a process that stood still is no news
+            known = now - asked_at <= self.retry.timeout + TOLERANCE
             self.gate.status(raws[self._status_slot], now)
             self.control_changed(now)
+        if known and self._side.control_slot is not None:
+            self._writer.write_word(now, known=True)
 
     def _missed(self, reason: str, now: float) -> None:
         if not self.online:
