@@ -34,6 +34,7 @@ class CommandGate:
     :param sample: what is measured, in the order of samples.
     :param leader: the machine of the drive whose control word it obeys, if that is another one.
     :param missed_limit: how many responses in a row may lack the status word of an enabled drive.
+    :ivar obeyed: the machine whose control word the drive obeys; None: there is none.
     """
 
     def __init__(self, presence: Presence, setpoints: Setpoints, control: ControlMachine | None,
@@ -42,7 +43,7 @@ class CommandGate:
         self._presence = presence
         self._setpoints = setpoints
         self._control = control
-        self._obeyed = leader or control
+        self.obeyed = leader or control
         self._report = report
         self._missed_limit = missed_limit
         self._lacking = 0   # responses in a row without a status word
@@ -56,7 +57,7 @@ class CommandGate:
             return DriveState.OFFLINE
         if self._control is not None and self._control.fault:
             return DriveState.FAULT
-        if self._obeyed is not None and not self._obeyed.operating:
+        if self.obeyed is not None and not self.obeyed.operating:
             return DriveState.DISABLED
         return DriveState.NOT_ARMED if self._setpoints.waiting else DriveState.ONLINE
 
@@ -75,7 +76,7 @@ class CommandGate:
 
     def _allow(self) -> None:
         """Take commands while they may move the drive, and only then: otherwise it is neutral."""
-        presence, obeyed = self._presence, self._obeyed
+        presence, obeyed = self._presence, self.obeyed
         self._setpoints.allow(presence.online and presence.active and (
             obeyed is None or obeyed.operating))
 

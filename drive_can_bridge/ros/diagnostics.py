@@ -169,8 +169,11 @@ class DriveReporter:
                     *self._warnings(rejected)]
             return DiagnosticStatus.ERROR, '; '.join(told)
         told = self._warnings(rejected)
-        if session.control is not None and session.control.disregard:
-            return DiagnosticStatus.ERROR, '; '.join((session.control.disregard, *told))
+        obeyed = session.gate.obeyed
+        if obeyed is not None and obeyed.disregard:
+            return DiagnosticStatus.ERROR, '; '.join((obeyed.disregard, *told))
+        if obeyed is not None and obeyed.stopping and obeyed.unconfirmed:
+            told.append(f'told to stop, and still {obeyed.state}')
         if state is DriveState.DISABLED:
             advice = f'disabled: {session.how_to_enable}'
             if now - session.setpoints.ignored_at < COMMANDS_RECENT:

@@ -58,6 +58,16 @@ def test_a_drive_that_runs_on_under_disable_is_an_error(
     assert status['message'].startswith('still enabled: stop it by other means')
 
 
+def test_a_drive_that_still_runs_is_no_disabled_one(
+        bridge: StartBridge, client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    one = bridge(parameters(lift=LIFT))
+    one.online()
+    monkeypatch.setattr(ControlMachine, 'unconfirmed', True)
+    status = client.diagnostics(DRIVE, lambda drive: 'still' in drive['message'])
+    assert (status['level'], status['state']) == ('WARN', 'disabled')
+    assert status['message'].startswith('told to stop, and still ready; disabled: call ')
+
+
 def test_the_control_word_has_no_topic(bridge: StartBridge, client: Client) -> None:
     one = bridge(parameters(
         lift=LIFT, conveyor={**LIFT, 'station': 3, 'profile': 'datamodel_example',
