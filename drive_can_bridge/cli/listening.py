@@ -42,7 +42,7 @@ class Taps:
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             # asked before the queue: what was heard until then is in it, or was taken out of it
-            heard_until = min((tap.heard_until for tap in self.taps), default=time.time())
+            heard_until = min(tap.heard_until for tap in self.taps)
             try:
                 yield self._queue.get(timeout=_PATIENCE)
             except queue.Empty:
