@@ -9,8 +9,10 @@ from bridges import Bridge, CONVEYOR, HASTY, LIFT, parameters, StartBridge
 from clients import Client, wait_until
 from lifecycle_msgs.srv import ChangeState
 import pytest
-from rcl_interfaces.srv import GetParameterTypes, ListParameters
+from rcl_interfaces.srv import GetParameterTypes, ListParameters, SetParameters
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.qos import qos_profile_parameters
+from rclpy.task import Future
 
 from drive_can_bridge.client import find_source, open_drives
 from drive_can_bridge.client.drive import Drive, Enabled, WhichBridge
@@ -162,6 +164,37 @@ def test_services_that_are_found_one_by_one(client: Client) -> None:
     source = find_source(namespace='slow')
     assert list(source.names) == ['conveyor', 'lift']
     source.close()
+
+
+def test_an_answer_that_is_lost_is_asked_for_again(
+        client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(graph, '_AGAIN', 0.3)
+    asked: dict[str, int] = {}
+
+    def answers(name: str) -> Callable[[Any, Any], Any]:
+        async def answer(_: Any, response: Any) -> Any:
+            asked[name] = asked.get(name, 0) + 1
+            if asked[name] == 1:
+                await Future()   # never
+            return response
+        return answer
+    # each call by itself: others do not wait for what has no end
+    services = {'get_parameter_types': GetParameterTypes, **graph.SERVICES}
+    for name, kind in services.items():
+        forgets = name in ('list_parameters', 'set_parameters')
+        client.node.create_service(
+            kind, f'/forgetful/{name}', answers(name) if forgets else lambda _, given: given,
+            qos_profile=qos_profile_parameters, callback_group=ReentrantCallbackGroup())
+    here = graph.Graph()
+    try:
+        here.call('/forgetful', 'list_parameters', ListParameters.Request())
+        assert asked['list_parameters'] == 2
+        # what changes something is not done twice
+        with pytest.raises(graph.NoAnswer, match='does not answer for 1 s'):
+            here.call('/forgetful', 'set_parameters', SetParameters.Request(), 1.0)
+        assert asked['set_parameters'] == 1
+    finally:
+        here.close()
 
 
 def test_where_one_was_slow_to_be_found_another_one_may_be_as_slow(client: Client) -> None:

@@ -34,6 +34,8 @@ _GREETING = 0.1
 _FIND_TIMEOUT = 10.0
 #: s that an answer may take: many reads that nobody answers are slow
 _CALL_TIMEOUT = 120.0
+#: s after which a question that changes nothing is asked again: DDS may lose an answer
+_AGAIN = 30.0
 #: s without the server until it has gone
 _GONE = 2.0
 
@@ -102,20 +104,24 @@ class Graph:
         self._acquaint(node)
         if not self.wait(client.service_is_ready, _FIND_TIMEOUT):
             raise NoAnswer(f'{node} does not offer {service}')
-        future = client.call_async(request)
-        deadline = time.monotonic() + timeout
-        seen = time.monotonic()
-        while not self.wait(future.done, 4 * _SLICE):
-            now = time.monotonic()
-            if client.service_is_ready():
-                seen = now
-            if now - seen > _GONE or now > deadline:
-                client.remove_pending_request(future)
-                self._known.discard(node)
-                gone = now - seen > _GONE
-                raise NoAnswer(f'{node} has gone' if gone
-                               else f'{node} does not answer for {timeout:g} s')
-        return future.result()
+        futures = [client.call_async(request)]
+        began = seen = asked = time.monotonic()
+        try:
+            while not self.wait(lambda: any(each.done() for each in futures), 4 * _SLICE):
+                now = time.monotonic()
+                if client.service_is_ready():
+                    seen = now
+                if now - seen > _GONE or now - began > timeout:
+                    self._known.discard(node)
+                    raise NoAnswer(f'{node} has gone' if now - seen > _GONE
+                                   else f'{node} does not answer for {timeout:g} s')
+                if service != WRITING and now - asked > _AGAIN:
+                    futures.append(client.call_async(request))
+                    asked = now
+        finally:
+            for each in futures:
+                client.remove_pending_request(each)
+        return next(each.result() for each in futures if each.done())
 
     def statuses(self, taken: Callable[[Any], bool], timeout: float) -> bool:
         """
