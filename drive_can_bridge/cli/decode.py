@@ -53,7 +53,8 @@ def define(parser: ArgumentParser) -> None:
     parser.add_argument('--csv', metavar='FILE', type=Path,
                         help='write the values of the exchange, a column each, instead of lines')
     parser.add_argument('--plot', metavar=('FILE.png', 'DRIVE.NAME'), nargs='+',
-                        help='draw these values (default: all actual values), instead of lines')
+                        help='draw these values (default: all actual values), instead of lines, '
+                             'in the format of the suffix (.png, .svg, .pdf, ...)')
     parser.add_argument('--summary', action='store_true',
                         help='for each drive exchanges, missed ones, period, latency, refusals; '
                              'for each bus its load; instead of lines')

@@ -111,19 +111,23 @@ class Scout(ABC):
 
     def _answer(self, station: int, text: str, now: float,
                 fits: Callable[[bytes], bool] = lambda request: True, *,
-                service: int = 0) -> bool:
+                service: int = 0, certainty: Certainty = Certainty.LIKELY) -> bool:
         """
         Note a frame of a station if it follows a request that it fits to; tell whether it does.
 
-        An answer to a question that is not our own may be chance: it takes two.
+        An answer to a question that is not our own may be chance: it takes two. One that nobody
+        but the station asked can give, to a question of ours, may take its time.
         """
         asked = self._asked.pop((station, service), None)
-        if asked is None or now - asked[0] > ANSWER_TIME or not fits(asked[1]):
+        if asked is None or not fits(asked[1]):
             return False
-        if not asked[2]:
+        asked_at, _, ours = asked
+        if now - asked_at > ANSWER_TIME and not (ours and self.unmistakable):
+            return False
+        if not ours:
             self._pairs[station] += 1
             if self._pairs[station] < 2:
                 return True
             self.master = f'requests to station {station} of {self.protocol}'
-        self._see(station, text, Certainty.LIKELY)
+        self._see(station, text, certainty)
         return True

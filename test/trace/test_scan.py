@@ -4,6 +4,7 @@
 from collections import deque
 import json
 from pathlib import Path
+from random import Random
 
 from foreign_devices import cannord, canopen, datamodel_extended, datamodel_standard, Device
 import pytest
@@ -16,7 +17,9 @@ from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import TransportError
 from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.protocols.datamodel.extended import DIR
 from drive_can_bridge.protocols.families import FAMILIES
+from drive_can_bridge.protocols.scout import Certainty, Scout
 from drive_can_bridge.resources import config_file
 from drive_can_bridge.simulation.simulation import Simulation
 from drive_can_bridge.transport.end_point import EndPoint
@@ -132,12 +135,21 @@ def test_drives_are_found() -> None:
     assert not survey.master
 
 
-def heard(protocol: str, *frames: tuple[float, str]) -> list[str]:
+def frame_of(text: str) -> Frame:
+    """Return a frame as candump writes it: eight digits are an identifier of 29 bits."""
+    identifier, _, data = text.partition('#')
+    return Frame(int(identifier, 16), bytes.fromhex(data), len(identifier) == 8)
+
+
+def scouted(protocol: str, *frames: tuple[float, str]) -> Scout:
     scout = FAMILIES[protocol].make_scout()
     for time, text in frames:
-        identifier, _, data = text.partition('#')
-        scout.hear(Frame(int(identifier, 16), bytes.fromhex(data), False), time)
-    return [sighting.text for sighting in scout.sightings.values()]
+        scout.hear(frame_of(text), time)
+    return scout
+
+
+def heard(protocol: str, *frames: tuple[float, str]) -> list[str]:
+    return [sighting.text for sighting in scouted(protocol, *frames).sightings.values()]
 
 
 def test_one_pair_of_others_may_be_chance() -> None:
@@ -154,6 +166,81 @@ def test_one_pair_of_others_may_be_chance() -> None:
     # each service has a request under way
     assert heard('cannord', (0.0, task[1]), request, answer, (0.02, response[1])) == [
         'answers to tasks for P102']
+
+
+#: answers of stations 42 and 1
+ANSWER_42 = '1548B4D1#0102A5A5A5A5A5A5'
+ANSWER_1 = '103FFFF0#0102A5A5A5A5A5A5'
+
+
+@pytest.mark.parametrize('text', [
+    ANSWER_42, ANSWER_1,
+    '18E8FF01#01FFFFFFFFEAFE00',    # an acknowledgement of J1939
+    '104007A4#0032003300000000',    # a request map
+    '104007E4#00D300D100000000',
+    '585#4303160120010030',         # a mailbox
+    '485#C7010025',
+])
+def test_what_nobody_asked_for_makes_no_drive(text: str) -> None:
+    for protocol in FAMILIES:
+        scout = scouted(protocol, *((0.01 * place, text) for place in range(5)))
+        assert not scout.sightings and not scout.master
+        assert not any(scout.settings(station).get('remarks') for station in (1, 2, 42))
+
+
+def test_noise_makes_no_drive() -> None:
+    noise = Random(1)
+    scout = FAMILIES['datamodel_extended'].make_scout()
+    for place in range(3000):
+        scout.hear(Frame(noise.getrandbits(29), noise.randbytes(8), True), place / 2000)
+    assert not scout.sightings
+
+
+def test_one_frame_before_all_stations_are_asked_makes_no_drive() -> None:
+    bench = Bench(datamodel_extended(3))
+    survey = bench.survey()
+    bench.answers += frame_of(ANSWER_42), frame_of(ANSWER_1)
+    survey.listen(0.5)
+    survey.ask('datamodel_extended')
+    assert [(each.station, each.certainty) for each in survey.sightings] == [
+        (3, Certainty.CERTAIN)]
+
+
+@pytest.mark.parametrize(('request_', 'answer', 'text', 'certainty'), [
+    ('0548B4D1#0000000000000000', ANSWER_42, 'answers to reads of P35661', Certainty.LIKELY),
+    ('003FFFF0#0000000000000000', ANSWER_1, 'cyclic responses', Certainty.CERTAIN),
+    ('004007A4#0000000000000000', '104007A4#0032003300000000', 'request map 50 51',
+     Certainty.CERTAIN),
+])
+def test_a_29_bit_drive_of_another_master(request_: str, answer: str, text: str,
+                                          certainty: Certainty) -> None:
+    pair = (0.0, request_), (0.01, answer)
+    again, late = ((0.5, request_), (0.51, answer)), ((0.5, request_), (0.7, answer))
+    other = (0.5, '0548B4E1#0000000000000000')
+    for frames in (pair, (*pair, pair[1]), (*pair, *late), (*pair, other, again[1])):
+        assert heard('datamodel_extended', *frames) == []
+    scout = scouted('datamodel_extended', *pair, *again)
+    [sighting] = scout.sightings.values()
+    assert sighting[2:] == (text, certainty)
+    assert scout.master == f'requests to station {sighting.station} of datamodel_extended'
+
+
+def test_a_mailbox_that_another_master_asks_for() -> None:
+    pair = (0.0, '605#4003160100000000'), (0.01, '585#4303160120010030')
+    other = (0.02, '605#4003160000000000')
+    assert heard('canopen_pkw', *pair) == heard('canopen_pkw', *pair, other, pair[1]) == []
+    scout = scouted('canopen_pkw', *pair, *pair)
+    assert [sighting.certainty for sighting in scout.sightings.values()] == [Certainty.CERTAIN]
+    # whatever it is, it is there: nothing is asked that it might take for a command
+    assert list(scouted('canopen_pkw', pair[1]).nodes) == [5]
+
+
+def test_a_slow_answer_to_a_question_of_ours_is_one() -> None:
+    scout = FAMILIES['datamodel_extended'].make_scout()
+    scout.asked(frame_of('004007A4#0000000000000000'), 0.0)
+    scout.hear(frame_of('104007A4#0032003300000000'), 0.25)
+    assert [sighting.certainty for sighting in scout.sightings.values()] == [Certainty.CERTAIN]
+    assert not scout.master
 
 
 @pytest.mark.parametrize('protocol', list(FAMILIES))
@@ -298,6 +385,7 @@ def test_what_is_written_is_valid_whatever_the_maps(
         tmp_path: Path, request_map: str, response_map: str, unfit: list[str]) -> None:
     scout = FAMILIES['datamodel_extended'].make_scout()
     for identifier, data in ((0x104007A4, request_map), (0x104007E4, response_map)):
+        scout.asked(Frame(identifier & ~DIR, bytes(8), True), 1.0)
         scout.hear(Frame(identifier, bytes.fromhex(data), True), 1.0)
     output = tmp_path / 'found.yaml'
     write_parameter_file(output, BusConfiguration('main', 'virtual', 'a', 500_000),

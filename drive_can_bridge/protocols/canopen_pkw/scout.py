@@ -39,8 +39,12 @@ class CanopenScout(Scout):
                             for node in range(1, network.NODE_MAX + 1)]
 
     def hear_request(self, frame: Frame, now: float) -> None:
-        if frame.identifier & 0x780 == network.REQUEST_BASE:
-            self._request(frame.identifier & 0x7F, frame.data, now)
+        base, node = frame.identifier & 0x780, frame.identifier & 0x7F
+        if base == network.REQUEST_BASE:
+            self._request(node, frame.data, now)
+        elif base == sdo.REQUEST_BASE:
+            self._request(node, frame.data, now,
+                          service=int.from_bytes(frame.data[1:4], 'little'))
 
     def hear(self, frame: Frame, now: float) -> None:
         if frame.extended:
@@ -55,11 +59,12 @@ class CanopenScout(Scout):
             elif base == network.HEARTBEAT_BASE:
                 self._fact(node, 'heartbeat', network.decode_heartbeat(frame.data).text)
             elif base == sdo.RESPONSE_BASE:
-                self._take_upload(node, sdo.decode_upload(frame.data))
+                self._take_upload(node, sdo.decode_upload(frame.data), now)
             elif base == sdo.REQUEST_BASE and len(frame.data) == 8:
+                self.hear_request(frame, now)
                 self.master = f'SDO requests to node {node}'
             elif base == network.REQUEST_BASE and len(frame.data) == 8:
-                self._request(node, frame.data, now)
+                self.hear_request(frame, now)
             elif base == network.RESPONSE_BASE and len(frame.data) == 8:
                 if self._answer(node, 'PKW answers', now, lambda request: _repeats(
                         request, frame.data)) and node in self.sightings:
@@ -67,7 +72,7 @@ class CanopenScout(Scout):
         except RemoteProtocolError:
             return
 
-    def _take_upload(self, node: int, upload: sdo.Uploaded) -> None:
+    def _take_upload(self, node: int, upload: sdo.Uploaded, now: float) -> None:
         (index, subindex), value = upload
         if index == sdo.DEVICE_TYPE:
             self._fact(node, 'device type', 'refused' if value is None else f'{value:08X}h')
@@ -78,8 +83,11 @@ class CanopenScout(Scout):
         elif index == sdo.IDENTITY:
             self._fact(node, 'vendor' if subindex == 1 else 'product', f'{value:X}h')
         elif index == sdo.RPDO4_MAPPING:
-            self._fact(node, 'RPDO4 maps', f'{value >> 16:04X}h')
-            if value >> 16 == _MAILBOX:
+            told = f'{value >> 16:04X}h'
+            self._fact(node, 'RPDO4 maps', told)
+            if value >> 16 == _MAILBOX and self._answer(
+                    node, told, now, service=_service(index, subindex)) and (
+                    node in self.sightings):
                 self._mailboxes.add(node)
                 self._fact(node, 'mailbox', 'yes')
                 self._questions.append(sdo.encode_upload(node, sdo.RPDO4, 1))
@@ -99,6 +107,11 @@ class CanopenScout(Scout):
             self._see(node, told, Certainty.CERTAIN)
         elif facts.get('PKW'):
             self._see(node, told, Certainty.LIKELY)
+
+
+def _service(index: int, subindex: int) -> int:
+    """Return the service that an object is; PKW is 0. Requests hold it in bytes 1 to 3."""
+    return subindex << 16 | index
 
 
 def _repeats(request: bytes, answer: bytes) -> bool:

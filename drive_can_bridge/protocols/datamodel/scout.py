@@ -38,20 +38,29 @@ class ExtendedScout(Scout):
             extended.encode_read_request(station, REQUEST_MAP_BASE, extended.SLOTS)
             for station in range(1, extended.STATION_MAX + 1)]
 
+    def hear_request(self, frame: Frame, now: float) -> None:
+        # its answer repeats the identifier, but for the direction
+        self._request(extended.station_of(frame.identifier), frame.data, now,
+                      service=frame.identifier)
+
     def hear(self, frame: Frame, now: float) -> None:
         try:
             telegram = extended.decode(frame)
         except RemoteProtocolError:
             return
         station = extended.station_of(frame.identifier)
+        service = frame.identifier & ~extended.DIR
         if isinstance(telegram, extended.CyclicResponse):
-            self._see(station, 'cyclic responses', Certainty.CERTAIN)
+            self._answer(station, 'cyclic responses', now, service=service,
+                         certainty=Certainty.CERTAIN)
         elif isinstance(telegram, extended.ReadResponse):
-            if telegram.number in (REQUEST_MAP_BASE, RESPONSE_MAP_BASE):
+            text = f'answers to reads of P{telegram.number}'
+            if self._answer(station, text, now, service=service) and (
+                    telegram.number in (REQUEST_MAP_BASE, RESPONSE_MAP_BASE)):
                 self._take_map(station, telegram.number, telegram.words)
-            else:
-                self._see(station, f'answers to reads of P{telegram.number}', Certainty.LIKELY)
         else:
+            if not isinstance(telegram, extended.Write):    # which nobody answers
+                self.hear_request(frame, now)
             self.master = f'requests to station {station} of {self.protocol}'
 
     def _take_map(self, station: int, base: int, words: tuple[int, ...]) -> None:
@@ -63,7 +72,8 @@ class ExtendedScout(Scout):
                 station, RESPONSE_MAP_BASE, extended.SLOTS))
         told = ', '.join(f'{name} map {_numbers(maps[key])}' for key, name in (
             (REQUEST_MAP_BASE, 'request'), (RESPONSE_MAP_BASE, 'response')) if key in maps)
-        self._see(station, told or 'answers to reads of its maps', Certainty.CERTAIN)
+        if station in self.sightings:
+            self._see(station, told or 'answers to reads of its maps', Certainty.CERTAIN)
 
     def settings(self, station: int) -> dict[str, Any]:
         maps = self.maps.get(station, {})
