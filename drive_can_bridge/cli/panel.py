@@ -6,6 +6,7 @@ A ROS client and a web server, nothing of a bridge. It never moves anything.
 """
 
 import argparse
+from collections.abc import Callable
 import sys
 
 from drive_can_bridge.cli.arguments import namespace, whole
@@ -47,36 +48,50 @@ def run(args: argparse.Namespace) -> int:
     :raises DriveCanError: no ROS, no NiceGUI, the port is taken.
     """
     with SignalWatcher(keep=True) as watcher:
-        try:
-            from drive_can_bridge.ros.monitor.client import MonitorClient
-            from drive_can_bridge.ros.monitor.operations import Operations
-        except ImportError as error:
-            raise DriveCanError(what_is_missing(COMMAND, error)) from error
-        try:
-            from drive_can_bridge.panel.access import Access, is_loopback, Role
-            from drive_can_bridge.panel.feed import Feed
-            from drive_can_bridge.panel.pages import application, Setting
-            from drive_can_bridge.panel.server import address, listen, serve
-        except ImportError as error:
-            raise DriveCanError(_MISSING.format(module=error.name)) from error
-        listener = listen(args.host, args.port)
-        access = Access(host=args.host, port=listener.getsockname()[1])
-        model = Model(args.namespace)
-        source = MonitorClient(model, budget=BUDGET)
-        place = environment.in_words()
-
-        def ready() -> None:
-            print(f'{COMMAND}: {place}', file=sys.stderr)
-            if not is_loopback(args.host):
-                print(f'{COMMAND}: listens on {args.host}: whoever reaches this machine and has a '
-                      f'token gets in, and whoever sees the traffic sees the token (no TLS); '
-                      f'docs/security.md says how to do better', file=sys.stderr)
-            for role in (Role.OPERATOR, Role.VIEWER):
-                print(f'{role.value}: {address(listener, access.tokens[role])}', flush=True)
-        try:
-            app = application(Feed(source, Operations(source.node), model), access,
-                              Setting(place, args.allow_writes))
-            serve(app, listener, ended=lambda: watcher.signalled, ready=ready)
-        finally:
-            source.close()
+        if not _serve(args, lambda: watcher.signalled):
+            print(f'{COMMAND}: ended before it served a page', file=sys.stderr)
         leave(watcher.exit_code(0))
+
+
+def _serve(args: argparse.Namespace, ended: Callable[[], bool]) -> bool:
+    """Serve until the end; return whether the addresses were told before it came."""
+    try:
+        from drive_can_bridge.ros.monitor.client import MonitorClient
+        from drive_can_bridge.ros.monitor.operations import Operations
+    except ImportError as error:
+        raise DriveCanError(what_is_missing(COMMAND, error)) from error
+    if ended():     # what follows takes seconds, too
+        return False
+    try:
+        from drive_can_bridge.panel.access import Access, is_loopback, Role
+        from drive_can_bridge.panel.feed import Feed
+        from drive_can_bridge.panel.pages import application, Setting
+        from drive_can_bridge.panel.server import address, listen, serve
+    except ImportError as error:
+        raise DriveCanError(_MISSING.format(module=error.name)) from error
+    if ended():
+        return False
+    listener = listen(args.host, args.port)
+    access = Access(host=args.host, port=listener.getsockname()[1])
+    model = Model(args.namespace)
+    source = MonitorClient(model, budget=BUDGET)
+    place = environment.in_words()
+    served = False
+
+    def ready() -> None:
+        nonlocal served
+        served = True
+        print(f'{COMMAND}: {place}', file=sys.stderr)
+        if not is_loopback(args.host):
+            print(f'{COMMAND}: listens on {args.host}: whoever reaches this machine and has a '
+                  f'token gets in, and whoever sees the traffic sees the token (no TLS); '
+                  f'docs/security.md says how to do better', file=sys.stderr)
+        for role in (Role.OPERATOR, Role.VIEWER):
+            print(f'{role.value}: {address(listener, access.tokens[role])}', flush=True)
+    try:
+        app = application(Feed(source, Operations(source.node), model), access,
+                          Setting(place, args.allow_writes))
+        serve(app, listener, ended=ended, ready=ready)
+    finally:
+        source.close()
+    return served

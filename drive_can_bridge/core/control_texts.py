@@ -61,10 +61,14 @@ def stuck_text(reports: StatusReports, table: ControlTable, wording: Wording | N
         text + wording.hint(reports.telling))
 
 
+#: how a refusal begins where a profile has no quick stop; others tell it by this
+NO_QUICK_STOP = 'no quick stop: '
+
+
 def no_word_text(action: ControlAction) -> str:
     """Say that a profile lacks the word for an action, and what there is instead."""
     if action is ControlAction.QUICK_STOP:
-        return ('no quick stop: the profile has no quick_stop word; '
+        return (f'{NO_QUICK_STOP}the profile has no quick_stop word; '
                 '~/enable false disables the drive')
     return 'no fault reset: the profile has no reset_fault word'
 

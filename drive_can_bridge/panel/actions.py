@@ -60,19 +60,19 @@ class Actions:
         async def action(request: Request) -> Response:
             _operator(request, stop.value.replace('_', ' '))
             wanted = (await _fields(request)).get('drive')
-            names = ([drive.name for drive in self._feed.snapshot.drives
-                      if has_control(drive)]
-                     if wanted == ALL else [self._drive(wanted).name])
-            if not names:
-                return _said(Outcome(False, 'no drive here has a control word'))
-            outcomes = await asyncio.gather(*(self._feed.stop(name, stop) for name in names))
             if wanted != ALL:
-                return _said(outcomes[0])
-            told = [f'{name[1:]}: {outcome.text or "done"}'
-                    for name, outcome in zip(names, outcomes)]
+                return _said(await self._feed.stop(self._drive(wanted).name, stop))
+            drives = self._feed.snapshot.drives
+            controlled = [drive for drive in drives if has_control(drive)]
+            if not controlled:
+                return _said(Outcome(False, 'no drive here has a control word'))
+            outcomes = await asyncio.gather(
+                *(self._feed.stop_as_it_can(drive, stop) for drive in controlled))
+            told = [f'{drive.name[1:]}: {outcome.text or "done"}'
+                    for drive, outcome in zip(controlled, outcomes)]
             # whoever stops all must not think that those stand still
             told += [f'{drive.name[1:]}: not told, it has no control word'
-                     for drive in self._feed.snapshot.drives if not has_control(drive)]
+                     for drive in drives if not has_control(drive)]
             return _said(Outcome(all(outcome.success for outcome in outcomes), '\n'.join(told)))
         return _answering(action)
 

@@ -11,7 +11,7 @@ from drive_can_bridge.monitor.reports import Level
 from drive_can_bridge.monitor.snapshot import DriveSnapshot, Snapshot, Times
 from drive_can_bridge.panel.access import Role
 from drive_can_bridge.panel.chart import Chart
-from drive_can_bridge.panel.feed import Feed, has_control, View
+from drive_can_bridge.panel.feed import Feed, stops, View
 from drive_can_bridge.panel.parameter_table import ParameterTable
 from drive_can_bridge.panel.parts import (
     box, button, Changing, in_script, level_class, Look, place_in_words, stop_buttons, Values,
@@ -48,7 +48,7 @@ class DrivePage:
         self._gone.set_visibility(not there)
         if drive is None or not there:
             return
-        content = self._content.of(('drive', has_control(drive)))
+        content = self._content.of(('drive', stops(drive)))
         content.show(drive, snapshot)
 
     def _make(self, _: Any) -> '_Content':
@@ -69,8 +69,7 @@ class _Content:
                 self._state = words('', 'chip state')
                 self._control = words('')
                 box('space')
-                if has_control(drive):
-                    stop_buttons(drive, role)
+                stop_buttons(drive, role)
             self._advice = words('', 'advice')
             self._place = words('', 'dim')
         with ui.tabs().props('no-caps').classes('tabs') as tabs:

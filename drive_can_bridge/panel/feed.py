@@ -11,8 +11,9 @@ import logging
 import time
 from typing import TypeVar
 
+from drive_can_bridge.core.control_texts import NO_QUICK_STOP as REFUSED
 from drive_can_bridge.core.parameters import Value
-from drive_can_bridge.monitor.drive import CONTROL_STATE
+from drive_can_bridge.monitor.drive import CONTROL_STATE, NO_QUICK_STOP, QUICK_STOP
 from drive_can_bridge.monitor.model import Model
 from drive_can_bridge.monitor.snapshot import DriveSnapshot, Snapshot
 from drive_can_bridge.monitor.source import Operations, Outcome, Source, Stop
@@ -120,6 +121,17 @@ class Feed:
         return await self._told(lambda done: self._operations.stop(
             drive, stop, done, time.monotonic()))
 
+    async def stop_as_it_can(self, drive: DriveSnapshot, stop: Stop) -> Outcome:
+        """Stop a drive, by ``disable`` if it has no quick stop; return what became of it."""
+        if stop in stops(drive):
+            outcome = await self.stop(drive.name, stop)
+            # a bridge that does not say beforehand what it has refuses
+            if outcome.success or not outcome.text.startswith(REFUSED):
+                return outcome
+        outcome = await self.stop(drive.name, Stop.DISABLE)
+        return Outcome(outcome.success,
+                       f'has no quick stop, told to disable: {outcome.text or "done"}')
+
     async def write(self, drive: str, name: str, value: Value) -> Outcome:
         """Write a parameter; return what became of it."""
         return await self._told(lambda done: self._operations.write(
@@ -147,3 +159,12 @@ class Feed:
 def has_control(drive: DriveSnapshot) -> bool:
     """Tell whether a drive has a control word."""
     return CONTROL_STATE in drive.facts
+
+
+def stops(drive: DriveSnapshot) -> tuple[Stop, ...]:
+    """Return what ends the movement of a drive, as far as its bridge says."""
+    if not has_control(drive):
+        return ()
+    if drive.facts.get(QUICK_STOP) == NO_QUICK_STOP:
+        return (Stop.DISABLE,)
+    return (Stop.QUICK_STOP, Stop.DISABLE)

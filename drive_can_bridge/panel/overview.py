@@ -10,7 +10,7 @@ from nicegui import ui
 from drive_can_bridge.monitor.reports import Level
 from drive_can_bridge.monitor.snapshot import BusSnapshot, DriveSnapshot, Snapshot
 from drive_can_bridge.panel.access import Role
-from drive_can_bridge.panel.feed import has_control
+from drive_can_bridge.panel.feed import stops
 from drive_can_bridge.panel.parts import (
     box, Changing, level_class, Look, marked, place_in_words, stop_buttons, Values, words,
 )
@@ -37,7 +37,7 @@ class Overview:
         buses = self._buses.of(tuple((bus.bridge, bus.name) for bus in snapshot.buses))
         for shown, bus in zip(buses, snapshot.buses):
             shown.show(bus)
-        cards = self._cards.of(tuple((drive.name, drive.label, has_control(drive))
+        cards = self._cards.of(tuple((drive.name, drive.label, stops(drive))
                                      for drive in snapshot.drives))
         for card, drive in zip(cards, snapshot.drives):
             card.show(drive)
@@ -83,8 +83,7 @@ class _Card:
             self._values = Values()
             with box('foot'):
                 self._place = words('', 'dim')
-                if has_control(drive):
-                    stop_buttons(drive, role)
+                stop_buttons(drive, role)
 
     def show(self, drive: DriveSnapshot) -> None:
         self._look.set(level_class(drive.level))

@@ -33,6 +33,9 @@ _HEAD = ''.join((
     f'<script src="/panel/panel.js?{__version__}"></script>'))
 _TITLE = 'drive_can panel'
 _PAGES = {'/': 'Drives', '/log': 'Log'}
+#: what the button does, said beside it
+_STOP_ALL = ('Quick stop of every drive that has one; other drives with a control word are '
+             'disabled; drives with none are named, and told nothing')
 #: pages at once for each role, so that viewers do not keep operators out: each takes memory until
 #: its browser has gone for a while
 PAGES_MAX = 20
@@ -122,7 +125,8 @@ def _frame(here: str, role: Role) -> Element:
         box('space')
         if role is Role.OPERATOR:
             button('Quick stop all', 'stop',
-                   f"panel.stop('quick_stop', {in_script(ALL)}, 'all drives')")
+                   f"panel.stop('quick_stop', {in_script(ALL)}, 'all drives')"
+                   ).props(f'title="{_STOP_ALL}"')
     return box('page')
 
 

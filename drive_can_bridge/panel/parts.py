@@ -17,6 +17,7 @@ from drive_can_bridge.monitor.reports import Level
 from drive_can_bridge.monitor.snapshot import DriveSnapshot, Shown
 from drive_can_bridge.monitor.source import Stop
 from drive_can_bridge.panel.access import Role
+from drive_can_bridge.panel.feed import stops
 
 _STOPS = {Stop.QUICK_STOP: ('Quick stop', 'stop'), Stop.DISABLE: ('Disable', 'danger')}
 
@@ -100,9 +101,10 @@ def in_script(value: Any) -> str:
 
 
 def stop_buttons(drive: DriveSnapshot, role: Role) -> None:
-    """Make the buttons that stop a drive, for an operator."""
+    """Make the buttons that stop a drive, those that it has, for an operator."""
     if role is Role.OPERATOR:
-        for stop, (text, classes) in _STOPS.items():
+        for stop in stops(drive):
+            text, classes = _STOPS[stop]
             button(text, classes, f'panel.stop({in_script(stop.value)}, {in_script(drive.name)}, '
                                   f'{in_script(drive.label)})')
 

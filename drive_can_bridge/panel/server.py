@@ -130,9 +130,10 @@ def listen(host: str, port: int) -> socket.socket:
 def serve(app: ASGIApp, listener: socket.socket, *, ended: Callable[[], bool],
           ready: Callable[[], None]) -> None:
     """
-    Serve until the end.
+    Serve until the end; then the port is closed, however far this had come.
 
-    :param ready: is told when the first request can come.
+    :param ended: tells whether this is to end.
+    :param ready: is told when the first request can come, unless it is to end by then.
     """
     _make_room()
     handler = logging.StreamHandler()
@@ -156,12 +157,12 @@ def serve(app: ASGIApp, listener: socket.socket, *, ended: Callable[[], bool],
         task = asyncio.create_task(server.serve(sockets=[listener]))
         told = False
         while not task.done():
-            await asyncio.sleep(_LOOK_PERIOD)
-            if server.started and not told:
-                told = True
-                ready()
             if ended():
                 server.should_exit = True
+            elif server.started and not told:
+                told = True
+                ready()
+            await asyncio.sleep(_LOOK_PERIOD)
         await task
     asyncio.run(run())
 

@@ -24,5 +24,5 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Run]:
 
 @pytest.fixture(scope='module')
 def site(run: Run, tmp_path_factory: pytest.TempPathFactory) -> Site:
-    """Return a panel that may write, of a bridge with two drives."""
+    """Return a panel that may write, of a bridge with three drives."""
     return Site(run, Path(tmp_path_factory.mktemp('site')), '--allow-writes')

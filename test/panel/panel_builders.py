@@ -42,6 +42,25 @@ FILE = """
         missed_limit: 1000
         cyclic_request: [control_word, speed_setpoint]
         cyclic_response: [status_word, actual_speed]
+      press:
+        bus: main
+        protocol: datamodel_extended
+        station: 3
+        profile: without_quick_stop
+        missed_limit: 1000
+        cyclic_request: [control_word]
+        cyclic_response: [status_word]
+"""
+WITHOUT_QUICK_STOP = """
+description: Can only be enabled and disabled
+protocols: [datamodel_extended]
+parameters:
+  control_word: {number: 52, type: uint16, access: rw, storage: ram}
+  status_word: {number: 211, type: uint16, access: ro, bits: {ready: 0, enabled: 1}}
+control:
+  parameter: control_word
+  words: {disable: 0x0000, enable: 0x0001}
+  status: {parameter: status_word, ready: [0x0001, 0x0001], enabled: [0x0002, 0x0002]}
 """
 PROFILE = """
 description: A profile whose author means no good
@@ -93,6 +112,7 @@ class Site:
         self._file = directory / 'drives.yaml'
         self._file.write_text(FILE.format(directory=directory), encoding='utf-8')
         self.write_profile()
+        (directory / 'without_quick_stop.yaml').write_text(WITHOUT_QUICK_STOP, encoding='utf-8')
         self._links = directory / 'links'
         #: as candump writes it
         self.frame_log = directory / 'frames.log'

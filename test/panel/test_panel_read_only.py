@@ -35,7 +35,7 @@ def test_nothing_is_written_and_stops_are_always_there(run: Run, tmp_path: Path)
             assert 'nobody' in said['text']
     site.bridge = site.start_bridge()
     # what is sent before is not heard, and waited for in vain
-    wait_for(lambda: 'active: 2 drives' in site.bridge.errors, 'the bridge')
+    wait_for(lambda: 'active: 3 drives' in site.bridge.errors, 'the bridge')
     wait_for(lambda: site.do('disable', 'operator', {'drive': '/lift'}).said['success'],
              'the bridge that is back')
     site.check_alive()
