@@ -166,12 +166,15 @@ class Restorer:
             outcome = heard[0] if heard else WriteOutcome(name, False, reason='interrupted')
         if outcome.ok:
             self._reasons.pop(name, None)
-            if name not in self._result.written:
-                self._result.written.append(name)
+            self._note_written(name)
         else:
             self._reasons[name] = outcome.reason
         self._told(outcome)
         return outcome
+
+    def _note_written(self, name: str) -> None:
+        if name not in self._result.written:
+            self._result.written.append(name)
 
     def _differing(self, changes: Sequence[Change]) -> list[Change]:
         outcomes = self._drive.read(*(change.name for change in changes))
@@ -233,6 +236,8 @@ class Restorer:
             return ''
         written = self._write_step(name, value_of_word(parameter, new))
         if written.ok:
+            if any((name, new) == (change.name, change.word) for change in self._plan.changes):
+                self._note_written(name)    # as it is to be, if nothing else was done
             return ''
         self._lost = parameter.readable and not self._drive.read(name)[name].ok
         return written.reason
@@ -262,8 +267,8 @@ class Restorer:
         for name in names:
             outcome, word = outcomes[name], self._plan.words[name]
             if _is(outcome, word):
-                if name in changed and name not in self._result.written:
-                    self._result.written.append(name)
+                if name in changed:
+                    self._note_written(name)
             else:
                 reason = self._reasons.get(name, '') or outcome.reason
                 self._result.wrong.append(

@@ -38,6 +38,18 @@ def whole(low: int, high: int) -> Callable[[str], int]:
     return read
 
 
+def output(text: str) -> str:
+    """Read the name of a file, or directory, that is written; its last slash matters to some."""
+    if text in ('', '-'):
+        raise ArgumentTypeError(f'{text!r} names no file')
+    return text
+
+
+def output_path(text: str) -> Path:
+    """Read the same as a path."""
+    return Path(output(text))
+
+
 def namespace(text: str) -> str:
     """Read ``/cell1``, or ``cell1``; '' for the root."""
     name = f'/{text.strip("/")}'

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from drive_can_bridge.backup.document import head_of, written
 from drive_can_bridge.backup.settings import settings_of
+from drive_can_bridge.cli.arguments import output
 from drive_can_bridge.cli.command import complain, FAILED, say, WrongUsage
 from drive_can_bridge.cli.completion import complete_drives
 from drive_can_bridge.cli.drives import (
@@ -34,7 +35,7 @@ def define(parser: ArgumentParser) -> None:
         'Exit code 0: written. 1: something could not be read or written, and there is no '
         'file. 2: wrong usage, or a file exists and nobody can be asked. --json, for each '
         'drive: drive, file, settings (how many), identity, left_out (parameter, reason).')
-    parser.add_argument('-o', '--output', metavar='FILE', required=True,
+    parser.add_argument('-o', '--output', metavar='FILE', type=output, required=True,
                         help='where it goes; for several drives DIR/, a file each')
     parser.add_argument('--partial', action='store_true',
                         help='write the file although parameters could not be read; it lists them '
@@ -67,20 +68,20 @@ def run(args: Namespace) -> int:
     return FAILED if None in texts.values() else 0
 
 
-def _files(output: str, names: Sequence[str]) -> dict[str, Path]:
+def _files(wanted: str, names: Sequence[str]) -> dict[str, Path]:
     """
     Return where the backup of each drive goes.
 
     :raises WrongUsage: one file for several drives.
     :raises OSError: nothing can be written there.
     """
-    path = Path(output)
-    if output.endswith('/') or path.is_dir():
+    path = Path(wanted)
+    if wanted.endswith('/') or path.is_dir():
         folder, files = path, {name: path / f'{name}{SUFFIX}' for name in names}
         above = folder.parent if not folder.exists() else folder
     elif len(names) > 1:
         raise WrongUsage(f'{len(names)} drives ({", ".join(names)}) do not go into one file: '
-                         f'write -o {output}/')
+                         f'write -o {wanted}/')
     else:
         above, files = path.parent, {names[0]: path}
     if not above.is_dir():

@@ -86,6 +86,9 @@ def run(args: Namespace) -> int:
     taken = _written_over(args)
     if taken is not None:
         raise WrongUsage(f'{taken}: is read, and would be written over, choose another name')
+    if args.plot and not Path(args.plot[0]).suffix:
+        raise WrongUsage(f'--plot {args.plot[0]}: its suffix says what is written: .png, .svg, '
+                         '.pdf, …')
     if not args.live and args.file != '-':      # before a file is replaced
         try:
             check_readable(Path(args.file))

@@ -5,6 +5,7 @@ from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter, SUP
 from pathlib import Path
 from typing import Any
 
+from drive_can_bridge.cli.arguments import output_path
 from drive_can_bridge.profiles.headings import Column
 from drive_can_bridge.profiles.numerals import DecimalSign
 from drive_can_bridge.protocols.families import FAMILIES
@@ -27,7 +28,8 @@ _OPTIONS: dict[tuple[str, ...], tuple[dict[str, Any], Any, tuple[str, ...]]] = {
          'help': 'also search this one, before the shipped profiles (may be repeated)'},
         [], ('list', 'show')),
     ('-o', '--output'): (
-        {'metavar': 'FILE', 'type': Path, 'help': 'profile to write (default: standard output)'},
+        {'metavar': 'FILE', 'type': output_path,
+         'help': 'profile to write (default: standard output)'},
         None, ('import',)),
     ('--columns',): (
         {'metavar': 'COLUMN=HEADING,...',

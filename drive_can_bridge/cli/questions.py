@@ -1,7 +1,9 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Questions to whoever sits at the terminal; ``--yes`` answers all of them."""
 
+from contextlib import suppress
 import sys
+import termios
 
 from drive_can_bridge.cli.command import complain, WrongUsage
 from drive_can_bridge.core.text import printable
@@ -49,6 +51,9 @@ def agree_to_hazard(hazard: str, question: str, *, yes: bool, who: str) -> None:
 
 
 def answered(question: str) -> bool:
-    """Tell whether the answer to a question is yes."""
+    """Tell whether the answer to a question is yes; what was typed before it is none."""
+    if sys.stdin.isatty():
+        with suppress(OSError, termios.error):
+            termios.tcflush(sys.stdin.fileno(), termios.TCIFLUSH)
     print(printable(f'{question} [y/N] ', None), end='', file=sys.stderr, flush=True)
     return sys.stdin.readline().strip().lower() in ('y', 'yes')

@@ -9,7 +9,9 @@ import sys
 import time
 from typing import Any, TextIO
 
-from drive_can_bridge.cli.arguments import above_zero, add_params_file, add_seconds
+from drive_can_bridge.cli.arguments import (
+    above_zero, add_params_file, add_seconds, output_path,
+)
 from drive_can_bridge.cli.command import complain, WrongUsage
 from drive_can_bridge.cli.listening import Taps
 from drive_can_bridge.cli.tables import print_json
@@ -35,7 +37,7 @@ def define(parser: ArgumentParser) -> None:
     parser.epilog = (
         f'Formats, by suffix: {", ".join(WRITABLE)}. Only .log, the format of candump, '
         'loses nothing.')
-    parser.add_argument('-o', '--output', metavar='FILE', type=Path, required=True,
+    parser.add_argument('-o', '--output', metavar='FILE', type=output_path, required=True,
                         help='the trace; an existing file, or what --rotate has made of it, is '
                              'replaced')
     add_params_file(parser, 'parameter file of the bridge: names the buses')

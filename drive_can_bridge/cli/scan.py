@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from drive_can_bridge.cli.arguments import above_zero
+from drive_can_bridge.cli.arguments import above_zero, output_path
 from drive_can_bridge.cli.command import complain, FAILED, WrongUsage
 from drive_can_bridge.cli.found_file import tables_beside, write_parameter_file
 from drive_can_bridge.cli.questions import agree_to_hazard, agreed
@@ -50,7 +50,7 @@ def define(parser: ArgumentParser) -> None:
     parser.add_argument('--bitrates', type=_bitrates, metavar='A,B,…',
                         help='only listen, at each of these; needs an adapter with a listen-only '
                              'mode')
-    parser.add_argument('-o', '--output', type=Path, metavar='FILE',
+    parser.add_argument('-o', '--output', type=output_path, metavar='FILE',
                         help='write what was found as a parameter file; one that exists, and '
                              'tables beside it, are asked for')
     parser.add_argument('--json', action='store_true',

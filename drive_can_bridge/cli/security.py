@@ -9,7 +9,7 @@ import argparse
 import ipaddress
 from pathlib import Path
 
-from drive_can_bridge.cli.arguments import namespace, whole
+from drive_can_bridge.cli.arguments import namespace, output_path, whole
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.security.policy import BRIDGE, OPERATOR, policy, VIEWER
 from drive_can_bridge.security.tls import bridge_profile, client_profile, Meeting
@@ -26,7 +26,7 @@ def define(parser: argparse.ArgumentParser) -> None:
         f'{BRIDGE}, {OPERATOR}, {VIEWER}), and Fast DDS profiles for TLS between '
         'hosts with certificates of your own.')
     parser.add_argument('file', metavar='FILE', help='parameter file of the bridge')
-    parser.add_argument('-o', '--output', metavar='DIR', type=Path, required=True,
+    parser.add_argument('-o', '--output', metavar='DIR', type=output_path, required=True,
                         help='directory for the files, made where it is missing')
     parser.add_argument('--namespace', metavar='NS', default='', type=namespace,
                         help='in which the bridge runs (default: none)')

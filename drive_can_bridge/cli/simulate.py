@@ -23,6 +23,7 @@ from drive_can_bridge.cli.arguments import of_drive
 from drive_can_bridge.cli.command import FAILED, WrongUsage
 from drive_can_bridge.core.configuration import BridgeConfiguration, BusConfiguration
 from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, ValueRefused
+from drive_can_bridge.exchange.one_master import END_FIRST, Ownership
 from drive_can_bridge.simulation.console import Console, describe, help_lines, LineReader
 from drive_can_bridge.simulation.faults import Fault, parse_fault
 from drive_can_bridge.simulation.plant import Mechanics
@@ -71,6 +72,7 @@ def run(args: argparse.Namespace) -> int:
     :return: 0 after SIGINT or SIGTERM, 1 failure; one line on standard error each.
     :raises WrongUsage: options that exclude each other, or mean nothing.
     :raises ConfigurationError: the file has problems.
+    :raises InUse: another process has a serial port.
     :raises OSError: a file cannot be read, or written.
     """
     try:
@@ -96,6 +98,9 @@ def _simulate(stack: ExitStack, configuration: BridgeConfiguration,
               link: Path | None, log_frames: Path | None, strict: bool) -> int:
     # before anything is announced: whoever reads the first line may send the signal at once
     wake = stack.enter_context(_signals_as_descriptor())
+    if not pty:     # a bridge locks the other end of a pseudo-terminal
+        stack.enter_context(Ownership([(bus, ()) for bus in configuration.buses.values()],
+                                      'drive_can simulate', END_FIRST))
     output = _Output(sys.stdout)
     terminals: dict[str, SlcanTerminal] = {}
 

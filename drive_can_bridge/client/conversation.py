@@ -19,6 +19,7 @@ from drive_can_bridge.core.requests import Outcome, Request
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.exchange.listeners import DriveListener
+from drive_can_bridge.exchange.one_master import Ownership
 from drive_can_bridge.protocols.families import FAMILIES
 
 #: s that a bus has to open
@@ -37,12 +38,14 @@ class BusConversation:
 
     :param drives: those that will be asked.
     :param neighbours: all drives that are known on the bus: no other master may talk to them.
+    :param ownership: of the bus; kept as long as its threads run, whoever forgets to close it.
     :raises DriveCanError: the bus cannot be opened.
     """
 
     def __init__(self, bus: BusConfiguration, drives: Sequence[DriveConfiguration],
-                 neighbours: Sequence[DriveConfiguration]) -> None:
+                 neighbours: Sequence[DriveConfiguration], ownership: Ownership) -> None:
         self.bus = bus
+        self._ownership = ownership
         self._changed = threading.Condition()
         self._outcomes: dict[int, tuple[Outcome, ...]] = {}
         self._trouble: DriveCanError | None = None

@@ -59,7 +59,7 @@ class DirectSource:
             for bus, drives in groups.items():
                 conversations[bus] = BusConversation(
                     configuration.buses[bus], [drive for drive in wanted if drive.bus == bus],
-                    drives)
+                    drives, ownership)
             seconds = LISTEN    # they all hear at the same time
             for conversation in conversations.values():
                 conversation.listen(seconds)

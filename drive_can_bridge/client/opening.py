@@ -19,8 +19,13 @@ def find_source(params_file: str | Path | None = None, *, namespace: str | None 
     :param nmt_start: directly: start CANopen nodes before they are asked.
     :raises ConfigurationError: the file is wrong.
     :raises DriveCanError: the file cannot be read; no bridge is running, or several in different
-        namespaces.
+        namespaces; an argument that means nothing to the way that is taken.
     """
+    if params_file is not None and namespace is not None:
+        raise DriveCanError('namespace is of a running bridge, params_file goes without one')
+    if params_file is None and nmt_start:
+        raise DriveCanError('nmt_start goes with params_file only: a bridge starts its nodes '
+                            'itself')
     if params_file is not None:
         from drive_can_bridge.client.direct import DirectSource
         try:

@@ -9,12 +9,12 @@ It takes no recursion, so that no nesting of a file ends in the depths of the C 
 
 from collections.abc import Iterator
 from enum import Enum
-from errno import EFBIG, EINVAL
 from pathlib import Path as FilePath
 from typing import NamedTuple
 
 import yaml
 
+from drive_can_bridge.configuration.regular_file import read_regular
 from drive_can_bridge.configuration.scalars import read_scalar, Scalar
 
 # libyaml, which rcl uses as well, where PyYAML was built with it.
@@ -84,13 +84,7 @@ def read_documents(path: FilePath) -> list[Document]:
     :raises OSError: it cannot be read, is no file, or is too large.
     :raises BrokenYaml: it is no YAML.
     """
-    if not path.is_file() and not path.is_dir() and path.exists():  # a pipe may keep us waiting
-        raise OSError(EINVAL, 'not a regular file, allowed is one', str(path))
-    with path.open('rb') as file:
-        data = file.read((SIZE_MAX << 20) + 1)
-    if len(data) > SIZE_MAX << 20:
-        raise OSError(EFBIG, f'too large, allowed are {SIZE_MAX} MiB', str(path))
-    return _documents(data)
+    return _documents(read_regular(path, SIZE_MAX))
 
 
 def _documents(data: bytes) -> list[Document]:

@@ -8,6 +8,7 @@ from enum import Enum
 from pathlib import Path
 import re
 
+from drive_can_bridge.configuration.regular_file import read_regular
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.profiles.build import build_profile, Built
 from drive_can_bridge.profiles.csv_import import read_table
@@ -18,8 +19,8 @@ from drive_can_bridge.profiles.errors import ImportFailed
 from drive_can_bridge.profiles.headings import Column
 from drive_can_bridge.profiles.numerals import DecimalSign
 
-#: larger files are no parameter tables, and would fill the memory
-SIZE_MAX = 32 * 1024 * 1024
+#: MiB; larger files are no parameter tables, and would fill the memory
+SIZE_MAX = 32
 _EDS_HEAD = re.compile(r'^\s*\[(?:FileInfo|DeviceInfo|DeviceComissioning|MandatoryObjects)\]',
                        re.IGNORECASE | re.MULTILINE)
 
@@ -52,12 +53,10 @@ def import_file(path: Path, *, columns: Mapping[Column, str], sign: DecimalSign,
     :param columns: of a CSV table, by heading or place; the others are guessed.
     :param file_format: None: what its name and contents say.
     :raises ImportFailed: it cannot be imported; the text begins with the name of the file.
-    :raises OSError: it cannot be read.
+    :raises OSError: it cannot be read, is no regular file, or is too large.
     """
     try:
-        if path.stat().st_size > SIZE_MAX:
-            raise ImportFailed(f'is larger than {SIZE_MAX >> 20} MiB: no parameter table')
-        text = decoded(path.read_bytes())
+        text = decoded(read_regular(path, SIZE_MAX))
         kind = file_format or _format_of(path, text)
         found = read_eds(text) if kind is FileFormat.EDS else read_table(text, columns, sign)
         built = build_profile(found, path.name, description=description, protocols=protocols)

@@ -213,6 +213,14 @@ class TestMode:
         assert again.written == result.stopped
         assert self.mode(shop) == 0x0020
 
+    def test_taken_back_is_written_when_interrupted(self, shop: Shop) -> None:
+        shop.drives['pump'].set_value('general_configuration', 0x0011)
+        file = shop.write_backup('pump', flc1_ratio=50.0)
+        with shop.reached('pump') as drive:
+            result = restored(drive, file, stopped=lambda: True)
+        assert self.mode(shop) == 0x0010
+        assert (result.written, result.stopped) == (['general_configuration'], ['flc1_ratio'])
+
     def test_power_cut_in_the_middle(self, shop: Shop) -> None:
         pump = shop.drives['pump']
         file = shop.write_backup('pump', motor_trip_class=10, flc1_ratio=50, flc2_ratio=51,

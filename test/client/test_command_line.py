@@ -7,6 +7,7 @@ import pytest
 
 from drive_can_bridge.cli.arguments import above_zero, of_drive, whole
 from drive_can_bridge.cli.command import WrongUsage
+from drive_can_bridge.cli.main import main
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.text import column_lines
 
@@ -34,3 +35,16 @@ def test_columns() -> None:
     assert column_lines(('name', 'count', 'what'), [('a', '5', ''), ('longer', '1000000', 'b')],
                         numbers=('count',)) == [
         'name      count  what', 'a             5', 'longer  1000000  b']
+
+
+@pytest.mark.parametrize('words', [
+    ('backup',), ('record', '--params-file', 'x'), ('scan', '--interface', 'i', '--channel', 'c'),
+    ('profile', 'import', 'x'), ('security', 'x')], ids=lambda words: words[0])
+@pytest.mark.parametrize('name', ['', '-'])
+def test_a_name_that_names_no_file(words: tuple[str, ...], name: str,
+                                   capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match='2'):
+        main([*words, '-o', name])
+    line, = capsys.readouterr().err.splitlines()
+    assert line.startswith(f'drive_can {words[0]}')
+    assert f'argument -o/--output: {name!r} names no file' in line

@@ -3,9 +3,12 @@
 
 from collections.abc import Iterator
 import copy
+import gc
 from pathlib import Path
+import threading
 import time
 from typing import Any
+import weakref
 
 from builders import frame
 from client_builders import a_world, ALL, CONVEYOR, LIFT, MIXER, PUMP, stranger, World
@@ -303,3 +306,33 @@ def test_after_the_end(tmp_path: Path) -> None:
         for ask in (conveyor.read, lambda: conveyor.write({'ramp_time': 1.0})):
             with pytest.raises(DriveCanError, match='^bus main: is closed already$'):
                 ask()
+
+
+def test_a_namespace_is_of_a_bridge_only(world: World) -> None:
+    with pytest.raises(DriveCanError, match='namespace is of a running bridge, params_file goes '
+                                            'without one'):
+        open_drives(world.file, namespace='/x')
+
+
+def test_what_only_the_direct_way_has() -> None:
+    with pytest.raises(DriveCanError, match='nmt_start goes with params_file only'):
+        open_drives(nmt_start=True)
+
+
+def test_drives_that_nobody_closes_are_locked_all_the_same(tmp_path: Path) -> None:
+    with a_world(tmp_path, conveyor=CONVEYOR) as world:
+        before = set(threading.enumerate())
+        conveyor = open_drives(world.file)['conveyor']
+        gc.collect()
+        assert conveyor.read('ramp_time')['ramp_time'].ok
+        assert set(threading.enumerate()) > before
+        with pytest.raises(InUse):
+            open_drives(world.file)
+        conversation = weakref.ref(conveyor._conversation)     # type: ignore[attr-defined]
+        del conveyor
+        gc.collect()
+        with pytest.raises(InUse):      # its threads still run
+            open_drives(world.file)
+        left = conversation()
+        assert left is not None
+        left.close()

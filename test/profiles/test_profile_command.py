@@ -5,6 +5,7 @@ import json
 import os
 from pathlib import Path
 import pty
+import resource
 import subprocess
 import sys
 from typing import Any
@@ -291,3 +292,22 @@ def test_nothing_upsets_a_terminal(tmp_path: Path, capsys: pytest.CaptureFixture
     out, err = capsys.readouterr()
     assert out.count('\\x1b[2J') == 2 and err == 'no\\x1b[2J.yaml: No such file or directory\n'
     assert '\x1b' not in out
+
+
+@pytest.mark.parametrize('name', ['/dev/zero', 'pipe', 'large.csv'])
+def test_what_has_no_end_is_not_read(name: str, tmp_path: Path) -> None:
+    file = tmp_path / name
+    reason = 'not a regular file, allowed is one'
+    if name == 'pipe':
+        os.mkfifo(file)
+    elif name == 'large.csv':
+        with file.open('wb') as content:
+            content.truncate((32 << 20) + 1)
+        reason = 'too large, allowed are 32 MiB'
+    limit = 1 << 30     # of memory
+    done = subprocess.run(
+        [sys.executable, '-m', 'drive_can_bridge.cli.main', 'profile', 'import', str(file)],
+        capture_output=True, text=True, timeout=60.0, check=False,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (limit, limit)))
+    assert (done.returncode, done.stdout, done.stderr) == (
+        1, '', f'drive_can: {file}: {reason}\n')

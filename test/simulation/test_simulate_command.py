@@ -14,6 +14,9 @@ import can
 import pytest
 from waiting import wait_for
 
+from drive_can_bridge.core.configuration import BusConfiguration
+from drive_can_bridge.exchange.one_master import END_FIRST, InUse, Ownership
+
 PARAMETERS = """
 /**/drive_can_bridge:
   ros__parameters:
@@ -216,3 +219,31 @@ def test_reader_of_the_output_who_left(start: Any) -> None:
     finally:
         process.kill()
         process.wait()
+
+
+class TestASerialPort:
+    """One process reads from it: it is locked as a whole, whoever opens it."""
+
+    @pytest.fixture(name='port')
+    def port_fixture(self) -> Iterator[str]:
+        ends = os.openpty()
+        yield os.ttyname(ends[1])
+        for end in ends:
+            os.close(end)
+
+    def test_of_a_bridge_is_left_alone(self, start: Any, port: str, tmp_path: Path) -> None:
+        file = tmp_path / 'adapter.yaml'
+        file.write_text(PARAMETERS.replace('virtual, channel: x}', f'slcan, channel: {port}}}'))
+        bus = BusConfiguration('main', 'slcan', port)
+        with Ownership([(bus, ())], 'drive_can_bridge', END_FIRST):
+            command = start('--params-file', str(file))
+            assert command.process.wait(30.0) == 1
+        assert command.errors == [f'bus main: the serial port {port} is used by process '
+                                  f'{os.getpid()}; end that first']
+        assert command.lines == []
+
+    def test_of_the_simulation_is_its_own(self, start: Any, port: str) -> None:
+        command = start('--interface', 'slcan', '--channel', port)
+        command.line('bus main: slcan')
+        with pytest.raises(InUse, match=rf'{command.process.pid} \(drive_can simulate\)'):
+            Ownership([(BusConfiguration('main', 'slcan', port), ())], 'x', END_FIRST)

@@ -123,6 +123,15 @@ def test_what_is_read_is_not_written_over(file: Path, trace: Path, option: str, 
     assert file.read_text().startswith('\n/**/drive_can_bridge')
 
 
+def test_a_picture_without_a_suffix(file: Path, trace: Path, tmp_path: Path,
+                                    capsys: pytest.CaptureFixture[str]) -> None:
+    assert drive_can('decode', trace, '--params-file', file, '--plot', tmp_path / 'values') == 2
+    assert capsys.readouterr() == ('', (
+        f'drive_can decode: --plot {tmp_path}/values: its suffix says what is written: .png, '
+        '.svg, .pdf, …\n'))
+    assert not list(tmp_path.glob('values*'))
+
+
 def test_a_table_on_a_full_disk(file: Path, trace: Path, tmp_path: Path,
                                 capsys: pytest.CaptureFixture[str]) -> None:
     table = tmp_path / 'values.csv'
