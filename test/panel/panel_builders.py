@@ -32,6 +32,7 @@ FILE = """
         station: 1
         profile: hostile
         missed_limit: 1000
+        parameter_timeout: 2.0
         cyclic_request: [speed_setpoint]
         cyclic_response: [actual_speed, status_word]
       lift:
@@ -40,6 +41,7 @@ FILE = """
         station: 2
         profile: datamodel_control_example
         missed_limit: 1000
+        parameter_timeout: 2.0
         cyclic_request: [control_word, speed_setpoint]
         cyclic_response: [status_word, actual_speed]
       press:
@@ -48,6 +50,7 @@ FILE = """
         station: 3
         profile: without_quick_stop
         missed_limit: 1000
+        parameter_timeout: 2.0
         cyclic_request: [control_word]
         cyclic_response: [status_word]
 """
