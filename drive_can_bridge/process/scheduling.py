@@ -3,11 +3,19 @@
 
 import os
 import sys
+import threading
+import time
 
-#: s for which a thread that computes may keep others waiting. Python's 5 ms are as long as the
-#: shortest period: a service call that is being answered would hold up a cycle by all of it. Far
-#: below 0.1 ms, threads that wait for the interpreter do nothing but ask for it.
-SWITCH_INTERVAL = 0.0001
+#: s for which a thread that computes may keep others waiting, at least and at most. Python's 5 ms
+#: are as long as the shortest period: a service call that is being answered would hold up a cycle
+#: by all of it.
+SHORTEST, LONGEST = 0.0001, 0.005
+#: handovers of the interpreter in the time between: who waits for it asks as often, and where
+#: asking takes as long as that, threads that wait do nothing else, and with real-time priority
+#: they keep the one that has it from ever giving it back
+HANDOVERS = 10
+#: handovers that are measured, there and back
+ROUNDS = 20
 #: of the whole process: who has the interpreter, and with it the exchange, must not wait behind
 #: other processes for long
 NICE = -10
@@ -25,11 +33,38 @@ def be_punctual() -> None:
 
     To be called first: threads inherit it.
     """
-    sys.setswitchinterval(SWITCH_INTERVAL)
+    sys.setswitchinterval(min(max(SHORTEST, HANDOVERS * handover_time()), LONGEST))
     try:
         os.setpriority(os.PRIO_PROCESS, 0, NICE)
     except OSError:  # not allowed; raise_priority says so
         pass
+
+
+def handover_time() -> float:
+    """
+    Measure what it takes to hand the interpreter over to a thread that waits.
+
+    :return: s, the shortest seen, so that other processes do not count: some microseconds, or, on
+        a slow processor, in a sandbox or an emulator, up to a millisecond.
+    """
+    here, there = threading.Lock(), threading.Lock()
+    here.acquire()
+    there.acquire()
+
+    def answer() -> None:
+        for _ in range(ROUNDS):
+            there.acquire()
+            here.release()
+    thread = threading.Thread(target=answer)
+    thread.start()
+    shortest = LONGEST
+    for _ in range(ROUNDS):
+        begin = time.perf_counter()
+        there.release()
+        here.acquire()
+        shortest = min(shortest, (time.perf_counter() - begin) / 2.0)
+    thread.join()
+    return shortest
 
 
 def raise_priority() -> str:

@@ -5,6 +5,7 @@ import os
 from pathlib import Path
 import sys
 import threading
+from types import SimpleNamespace
 
 import pytest
 
@@ -13,8 +14,12 @@ from drive_can_bridge.process import scheduling
 SOURCES = Path(scheduling.__file__).parents[1]
 
 
-@pytest.mark.parametrize('allowed', [True, False])
-def test_be_punctual(monkeypatch: pytest.MonkeyPatch, allowed: bool) -> None:
+@pytest.mark.parametrize(('handover', 'interval', 'allowed'), [
+    (6e-6, 0.0001, True), (6e-6, 0.0001, False),
+    # threads that wait would do nothing but ask for the interpreter
+    (60e-6, 0.0006, True), (0.002, 0.005, True)])
+def test_be_punctual(monkeypatch: pytest.MonkeyPatch, handover: float, interval: float,
+                     allowed: bool) -> None:
     asked: list[tuple[int, ...]] = []
 
     def set_priority(*arguments: int) -> None:
@@ -22,13 +27,23 @@ def test_be_punctual(monkeypatch: pytest.MonkeyPatch, allowed: bool) -> None:
         if not allowed:
             raise PermissionError(13, 'Permission denied')
     monkeypatch.setattr(os, 'setpriority', set_priority)
+    monkeypatch.setattr(scheduling, 'handover_time', lambda: handover)
     before = sys.getswitchinterval()
     try:
         scheduling.be_punctual()
-        assert sys.getswitchinterval() == pytest.approx(0.0001)
+        assert sys.getswitchinterval() == pytest.approx(interval)
         assert asked == [(os.PRIO_PROCESS, 0, -10)]
     finally:
         sys.setswitchinterval(before)
+
+
+def test_a_handover_is_measured_there_and_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    # one round of 80 us among slower ones
+    times = iter([0.0, 0.001] + [1.0, 1.00008] + 18 * [2.0, 2.5])
+    monkeypatch.setattr(scheduling, 'time', SimpleNamespace(perf_counter=lambda: next(times)))
+    before = threading.active_count()
+    assert scheduling.handover_time() == pytest.approx(40e-6)
+    assert threading.active_count() == before
 
 
 @pytest.mark.parametrize('path', ['ros/main.py'])
