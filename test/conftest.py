@@ -91,7 +91,7 @@ FIRST = ('test/system/test_system_parameters', 'test/system/test_system_backup',
 #: s for which others are looked at
 LOOK = 0.5
 #: processes for each core that has nothing else to do: most of the time they wait
-WORKERS_PER_CORE = 3
+WORKERS_PER_CORE = 2
 
 
 # -- signals and domains --------------------------------------------------------------------------

@@ -62,6 +62,11 @@ class SafeStop(Generic[StepT, ReplyT]):
         self._insisting = self._again = False
         self._whole = False         # all that the drive can be told is in it
 
+    @property
+    def answer_time(self) -> float:
+        """How many s an answer is waited for where a stop is read back, and for the status."""
+        return min(ANSWER_TIME, self._session.retry.timeout)
+
     def writes(self, *, word: bool = True, setpoints: bool = True) -> list[StopWrite]:
         """
         Return what the drive has to be told: ``disable``, then neutral setpoints.
@@ -117,7 +122,7 @@ class SafeStop(Generic[StepT, ReplyT]):
         session = self._session
         if self._status is None or session.active or not session.online:
             return
-        raw = yield from self._read(self._status, min(ANSWER_TIME, session.retry.timeout))
+        raw = yield from self._read(self._status, self.answer_time)
         if raw is not None:
             session.gate.status(raw, self._channel.now)
 

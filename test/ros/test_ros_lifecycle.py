@@ -230,6 +230,10 @@ def test_ten_rounds_leak_nothing(bridge: StartBridge, client: Client) -> None:
     gc.collect()
 
 
+#: calls that traffic has under way at most
+UNDER_WAY = 50
+
+
 def test_any_order_during_traffic(bridge: StartBridge, client: Client) -> None:
     """Sixty transitions by chance, legal and illegal, while everybody uses the drives."""
     waiting(bridge, parameters(conveyor=CONVEYOR, lift=LIFT))
@@ -248,6 +252,9 @@ def test_any_order_during_traffic(bridge: StartBridge, client: Client) -> None:
             value += 1
             for publisher in commands:
                 publisher.publish(Float64(data=float(value % 3)))
+            # what a slow machine cannot answer would keep everybody's calls waiting for minutes
+            if sum(not future.done() for future in futures[-UNDER_WAY:]) == UNDER_WAY:
+                continue
             futures.extend(
                 entry.call_async(GetParameters.Request(names=['ramp_time', 'actual_speed']))
                 for entry in reads if entry.service_is_ready())

@@ -27,7 +27,7 @@ from drive_can_bridge.protocols.datamodel.extended import PAYLOAD, SLOTS
 from drive_can_bridge.protocols.datamodel.numbers import Numbers
 from drive_can_bridge.protocols.datamodel.options import DataModelOptions
 from drive_can_bridge.protocols.placement import SentWrites
-from drive_can_bridge.protocols.safe_stop import ANSWER_TIME, SafeStop, StatusRead, STOP_ATTEMPTS
+from drive_can_bridge.protocols.safe_stop import SafeStop, StatusRead, STOP_ATTEMPTS
 from drive_can_bridge.protocols.stop_again import StopAgain
 
 
@@ -130,6 +130,16 @@ class AcyclicSide:
 
     # -- stopping by acyclic writes ---------------------------------------------------------------
 
+    @property
+    def longest_stop(self) -> float:
+        """How many s a stop by acyclic writes takes at most, and the read of the status then."""
+        answer, count = self.stop.answer_time, len(self.stop.writes())
+        if not self.courier.anonymous:
+            return (STOP_ATTEMPTS * count + 1) * answer
+        silence = self.courier.silence
+        asked_before = self._session.retry.timeout + silence
+        return asked_before + STOP_ATTEMPTS * (count * answer + silence) + answer + silence
+
     def begin_stop(self, now: float, *, setpoints: bool = True, again: bool = False) -> None:
         """
         Write ``disable`` and neutral setpoints by their numbers, which no map can misroute.
@@ -150,8 +160,7 @@ class AcyclicSide:
         stop.running = True     # before the first of them leaves
         for _, write in writes:
             self.courier.write_now(write, lambda sent, then: None, now)
-        timeout = min(self._session.retry.timeout, ANSWER_TIME)
-        stop.begin(confirm(writes, timeout), now, setpoints=setpoints, again=again)
+        stop.begin(confirm(writes, stop.answer_time), now, setpoints=setpoints, again=again)
 
     def _read_status(self, status: Parameter, timeout: float) -> StatusRead[Step, Reply]:
         words = yield Read(

@@ -39,7 +39,6 @@ from drive_can_bridge.protocols.datamodel.map_supervision import (
 )
 from drive_can_bridge.protocols.datamodel.positions import Positions
 from drive_can_bridge.protocols.datamodel.process_words import CyclicCodec
-from drive_can_bridge.protocols.safe_stop import ANSWER_TIME, STOP_ATTEMPTS
 
 #: direction and station of an identifier
 FROM_WHOM = extended.DIR | extended.STATION_MASK
@@ -121,7 +120,7 @@ class ExtendedSession(Session):
 
     @property
     def longest_stop(self) -> float:
-        return self._exchange.longest_stop + STOP_ATTEMPTS * ANSWER_TIME
+        return self._exchange.longest_stop + self._side.longest_stop
 
     def begin(self, now: float) -> None:
         self._exchange.stop()

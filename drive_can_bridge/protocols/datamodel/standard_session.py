@@ -20,7 +20,6 @@ from drive_can_bridge.protocols.datamodel.setpoint_writer import SetpointWriter
 from drive_can_bridge.protocols.datamodel.standard_round import StandardRound
 from drive_can_bridge.protocols.polled_exchange import PolledExchange, Raws
 from drive_can_bridge.protocols.polling import TOLERANCE
-from drive_can_bridge.protocols.safe_stop import ANSWER_TIME, STOP_ATTEMPTS
 
 SILENT = 'no answer to reads: drive silent, wrong station, bit rate or identifier mode'
 
@@ -71,9 +70,7 @@ class StandardSession(Session):
 
     @property
     def longest_stop(self) -> float:
-        # one more: the read of the status
-        return (STOP_ATTEMPTS + 1) * (
-            ANSWER_TIME + float(self.configuration.options.quarantine))
+        return self._side.longest_stop
 
     def time_lost(self, now: float) -> None:
         self._expected = self._expected or self._side.courier.outstanding is not None
