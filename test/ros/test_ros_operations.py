@@ -1,15 +1,96 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""Stops that a monitor or panel asks for."""
+"""What a monitor or panel asks for: stops, reads and writes."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+import time
 from typing import Any
 
 from clients import Client, wait_until
+from rcl_interfaces.msg import SetParametersResult
+from rcl_interfaces.srv import GetParameterTypes, SetParameters
 import rclpy
+from rclpy.qos import qos_profile_parameters
 from std_srvs.srv import Trigger
 
 from drive_can_bridge.monitor.source import Outcome, Stop
 from drive_can_bridge.ros.monitor.inbox import OFFER_TIMEOUT
-from drive_can_bridge.ros.monitor.operations import Operations
+from drive_can_bridge.ros.monitor.operations import Operations, PARAMETER_TIMEOUT
+
+
+@contextmanager
+def asking(client: Client) -> Iterator[Operations]:
+    """Return operations of a node of their own."""
+    node = rclpy.create_node('asking', context=client.node.context, enable_rosout=False,
+                             start_parameter_services=False)
+    try:
+        yield Operations(node)
+    finally:
+        node.destroy_node()
+
+
+class Shy:
+    """A drive's parameter services: who is not known yet gets no answer, as with DDS."""
+
+    def __init__(self, client: Client, known_after: int) -> None:
+        self.known_after = known_after
+        self.greetings = self.writes = 0
+        self._node = client.node
+        self._services = [
+            self._node.create_service(kind, f'/lift/{name}', answer,
+                                      qos_profile=qos_profile_parameters)
+            for kind, name, answer in ((GetParameterTypes, 'get_parameter_types', self._greeted),
+                                       (SetParameters, 'set_parameters', self._written))]
+        for service in self._services:
+            send = service.send_response
+            service.send_response = lambda *answer, send=send: (
+                self.greetings >= self.known_after and send(*answer))
+
+    def _greeted(self, _: Any, response: Any) -> Any:
+        self.greetings += 1
+        return response
+
+    def _written(self, _: Any, response: Any) -> Any:
+        self.writes += 1
+        response.results = [SetParametersResult(successful=True)]
+        return response
+
+    def close(self) -> None:
+        for service in self._services:
+            self._node.destroy_service(service)
+
+
+def test_what_is_asked_of_a_drive_is_asked_once_it_knows_us(client: Client) -> None:
+    """An answer to somebody unknown is given up; what it was about was done all the same."""
+    shy, told, later = Shy(client, known_after=3), list[Outcome](), 0.0
+
+    def now() -> float:
+        return time.monotonic() + later
+
+    def write(value: float) -> Outcome:
+        operations.write('/lift', 'ramp_time', value, told.append, now())
+        wait_until(lambda: not operations.poll([], now()), what='an answer')
+        return told[-1]
+    try:
+        with asking(client) as operations:
+            assert write(1.5) == Outcome(True, '')
+            assert shy.greetings >= 3
+            assert write(2.5) == Outcome(True, '')
+            # somebody else by the same name
+            shy.known_after, later = shy.greetings + 3, 10.0
+            assert write(3.5) == Outcome(True, '')
+            assert shy.greetings >= shy.known_after
+            assert shy.writes == 3, 'each of them once'
+            # nobody
+            shy.known_after, later = 1_000_000, 20.0
+            operations.write('/lift', 'ramp_time', 4.5, told.append, now())
+            assert operations.poll([], now())
+            later += PARAMETER_TIMEOUT
+            assert not operations.poll([], now())
+            assert 'nobody answered' in told[3].text
+            assert shy.writes == 3
+    finally:
+        shy.close()
 
 
 def test_a_stop_waits_a_moment_for_whoever_offers_it(client: Client) -> None:
@@ -19,10 +100,7 @@ def test_a_stop_waits_a_moment_for_whoever_offers_it(client: Client) -> None:
         return response
 
     now, told = 100.0, list[Outcome]()
-    node = rclpy.create_node('asking', context=client.node.context, enable_rosout=False,
-                             start_parameter_services=False)
-    operations = Operations(node)
-    try:
+    with asking(client) as operations:
         operations.poll(['/lift'], now)
         operations.stop('/lift', Stop.QUICK_STOP, told.append, now)
         assert operations.poll(['/lift'], now)
@@ -39,5 +117,3 @@ def test_a_stop_waits_a_moment_for_whoever_offers_it(client: Client) -> None:
             assert 'nobody offers /conveyor/enable: no control word' in told[-1].text
         finally:
             client.node.destroy_service(service)
-    finally:
-        node.destroy_node()

@@ -29,7 +29,7 @@ from drive_can_bridge.ros.guest import Guest
 
 _SLICE = 0.05
 #: s after which a greeting is said again for the first time; then twice as many, and so on
-_GREETING = 0.1
+FIRST_GREETING = 0.1
 #: s that a server may take to be found, or to know us
 _FIND_TIMEOUT = 10.0
 #: s that an answer may take: many reads that nobody answers are slow
@@ -164,7 +164,7 @@ class Graph:
         deadline = time.monotonic() + _FIND_TIMEOUT
         greeting = self.node.create_client(
             GetParameterTypes, f'{node}/get_parameter_types', qos_profile=qos_profile_parameters)
-        patience = _GREETING
+        patience = FIRST_GREETING
         futures: list[Any] = []
         try:
             self.wait(greeting.service_is_ready, _FIND_TIMEOUT)

@@ -26,11 +26,12 @@ from drive_can_bridge.monitor.values import ParameterInfo
 from drive_can_bridge.ros.guest import Guest
 from drive_can_bridge.ros.messages import drive_value, plain
 from drive_can_bridge.ros.monitor.inbox import (
-    Call, Inbox, latched_quality, log_quality, newest_quality,
+    CALL_TIMEOUT, Inbox, latched_quality, log_quality, newest_quality,
 )
 from drive_can_bridge.ros.monitor.messages import (
     log_level, parameter_info, stamp_of, statuses, values,
 )
+from drive_can_bridge.ros.monitor.parameter_calls import ParameterCalls
 
 #: s between two looks at the graph, which are not cheap
 _GRAPH_PERIOD = 2.0
@@ -64,7 +65,7 @@ class MonitorClient:
         self._focus: frozenset[str] = frozenset()
         self._watched = True
         self._graph_at = 0.0
-        self._calls: dict[tuple[str, str], Call] = {}
+        self._calls = ParameterCalls(self._node, CALL_TIMEOUT)
         self._asked: set[str] = set()
 
     # -- for the view -----------------------------------------------------------------------------
@@ -77,7 +78,7 @@ class MonitorClient:
     @property
     def busy(self) -> bool:
         """Wait for an answer to something: polling soon is worth it."""
-        return bool(self._calls)
+        return self._calls.busy
 
     def focus(self, *drives: str) -> None:
         """Look at drives closely: all of their samples, and their bits."""
@@ -99,8 +100,7 @@ class MonitorClient:
             answers = [drive_value(value) for value in found]
             answers += [None] * (len(names) - len(answers))
             self._model.read(drive, zip(names, answers), self._now)
-        self._call(drive, GetParameters, 'get_parameters', GetParameters.Request(names=names),
-                   take)
+        self._ask(drive, 'get_parameters', GetParameters.Request(names=names), take)
 
     def poll(self, now: float) -> None:
         """Take what has arrived, and ask for what is missing."""
@@ -110,10 +110,7 @@ class MonitorClient:
         for pair in self._samples.values():
             for inbox in pair:
                 inbox.look()
-        for key, call in list(self._calls.items()):
-            # what is done may ask again, under the same key
-            if call.look(now) and self._calls.get(key) is call:
-                del self._calls[key]
+        self._calls.look(now)
         self._follow()
 
     def glance(self, now: float) -> None:
@@ -198,8 +195,7 @@ class MonitorClient:
             for drive, (bus, station, protocol, period) in zip(drives, zip(*[found] * 4)):
                 self._model.placed(drive, Place(
                     _text(bus), _text(station), _text(protocol), _number(period)))
-        self._call(bridge, GetParameters, 'get_parameters', GetParameters.Request(names=names),
-                   take)
+        self._ask(bridge, 'get_parameters', GetParameters.Request(names=names), take)
 
     def _ask_names(self, drive: str) -> None:
         """Ask a drive what parameters it has, and then what they are."""
@@ -210,7 +206,7 @@ class MonitorClient:
                 self._asked.discard(drive)
             elif response.result.names:
                 self._ask_descriptors(drive, list(response.result.names), [])
-        self._call(drive, ListParameters, 'list_parameters', ListParameters.Request(), take)
+        self._ask(drive, 'list_parameters', ListParameters.Request(), take)
 
     def _ask_descriptors(self, drive: str, names: list[str], known: list[ParameterInfo]) -> None:
         def take(response: DescribeParameters.Response | None) -> None:
@@ -221,17 +217,14 @@ class MonitorClient:
             self._model.described(drive, found)
             if names[_BATCH:]:
                 self._ask_descriptors(drive, names[_BATCH:], found)
-        self._call(drive, DescribeParameters, 'describe_parameters',
-                   DescribeParameters.Request(names=names[:_BATCH]), take)
+        self._ask(drive, 'describe_parameters',
+                  DescribeParameters.Request(names=names[:_BATCH]), take)
 
-    def _call(self, node: str, service_type: Any, service: str, request: Any,
-              done: Callable[[Any], None]) -> None:
-        before = self._calls.pop((node, service), None)
-        if before is not None:
-            before.close()
+    def _ask(self, node: str, service: str, request: Any, done: Callable[[Any], None]) -> None:
+        """Ask; what was asked of the same service before is not waited for any more."""
+        self._calls.drop(node, service)
         if is_ros_name(node):
-            self._calls[node, service] = Call(self._node, service_type, f'{node}/{service}',
-                                              request, done, self._now)
+            self._calls.ask(node, service, request, done, self._now)
 
 
 def _keep(have: dict[str, Any], wanted: Iterable[str], make: Callable[[str], Any],

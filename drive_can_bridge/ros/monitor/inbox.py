@@ -140,41 +140,17 @@ class Service:
             if asked is not None:
                 asked[1](response)
         for number, (deadline, done) in list(self._waiting.items()):
-            if now >= deadline:
-                del self._waiting[number]
+            if now >= deadline and self._waiting.pop(number, None) is not None:
                 done(None)
 
+    def forget(self) -> None:
+        """Wait for no answer to what was asked."""
+        self._waiting.clear()
+        self._unsent.clear()
+
     def close(self) -> None:
-        """Wait for no answer."""
+        """Wait for no answer any more."""
         self._node.destroy_client(self._client)
-
-
-class Call:
-    """
-    One request to a service, sent as soon as somebody offers it.
-
-    :param done: takes the response, or None: nobody answered.
-    """
-
-    def __init__(self, node: Node, service_type: Any, name: str, request: Any,
-                 done: Callable[[Any], None], now: float, timeout: float = CALL_TIMEOUT) -> None:
-        self._service = Service(node, service_type, name, timeout)
-        self._done = done
-        self._answers: list[Any] = []
-        self._service.send(request, self._answers.append, now, timeout)
-
-    def look(self, now: float) -> bool:
-        """Do what can be done now; return whether the call is over."""
-        self._service.look(now)
-        if not self._answers:
-            return False
-        self._service.close()
-        self._done(self._answers[0])
-        return True
-
-    def close(self) -> None:
-        """Wait for no answer."""
-        self._service.close()
 
 
 def _never(_: Any) -> None:

@@ -13,7 +13,8 @@ from drive_can_bridge.core.text import printable
 from drive_can_bridge.monitor.source import Outcome, Stop
 from drive_can_bridge.monitor.text import is_ros_name
 from drive_can_bridge.ros.messages import drive_value, parameter_message
-from drive_can_bridge.ros.monitor.inbox import Call, Service
+from drive_can_bridge.ros.monitor.inbox import Service
+from drive_can_bridge.ros.monitor.parameter_calls import ParameterCalls
 
 #: s for a stop, which answers when the drive's status says so, and for a read or write
 STOP_TIMEOUT = 10.0
@@ -37,7 +38,7 @@ class Operations:
     def __init__(self, node: Node) -> None:
         self._node = node
         self._stops: dict[str, dict[Stop, Service]] = {}
-        self._calls: list[Call] = []
+        self._calls = ParameterCalls(node, PARAMETER_TIMEOUT)
 
     def poll(self, controlled: Iterable[str], now: float) -> bool:
         """Take the answers that have arrived; return whether somebody still waits for one."""
@@ -54,8 +55,8 @@ class Operations:
             for service in services.values():
                 if service.busy:
                     service.look(now)
-        self._calls = [call for call in self._calls if not call.look(now)]
-        return bool(self._calls) or any(
+        self._calls.look(now)
+        return self._calls.busy or any(
             service.busy for services in self._stops.values() for service in services.values())
 
     def stop(self, drive: str, stop: Stop, done: Callable[[Outcome], None], now: float) -> None:
@@ -77,8 +78,8 @@ class Operations:
             results = [] if response is None else response.results
             done(Outcome(results[0].successful, printable(results[0].reason)) if results
                  else _SILENCE)
-        self._call(drive, SetParameters, 'set_parameters',
-                   SetParameters.Request(parameters=[parameter_message(name, value)]), take, now)
+        self._ask(drive, 'set_parameters',
+                  SetParameters.Request(parameters=[parameter_message(name, value)]), take, now)
 
     def read(self, drive: str, names: Sequence[str],
              done: Callable[[Sequence[Value | None]], None], now: float) -> None:
@@ -86,13 +87,12 @@ class Operations:
         def take(response: GetParameters.Response | None) -> None:
             answers = [] if response is None else [drive_value(v) for v in response.values]
             done((answers + [None] * len(names))[:len(names)])
-        self._call(drive, GetParameters, 'get_parameters',
-                   GetParameters.Request(names=list(names)), take, now)
+        self._ask(drive, 'get_parameters',
+                  GetParameters.Request(names=list(names)), take, now)
 
-    def _call(self, drive: str, kind: Any, service: str, request: Any,
-              take: Callable[[Any], None], now: float) -> None:
+    def _ask(self, drive: str, service: str, request: Any, take: Callable[[Any], None],
+             now: float) -> None:
         if is_ros_name(drive):
-            self._calls.append(Call(self._node, kind, f'{drive}/{service}', request, take, now,
-                                    PARAMETER_TIMEOUT))
+            self._calls.ask(drive, service, request, take, now)
         else:
             take(None)
