@@ -154,9 +154,9 @@ KINDS: dict[str, tuple[Callable[[Motor], Any], Callable[[], DriveConfiguration],
                             lambda: drive_of('datamodel_extended', WORD), 4 * PERIOD),
     '11 bit, by number': (lambda motor: StandardDrive(datamodel(motor)),
                           lambda: drive_of('datamodel_standard'), 0.0),
-    '11 bit, with its setpoints': (lambda motor: StandardDrive(datamodel(motor)),
-                                   lambda: drive_of('datamodel_standard', WORD, refresh_interval=0.05),
-                                   0.005),
+    '11 bit, with its setpoints': (
+        lambda motor: StandardDrive(datamodel(motor)),
+        lambda: drive_of('datamodel_standard', WORD, refresh_interval=0.05), 0.005),
     'PKW, by number': (tesys, tesys_of, 0.0),
     'PKW, with its setpoints': (tesys, lambda: tesys_of(TESYS_WORD), 0.11),
     'CANnord': (Inverter, lambda: drive(
