@@ -41,13 +41,16 @@ INTERNAL: dict[str, set[str]] = {
     # what it asks of drives comes from whoever starts it: it knows no ROS
     'panel': {'', 'core', 'monitor'},
     'security': {'', 'core', 'protocols'},
+    'ros.acquaintance': {''},
     'ros.guest': {'', 'core'},
     'ros.messages': {'', 'core'},
-    'ros.monitor': {'', 'core', 'monitor', 'ros.guest', 'ros.messages'},
+    'ros.monitor': {
+        '', 'core', 'monitor', 'ros.acquaintance', 'ros.guest', 'ros.messages'},
     'ros.demo': {'', 'core', 'configuration', 'simulation', 'monitor', 'ros', 'ros.monitor'},
     'demo': {'', 'core', 'configuration', 'process'},
     'client.drive': {'', 'core', 'process'},
-    'ros.client': {'', 'core', 'client.drive', 'ros.guest', 'ros.messages'},
+    'ros.client': {
+        '', 'core', 'client.drive', 'ros.acquaintance', 'ros.guest', 'ros.messages'},
     'client': {
         '', 'core', 'configuration', 'protocols', 'transport', 'exchange', 'process',
         'client.drive', 'ros.client'},
@@ -74,6 +77,7 @@ EXTERNAL: dict[str, set[str]] = {
     'trace': {'can', 'matplotlib'},
     # yaml: only to tell which nodes a parameter file names when none of them is ours
     'ros': {*ROS_PACKAGES, 'yaml'},
+    'ros.acquaintance': ROS_PACKAGES,
     'ros.guest': ROS_PACKAGES,
     'ros.messages': ROS_PACKAGES,
     'ros.monitor': ROS_PACKAGES,

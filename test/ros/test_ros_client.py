@@ -19,6 +19,7 @@ from drive_can_bridge.client.drive import Drive, Enabled, WhichBridge
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.parameters import Access, Storage
 from drive_can_bridge.core.roles import Role
+from drive_can_bridge.ros.acquaintance import SERVICES
 from drive_can_bridge.ros.client import graph
 
 PUMP: dict[str, Any] = {
@@ -179,7 +180,7 @@ def test_an_answer_that_is_lost_is_asked_for_again(
             return response
         return answer
     # each call by itself: others do not wait for what has no end
-    services = {'get_parameter_types': GetParameterTypes, **graph.SERVICES}
+    services = {'get_parameter_types': GetParameterTypes, **SERVICES}
     for name, kind in services.items():
         forgets = name in ('list_parameters', 'set_parameters')
         client.node.create_service(

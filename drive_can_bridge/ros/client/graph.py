@@ -4,13 +4,6 @@ A hidden node that calls services and waits for their answers.
 
 No thread: everything happens while somebody waits. rcl's wait does not end at a signal, so it is
 cut into slices; Ctrl-C comes through between two of them.
-
-``service_is_ready`` says that this side has found the server, not that the server has found this
-client. A server that has not gives its answer up, though it has done what it was asked. So before
-the first call another one is made that changes nothing, through a client that was made later,
-until it is answered: endpoints are announced in order, so that a server which knows the later one
-knows the earlier ones of this node, too. Nor has this side found all services of a node when it
-has found one: what is sent to one that it does not know yet is lost.
 """
 
 from collections.abc import Callable
@@ -18,18 +11,16 @@ import time
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from rcl_interfaces.srv import (
-    DescribeParameters, GetParameters, GetParameterTypes, ListParameters, SetParameters,
-)
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import qos_profile_parameters, QoSProfile
 
 from drive_can_bridge.core.errors import DriveCanError
+from drive_can_bridge.ros.acquaintance import (
+    FIRST_PATIENCE, GREETING, SERVICES, wanted_with, WRITING,
+)
 from drive_can_bridge.ros.guest import Guest
 
 _SLICE = 0.05
-#: s after which a greeting is said again for the first time; then twice as many, and so on
-FIRST_GREETING = 0.1
 #: s that a server may take to be found, or to know us
 _FIND_TIMEOUT = 10.0
 #: s that an answer may take: many reads that nobody answers are slow
@@ -38,11 +29,6 @@ _CALL_TIMEOUT = 120.0
 _AGAIN = 30.0
 #: s without the server until it has gone
 _GONE = 2.0
-
-WRITING = 'set_parameters'
-SERVICES: dict[str, Any] = {
-    'get_parameters': GetParameters, WRITING: SetParameters,
-    'list_parameters': ListParameters, 'describe_parameters': DescribeParameters}
 
 
 class NoAnswer(DriveCanError):
@@ -151,8 +137,7 @@ class Graph:
         key = node, service
         if key not in self._clients:
             self._known.discard(node)
-            # all that may be wanted by whoever reads; what writes is not for everybody (SROS2)
-            for name in ({service} if service == WRITING else SERVICES.keys() - {WRITING}):
+            for name in wanted_with(service):
                 self._clients[node, name] = self.node.create_client(
                     SERVICES[name], f'{node}/{name}', qos_profile=qos_profile_parameters)
         return self._clients[key]
@@ -162,14 +147,15 @@ class Graph:
         if node in self._known:
             return
         deadline = time.monotonic() + _FIND_TIMEOUT
-        greeting = self.node.create_client(
-            GetParameterTypes, f'{node}/get_parameter_types', qos_profile=qos_profile_parameters)
-        patience = FIRST_GREETING
+        name, kind = GREETING
+        greeting = self.node.create_client(kind, f'{node}/{name}',
+                                           qos_profile=qos_profile_parameters)
+        patience = FIRST_PATIENCE
         futures: list[Any] = []
         try:
             self.wait(greeting.service_is_ready, _FIND_TIMEOUT)
             while time.monotonic() < deadline:
-                futures.append(greeting.call_async(GetParameterTypes.Request()))
+                futures.append(greeting.call_async(kind.Request()))
                 if self.wait(lambda: any(each.done() for each in futures), patience):
                     self._known.add(node)
                     return

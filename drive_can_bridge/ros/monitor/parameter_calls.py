@@ -1,20 +1,17 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Parameter services of other nodes, asked by clients that stay, once these are known.
+Parameter services of other nodes, asked by clients that stay, once these are known there.
 
-A server that has not found a client yet does what it is asked, and gives its answer up. So the
-first question to a node is one that changes nothing, asked again until it is answered, by a client
-that was made after the others (see :mod:`drive_can_bridge.ros.client.graph`).
+See :mod:`drive_can_bridge.ros.acquaintance`.
 """
 
 from collections.abc import Callable
 import math
 from typing import Any, NamedTuple
 
-from rcl_interfaces.srv import GetParameterTypes
 from rclpy.node import Node
 
-from drive_can_bridge.ros.client.graph import FIRST_GREETING, SERVICES, WRITING
+from drive_can_bridge.ros.acquaintance import FIRST_PATIENCE, GREETING, SERVICES, wanted_with
 from drive_can_bridge.ros.monitor.inbox import Service
 
 #: s without a question after which a node's clients are closed
@@ -99,7 +96,7 @@ class _Host:
         if service not in self._services:
             self._get_to_know(service)
         if not self._waiting:
-            self._greet_at, self._pause = now, FIRST_GREETING
+            self._greet_at, self._pause = now, FIRST_PATIENCE
         self._waiting.append(_Question(
             now + self._timeout, self._services[service], request, done))
         self._send(now)
@@ -123,12 +120,11 @@ class _Host:
                 service.close()
 
     def _get_to_know(self, service: str) -> None:
-        """Make clients: what only reads needs no right to write (SROS2)."""
-        for name in [service] if service == WRITING else SERVICES.keys() - {WRITING}:
+        for name in wanted_with(service):
             self._services[name] = self._client(name, SERVICES[name])
         if self._greeting is not None:
             self._greeting.close()
-        self._greeting = self._client('get_parameter_types', GetParameterTypes)
+        self._greeting = self._client(*GREETING)
         self._heard_at = -math.inf
 
     def _client(self, service: str, kind: Any) -> Service:
@@ -139,7 +135,7 @@ class _Host:
         if greeting is None or not self._waiting:
             return
         if now >= self._greet_at and greeting.ready:
-            greeting.send(GetParameterTypes.Request(), self._told(now, _nothing), now)
+            greeting.send(GREETING[1].Request(), self._told(now, _nothing), now)
             self._greet_at = now + self._pause
             self._pause *= 2.0
         greeting.look(now)
