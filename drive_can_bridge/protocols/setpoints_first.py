@@ -4,7 +4,8 @@ Drives that are told one thing at a time: no word that starts one leaves before 
 
 A drive may have been off for a moment, unseen, and have in its registers what somebody else has
 put there. So each of its setpoints is written again, neutral as they are then, right before it is
-told ``enable``, and counts when it has left; where a write is acknowledged, when it was.
+told ``enable``, every time, and counts when it has left (where a write is acknowledged, when it
+was), but not while nobody answers.
 """
 
 from collections.abc import Collection
@@ -29,17 +30,25 @@ class SetpointsFirst:
         self._starting = False
         self._lacking: set[int] = set()
 
-    def look(self) -> bool:
-        """Tell whether the word has to wait; when it begins to, all setpoints become due."""
+    def look(self, *, again: bool = False) -> bool:
+        """
+        Tell whether the word has to wait; when it begins to, all setpoints become due.
+
+        :param again: the word is due again, to a drive that takes no notice of it.
+        """
         control = self._session.control
-        starting = control is not None and control.word_due and not (
-            control.stopping or control.pulsing)
+        starting = control is not None and (control.word_due or again) and not (
+            control.at_rest or control.stopping or control.pulsing)
         if starting and not self._starting:
             self._lacking = set(self._indices)
             for index in self._indices:
                 self._schedule.failed(index)
         self._starting = starting
         return starting and bool(self._lacking)
+
+    def forget(self) -> None:
+        """Let what was written not count: whether the drive was there to hear it, nobody knows."""
+        self._starting = False
 
     def written(self, index: int) -> bool:
         """Take note that the drive has a setpoint; tell whether it was the last one waited for."""

@@ -15,6 +15,7 @@ from collections.abc import Callable
 import math
 from typing import Any
 
+from any_order import PATIENCE
 from builders import (
     ACTUAL, CONTROL, Conversation, CURRENT, drive, frame, INT16, LIMIT, parameter, RAM, RO, SPEED,
     STATUS, WORD,
@@ -300,12 +301,17 @@ THINGS = st.lists(st.tuples(
     st.sampled_from([0.0, 0.001, 0.003, 0.011, 0.03, 0.07, 0.15, 0.4, 1.3])), max_size=12)
 
 
+@pytest.mark.timeout(PATIENCE)     # to find the shortest story
 @pytest.mark.parametrize('kind', KINDS)
 @given(things=THINGS)
 @example(things=[('run', 0.0), ('power', 0.03), ('back', 1.3)])
 @example(things=[('run', 0.0), ('trip', 0.03), ('back', 1.3)])
 @example(things=[('run', 0.0), ('hand', 1.3)])
 @example(things=[('run', 0.0), ('power', 1.3), ('back', 0.4), ('run', 0.1)])
+# told to run while it is without power, unseen, and when it is there
+@example(things=[('power', 0.4), ('enable', 0.001), ('back', 0.0)])
+@example(things=[('power', 0.011), ('enable', 0.07), ('enable', 0.15), ('enable', 0.15),
+                 ('back', 0.0)])
 def test_nothing_starts_by_itself(kind: str, things: list[tuple[str, float]]) -> None:
     story = Story(kind)
     for what, seconds in things:

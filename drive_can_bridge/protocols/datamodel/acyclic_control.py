@@ -37,6 +37,7 @@ class AcyclicControl:
 
     :param word: parameter of the control word; None: it is sent cyclically.
     :param status: parameter of the status word; None: it comes cyclically, or there is none.
+    :ivar repetition: of the word.
     """
 
     def __init__(self, session: Session, control: ControlMachine, channel: AcyclicChannel,
@@ -52,7 +53,7 @@ class AcyclicControl:
         self._status = status
         self._spacing = stop_spacing(session.configuration.period)
         self._numbers = numbers
-        self._repetition = WordRepetition(
+        self.repetition = WordRepetition(
             control, wears=word is not None and word.storage is not Storage.RAM)
         self._reading = False
         self._outdated = False  # what is being read was asked before the word left
@@ -60,7 +61,7 @@ class AcyclicControl:
 
     def begin(self, now: float) -> None:
         """Handle a drive that was found: it gets its word, and its status is looked at."""
-        self._repetition.forget()
+        self.repetition.forget()
         self._watching = True
         if self._status is not None:
             self._look_at = now
@@ -77,7 +78,7 @@ class AcyclicControl:
 
     def update(self, now: float) -> None:
         """Write the control word if it changed, or if the drive takes no notice of it."""
-        word, repetition = self._control.word, self._repetition
+        word, repetition = self._control.word, self.repetition
         if self._word is None or word == repetition.word and not repetition.due(now):
             return
         repetition.begun(word)
@@ -114,18 +115,18 @@ class AcyclicControl:
 
     def _left(self, word: int, sent: bool, now: float, *, runs: bool) -> None:
         if not sent:
-            if word == self._repetition.word:
-                self._repetition.word = None
+            if word == self.repetition.word:
+                self.repetition.word = None
                 self._retry_at = now + REFUSED_PAUSE
             return
         self._session.told.note_unacknowledged(CONTROL_WORD, runs=runs)
         self._outdated = self._reading
         if self._watching:  # else others see to the stop
-            self._repetition.left(now)
+            self.repetition.left(now)
         if word == self._control.word:
             self._control.word_sent(now)
             if self._control.pulsing:
-                self._repetition.left(now, self._spacing)
+                self.repetition.left(now, self._spacing)
                 self._retry_at = now + self._spacing
         self._session.control_changed(now)
 

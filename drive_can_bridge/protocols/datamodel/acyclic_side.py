@@ -27,7 +27,9 @@ from drive_can_bridge.protocols.datamodel.extended import PAYLOAD, SLOTS
 from drive_can_bridge.protocols.datamodel.numbers import Numbers
 from drive_can_bridge.protocols.datamodel.options import DataModelOptions
 from drive_can_bridge.protocols.placement import SentWrites
-from drive_can_bridge.protocols.safe_stop import SafeStop, StatusRead, STOP_ATTEMPTS
+from drive_can_bridge.protocols.safe_stop import (
+    SafeStop, StatusRead, STOP_ATTEMPTS, StopWrite,
+)
 from drive_can_bridge.protocols.stop_again import StopAgain
 
 
@@ -130,10 +132,13 @@ class AcyclicSide:
 
     # -- stopping by acyclic writes ---------------------------------------------------------------
 
-    @property
-    def longest_stop(self) -> float:
-        """How many s a stop by acyclic writes takes at most, and the read of the status then."""
-        answer, count = self.stop.answer_time, len(self.stop.writes())
+    def longest_stop(self, *, setpoints: bool = True) -> float:
+        """
+        Return how many s a stop by acyclic writes takes at most, and the read of the status then.
+
+        :param setpoints: as for :meth:`begin_stop`.
+        """
+        answer, count = self.stop.answer_time, len(self._stop_writes(setpoints))
         if not self.courier.anonymous:
             return (STOP_ATTEMPTS * count + 1) * answer
         silence = self.courier.silence
@@ -151,7 +156,7 @@ class AcyclicSide:
         :param again: a stop before this one has failed, which was told.
         """
         stop = self.stop
-        told = stop.writes(word=setpoints or self.control_slot is None, setpoints=setpoints)
+        told = self._stop_writes(setpoints)
         if not told or stop.running:
             return
         writes = [(each.parameter, self.numbers.write(each.parameter, each.raw)) for each in told]
@@ -161,6 +166,9 @@ class AcyclicSide:
         for _, write in writes:
             self.courier.write_now(write, lambda sent, then: None, now)
         stop.begin(confirm(writes, stop.answer_time), now, setpoints=setpoints, again=again)
+
+    def _stop_writes(self, setpoints: bool) -> list[StopWrite]:
+        return self.stop.writes(word=setpoints or self.control_slot is None, setpoints=setpoints)
 
     def _read_status(self, status: Parameter, timeout: float) -> StatusRead[Step, Reply]:
         words = yield Read(

@@ -120,7 +120,8 @@ class ExtendedSession(Session):
 
     @property
     def longest_stop(self) -> float:
-        return self._exchange.longest_stop + self._side.longest_stop
+        by_number = self._side.longest_stop(setpoints=not self._cycling)
+        return by_number + (self._exchange.longest_stop if self._cycling else 0.0)
 
     def begin(self, now: float) -> None:
         self._exchange.stop()

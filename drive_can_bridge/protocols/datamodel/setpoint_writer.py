@@ -32,6 +32,7 @@ class SetpointWriter:
         self.word_written_at = -math.inf
         self._session = session
         self._exchange = exchange
+        self._side = side
         self._courier = side.courier
         self._numbers = side.numbers
         self._slot = side.control_slot
@@ -64,8 +65,10 @@ class SetpointWriter:
                 stopping or not self._exchange.reading):
             self._schedule.failed(slot)
         doubt = starts and (self._exchange.silent or unanswered)
+        if starts and self._exchange.silent:
+            self._first.forget()
         repeated = starts and control is not None and not (control.word_due or control.pulsing)
-        hold = [slot] if doubt or repeated and not known or self.holds_word else []
+        hold = [slot] if doubt or repeated and not known or self.holds_word(now) else []
         unknown = self._session.setpoints.unknown
         if unknown:
             hold += [index for index, parameter in enumerate(self._parameters)
@@ -75,10 +78,12 @@ class SetpointWriter:
             # a word that starts the drive behind setpoints, also when all are only refreshed
             self._schedule.order(slot, first=stopping or control.pulsing)
 
-    @property
-    def holds_word(self) -> bool:
-        """The control word waits for setpoints."""
-        return self._first.look()
+    def holds_word(self, now: float) -> bool:
+        """Tell whether the control word waits for setpoints."""
+        by_number = self._side.control_writer
+        repetition = (self._repetition if self._slot is not None or by_number is None
+                      else by_number.repetition)
+        return self._first.look(again=repetition.due(now))
 
     def write(self, now: float) -> None:
         """Write one that is due, if there is one, with the value that it has now."""

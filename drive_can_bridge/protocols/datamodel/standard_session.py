@@ -70,7 +70,7 @@ class StandardSession(Session):
 
     @property
     def longest_stop(self) -> float:
-        return self._side.longest_stop
+        return self._side.longest_stop()
 
     def time_lost(self, now: float) -> None:
         self._expected = self._expected or self._side.courier.outstanding is not None
@@ -137,7 +137,7 @@ class StandardSession(Session):
         control, by_number = self.control, self._side.control_writer
         if control is None or not self.online or self.stage is not Stage.RUNNING:
             return
-        waits = self._writer.holds_word
+        waits = self._writer.holds_word(now)
         if by_number is not None and not waits:
             by_number.update(now)
         if self._side.control_slot is not None or waits or control.stopping:
