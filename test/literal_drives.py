@@ -8,7 +8,17 @@ all, is the test's business. The simulated drives of the package know more, and 
 ``registers`` is number -> raw value; what is not in it the drive does not have.
 """
 
+from typing import Any
+
 from drive_can_bridge.core.frame import Frame
+
+
+class Registers(dict[int, int]):
+    """Registers into which every value goes by ``__setitem__``, one after the other."""
+
+    def update(self, entries: Any = (), **_: int) -> None:
+        for number, raw in entries:
+            self[number] = raw
 
 
 class ExtendedDrive:

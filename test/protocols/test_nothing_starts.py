@@ -21,7 +21,7 @@ from builders import (
     STATUS, WORD,
 )
 from hypothesis import example, given, strategies as st
-from literal_drives import ExtendedDrive, PkwNode, StandardDrive
+from literal_drives import ExtendedDrive, PkwNode, Registers, StandardDrive
 import pytest
 from timeline import Timeline
 
@@ -74,13 +74,12 @@ class Motor:
         self.setpoint = PRESET
 
 
-class Registers(dict[int, int]):
+class MotorRegisters(Registers):
     """Those of a drive with a motor: the word that runs it, its setpoint, its status."""
 
     def __init__(self, motor: Motor, rest: dict[int, int], *, word: int, setpoint: int,
                  status: int, bits: tuple[int, int, int]) -> None:
-        super().__init__(rest)
-        super().update({word: 0, setpoint: 0, status: 0})
+        super().__init__({**rest, word: 0, setpoint: 0, status: 0})
         self.motor, self.word, self.place, self.status, self.bits = (
             motor, word, setpoint, status, bits)
 
@@ -93,8 +92,7 @@ class Registers(dict[int, int]):
 
     def update(self, entries: Any = (), **_: int) -> None:
         # a frame is taken as a whole, and what it says of the setpoint counts when it starts
-        for number, raw in sorted(entries, key=lambda entry: bool(entry[0] == self.word)):
-            self[number] = raw
+        super().update(sorted(entries, key=lambda entry: bool(entry[0] == self.word)))
 
     def __getitem__(self, number: int) -> int:
         if number == self.status:
@@ -122,15 +120,16 @@ class Inverter:
         return [frame(f'003#{state}0B0000')]
 
 
-def datamodel(motor: Motor, **rest: int) -> Registers:
-    table = {50: 0, 51: 0, 209: 0, 210: 0, 211: 0, 122: 50, 123: 51, 124: 0, 125: 0, 126: 209,
-             127: 210, 128: 211, 129: 0, **{int(key[1:]): raw for key, raw in rest.items()}}
-    return Registers(motor, table, word=52, setpoint=50, status=211, bits=(1, 2, 8))
+def datamodel(motor: Motor, slot: int = 0) -> MotorRegisters:
+    """Return what has its control word in the third request slot, or by number only."""
+    table = {51: 0, 209: 0, 210: 0, 122: 50, 123: 51, 124: slot, 125: 0, 126: 209, 127: 210,
+             128: 211, 129: 0}
+    return MotorRegisters(motor, table, word=52, setpoint=50, status=211, bits=(1, 2, 8))
 
 
 def tesys(motor: Motor) -> PkwNode:
-    node = PkwNode(5, Registers(motor, {456: 0}, word=704, setpoint=710, status=455,
-                                bits=(0x01, 0x80, 0x04)))
+    node = PkwNode(5, MotorRegisters(motor, {}, word=704, setpoint=710, status=455,
+                                     bits=(0x01, 0x80, 0x04)))
     node.operational = True
     return node
 
@@ -151,7 +150,7 @@ def tesys_of(*more: Parameter) -> DriveConfiguration:
 KINDS: dict[str, tuple[Callable[[Motor], Any], Callable[[], DriveConfiguration], float]] = {
     '29 bit, by number': (lambda motor: ExtendedDrive(datamodel(motor)),
                           lambda: drive_of('datamodel_extended'), 0.0),
-    '29 bit, in its slot': (lambda motor: ExtendedDrive(datamodel(motor, p124=52)),
+    '29 bit, in its slot': (lambda motor: ExtendedDrive(datamodel(motor, slot=52)),
                             lambda: drive_of('datamodel_extended', WORD), 4 * PERIOD),
     '11 bit, by number': (lambda motor: StandardDrive(datamodel(motor)),
                           lambda: drive_of('datamodel_standard'), 0.0),

@@ -6,7 +6,7 @@ from functools import partial
 from builders import (
     ACTUAL, Conversation, CURRENT, DAMPING, drive, frame, GAIN, LIMIT, SPEED, STATUS,
 )
-from literal_drives import ExtendedDrive, StandardDrive
+from literal_drives import ExtendedDrive, Registers, StandardDrive
 import pytest
 from timeline import Timeline
 
@@ -21,7 +21,7 @@ REGISTERS = {50: 0, 51: 0, 40: 0, 41: 0, 209: 0, 210: 0, 211: 0,
              122: 50, 123: 51, 124: 40, 125: 41, 126: 209, 127: 210, 128: 211, 129: 0}
 
 
-class Stubborn(dict[int, int]):
+class Stubborn(Registers):
     """Registers that keep what they have, once told so."""
 
     stuck = False
@@ -29,10 +29,6 @@ class Stubborn(dict[int, int]):
     def __setitem__(self, number: int, raw: int) -> None:
         if not self.stuck:
             super().__setitem__(number, raw)
-
-    def update(self, entries: object = (), **_: int) -> None:
-        for number, raw in entries:     # type: ignore[attr-defined]
-            self[number] = raw
 
 
 @pytest.mark.parametrize('protocol', ['datamodel_standard', 'datamodel_extended'])

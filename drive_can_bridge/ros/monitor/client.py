@@ -26,7 +26,7 @@ from drive_can_bridge.monitor.values import ParameterInfo
 from drive_can_bridge.ros.guest import Guest
 from drive_can_bridge.ros.messages import drive_value, plain
 from drive_can_bridge.ros.monitor.inbox import (
-    CALL_TIMEOUT, Inbox, latched_quality, log_quality, newest_quality,
+    Inbox, latched_quality, log_quality, newest_quality,
 )
 from drive_can_bridge.ros.monitor.messages import (
     log_level, parameter_info, stamp_of, statuses, values,
@@ -35,6 +35,8 @@ from drive_can_bridge.ros.monitor.parameter_calls import ParameterCalls
 
 #: s between two looks at the graph, which are not cheap
 _GRAPH_PERIOD = 2.0
+#: s after which an answer is not waited for any more
+_CALL_TIMEOUT = 5.0
 #: descriptors asked for at once
 _BATCH = 200
 _BITS_MAX = 256
@@ -65,7 +67,7 @@ class MonitorClient:
         self._focus: frozenset[str] = frozenset()
         self._watched = True
         self._graph_at = 0.0
-        self._calls = ParameterCalls(self._node, CALL_TIMEOUT)
+        self._calls = ParameterCalls(self._node, _CALL_TIMEOUT)
         self._asked: set[str] = set()
 
     # -- for the view -----------------------------------------------------------------------------

@@ -20,8 +20,6 @@ RCLError = rclpy_implementation.RCLError
 
 #: messages taken at once; what is left waits for the next look
 _BATCH = 200
-#: s after which an answer is not waited for any more
-CALL_TIMEOUT = 5.0
 #: s that a service which nobody offers yet may still be found in: each is found by itself
 OFFER_TIMEOUT = 2.0
 
@@ -85,7 +83,7 @@ class Service:
     """
 
     def __init__(self, node: Node, service_type: Any, name: str,
-                 timeout: float = CALL_TIMEOUT) -> None:
+                 timeout: float) -> None:
         self._node = node
         self._type = service_type
         self._timeout = timeout
