@@ -237,7 +237,7 @@ def test_ros_packages_are_declared() -> None:
 # -- size and inheritance -------------------------------------------------------------------------
 
 #: lines that a module has at most
-LINES_MAX = 400
+LINES_MAX = 600
 #: steps from a class to the base of all its ancestors in this package: a base, and its subclasses
 STEPS_MAX = 1
 

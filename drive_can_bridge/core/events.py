@@ -36,6 +36,13 @@ class StationLost:
 
 
 @dataclass(frozen=True)
+class DriveFailed:
+    """A defect of this program: the drive is stopped, and offline; ``reason`` has the words."""
+
+    reason: str
+
+
+@dataclass(frozen=True)
 class MappingDiffered:
     """The drive's maps are not the configured ones: no cyclic frame is sent."""
 
@@ -92,6 +99,6 @@ class Noted:
     danger: bool = False
 
 
-Event = Union[ProcessDataReceived, StationFound, StationLost, MappingDiffered, MappingWritten,
-              SetpointsExpired, RequestCompleted, ControlCompleted, FrameRejected,
+Event = Union[ProcessDataReceived, StationFound, StationLost, DriveFailed, MappingDiffered,
+              MappingWritten, SetpointsExpired, RequestCompleted, ControlCompleted, FrameRejected,
               ForeignMasterSeen, Noted]

@@ -86,6 +86,7 @@ class Session(ABC):
     :ivar stage: what is being done for the drive.
     :ivar online: the drive exchanges process data.
     :ivar ever_online: it did so at least once since activation.
+    :ivar defect: what went wrong in the program, in words, while the drive is left alone for that.
     :ivar serving: it only cares for parameter requests; ``online``: the last one was answered.
     :ivar how_to_enable: what to do about a drive that is disabled.
     :ivar partners: sessions on this bus whose timers and events any call of this one may change.
@@ -120,6 +121,7 @@ class Session(ABC):
             offline=lambda: self.state is DriveState.OFFLINE)
         self.stage = Stage.IDLE
         self.active = self.serving = self.bus_available = self.online = self.ever_online = False
+        self.defect = ''
         self.how_to_enable = 'call ~/enable'
         self.partners: Sequence[Session] = ()
         self.phase: float | None = None
@@ -139,6 +141,7 @@ class Session(ABC):
     def activate(self, now: float) -> None:
         """Begin to exchange (as soon as the bus is there)."""
         self.active = True
+        self.defect = ''
         self.ever_online = False
         self.sent.clear()
         self.setpoints.reset()
@@ -157,13 +160,36 @@ class Session(ABC):
 
     def deactivate(self, now: float) -> None:
         """Begin the safe stop: neutral setpoints, ``disable``; then silence."""
+        self._begin_end(BRIDGE_INACTIVE, now)
+
+    def fail(self, reason: str, now: float) -> None:
+        """
+        Stop the drive as at the end: this program has a defect, and nobody knows what it spoilt.
+
+        It is offline from now on, and left alone until :meth:`begin_anew`.
+
+        :param reason: in words.
+        """
+        if self.defect or self.stage is Stage.IDLE and not self.active:
+            return      # its stop takes its course
+        self.defect = reason
+        self._begin_end(reason, now)
+
+    def begin_anew(self, now: float) -> None:
+        """Look for the drive again, after a defect."""
+        self.defect = ''
+        self.active = True
+        if self.bus_available:
+            self.bus_up(now)
+
+    def _begin_end(self, reason: str, now: float) -> None:
         self.active = False
         unheard = not self.online and self.told.doubt()
         owes = self.prepare_stop(now)
         if owes:
             self.stage = Stage.STOPPING
-        self.users.fail_all(BRIDGE_INACTIVE)
-        self.withdraw(BRIDGE_INACTIVE, now)
+        self.users.fail_all(reason)
+        self.withdraw(reason, now)
         if owes and self.begin_stop(now):
             return
         if owes or unheard or not self.bus_available:
@@ -382,7 +408,7 @@ class Session(ABC):
     @property
     def state(self) -> DriveState:
         """The state in one word."""
-        return self.gate.state
+        return DriveState.OFFLINE if self.defect else self.gate.state
 
     @property
     def warning(self) -> str:
@@ -396,4 +422,4 @@ class Session(ABC):
     @property
     def offline_advice(self) -> str:
         """While not online: what is missing and what to look at; '' while online."""
-        return self.report.advice
+        return self.defect or self.report.advice

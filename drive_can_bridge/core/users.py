@@ -115,7 +115,7 @@ class Users:
     @property
     def _absence(self) -> str:
         if not self._session.active:
-            return BRIDGE_INACTIVE
+            return self._session.defect or BRIDGE_INACTIVE
         return '' if self._session.bus_available else BUS_DOWN
 
     def control_refusal(self, action: ControlAction) -> str:

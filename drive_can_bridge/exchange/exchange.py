@@ -22,13 +22,13 @@ from typing import Any
 
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.control import ControlRequest
-from drive_can_bridge.core.events import ProcessDataReceived
 from drive_can_bridge.core.frame import bits_on_bus, Frame, Route
 from drive_can_bridge.core.requests import Request
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.exchange.alarm import Alarm
 from drive_can_bridge.exchange.errand import Errand
 from drive_can_bridge.exchange.listeners import BusListener, DriveListener
+from drive_can_bridge.exchange.member import Member, STOP_MARGIN
 from drive_can_bridge.exchange.phases import spread
 from drive_can_bridge.exchange.router import Router
 from drive_can_bridge.transport.link import Link, steady_now
@@ -43,30 +43,6 @@ LATENESS_MAX = 0.25
 LOOK_PERIOD = 0.05
 #: s until what was last sent is told again
 REQUEST_PERIOD = 1.0
-#: s that a stop may take beyond its neutral cycles
-STOP_MARGIN = 0.5
-
-
-class Member:
-    """
-    A drive on the bus: its session and whoever listens to it.
-
-    :ivar partners: drives that share frames with this one: what happens to it may concern them.
-    :ivar due: when the session wants to be called; kept here, so that a pass over all drives costs
-        a comparison each.
-    :ivar look_at: when its commands are to be looked at.
-    :ivar told: what the listener knows to have been sent.
-    """
-
-    __slots__ = ('due', 'listener', 'look_at', 'partners', 'session', 'told')
-
-    def __init__(self, session: Session, listener: DriveListener) -> None:
-        self.session = session
-        self.listener = listener
-        self.look_at = -math.inf
-        self.partners: list[Member] = []
-        self.due = session.next_timer()
-        self.told = session.sent.raws
 
 
 class BusExchange:
@@ -125,7 +101,7 @@ class BusExchange:
 
     def attach(self, session: Session, listener: DriveListener) -> None:
         """Say who listens to a session. Once for each, before ``open``."""
-        member = Member(session, listener)
+        member = Member(session, listener, self._transmit, self._clock)
         for other in self._members:
             if other.session in session.partners:
                 other.partners.append(member)
@@ -147,9 +123,9 @@ class BusExchange:
             self._last_pass = self._meant_at = now
             self.active = True
             for member in self._members:
-                member.listener.discard_commands('')
-                member.session.activate(now)
-                self._pump(member)
+                member.anew_at = math.inf
+                member.tell(member.listener.discard_commands, '')
+                member.take(member.session.activate, now)
         self._alarm.ring()
 
     def serve(self) -> None:
@@ -169,9 +145,10 @@ class BusExchange:
             lost = self.active and now - self._last_pass >= LOST_TIME  # nobody has noticed yet
             self.active = False
             for member in self._members:
+                member.anew_at = math.inf
                 if lost:
-                    self._stop_one(member, lambda session: session.time_lost(now))
-                self._stop_one(member, lambda session: session.deactivate(now))
+                    member.take(member.session.time_lost, now)
+                member.take(member.session.deactivate, now)
         self._alarm.ring()
         end = self._clock() + STOP_MARGIN + max(
             (session.longest_stop for session in self._sessions), default=0.0)
@@ -193,25 +170,18 @@ class BusExchange:
         """End stops that do not come to an end: nobody knows what the drives do."""
         with self.lock:
             for member in self._members:
-                if not member.session.stopped:
-                    self._stop_one(member, lambda session: session.give_up(self._clock()))
+                session = member.session
+                if not session.stopped:
+                    member.take(session.give_up, self._clock())
+                    if session.defect:
+                        self.bus_reason = f'{session.configuration.name}: {session.defect}'
 
     def _pass_to_stop(self) -> None:
         """Serve the stops, without the timer thread and without commands."""
         with self.lock:
             for member in self._members:
                 if member.due <= self._clock():
-                    self._stop_one(member, lambda session: session.handle_timer(self._clock()))
-
-    def _stop_one(self, member: Member, step: Callable[[Session], None]) -> None:
-        """Do what stops one drive: should that fail, the others are stopped all the same."""
-        try:
-            step(member.session)
-            self._pump(member)
-        except Exception as error:  # noqa: BLE001  the last resort: it is told, and costs no other
-            member.due = math.inf
-            name = member.session.configuration.name
-            self.bus_reason = f'{name}: {type(error).__name__}: {error}'
+                    member.take(member.session.handle_timer, self._clock())
 
     def close(self) -> None:
         """End both threads and close the bus."""
@@ -232,8 +202,12 @@ class BusExchange:
         member = self._member(session)
         with self.lock:
             now = self._clock()
-            session.users.submit(request, now)
-            self._pump(member)
+            try:
+                session.users.submit(request, now)
+                member.pump()
+            except Exception as error:
+                member.contain(error)
+                raise
         self._ring_if_sooner(member)
 
     def reconfigure(self, session: Session, **changes: Any) -> None:
@@ -272,7 +246,8 @@ class BusExchange:
         late = now - self._meant_at
         if not self._notice_lost_time(now) and late > LATENESS_MAX and self.active:
             for member in self._members:
-                member.listener.discard_commands(f'the exchange was {late:.2f} s late')
+                member.tell(member.listener.discard_commands,
+                            f'the exchange was {late:.2f} s late')
         if now >= self._tell_at:
             self._tell_again(now)
         soonest = min(now + PASS_PERIOD, self._tell_at)
@@ -280,9 +255,9 @@ class BusExchange:
             if member.due <= now or member.look_at <= now and self.active:
                 now = self._clock()  # the drives before took their time
                 member.look_at = now + LOOK_PERIOD
-                member.listener.take_commands(now)
-                member.session.handle_timer(now)
-                self._pump(member)
+                member.serve(now)
+            if member.anew_at <= now:
+                member.begin_anew(now)
         for member in self._members:  # a partner's timer may have changed after its turn
             due = member.look_at if member.look_at < member.due and self.active else member.due
             if due < soonest:
@@ -294,7 +269,7 @@ class BusExchange:
         self._tell_at = now + REQUEST_PERIOD
         if self.active:
             for member in self._members:
-                member.listener.request_sent(now)
+                member.tell(member.listener.request_sent, now)
 
     def _notice_lost_time(self, now: float) -> bool:
         """Re-arm everything after a second that was lost; False: none was."""
@@ -304,9 +279,9 @@ class BusExchange:
             return False
         self._meant_at = now
         for member in self._members:
-            member.listener.discard_commands(f'the bridge stood still for {gap:.2f} s')
-            member.session.time_lost(now)
-            self._pump(member)
+            member.tell(member.listener.discard_commands,
+                        f'the bridge stood still for {gap:.2f} s')
+            member.take(member.session.time_lost, now)
         return True
 
     # -- the reader thread (LinkListener) ---------------------------------------------------------
@@ -324,12 +299,10 @@ class BusExchange:
             member = self._router.find(frame)
             if member is None:
                 for hearer in (hearers := self._router.hearers(frame)):
-                    hearer.session.receive_frame(frame, now, now - arrived)
-                    self._pump(hearer)
+                    hearer.take(hearer.session.receive_frame, frame, now, now - arrived)
                 self.frames_rejected += not hearers
                 return
-            member.session.receive_frame(frame, now, now - arrived)
-            self._pump(member)
+            member.take(member.session.receive_frame, frame, now, now - arrived)
         self._ring_if_sooner(member)
 
     def bus_opened(self) -> None:
@@ -338,8 +311,7 @@ class BusExchange:
             now = self._clock()
             self.bus_state, self.bus_reason = 'up', ''
             for member in self._members:
-                member.session.bus_up(now)
-                self._pump(member)
+                member.take(member.session.bus_up, now)
         self._alarm.ring()
         self._listener.bus_opened(self.bus.name)
 
@@ -349,8 +321,7 @@ class BusExchange:
             now = self._clock()
             self.bus_state, self.bus_reason = 'down', reason
             for member in self._members:
-                member.session.bus_down(now, reason)
-                self._pump(member)
+                member.take(member.session.bus_down, now, reason)
         self._listener.bus_lost(self.bus.name, reason)
 
     def bus_misconfigured(self, reason: str) -> None:
@@ -368,33 +339,11 @@ class BusExchange:
 
     # -- from session to the outside --------------------------------------------------------------
 
-    def _pump(self, member: Member) -> None:
-        """Send what a session wants sent, and tell its listener what happened."""
-        self._pump_one(member)
-        for partner in member.partners:
-            self._pump_one(partner)
-
-    def _pump_one(self, member: Member) -> None:
-        session = member.session
-        frames = session.take_frames()
-        while frames:
-            refused = []
-            leaving = self._clock()     # nothing answers before that
-            for place, frame in enumerate(frames):
-                if self.link.send(frame):
-                    self.sent_bits += bits_on_bus(len(frame[1]), frame[2])
-                    if self._note is not None:
-                        self._note(frame, leaving, True)
-                else:
-                    refused.append(place)
-            session.frames_left(self._clock(), refused)
-            frames = session.take_frames()
-        if session.sent.raws is not member.told:
-            member.told = session.sent.raws
-            member.listener.request_sent(self._clock())
-        for event in session.take_events():
-            if type(event) is ProcessDataReceived:
-                member.listener.process_data(event)
-            else:
-                member.listener.handle_event(event)
-        member.due = session.next_timer()
+    def _transmit(self, frame: Frame, now: float) -> bool:
+        """Send a frame of a session; False: the bus did not take it."""
+        if not self.link.send(frame):
+            return False
+        self.sent_bits += bits_on_bus(len(frame[1]), frame[2])
+        if self._note is not None:
+            self._note(frame, now, True)
+        return True

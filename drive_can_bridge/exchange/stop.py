@@ -16,10 +16,10 @@ def stop_all(exchanges: Iterable[BusExchange]) -> dict[str, str]:
     failures: dict[str, str] = {}
 
     def stop(exchange: BusExchange) -> None:
-        reason = exchange.bus_reason or 'the bus blocks'
         try:
             if exchange.deactivate():
                 return
+            reason = exchange.bus_reason or 'the bus blocks'
         except Exception as error:  # noqa: BLE001  outermost call of a thread: nothing is silent
             reason = f'{type(error).__name__}: {error}'
         failures[exchange.bus.name] = reason

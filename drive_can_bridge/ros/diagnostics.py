@@ -149,6 +149,10 @@ class DriveReporter:
 
     def _judge(self, state: DriveState, rejected: int, now: float) -> tuple[bytes, str]:
         drive, session = self._drive, self._drive.session
+        if session.defect and drive.exchange.active:
+            return DiagnosticStatus.ERROR, (
+                f'offline: {session.defect}; told to stop, looked for again in a moment; please '
+                f'report this defect of the bridge with its log')
         if not session.active:
             return DiagnosticStatus.STALE, self.inactive
         if state is DriveState.MAPPING_DIFFERS:

@@ -19,7 +19,7 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlCompleted, ControlRequest
 from drive_can_bridge.core.directory import ParameterDirectory
 from drive_can_bridge.core.events import (
-    Event, ForeignMasterSeen, FrameRejected, MappingDiffered, MappingWritten, Noted,
+    DriveFailed, Event, ForeignMasterSeen, FrameRejected, MappingDiffered, MappingWritten, Noted,
     ProcessDataReceived, RequestCompleted, SetpointsExpired, StationFound, StationLost,
 )
 from drive_can_bridge.core.requests import (
@@ -229,6 +229,11 @@ class DriveNode(DriveListener):
                 self._log.warning(f'offline: {event.reason}', urgent=True)
             elif not self._may_run:
                 self._tell_stopped()
+        elif isinstance(event, DriveFailed):
+            self._log.error(f'offline: {event.reason}; told to stop, and then looked for again')
+            self._online.publish(Bool(data=False))
+            self.samples.forget()
+            self.times_lost += 1
         elif isinstance(event, SetpointsExpired):
             self.warn('command timeout',
                       f'no command for {self.session.configuration.command_timeout:g} s: '

@@ -114,12 +114,14 @@ def _run(watcher: SignalWatcher, arguments: Sequence[str]) -> int:
     watcher.last_steps.insert(0, last_words)
     code = 0
     try:
-        if not watcher.signalled:  # else nothing is begun that had to be stopped
-            if bridge.autostart and not bridge.start(lambda: watcher.signalled):
-                code = 1
-            elif watcher.wait():
-                code = 1
-        bridge.stop()
+        try:
+            if not watcher.signalled:  # else nothing is begun that had to be stopped
+                if bridge.autostart and not bridge.start(lambda: watcher.signalled):
+                    code = 1
+                elif watcher.wait():
+                    code = 1
+        finally:    # whatever dies
+            bridge.stop()
     finally:
         watcher.last_steps.remove(last_words)   # which keeps the node
         spinner.stop()

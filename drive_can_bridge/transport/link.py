@@ -186,10 +186,25 @@ class Link:
         except BusMisconfigured as error:
             self._listener.bus_misconfigured(in_words(error))
         except Exception as error:  # noqa: BLE001  outermost loop of a thread: nothing is silent
+            self._first_attempt.set()
             self._listener.link_failed(f'{type(error).__name__}: {in_words(error)}')
+            self._read_on()
         finally:
             self._close_port()
             self._first_attempt.set()
+
+    def _read_on(self) -> None:
+        """Keep the port after a defect, until the drives were stopped: answers show that."""
+        while not self._closing.is_set():
+            try:
+                port = self._port
+                frame = None if port is None else port.receive(RECEIVE_TIMEOUT)
+                if frame is not None and port is not None:
+                    self._listener.frame_received(frame, port.age)
+            except Exception:   # noqa: BLE001  more of what was told, or the bus is gone
+                frame = None
+            if frame is None:
+                self._closing.wait(RECEIVE_TIMEOUT)
 
     def _keep_open(self) -> None:
         reported = ''
@@ -217,8 +232,6 @@ class Link:
                 if reason != reported:
                     self._listener.bus_lost(reason)
                 reported = reason
-            finally:
-                self._close_port()
                 self._first_attempt.set()
             self._closing.wait(self.bus.reconnect_period)
 

@@ -274,6 +274,19 @@ def test_defect_is_told(make: Callable[..., Bench]) -> None:
     assert bench.listener.told[1] == 'failed: ZeroDivisionError: a defect'
 
 
+def test_the_bus_stays_open_after_a_defect_until_the_drives_were_stopped(
+        make: Callable[..., Bench]) -> None:
+    bench = make()
+    bench.opened()
+    bench.port.coming.extend([ZeroDivisionError('a defect'), KeyError('another'), ANSWER])
+    wait_for(lambda: bench.listener.frames == [ANSWER])
+    assert bench.listener.told[1:] == ['failed: ZeroDivisionError: a defect']
+    assert not bench.port.closed
+    assert bench.link.send(FRAME)
+    bench.link.stop()
+    assert bench.port.closed
+
+
 # -- nothing leaves any more ----------------------------------------------------------------------
 
 

@@ -21,7 +21,6 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
 from drive_can_bridge.core.events import Event
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.core.requests import BRIDGE_INACTIVE
 from drive_can_bridge.core.session import Stage
 from drive_can_bridge.core.told import MAY_RUN
 from drive_can_bridge.core.users import DRIVE_OFFLINE
@@ -129,9 +128,9 @@ class Group:
             self.control.member_lost(member.configuration.name)
             self.leader.gate.follow()
 
-    def end(self, now: float) -> None:
-        """Take note that the bridge ends: that, and no member that goes, takes the enable back."""
-        self.control.withdraw(BRIDGE_INACTIVE, now, lost=False)
+    def end(self, reason: str, now: float) -> None:
+        """Take note that all are stopped: that, and no member that goes, takes the enable back."""
+        self.control.withdraw(reason, now, lost=False)
 
     def member_status(self, member: CannordSession, word: int, now: float) -> None:
         """Take the status word of an inverter that is led."""

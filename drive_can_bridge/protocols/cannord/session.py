@@ -27,6 +27,7 @@ from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.events import Event, ForeignMasterSeen
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.process_image import ProcessImage
+from drive_can_bridge.core.requests import BRIDGE_INACTIVE
 from drive_can_bridge.core.roles import publish_it, Roles
 from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.users import Users
@@ -127,7 +128,7 @@ class CannordSession(Session):
 
     def prepare_stop(self, now: float) -> bool:
         if self._group is not None:
-            self._group.end(now)
+            self._group.end(self.defect or BRIDGE_INACTIVE, now)
         return super().prepare_stop(now)
 
     def begin_stop(self, now: float) -> bool:

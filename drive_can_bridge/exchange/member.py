@@ -1,0 +1,176 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+A drive on its bus: its session, whoever listens to it, and what a defect in either of them costs.
+
+Whatever one of the two raises, the bus and its other drives go on. The drive itself is not
+commanded on blindly: it is stopped as at the end of the bridge, is offline for a moment, and is
+looked for again as after a loss. Drives that share frames with it share that.
+"""
+
+from collections.abc import Callable
+from functools import partial
+import math
+
+from drive_can_bridge.core.events import DriveFailed, ProcessDataReceived
+from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.session import Session
+from drive_can_bridge.exchange.listeners import DriveListener
+
+#: s that a stop may take beyond its neutral cycles
+STOP_MARGIN = 0.5
+#: s that a drive is left alone after a defect: long enough to be seen
+PAUSE = 1.0
+#: s until a step is taken again that has failed during a stop
+RETRY_AFTER = 0.01
+
+
+class Member:
+    """
+    A drive on the bus.
+
+    :param transmit: (frame, time): sends it; False: the bus did not take it.
+    :ivar partners: drives that share frames with this one: what happens to it may concern them.
+    :ivar due: when the session wants to be called; kept here, so that a pass over all drives costs
+        a comparison each.
+    :ivar look_at: when its commands are to be looked at.
+    :ivar anew_at: when to look for it again after a defect; infinity: there was none.
+    :ivar told: what the listener knows to have been sent.
+    """
+
+    __slots__ = ('_clock', '_defect_told', '_give_up_at', '_transmit', 'anew_at', 'due',
+                 'listener', 'look_at', 'partners', 'session', 'told')
+
+    def __init__(self, session: Session, listener: DriveListener,
+                 transmit: Callable[[Frame, float], bool], clock: Callable[[], float]) -> None:
+        self.session = session
+        self.listener = listener
+        self.look_at = -math.inf
+        self.partners: list[Member] = []
+        self.due = session.next_timer()
+        self.told = session.sent.raws
+        self.anew_at = self._give_up_at = math.inf
+        self._defect_told = ''
+        self._transmit = transmit
+        self._clock = clock
+
+    # -- steps ------------------------------------------------------------------------------------
+
+    def take(self, step: Callable[..., object], *arguments: object) -> None:
+        """Take a step of the session, and see to what comes of it."""
+        before = self.session.defect
+        try:
+            step(*arguments)
+            self.pump()
+        except Exception as error:  # noqa: BLE001  one drive costs no other: it is told
+            self.contain(error)
+            if before:      # not for ever in one go
+                self.due = self._clock() + RETRY_AFTER
+
+    def tell(self, call: Callable[..., object], *arguments: object) -> None:
+        """Tell the listener something that no event says."""
+        try:
+            call(*arguments)
+        except Exception as error:  # noqa: BLE001  likewise
+            self._unheard(error)
+
+    def serve(self, now: float) -> None:
+        """Let the drive have its turn: it is due, or commands may wait for it."""
+        if not self.session.defect:
+            self.tell(self.listener.take_commands, now)
+        self.take(self.session.handle_timer, now)
+
+    def pump(self) -> None:
+        """Send what the session wants sent, and tell its listener what happened."""
+        self._pump()
+        for partner in self.partners:
+            partner._pump()
+
+    def _pump(self) -> None:
+        session = self.session
+        try:
+            frames = session.take_frames()
+            while frames:
+                refused = []
+                leaving = self._clock()     # nothing answers before that
+                for place, frame in enumerate(frames):
+                    if not self._transmit(frame, leaving):
+                        refused.append(place)
+                session.frames_left(self._clock(), refused)
+                frames = session.take_frames()
+        finally:
+            self._report()
+        self.due = session.next_timer()
+
+    def _report(self) -> None:
+        """Tell the listener what was sent, and what happened."""
+        session, failure = self.session, None
+        if session.sent.raws is not self.told:
+            self.told = session.sent.raws
+            self.tell(self.listener.request_sent, self._clock())
+        for event in session.take_events():
+            try:
+                if type(event) is not ProcessDataReceived:
+                    self.listener.handle_event(event)
+                elif not session.defect:
+                    self.listener.process_data(event)
+            except Exception as error:  # noqa: BLE001  the other events are told all the same
+                failure = failure or error
+        if failure is not None:
+            self._unheard(failure)
+
+    # -- defects ----------------------------------------------------------------------------------
+
+    def contain(self, error: Exception) -> None:
+        """
+        Stop the drive, and whoever shares frames with it, because of a defect.
+
+        :raises Exception: the error, where nobody but its user needs the drive.
+        """
+        if self.session.serving:
+            raise error
+        text = _in_words(error)
+        self._fail(text)
+        for partner in self.partners:
+            partner._fail(f'{self.session.configuration.name}: {text}')
+
+    def _unheard(self, error: Exception) -> None:
+        """Take note that the listener has raised: a stop that takes its course goes on."""
+        if self.session.active:
+            self.contain(error)
+        else:
+            self._tell_defect(_in_words(error))
+
+    def _fail(self, text: str) -> None:
+        session, now = self.session, self._clock()
+        if session.active:
+            self.anew_at = now + PAUSE
+        self._tell_defect(text)
+        for step in (partial(session.fail, text, now), self._pump):
+            try:
+                step()
+            except Exception:   # noqa: BLE001  more of what was told
+                self.due = now + RETRY_AFTER
+        self._give_up_at = now + session.longest_stop + STOP_MARGIN
+
+    def _tell_defect(self, text: str) -> None:
+        if text == self._defect_told:
+            return
+        self._defect_told = text
+        try:
+            self.listener.handle_event(DriveFailed(text))
+        except Exception:   # noqa: BLE001  diagnostics have it
+            pass
+
+    def begin_anew(self, now: float) -> None:
+        """Look for the drive again, as soon as its stop has run its course."""
+        session = self.session
+        if session.stopped:
+            self.anew_at, self._defect_told = math.inf, ''
+            self.tell(self.listener.discard_commands, '')
+            self.take(session.begin_anew, now)
+        elif now >= self._give_up_at:
+            self.take(session.give_up, now)
+
+
+def _in_words(error: Exception) -> str:
+    return f'internal error: {type(error).__name__}: {error}'

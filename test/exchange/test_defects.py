@@ -1,0 +1,294 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+A defect in what belongs to one drive stops that drive, and disturbs no other.
+
+Two drives of a family run on one bus, in virtual time, and something raises in a step of the
+session of the first, or in what its listener is told.
+"""
+
+from collections.abc import Callable
+import heapq
+from itertools import count
+from typing import Any
+
+from builders import ACTUAL, CONTROL, CURRENT, drive, frame, SPEED, STATUS, WORD
+from exchange_builders import Bench
+from literal_drives import ExtendedDrive, PkwNode
+import pytest
+
+from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.control import ControlAction, ControlRequest
+from drive_can_bridge.core.drive_state import DriveState
+from drive_can_bridge.core.events import DriveFailed, Noted, StationFound
+from drive_can_bridge.core.frame import Frame
+
+DELAY = 0.001
+WORDS = dict.fromkeys((50, 51, 52), 0)
+
+
+class Standard:
+    """DataModel with 11-bit identifiers, of any station."""
+
+    def __init__(self, registers: dict[int, int]) -> None:
+        self.registers = registers
+
+    def takes(self, sent: Frame) -> list[Frame]:
+        number = int.from_bytes(sent.data[1:3], 'little')
+        if sent.data[0] == 6:
+            self.registers[number] = int.from_bytes(sent.data[3:5], 'little')
+            return []
+        answer = b''.join(self.registers[entry].to_bytes(2, 'little')
+                          for entry in range(number, number + sent.data[3]))
+        return [Frame(sent.identifier + 0x400, answer.ljust(8, b'\0'), False)]
+
+
+class Inverter:
+    """CANnord: 7F04 runs it; what it obeys is in registers 50 and 52."""
+
+    def __init__(self, registers: dict[int, int], alone: int, *broadcasts: int) -> None:
+        self.registers, self.alone, self.obeys = registers, alone, (alone, *broadcasts)
+
+    def takes(self, sent: Frame) -> list[Frame]:
+        if sent.identifier not in self.obeys:
+            return []
+        self.registers[52] = int(sent.data[:2] == b'\x7F\x04')
+        self.registers[50] = int.from_bytes(sent.data[2:4], 'little')
+        state = '370B' if self.registers[52] else '310B'
+        return [frame(f'{self.alone + 1:03X}#{state}E803FA000000')] * (
+            sent.identifier == self.alone)
+
+
+class Status(dict[int, int]):
+    """Registers of which 211 is the status: ready, and enabled while 52 holds 1."""
+
+    def __getitem__(self, number: int) -> int:
+        return 1 | 2 * (super().__getitem__(52) == 1) if number == 211 else super().__getitem__(
+            number)
+
+
+def _registers(*, word: bool) -> dict[int, int]:
+    maps = zip(range(122, 130), (50, 52 * word, 0, 0, 209, 210, 211, 0))
+    return Status({**WORDS, **dict(maps), 209: 1000, 210: 250, 211: 1})
+
+
+def _extended(word: bool) -> tuple[list[DriveConfiguration], list[Any]]:
+    request = (SPEED, WORD) if word else (SPEED,)
+    return [drive(name=name, station=station, request=request,
+                  control=CONTROL if word else None)
+            for name, station in (('first', 1), ('second', 2))], [
+        ExtendedDrive(_registers(word=word)) for _ in range(2)]
+
+
+def _single(protocol: str, make: Callable[[int, dict[int, int]], Any], *,
+            control: bool = True) -> tuple[list[DriveConfiguration], list[Any]]:
+    return [drive(protocol, name=name, station=station, request=(SPEED,), period=0.05,
+                  response=(ACTUAL, CURRENT, STATUS), control=CONTROL if control else None)
+            for name, station in (('first', 1), ('second', 2))], [
+        make(station, _registers(word=False)) for station in (1, 2)]
+
+
+def _cannord(broadcast: str) -> tuple[list[DriveConfiguration], list[Any]]:
+    return [drive('cannord', name=name, station=station, request=(SPEED,),
+                  response=(ACTUAL, CURRENT), broadcast=broadcast)
+            for name, station in (('first', 1), ('second', 2))], [
+        Inverter(dict(WORDS), 2 * station, *[0x400] * (broadcast != 'none'))
+        for station in (1, 2)]
+
+
+KINDS: dict[str, Callable[[], tuple[list[DriveConfiguration], list[Any]]]] = {
+    '29 bit': lambda: _extended(False),
+    '29 bit, word in its slot': lambda: _extended(True),
+    '11 bit': lambda: _single('datamodel_standard', lambda _, cells: Standard(cells)),
+    '11 bit, without control': lambda: _single(
+        'datamodel_standard', lambda _, cells: Standard(cells), control=False),
+    'CANnord': lambda: _cannord('none'),
+    'CANnord group': lambda: _cannord('group'),
+    'PKW': lambda: _single('canopen_pkw', PkwNode),
+}
+
+
+class World:
+    """A bus with two drives that run."""
+
+    def __init__(self, kind: str) -> None:
+        configurations, self.devices = KINDS[kind]()
+        self.group = 'group' in kind
+        self.bench = Bench(*configurations)
+        self.coming: list[tuple[float, int, str]] = []
+        self.number = count()
+        self.frames: list[str] = []
+        self.deaf = False
+        self.bench.now = 10.0
+        self.bench.exchange._last_pass = 10.0
+        self.bench.exchange.bus_opened()
+        self.bench.exchange.activate()
+        self.took()
+        self.live(1.0)
+
+    @property
+    def exchange(self) -> Any:
+        return self.bench.exchange
+
+    def took(self) -> None:
+        """Have the drives hear what was sent."""
+        for text in self.bench.link.take():
+            self.frames.append(text)
+            sent = frame(text)
+            for index, device in enumerate(self.devices):
+                if self.deaf or not self._is_for(sent, index):
+                    continue
+                for answer in device.takes(sent):
+                    heapq.heappush(self.coming, (
+                        self.bench.now + DELAY, next(self.number), str(answer)))
+
+    def _is_for(self, sent: Frame, index: int) -> bool:
+        device, station = self.devices[index], index + 1
+        if isinstance(device, ExtendedDrive):
+            return sent.identifier >> 21 & 0x7F == station
+        if isinstance(device, Standard):
+            return sent.identifier == 0x3F0 + station
+        if isinstance(device, PkwNode):
+            return sent.identifier == 0x500 + station or (
+                sent.identifier == 0 and sent.data[1] == station)
+        return True
+
+    def live(self, seconds: float) -> None:
+        end = self.bench.now + seconds
+        for _ in range(100_000):
+            at = min(member.due for member in self.exchange._members)
+            at = min(max(at, self.bench.now), self.bench.now + 0.02)
+            if self.coming and self.coming[0][0] <= min(at, end):
+                self.bench.now, _, text = heapq.heappop(self.coming)
+                self.exchange.frame_received(frame(text), 0.0)
+            elif at <= end:
+                self.bench.now = at
+                with self.exchange.lock:
+                    self.exchange._pass()
+            else:
+                self.bench.now = end
+                return
+            self.took()
+        raise AssertionError('the exchange spins')
+
+    def ask(self, index: int, action: ControlAction) -> None:
+        session = self.bench.sessions[index]
+        if session.control is not None:
+            self.exchange.submit(session, ControlRequest(action))
+            self.took()
+
+    def run(self) -> None:
+        """Have both run."""
+        for index in (0, 1):
+            if not self.group or index == 0:
+                self.ask(index, ControlAction.ENABLE)
+        self.live(0.5)
+        for value in (0.0, 100.0):
+            for notes in self.bench.notes[:1 if self.group else 2]:
+                notes.commands.append((0, value))
+            self.live(0.1)
+        assert [device.registers[50] for device in self.devices] == [1000, 1000]
+
+    def keep_commanding(self, seconds: float) -> None:
+        for _ in range(round(seconds / 0.1)):
+            for notes in self.bench.notes[:1 if self.group else 2]:
+                notes.commands.append((0, 100.0))
+            self.live(0.1)
+
+
+LISTENER = ('take_commands', 'process_data', 'request_sent', 'handle_event')
+STEPS = ('receive_frame', 'handle_timer', 'take_frames', 'frames_left', 'take_events',
+         'next_timer')
+
+
+def raising(times: float, then: Callable[..., Any]) -> Callable[..., Any]:
+    """Return what raises so often, and does then what it should."""
+    left = [times]
+
+    def step(*arguments: Any) -> Any:
+        if left[0] > 0:
+            left[0] -= 1
+            raise KeyError('a defect')
+        return then(*arguments)
+    return step
+
+
+@pytest.mark.parametrize('times', [1, float('inf')])
+@pytest.mark.parametrize('place', [*LISTENER, *STEPS])
+@pytest.mark.parametrize('kind', KINDS)
+def test_a_defect_stops_one_drive_and_disturbs_no_other(
+        kind: str, place: str, times: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    world = World(kind)
+    bench = world.bench
+    assert all(session.online for session in bench.sessions)
+    world.run()
+    missed = bench.sessions[1].statistics.missed
+    owner: Any = bench.notes[0] if place in LISTENER else bench.sessions[0]
+    with monkeypatch.context() as patch:
+        patch.setattr(owner, place, raising(times, getattr(owner, place)))
+        bench.sessions[0].report.note(Noted('something to be told'))
+        world.keep_commanding(0.6)
+        assert bench.sessions[0].state is DriveState.OFFLINE
+        assert 'KeyError' in bench.sessions[0].offline_advice
+        # what cannot be asked any more what it wants sent, nobody can stop
+        if times == 1 or place in (*LISTENER, 'receive_frame', 'take_events'):
+            assert world.devices[0].registers[50] == 0
+            assert world.devices[0].registers[52] == 0
+        if not world.group:
+            assert world.devices[1].registers[50] == 1000
+            assert bench.sessions[1].state is DriveState.ONLINE
+            assert bench.sessions[1].statistics.missed == missed
+            assert not bench.sessions[1].defect
+        world.keep_commanding(2.0)
+        assert not [told for told in bench.bus_notes.told if told[0] == 'fatal']
+    world.keep_commanding(4.0)
+    # it has begun anew, as after a loss: nothing is resumed
+    assert bench.sessions[0].online
+    assert not bench.sessions[0].defect
+    assert bench.sessions[0].state in (DriveState.NOT_ARMED, DriveState.DISABLED)
+    assert world.devices[0].registers[50] == 0
+    if place != 'handle_event' or times == 1:
+        assert any(isinstance(event, DriveFailed) for event in bench.notes[0].events)
+    world.run()
+
+
+@pytest.mark.parametrize('mute', [False, True])
+@pytest.mark.parametrize('place', LISTENER)
+@pytest.mark.parametrize('kind', KINDS)
+def test_a_listener_that_raises_costs_no_stop_frame(
+        kind: str, place: str, mute: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The stop of the end goes out whole, and to its end, whoever hears it."""
+    ends = []
+    for broken in (False, True):
+        world = World(kind)
+        world.run()
+        world.deaf = mute
+        if mute:
+            world.coming.clear()
+        if broken:
+            monkeypatch.setattr(world.bench.notes[0], place, raising(
+                float('inf'), getattr(world.bench.notes[0], place)))
+        world.frames.clear()
+        monkeypatch.setattr('time.sleep', lambda _, world=world: world.live(0.002))
+        # the thread that waits is the only one
+        monkeypatch.setattr(world.exchange, '_pass_to_stop', lambda: None)
+        world.exchange.deactivate()
+        world.took()
+        assert all(session.stopped for session in world.bench.sessions)
+        ends.append(world.frames)
+        if not mute:
+            assert [device.registers[50] for device in world.devices] == [0, 0]
+    whole, broken_frames = ends
+    assert {text for text in whole if whole.count(text) >= 3} <= set(broken_frames)
+    for text in set(whole):
+        assert broken_frames.count(text) >= min(3, whole.count(text)), text
+
+
+def test_online_again_is_told() -> None:
+    world = World('29 bit')
+    world.run()
+    world.bench.notes[0].failing = True
+    world.live(0.1)
+    world.bench.notes[0].failing = False
+    world.bench.notes[0].events.clear()
+    world.live(3.0)
+    assert StationFound() in world.bench.notes[0].events
