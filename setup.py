@@ -40,6 +40,7 @@ setup(
     name=PACKAGE,
     version=version(),
     description='Bridge motor drives on CAN buses to ROS 2',
+    url='https://drive-can-bridge.invalid',
     license='Apache-2.0',
     author='the drive_can_bridge authors',
     maintainer='the drive_can_bridge authors',
@@ -52,7 +53,10 @@ setup(
     },
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{PACKAGE}']),
-        (f'share/{PACKAGE}', ['package.xml']),
+        # colcon.pkg names the environment hooks to colcon, package.dsv to other installations.
+        (f'share/{PACKAGE}', ['package.xml', 'resource/package.dsv']),
+        (f'share/{PACKAGE}/environment', [
+            'resource/environment/path.dsv', 'resource/environment/path.sh']),
         *shared_tree('config'),
         *shared_tree('launch'),
     ],
@@ -77,14 +81,12 @@ setup(
         ],
         # EDS and DCF files as profiles. No rosdep key: without it, CSV tables can be imported.
         'eds': ['canopen>=2.3'],
-        # completion in the shell
+        # completion in the shell; rosdep brings it
         'completion': ['argcomplete'],
         # drive_can panel: the drives in a browser. No rosdep key either.
         'panel': ['nicegui>=3,<4'],
-        # pictures of drive_can decode --plot
-        'plot': [
-            'matplotlib',
-        ],
+        # pictures of drive_can decode --plot; rosdep brings it
+        'plot': ['matplotlib'],
         'test': [
             # No rosdep keys for these two: the tests run without them, only fewer, or slower.
             'argcomplete',

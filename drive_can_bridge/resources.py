@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Where the files live that come with the package: profiles, examples, launch files.
+What comes with the package: profiles, examples, launch files; and how its extras are brought.
 
 They are found in a source checkout (also when installed with ``pip install -e`` or
 ``colcon build --symlink-install``), in a ROS 2 workspace or distribution, and in whatever prefix
@@ -9,6 +9,7 @@ pip installed into, virtual environment or not.
 
 from collections.abc import Iterator
 from pathlib import Path
+import shlex
 import sys
 
 _PACKAGE = 'drive_can_bridge'
@@ -46,6 +47,19 @@ def config_file(name: str) -> Path:
         present = ', '.join(sorted(file.name for file in directory.glob('*.yaml'))) or 'none'
         raise FileNotFoundError(f'no {name} in {directory}, which has: {present}')
     return path
+
+
+def command_that_brings(extra: str) -> str:
+    """Return what to type for the Python packages that an extra of this package needs."""
+    from importlib.metadata import PackageNotFoundError, requires
+    try:
+        entries = [entry.partition(';') for entry in requires(_PACKAGE) or ()]
+    except PackageNotFoundError:    # sources that nobody installed
+        entries = []
+    needed = [entry.strip() for entry, _, condition in entries
+              if condition.strip().endswith((f"'{extra}'", f'"{extra}"'))]
+    return shlex.join([sys.executable, '-m', 'pip', 'install',
+                       *(needed or [f'{_PACKAGE}[{extra}]'])])
 
 
 def _candidates() -> Iterator[Path]:

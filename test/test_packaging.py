@@ -2,10 +2,13 @@
 """What is installed: versions agree, and nothing is left behind."""
 
 import ast
+import importlib.metadata
 import importlib.util
+import json
 from pathlib import Path
 import re
 import runpy
+import shlex
 import subprocess
 import sys
 from types import ModuleType
@@ -28,7 +31,11 @@ ROSDEP_KEYS = {
     'jsonschema': 'python3-jsonschema',
     'rich': 'python3-rich',
     'pyserial': 'python3-serial',
+    'argcomplete': 'python3-argcomplete',
+    'matplotlib': 'python3-matplotlib',
 }
+#: extras of which rosdep knows all, and those of which it knows nothing
+WITH_KEYS, WITHOUT_KEYS = ('completion', 'plot'), ('eds', 'panel')
 
 
 @pytest.fixture
@@ -111,6 +118,48 @@ def test_ros_finds_the_package(arguments: dict[str, Any]) -> None:
     assert 'package.xml' in targets[f'share/{PACKAGE.name}']
 
 
+def test_environment_hooks_put_the_executables_on_the_path(arguments: dict[str, Any]) -> None:
+    installed = {f'{target}/{Path(source).name}': (CHECKOUT / source).read_text(encoding='utf-8')
+                 for target, sources in arguments['data_files'] for source in sources}
+    hook = f'share/{PACKAGE.name}/environment/path'
+    # colcon: the prefix's setup.* read the one, the package's own the other
+    hooks = json.loads((CHECKOUT / 'colcon.pkg').read_text(encoding='utf-8'))['hooks']
+    assert hooks == [f'{hook}.dsv', f'{hook}.sh']
+    # any other installation
+    assert installed[f'share/{PACKAGE.name}/package.dsv'] == f'source;{hook}.dsv\n'
+    scripts = f'lib/{PACKAGE.name}'
+    assert f'install_scripts=$base/{scripts}\n' in (CHECKOUT / 'setup.cfg').read_text()
+    assert installed[f'{hook}.dsv'] == f'prepend-non-duplicate;PATH;{scripts}\n'
+    assert installed[f'{hook}.sh'].endswith(
+        f'_colcon_prepend_unique_value PATH "$COLCON_CURRENT_PREFIX/{scripts}"\n')
+
+
+def test_readme_shows_the_version_that_it_installs() -> None:
+    readme = (CHECKOUT / 'README.md').read_text(encoding='utf-8')
+    told = re.findall(r'^drive_can --version +# (.*)$', readme, re.MULTILINE)
+    assert told == [f'drive_can {drive_can_bridge.__version__}'] * 2
+
+
+@pytest.mark.parametrize(('extra', 'package'), [
+    ('eds', 'canopen>=2.3'), ('panel', 'nicegui<4,>=3'), ('plot', 'matplotlib')])
+def test_an_extra_that_is_missing_comes_with_one_line(
+    monkeypatch: pytest.MonkeyPatch, extra: str, package: str,
+) -> None:
+    monkeypatch.setattr('importlib.metadata.requires', lambda _: [
+        'rich', 'canopen>=2.3; extra == "eds"', "nicegui<4,>=3 ; extra == 'panel'",
+        'matplotlib; extra == "plot"', 'matplotlib; extra == "test"'])
+    assert resources.command_that_brings(extra) == shlex.join(
+        [sys.executable, '-m', 'pip', 'install', package])
+
+
+def test_an_extra_of_sources_that_nobody_installed(monkeypatch: pytest.MonkeyPatch) -> None:
+    def unknown(name: str) -> list[str]:
+        raise importlib.metadata.PackageNotFoundError(name)
+
+    monkeypatch.setattr('importlib.metadata.requires', unknown)
+    assert resources.command_that_brings('eds').endswith("pip install 'drive_can_bridge[eds]'")
+
+
 def test_executables_have_a_function_behind_them(arguments: dict[str, Any]) -> None:
     scripts = arguments['entry_points']['console_scripts']
     assert {script.split(' = ')[0] for script in scripts} == {'drive_can_bridge', 'drive_can'}
@@ -153,7 +202,10 @@ def test_interrupt_while_it_is_loaded(arguments: dict[str, Any], name: str, word
 def test_pip_and_rosdep_bring_the_same(
     arguments: dict[str, Any], manifest: ElementTree.Element,
 ) -> None:
-    by_pip = {re.split('[<>=~!]', entry)[0] for entry in arguments['install_requires']}
+    extras = arguments['extras_require']
+    assert set(extras) == {*WITH_KEYS, *WITHOUT_KEYS, 'ros', 'test'}
+    by_pip = {re.split('[<>=~!]', entry)[0] for entry in [
+        *arguments['install_requires'], *(each for name in WITH_KEYS for each in extras[name])]}
     by_rosdep = {
         node.text for node in manifest.iter('exec_depend')
         if (node.text or '').startswith('python3-')}

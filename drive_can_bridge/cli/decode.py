@@ -17,6 +17,7 @@ from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.record import Record
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.protocols.observer import Telegram
+from drive_can_bridge.resources import command_that_brings
 from drive_can_bridge.trace import summary
 from drive_can_bridge.trace.files import check_readable, read_records, READABLE, UnknownFormat
 from drive_can_bridge.trace.lines import LineWriter, Only, Selection
@@ -187,8 +188,8 @@ def _draw(plotter: Plotter, path: str) -> None:
     try:
         plotter.draw(path)
     except ImportError:
-        raise DriveCanError('drive_can decode: --plot needs the Python module matplotlib '
-                            '(package python3-matplotlib, or pip install matplotlib)') from None
+        raise DriveCanError('drive_can decode: --plot needs the Python module matplotlib (package '
+                            f"python3-matplotlib, or {command_that_brings('plot')})") from None
     except OSError as error:
         error.filename = path
         raise

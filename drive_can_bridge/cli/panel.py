@@ -15,12 +15,11 @@ from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.monitor.model import Model
 from drive_can_bridge.process import environment
 from drive_can_bridge.process.signals import leave, SignalWatcher
+from drive_can_bridge.resources import command_that_brings
 
 COMMAND = 'drive_can panel'
 #: messages per second to be sampled for all drives that nobody looks at closely
 BUDGET = 300.0
-_MISSING = (f"{COMMAND}: the Python module {{module}} is not installed: it comes with the extra "
-            f"'panel' of this package (pip install 'drive_can_bridge[panel]')")
 
 
 def define(parser: argparse.ArgumentParser) -> None:
@@ -68,7 +67,8 @@ def _serve(args: argparse.Namespace, ended: Callable[[], bool]) -> bool:
         from drive_can_bridge.panel.pages import application, Setting
         from drive_can_bridge.panel.server import address, listen, serve
     except ImportError as error:
-        raise DriveCanError(_MISSING.format(module=error.name)) from error
+        raise DriveCanError(f'{COMMAND}: the Python module {error.name} is not installed: '
+                            f"{command_that_brings('panel')}") from error
     if ended():
         return False
     listener = listen(args.host, args.port)

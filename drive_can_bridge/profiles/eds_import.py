@@ -19,6 +19,7 @@ from drive_can_bridge.profiles.errors import ImportFailed, Unusable
 from drive_can_bridge.profiles.text import one_line
 from drive_can_bridge.profiles.types import access_of
 from drive_can_bridge.profiles.units import unit
+from drive_can_bridge.resources import command_that_brings
 
 #: what the library needs these keys to be called
 _SPELLINGS = {key.lower(): key for key in (
@@ -52,7 +53,7 @@ def canopen_library() -> ModuleType:
     except ImportError:
         raise ImportFailed(
             'needs the Python library canopen, which is not installed: '
-            "pip install 'drive_can_bridge[eds]' (or: pip install canopen)") from None
+            f"{command_that_brings('eds')}") from None
     # what it complains about is told here, with section and line
     logging.getLogger('canopen').setLevel(logging.CRITICAL)
     module: ModuleType = eds

@@ -239,5 +239,5 @@ def test_without_the_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
         return real(name, *args, **kwargs)
 
     monkeypatch.setattr(builtins, '__import__', without)
-    with pytest.raises(ImportFailed, match=r"pip install 'drive_can_bridge\[eds\]'"):
+    with pytest.raises(ImportFailed, match="-m pip install 'canopen>=2.3'"):
         bring(tmp_path)
