@@ -75,7 +75,6 @@ class PkwSession(Session):
             self, procedures.RegisterAccess(self._channel, self.retry, placement),
             blocked=self._supervision.refusal, control_refusal=self._writers.control_refusal)
         self.look_after(channel=self._channel)
-        self._made_room = False     # for setpoints, in this round
 
     # -- life cycle -------------------------------------------------------------------------------
 
@@ -212,14 +211,11 @@ class PkwSession(Session):
             if self.control is not None and now >= self.control.next_timer():
                 self.control.handle_timer(now)
                 self.control_changed(now)
-            if self.gate.expire(now):
-                if not self._made_room:     # once a round: a slow drive has to be read, too
-                    self._made_room = True
-                    self._channel.make_room(now)
+            if self._writers.expire(now):
                 self._writers.write_setpoints(now)
         self._channel.advance(now)
         if now >= self._round_due:
-            self._made_room = False
+            self._writers.round_begins()
             if self.control is not None and self.control.stopping:
                 self.see_to_control_word(now)   # before setpoints, should it be due again
             if self.online:

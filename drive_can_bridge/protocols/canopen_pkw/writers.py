@@ -57,6 +57,7 @@ class Writers:
         self._failures: dict[str, str] = {}     # of setpoints, by name
         self._warned: dict[str, str] = {}
         self._silences = Counter[int]()         # in a row, by index
+        self._made_room = False                 # for setpoints, in this round
         self._patience = STOP_PATIENCE          # s until a stop is written again
         self._stop: SafeStop[Step, Reply] = SafeStop(
             session, channel, stop_ended, status_word(drive), self._read_status)
@@ -93,6 +94,7 @@ class Writers:
 
     def write_setpoints(self, now: float) -> None:
         """Write the setpoints that are due, each once."""
+        self.expire(now)
         self._setpoints.changed = False
         items = self._setpoints.items
         if not items:
@@ -101,6 +103,22 @@ class Writers:
             index for index, setpoint in enumerate(items) if not setpoint.known])
         if self._schedule.waiting and self._channel.is_idle(Lane.SETPOINTS):
             self._channel.run(self._write_setpoints(), lambda _: None, now, Lane.SETPOINTS)
+
+    def expire(self, now: float) -> bool:
+        """
+        Let setpoints go neutral that are too old, before any of them is handed out.
+
+        Others make room for those, once a round: a slow drive has to be read, too.
+        """
+        expired = self._session.gate.expire(now)
+        if expired and not self._made_room:
+            self._made_room = True
+            self._channel.make_room(now)
+        return expired
+
+    def round_begins(self) -> None:
+        """Take note that a round begins, in which others may make room once more."""
+        self._made_room = False
 
     def _stops(self, index: int, setpoint: Setpoint) -> bool:
         """Tell whether a setpoint, as it is now, takes back what the drive was told."""
@@ -153,6 +171,7 @@ class Writers:
         """
         since, timeout = self._channel.now, self._session.retry.timeout
         for left in range(STOP_ATTEMPTS - 1, -1, -1):
+            self.expire(self._channel.now)
             raw, begun_at = setpoint.raw, self._channel.now
             alone = self.control is None and self._stops(index, setpoint)
             # at once: a look while the answer is awaited must not find it due again

@@ -58,6 +58,7 @@ class SetpointWriter:
         :param known: the status was read just now, or there is none. A word that starts the drive
             is repeated only then: one that was off meanwhile, unseen, must not start by that.
         """
+        self._session.gate.expire(now)      # nothing is handed out that is too old
         control, slot = self._session.control, self._slot
         stopping = control is not None and control.stopping
         starts = control is not None and not (control.at_rest or stopping)
@@ -89,6 +90,7 @@ class SetpointWriter:
         """Write one that is due, if there is one, with the value that it has now."""
         if not self._schedule.waiting or now < self._courier.free_at:
             return
+        self._session.gate.expire(now)
         index = self._schedule.next()
         parameter, raw = self._parameters[index], self._raws()[index]
         # now: a neutral value that follows the axis may be another one when the frame leaves
