@@ -88,6 +88,13 @@ class Setpoints:
             self.changed = True
         return outcome
 
+    def old_command(self, index: int, value: Value) -> None:
+        """Take a command that is too old to move anything: one that equals neutral disarms."""
+        setpoint = self.items[index]
+        if setpoint.armed and setpoint.armed_by(value):
+            setpoint.disarm()
+            self.changed = True
+
     def expire(self, now: float) -> list[Setpoint]:
         """
         Disarm every setpoint whose last command is older than the time-out.

@@ -9,10 +9,12 @@ exception in the thread of the exchange.
 How old a command is, its two time stamps say: what the publisher's clock showed when it was
 published, and this machine's when it arrived. The clocks may differ; so what counts is by how much
 the difference exceeds the smallest that was seen on the topic. A command that waited somewhere (a
-process that stood still, a network that was away) is told from a fresh one by that.
+process that stood still, a network that was away) is told from a fresh one by that. It moves
+nothing, but one that equals neutral stops all the same: so whoever has a clock that lags can.
 """
 
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 import math
 import struct
@@ -34,6 +36,8 @@ LENGTH_MAX = 65536
 HEADER = 4
 #: struct code of the one number of these messages
 _CODES = {Float64: 'd', Int64: 'q', Bool: '?'}
+#: what bytes that nobody can read raise
+_UNREADABLE = RuntimeError, ValueError, struct.error
 
 
 class CommandTopic:
@@ -41,13 +45,15 @@ class CommandTopic:
     Takes what waits on one subscription.
 
     :param use: takes each message (of the types with one number: the number) and ``now``.
+    :param old: takes each that is thrown away for its age, for what it may stop.
     :param late: takes by how many s a command that is thrown away came too late.
     :param unreadable: takes why a message cannot be read.
     :param read: makes of the bytes what ``use`` takes; None: the number, or a message of the type.
     """
 
     def __init__(self, subscription: Subscription, *, use: Callable[[Any, float], None],
-                 late: Callable[[float], None], unreadable: Callable[[str], None],
+                 old: Callable[[Any], None], late: Callable[[float], None],
+                 unreadable: Callable[[str], None],
                  read: Callable[[bytes], Any] | None = None) -> None:
         self.subscription = subscription
         self.handle: Any = subscription.handle
@@ -56,7 +62,7 @@ class CommandTopic:
         quality = subscription.qos_profile
         self._depth = (quality.depth if quality.history is HistoryPolicy.KEEP_LAST
                        else DEPTH_UNBOUNDED) or 1
-        self._use = use
+        self._use, self._old = use, old
         self._late = late
         self._unreadable = unreadable
         code = _CODES.get(self._type)
@@ -79,20 +85,27 @@ class CommandTopic:
             lateness = self._lateness(info)
             if lateness > LATENESS_MAX:
                 self._late(1e-9 * lateness)
+                self._take_old(data)
                 continue
             try:
                 message = self._decode(data)
-            except (RuntimeError, ValueError, struct.error) as error:
+            except _UNREADABLE as error:
                 self._unreadable(str(error) or type(error).__name__)
                 continue
             self._use(message, now)
 
     def discard(self) -> int:
-        """Throw away what waits; return how many commands that were."""
+        """Throw away what waits, but for what it may stop; return how many commands that were."""
         for count in range(self._depth):
-            if self.handle.take_message(self._type, True) is None:
+            taken = self.handle.take_message(self._type, True)
+            if taken is None:
                 return count
+            self._take_old(taken[0])
         return self._depth
+
+    def _take_old(self, data: bytes) -> None:
+        with suppress(*_UNREADABLE):
+            self._old(self._decode(data))
 
     def forget(self) -> None:
         """Take note that nobody publishes here any more: whoever comes has a clock of its own."""

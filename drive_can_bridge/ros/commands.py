@@ -11,6 +11,7 @@ group that no executor ever runs.
 
 from collections.abc import Callable
 from functools import partial
+from typing import NamedTuple
 
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
@@ -29,6 +30,14 @@ from drive_can_bridge.ros.values import TOPIC_TYPES
 _ACCEPTED = CommandOutcome.ACCEPTED
 
 
+class _Target(NamedTuple):
+    """Which setpoint a quantity of the joint is, SI units per unit of it, whether an integer."""
+
+    setpoint: int
+    factor: float
+    integer: bool
+
+
 class CommandIntake:
     """
     The command subscriptions of one drive.
@@ -45,20 +54,20 @@ class CommandIntake:
         self._told: set[str] = set()
         self._joint = joint = drive.joint
         self._topics = PolledTopics(node, warn, self.refuse)
-        #: by quantity of the joint: which setpoint, SI units per unit of it, whether an integer
-        self._joint_targets: dict[str, tuple[int, float, bool]] = {}
+        self._joint_targets: dict[str, _Target] = {}    # by quantity of the joint
         try:
             for index, setpoint in enumerate(session.setpoints.items):
                 name, kind = setpoint.parameter.name, setpoint.parameter.kind
                 self._topics.subscribe(TOPIC_TYPES[kind], f'~/command/{name}',
-                                       partial(self._command, index))
+                                       partial(self._command, index),
+                                       partial(session.setpoints.old_command, index))
                 for quantity in QUANTITIES if joint is not None else ():
                     if joint is not None and getattr(joint, f'{quantity}_command') == name:
-                        self._joint_targets[quantity] = (
+                        self._joint_targets[quantity] = _Target(
                             index, joint.factors[name], kind is ValueKind.INTEGER)
             if joint is not None:
                 self._topics.subscribe(JointState, '~/joint_command', self._take_joint,
-                                       JointReader())
+                                       self._take_old_joint, JointReader())
         except BaseException:
             self.destroy()
             raise
@@ -129,6 +138,18 @@ class CommandIntake:
             else:
                 self._tell_ignored(quantity)
 
+    def _take_old_joint(self, message: JointMessage) -> None:
+        if self._joint is not None and self._joint.name in message.names:
+            self.take_old(message, message.names.index(self._joint.name))
+
+    def take_old(self, message: JointMessage, entry: int) -> None:
+        """Take what a message that is thrown away for its age has for the joint."""
+        for quantity, values in message.columns:
+            target = self._joint_targets.get(quantity)
+            if target is not None and entry < len(values) and values[entry] == values[entry]:
+                self._session.setpoints.old_command(
+                    target.setpoint, _in_units(values[entry], target))
+
     def take_quantity(self, quantity: str, value: float, now: float) -> None:
         """Take a command for one quantity of the joint, in SI units; NaN leaves it alone."""
         if value != value:
@@ -137,11 +158,7 @@ class CommandIntake:
         if target is None:
             self._tell_ignored(quantity)
             return
-        index, factor, integer = target
-        physical: Value = value / factor
-        if integer:
-            physical = round(physical) if abs(physical) < 1e15 else physical
-        self._command(index, physical, now)
+        self._command(target.setpoint, _in_units(value, target), now)
 
     def _tell_ignored(self, quantity: str) -> None:
         if quantity not in self._told:
@@ -157,3 +174,9 @@ class CommandIntake:
     def count_refused(self) -> None:
         """Count a command that is thrown away; somebody else tells it."""
         self._session.statistics.commands_refused += 1
+
+
+def _in_units(value: float, target: _Target) -> Value:
+    """Return a value in SI units in those of the setpoint."""
+    physical = value / target.factor
+    return round(physical) if target.integer and abs(physical) < 1e15 else physical

@@ -57,7 +57,7 @@ class Joints:
                 taker = _Taker(joints, known, warn, log.info)
             taken = PolledTopics(node, warn, taker.refuse)
             self._taken.append(taken)
-            taken.subscribe(JointState, COMMANDS, taker, JointReader())
+            taken.subscribe(JointState, COMMANDS, taker, taker.take_old, JointReader())
             for drive in here:
                 drive.joint_commands = taken
         if configuration.joint_state_rate > 0.0:
@@ -128,6 +128,14 @@ class _Taker:
         for quantity, values in columns:
             for entry, take in self._parts:
                 take(quantity, values[entry], now)
+
+    def take_old(self, message: JointMessage) -> None:
+        """Take what a message that is thrown away for its age may stop, unless it is refused."""
+        names, columns = message
+        if self._problem(names, columns) is None:
+            for entry, name in enumerate(names):
+                if name in self._joints:
+                    self._joints[name].take_old(message, entry)
 
     def refuse(self, topic: str, text: str) -> None:
         """Count and tell a message that is thrown away, for all that it might have moved."""

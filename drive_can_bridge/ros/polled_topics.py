@@ -86,12 +86,13 @@ class PolledTopics:
         self._look_at = -math.inf
 
     def subscribe(self, message_type: type, topic: str,
-                  take: Callable[[Any, float], None],
+                  take: Callable[[Any, float], None], old: Callable[[Any], None],
                   read: Callable[[bytes], Any] | None = None) -> None:
         """
         Add a topic.
 
         :param take: gets each message (or its number) and ``now``.
+        :param old: gets each that is thrown away for its age, for what it may stop.
         :param read: makes of the bytes what ``take`` gets; None: the message.
         """
         node = self._node
@@ -116,7 +117,7 @@ class PolledTopics:
         def unreadable(reason: str) -> None:
             self._refuse(f'unreadable {name}',
                          f'command on {name} cannot be read: {printable(reason)}')
-        self._topics.append(CommandTopic(subscription, use=take, late=late,
+        self._topics.append(CommandTopic(subscription, use=take, old=old, late=late,
                                          unreadable=unreadable, read=read))
 
     def take(self, now: float) -> None:

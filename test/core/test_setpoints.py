@@ -8,6 +8,7 @@ from hypothesis import given, strategies as st
 import pytest
 
 from drive_can_bridge.core.errors import ValueRefused
+from drive_can_bridge.core.last_sent import LastSent
 from drive_can_bridge.core.setpoints import CommandOutcome, Setpoints
 
 
@@ -51,6 +52,40 @@ def test_changed_says_whether_something_else_is_to_be_sent() -> None:
     assert not made.changed
     assert len(made.expire(2.0)) == 1
     assert made.changed
+
+
+@pytest.mark.parametrize(('value', 'stops'), [
+    (0.0, True), (0.1, True), (0.2, False), (5.0, False), (math.nan, False), (math.inf, False)])
+def test_a_command_that_is_too_old_can_only_stop(value: float, stops: bool) -> None:
+    made = setpoints(immediate=True)
+    made.old_command(0, value)
+    assert not made.changed and made.waiting == list(made.items)     # it arms nothing
+    for index in (0, 1):
+        made.command(index, 5.0, 1.0)
+    made.changed = False
+    made.old_command(0, value)
+    assert [item.raw for item in made.items] == [0 if stops else 50, 50]
+    assert [item.armed for item in made.items] == [not stops, True]
+    assert made.changed is stops
+    assert made.expire(1.4) == []     # nor does it refresh anything
+    assert len(made.expire(2.0)) == 2 - stops
+
+
+def test_an_axis_stays_what_was_sent_last() -> None:
+    position = parameter('position', 60, type=INT16, neutral_from='actual', arming_tolerance=2.0)
+    actual = parameter('actual', 61, type=INT16)
+    sent = LastSent([position])
+    made = Setpoints((position,), timeout=0.5, rearm_immediate=False, sample=(actual,), sent=sent)
+    made.measure([100], driven=False)
+    made.allow(True)
+    made.command(0, 100, 1.0)
+    made.command(0, 130, 1.1)
+    sent.take([120])
+    made.old_command(0, 110)        # the position that was latched is 100
+    assert made.items[0].raw == 130
+    made.old_command(0, 101)
+    assert made.items[0].raw == 120
+    assert not made.items[0].armed
 
 
 def test_refused_values_are_refused_even_while_closed() -> None:

@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-No setpoint leaves that is older than ``command_timeout``, whichever thread goes first after a stall.
+No setpoint leaves that is older than ``command_timeout``, whichever thread goes first.
 
 The process stands still for less than a second, and hears then, at once, what arrived meanwhile:
 answers that let the session go on, before any timer has run.

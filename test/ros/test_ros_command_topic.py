@@ -42,11 +42,12 @@ class Taken:
     def __init__(self, kind: Any, depth: int = 8) -> None:
         self.subscription = Subscription(kind, depth)
         self.used: list[Any] = []
+        self.old: list[Any] = []
         self.late: list[float] = []
         self.unreadable: list[str] = []
         self.topic = CommandTopic(
             self.subscription, use=lambda message, _: self.used.append(message),  # type: ignore
-            late=self.late.append, unreadable=self.unreadable.append)
+            old=self.old.append, late=self.late.append, unreadable=self.unreadable.append)
 
 
 @pytest.mark.parametrize('message', [
@@ -113,6 +114,19 @@ def test_age(skew: int) -> None:
     assert came(5000) == (0, [pytest.approx(4.998)])
     taken.topic.forget()                # another publisher, another clock
     assert came(5000) == (1, [])
+
+
+def test_what_is_thrown_away_may_still_stop() -> None:
+    taken = Taken(Float64)
+    taken.subscription.put(serialize_message(Float64(data=1.0)), 10_000 * MS, 10_000 * MS)
+    taken.subscription.put(serialize_message(Float64(data=2.0)), 10_000 * MS, 10_300 * MS)
+    taken.subscription.put(b'', 10_000 * MS, 10_300 * MS)
+    taken.topic.take(1.0)
+    assert (taken.used, taken.old, len(taken.late), taken.unreadable) == ([1.0], [2.0], 2, [])
+    taken.subscription.put(serialize_message(Float64(data=3.0)))
+    taken.subscription.put(b'')
+    assert taken.topic.discard() == 2
+    assert (taken.used, taken.old, taken.unreadable) == ([1.0], [2.0, 3.0], [])
 
 
 def test_a_middleware_without_time_stamps() -> None:
