@@ -20,7 +20,7 @@ CHECKOUT = Path(__file__).resolve().parent.parent
 PACKAGE = CHECKOUT / 'drive_can_bridge'
 
 #: Layer: the layers that it may import, besides itself. '' is the package's own __init__.
-#: ``ros.monitor`` is a client of bridges, no part of one: it knows none of them.
+#: ``ros.client`` is a client of bridges, no part of one: it knows none of them.
 INTERNAL: dict[str, set[str]] = {
     '': set(),
     'resources': {''},
@@ -35,30 +35,28 @@ INTERNAL: dict[str, set[str]] = {
     'simulation': {'', 'core', 'configuration', 'protocols', 'resources', 'transport'},
     'ros': {
         '', 'core', 'configuration', 'protocols', 'resources', 'trace', 'transport', 'exchange',
-        'process', 'ros.messages'},
+        'process', 'ros.messages', 'ros.recognition'},
     'monitor': {'', 'core'},
     'view': {'', 'core', 'monitor'},
     # what it asks of drives comes from whoever starts it: it knows no ROS
     'panel': {'', 'core', 'monitor'},
     'security': {'', 'core', 'protocols'},
-    'ros.acquaintance': {''},
-    'ros.guest': {'', 'core'},
     'ros.messages': {'', 'core'},
-    'ros.monitor': {
-        '', 'core', 'monitor', 'ros.acquaintance', 'ros.guest', 'ros.messages'},
+    'ros.recognition': {''},
+    'ros.client': {'', 'core', 'ros.recognition'},
+    'ros.monitor': {'', 'core', 'monitor', 'ros.client', 'ros.messages'},
     'ros.demo': {'', 'core', 'configuration', 'simulation', 'monitor', 'ros', 'ros.monitor'},
     'demo': {'', 'core', 'configuration', 'process'},
     'client.drive': {'', 'core', 'process'},
-    'ros.client': {
-        '', 'core', 'client.drive', 'ros.acquaintance', 'ros.guest', 'ros.messages'},
+    'client.bridged': {'', 'core', 'client.drive', 'ros.client', 'ros.messages'},
     'client': {
         '', 'core', 'configuration', 'protocols', 'transport', 'exchange', 'process',
-        'client.drive', 'ros.client'},
+        'client.drive', 'client.bridged'},
     'backup': {'', 'core', 'configuration', 'client.drive'},
     'cli': {
         '', 'core', 'configuration', 'protocols', 'resources', 'transport', 'exchange', 'process',
         'profiles', 'simulation', 'trace', 'monitor', 'view', 'panel', 'security', 'demo',
-        'client', 'client.drive', 'backup', 'ros', 'ros.monitor', 'ros.demo'},
+        'client', 'client.drive', 'backup', 'ros', 'ros.client', 'ros.monitor', 'ros.demo'},
 }
 
 ROS_PACKAGES = {
@@ -77,11 +75,10 @@ EXTERNAL: dict[str, set[str]] = {
     'trace': {'can', 'matplotlib'},
     # yaml: only to tell which nodes a parameter file names when none of them is ours
     'ros': {*ROS_PACKAGES, 'yaml'},
-    'ros.acquaintance': ROS_PACKAGES,
-    'ros.guest': ROS_PACKAGES,
     'ros.messages': ROS_PACKAGES,
     'ros.monitor': ROS_PACKAGES,
     'ros.client': ROS_PACKAGES,
+    'client.bridged': ROS_PACKAGES,
     'ros.demo': ROS_PACKAGES,
     'view': {'rich'},
     # an optional extra
@@ -93,8 +90,8 @@ EXTERNAL: dict[str, set[str]] = {
 
 #: Layer: edges that may be used inside functions only, so that importing the layer stays cheap and
 #: works where the other side is missing.
-LAZY = {('cli', 'ros'), ('cli', 'ros.monitor'), ('cli', 'ros.demo'), ('cli', 'view'),
-        ('cli', 'panel'), ('cli', 'demo'), ('client', 'ros.client')}
+LAZY = {('cli', 'ros'), ('cli', 'ros.client'), ('cli', 'ros.monitor'), ('cli', 'ros.demo'),
+        ('cli', 'view'), ('cli', 'panel'), ('cli', 'demo'), ('client', 'client.bridged')}
 
 #: No clock, no thread, no log, no input or output in here: time and frames are arguments.
 SANS_IO = {'core', 'protocols', 'monitor'}

@@ -13,9 +13,9 @@ from pathlib import Path
 
 from drive_can_bridge.cli.command import complain, what_is_missing, WrongUsage
 from drive_can_bridge.cli.progress import Bar, waiting
-from drive_can_bridge.client.drive import Drive, Drives, ReadOutcome, Source, WhichBridge
+from drive_can_bridge.client.drive import Drive, Drives, ReadOutcome, Source
 from drive_can_bridge.client.opening import find_source
-from drive_can_bridge.core.errors import DriveCanError
+from drive_can_bridge.core.errors import DriveCanError, WhichBridge
 
 
 def add_words(parser: ArgumentParser, completer: Callable[..., list[str]], metavar: str,

@@ -31,15 +31,11 @@ from enum import Enum
 from typing import Protocol
 
 from drive_can_bridge.core.directory import ParameterDirectory
-from drive_can_bridge.core.errors import DriveCanError, ValueRefused
+from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.profile import RestoreTable
 from drive_can_bridge.core.roles import Role
 from drive_can_bridge.process.interruption import finish_first
-
-
-class WhichBridge(DriveCanError):
-    """Several bridges are running, and nobody has said which one is meant."""
 
 
 class Enabled(Enum):

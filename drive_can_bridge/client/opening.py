@@ -33,7 +33,7 @@ def find_source(params_file: str | Path | None = None, *, namespace: str | None 
         except OSError as error:
             raise DriveCanError(f'{error.filename or params_file}: '
                                 f'{error.strerror or error}') from error
-    from drive_can_bridge.ros.client.bridge import BridgeSource
+    from drive_can_bridge.client.bridged.source import BridgeSource
     return BridgeSource(namespace)
 
 

@@ -12,6 +12,8 @@ The errors of the package.
      +-- TransportError         the bus is there, and does not take a frame
      +-- BusUnavailable         device absent, busy or lost: try again (also an OSError)
      +-- BusMisconfigured       unknown interface, driver missing, impossible bit rate
+     +-- NoBridge               none is running, or it does not answer
+     +-- WhichBridge            several are running, and nobody has said which one is meant
 
 Every message is a sentence for a user, without a trailing period, in the manuals' own terms.
 """
@@ -55,3 +57,11 @@ class BusUnavailable(DriveCanError, OSError):
 
 class BusMisconfigured(DriveCanError):
     """No attempt will ever succeed: the configuration of the bus is wrong."""
+
+
+class NoBridge(DriveCanError):
+    """No bridge is running, or it does not answer."""
+
+
+class WhichBridge(DriveCanError):
+    """Several bridges are running, and nobody has said which one is meant."""

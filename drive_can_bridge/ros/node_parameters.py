@@ -7,7 +7,7 @@ declared with its value in effect, so that ``ros2 param get`` tells it. Four of 
 while the bridge runs; all others are read-only and say so.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from rcl_interfaces.msg import (
@@ -22,6 +22,7 @@ from drive_can_bridge.configuration.load import check_dynamic, declared_paramete
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.directory import NAME_SHOWN
 from drive_can_bridge.core.text import printable
+from drive_can_bridge.ros.recognition import BRIDGES, bridges_among
 
 _OURS = ('drives.', 'buses.')
 _OURS_ALONE = ('diagnostics_period', 'autostart')
@@ -42,9 +43,13 @@ class NodeParameters:
         self._refusal = refusal
         self._dynamic: list[str] = []
         self._announcing = False
+        node.declare_parameter(
+            BRIDGES, [node.get_fully_qualified_name()], ParameterDescriptor(
+                description='full names of all bridges that this one sees, its own among them',
+                read_only=True), ignore_override=True)
         node.add_on_set_parameters_callback(self._check)
         node.add_post_set_parameters_callback(self._apply)
-        self._services = _Services(node)
+        self._services = _Services(node, self._prepare)
 
     @property
     def overrides(self) -> dict[str, Any]:
@@ -71,6 +76,14 @@ class NodeParameters:
                 name, value, ParameterDescriptor(
                     description=description, read_only=not dynamic, dynamic_typing=True),
                 ignore_override=True)
+
+    def _prepare(self, names: Sequence[str]) -> None:
+        """Have a value that is being asked for: looking at the graph is not cheap."""
+        if BRIDGES in names:
+            own = self._node.get_fully_qualified_name()
+            seen = {own, *bridges_among(self._node.get_service_names_and_types())}
+            self.announce(BRIDGES, sorted(name for name in seen for _ in range(
+                max(1, self._node.count_services(f'{name}/change_state')))))
 
     def announce(self, name: str, value: Any) -> None:
         """Change a read-only parameter: what the bridge itself has found out."""
@@ -108,7 +121,17 @@ class _Services(ParameterService):
     The parameter services of rclpy, which answer whatever the type of a value is said to be.
 
     There, a type that does not exist ends the callback: whoever asks waits for ever.
+
+    :param prepare: is told the names of parameters that are asked for.
     """
+
+    def __init__(self, node: Node, prepare: Callable[[Sequence[str]], None]) -> None:
+        super().__init__(node)
+        self._prepare = prepare
+
+    def _get_parameters_callback(self, request: Any, response: Any) -> Any:
+        self._prepare(request.names)
+        return super()._get_parameters_callback(request, response)
 
     def _set_parameters_callback(self, request: Any, response: Any) -> Any:
         response.results = [self._set([message]) for message in request.parameters]

@@ -1,7 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The way to drives through a running bridge: the same answers as directly."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,18 +9,21 @@ from bridges import Bridge, CONVEYOR, HASTY, LIFT, parameters, StartBridge
 from clients import Client, wait_until
 from lifecycle_msgs.srv import ChangeState
 import pytest
-from rcl_interfaces.srv import GetParameterTypes, ListParameters, SetParameters
+from rcl_interfaces.msg import ParameterType, ParameterValue
+from rcl_interfaces.srv import (
+    GetParameters, GetParameterTypes, ListParameters, SetParameters,
+)
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.qos import qos_profile_parameters
 from rclpy.task import Future
+from std_srvs.srv import Trigger
 
 from drive_can_bridge.client import find_source, open_drives
-from drive_can_bridge.client.drive import Drive, Enabled, WhichBridge
-from drive_can_bridge.core.errors import DriveCanError
+from drive_can_bridge.client.drive import Drive, Enabled
+from drive_can_bridge.core.errors import DriveCanError, NoBridge, WhichBridge
 from drive_can_bridge.core.parameters import Access, Storage
 from drive_can_bridge.core.roles import Role
-from drive_can_bridge.ros.acquaintance import SERVICES
-from drive_can_bridge.ros.client import graph
+from drive_can_bridge.ros.client import calls, graph, search
 
 PUMP: dict[str, Any] = {
     'bus': 'main', 'protocol': 'canopen_pkw', 'station': 5, 'profile': 'tesys_t_ltmr',
@@ -149,27 +152,92 @@ def offer(client: Client, name: str, service: str, kind: Any, answer: Any = None
                                qos_profile=qos_profile_parameters)
 
 
+def hang(client: Client, name: str) -> None:
+    """Be a bridge that is in the graph, and answers nothing."""
+    offer(client, name, 'change_state', ChangeState)
+    offer(client, name, 'save_trace', Trigger)
+
+
+def answer(client: Client, name: str, others: Sequence[str] = (), drives: str = 'conveyor',
+           greet: Any = None) -> Callable[[], None]:
+    """Answer as a bridge does; return what begins to tell of its drives."""
+    def tell_drives(_: Any, response: Any) -> Any:
+        response.result.names = [f'drives.{each}.profile_sha256' for each in drives.split()]
+        return response
+
+    def tell_others(request: Any, response: Any) -> Any:
+        assert list(request.names) == ['bridges']
+        response.values = [ParameterValue(type=ParameterType.PARAMETER_STRING_ARRAY,
+                                          string_array_value=sorted([name, *others]))]
+        return response
+    hang(client, name)
+    offer(client, name, 'get_parameter_types', GetParameterTypes, greet)
+    offer(client, name, 'get_parameters', GetParameters, tell_others)
+    return lambda: offer(client, name, 'list_parameters', ListParameters, tell_drives)
+
+
 def test_services_that_are_found_one_by_one(client: Client) -> None:
     def greet(_: Any, response: Any) -> Any:
         def later() -> None:
             timer.cancel()
-            offer(client, '/slow/bridge', 'list_parameters', ListParameters, tell)
+            tell()
         timer = client.node.create_timer(0.5, later)
         return response
-
-    def tell(_: Any, response: Any) -> Any:
-        response.result.names = ['drives.conveyor.profile_sha256', 'drives.lift.profile_sha256']
-        return response
-    offer(client, '/slow/bridge', 'change_state', ChangeState)
-    offer(client, '/slow/bridge', 'get_parameter_types', GetParameterTypes, greet)
+    tell = answer(client, '/slow/bridge', drives='conveyor lift', greet=greet)
     source = find_source(namespace='slow')
     assert list(source.names) == ['conveyor', 'lift']
     source.close()
 
 
+def test_a_bridge_says_which_others_there_are(bridge: StartBridge, client: Client) -> None:
+    one = bridge(parameters(), arguments=('-r', '__ns:=/b'))
+    own = '/b/drive_can_bridge'
+    assert client.get(own, 'bridges') == [[own]]
+    hang(client, '/a/bridge')
+    offer(client, '/robot/controller', 'change_state', ChangeState)     # hangs, but is no bridge
+    wait_until(lambda: client.get(own, 'bridges') == [['/a/bridge', own]])
+    (changed, _), = client.set(own, bridges=['/c'])
+    assert not changed
+    one.node.trigger_deactivate()
+    one.node.trigger_cleanup()
+    assert client.get(own, 'bridges') == [['/a/bridge', own]]
+
+
+def test_one_that_hangs_counts(bridge: StartBridge, client: Client) -> None:
+    """Which of two drives of one name is meant, nobody knows."""
+    bridge(parameters()).online()
+    hang(client, '/other/bridge')
+    with pytest.raises(WhichBridge, match='/drive_can_bridge, /other/bridge; choose one with'):
+        find_source()
+
+
+def test_one_that_this_process_has_not_seen_yet_counts(client: Client) -> None:
+    answer(client, '/first/bridge', others=['/second/bridge'])()
+    with pytest.raises(WhichBridge, match='/first/bridge, /second/bridge; choose one with'):
+        find_source()
+    source = find_source(namespace='first')
+    assert list(source.names) == ['conveyor']
+    source.close()
+
+
+def test_two_of_one_name_are_two(client: Client) -> None:
+    answer(client, '/cell/bridge', others=['/cell/bridge'])()
+    with pytest.raises(WhichBridge, match='^2 bridges are called /cell/bridge'):
+        find_source(namespace='cell')
+
+
+def test_somebody_elses_managed_node_that_hangs_blocks_nobody(
+        bridge: StartBridge, client: Client) -> None:
+    offer(client, '/robot/controller', 'change_state', ChangeState)
+    bridge(parameters()).online()
+    source = find_source()
+    assert list(source.names) == ['conveyor']
+    source.close()
+
+
 def test_an_answer_that_is_lost_is_asked_for_again(
         client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(graph, '_AGAIN', 0.3)
+    monkeypatch.setattr(calls, 'AGAIN', 0.3)
     asked: dict[str, int] = {}
 
     def answers(name: str) -> Callable[[Any, Any], Any]:
@@ -180,7 +248,8 @@ def test_an_answer_that_is_lost_is_asked_for_again(
             return response
         return answer
     # each call by itself: others do not wait for what has no end
-    services = {'get_parameter_types': GetParameterTypes, **SERVICES}
+    services = {'get_parameter_types': GetParameterTypes, **calls.ASKING,
+                'set_parameters': SetParameters}
     for name, kind in services.items():
         forgets = name in ('list_parameters', 'set_parameters')
         client.node.create_service(
@@ -198,40 +267,14 @@ def test_an_answer_that_is_lost_is_asked_for_again(
         here.close()
 
 
-def test_where_one_was_slow_to_be_found_another_one_may_be_as_slow(client: Client) -> None:
-    """A write must not go to the first of two for nobody has heard of the other one yet."""
-    def later(seconds: float, action: Callable[[], None]) -> None:
-        def once() -> None:
-            timer.cancel()
-            action()
-        timer = client.node.create_timer(seconds, once)
-
-    def tell(_: Any, response: Any) -> Any:
-        response.result.names = ['drives.conveyor.profile_sha256']
-        return response
-
-    def begin(name: str) -> None:
-        offer(client, name, 'change_state', ChangeState)
-        offer(client, name, 'get_parameter_types', GetParameterTypes)
-        offer(client, name, 'list_parameters', ListParameters, tell)
-    later(1.5, lambda: begin('/first/bridge'))
-    later(3.3, lambda: begin('/second/bridge'))
-    with pytest.raises(WhichBridge, match='/first/bridge, /second/bridge; choose one with'):
-        find_source()
-
-
 def test_what_may_be_a_bridge_and_answers_nothing_is_named(
         client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(graph, '_FIND_TIMEOUT', 1.0)
-    offer(client, '/mute/bridge', 'change_state', ChangeState)
+    monkeypatch.setattr(search, '_ANSWER_TIMEOUT', 1.0)
+    hang(client, '/mute/bridge')
     offer(client, '/mute/bridge', 'get_parameter_types', GetParameterTypes)
-    offer(client, '/deaf/bridge', 'change_state', ChangeState)
-    with pytest.raises(DriveCanError, match=r'^no bridge answers in namespace /mute \(ROS domain '
-                                            r'\d+\): /mute/bridge does not offer list_param'):
+    with pytest.raises(NoBridge, match=r'^no bridge answers in namespace /mute \(ROS domain '
+                                       r'\d+\): /mute/bridge does not'):
         find_source(namespace='mute')
-    with pytest.raises(DriveCanError, match=r'^no bridge answers \(.*\): /deaf/bridge does not '
-                                            r'answer; /mute/bridge does not offer list_param'):
-        find_source()
 
 
 def test_a_second_bridge_with_the_same_drive_does_not_configure(bridge: StartBridge) -> None:

@@ -13,7 +13,6 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import Log, ParameterEvent
 from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters
-from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from std_msgs.msg import Bool
 
@@ -23,15 +22,13 @@ from drive_can_bridge.monitor.plan import BUDGET, SamplingPlan
 from drive_can_bridge.monitor.snapshot import Place
 from drive_can_bridge.monitor.text import is_ros_name
 from drive_can_bridge.monitor.values import ParameterInfo
-from drive_can_bridge.ros.guest import Guest
+from drive_can_bridge.ros.client.calls import NodeCalls
+from drive_can_bridge.ros.client.guest import Guest
+from drive_can_bridge.ros.client.inbox import Inbox, latched_quality, log_quality, newest_quality
 from drive_can_bridge.ros.messages import drive_value, plain
-from drive_can_bridge.ros.monitor.inbox import (
-    Inbox, latched_quality, log_quality, newest_quality,
-)
 from drive_can_bridge.ros.monitor.messages import (
     log_level, parameter_info, stamp_of, statuses, values,
 )
-from drive_can_bridge.ros.monitor.parameter_calls import ParameterCalls
 
 #: s between two looks at the graph, which are not cheap
 _GRAPH_PERIOD = 2.0
@@ -53,8 +50,7 @@ class MonitorClient:
 
     def __init__(self, model: Model, *, budget: float = BUDGET) -> None:
         self._model = model
-        self._guest = Guest('monitor')
-        self._node = self._guest.node
+        self._node = Guest('monitor')
         self._now = 0.0
         self._plan = SamplingPlan(budget)
         self._inboxes = [
@@ -67,13 +63,13 @@ class MonitorClient:
         self._focus: frozenset[str] = frozenset()
         self._watched = True
         self._graph_at = 0.0
-        self._calls = ParameterCalls(self._node, _CALL_TIMEOUT)
+        self._calls = NodeCalls(self._node, _CALL_TIMEOUT)
         self._asked: set[str] = set()
 
     # -- for the view -----------------------------------------------------------------------------
 
     @property
-    def node(self) -> Node:
+    def node(self) -> Guest:
         """The node, for whoever asks more of drives than this."""
         return self._node
 
@@ -124,7 +120,7 @@ class MonitorClient:
 
     def close(self) -> None:
         """Leave the graph."""
-        self._guest.leave()
+        self._node.leave()
 
     # -- what arrives -----------------------------------------------------------------------------
 
@@ -173,7 +169,7 @@ class MonitorClient:
 
     def _find_bits(self) -> None:
         """Subscribe to the bits of drives: ``~/<parameter>/<bit>``."""
-        for topic, types in self._node.get_topic_names_and_types():
+        for topic, types in self._node.topics():
             drive, _, below = topic.rpartition('/')
             drive, _, parameter = drive.rpartition('/')
             if (drive in self._focus and parameter != 'command'

@@ -5,16 +5,14 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from rcl_interfaces.srv import GetParameters, SetParameters
-from rclpy.node import Node
 from std_srvs.srv import SetBool, Trigger
 
 from drive_can_bridge.core.parameters import Value
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.monitor.source import Outcome, Stop
 from drive_can_bridge.monitor.text import is_ros_name
+from drive_can_bridge.ros.client.calls import HasHandle, NodeCalls, Service
 from drive_can_bridge.ros.messages import drive_value, parameter_message
-from drive_can_bridge.ros.monitor.inbox import Service
-from drive_can_bridge.ros.monitor.parameter_calls import ParameterCalls
 
 #: s for a stop, which answers when the drive's status says so, and for a read or write
 STOP_TIMEOUT = 10.0
@@ -35,10 +33,10 @@ class Operations:
     :param node: of the monitor.
     """
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: HasHandle) -> None:
         self._node = node
         self._stops: dict[str, dict[Stop, Service]] = {}
-        self._calls = ParameterCalls(node, PARAMETER_TIMEOUT)
+        self._calls = NodeCalls(node, PARAMETER_TIMEOUT)
 
     def poll(self, controlled: Iterable[str], now: float) -> bool:
         """Take the answers that have arrived; return whether somebody still waits for one."""

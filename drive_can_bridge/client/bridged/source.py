@@ -1,37 +1,25 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Finding a running bridge, and what it says of its drives."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 import json
-import os
-import time
 from typing import Any
 
 from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters
 
-from drive_can_bridge.client.drive import DriveFacts, Drives, WhichBridge
-from drive_can_bridge.core.errors import DriveCanError
+from drive_can_bridge.client.bridged.descriptors import parameter_of, role_of
+from drive_can_bridge.client.bridged.drive import BridgedDrive
+from drive_can_bridge.client.drive import DriveFacts, Drives
+from drive_can_bridge.core.errors import NoBridge
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.profile import RestoreStep, RestoreTable
 from drive_can_bridge.core.roles import Role
-from drive_can_bridge.ros.client.descriptors import parameter_of, role_of
-from drive_can_bridge.ros.client.drive import BridgedDrive
-from drive_can_bridge.ros.client.graph import Graph, NoAnswer
+from drive_can_bridge.ros.client.graph import Graph
+from drive_can_bridge.ros.client.search import find_bridge
 from drive_can_bridge.ros.messages import plain
 
-#: s without anything new in the graph until nobody is there; where one is known to be there
-_SEARCH, _EXPECTED = 4.0, 6.0
-#: s without anything new, once a bridge is found, until nobody else is there; and how many times
-#: as long as it took to find that one: on a busy machine others need as long at least
-_SETTLE, _AS_LONG = 1.0, 2.0
-#: s that looking takes in a graph where there is always something new
-_LONGEST = 12.0
-#: s that one that may be a bridge has to say so
-_ASK_TIMEOUT = 5.0
 #: names in one call
 _BATCH = 200
-_LIFECYCLE = 'lifecycle_msgs/srv/ChangeState'
-_MARK = '.profile_sha256'
 _DRIVE_KEYS = ('bus', 'protocol', 'station', 'profile', 'profile_sha256', 'identity', 'restore')
 _BUS_KEYS = ('interface', 'channel', 'bitrate')
 
@@ -42,16 +30,20 @@ class BridgeSource:
 
     :param namespace: where it runs; None: anywhere, if there is only one.
     :raises WhichBridge: there are several.
-    :raises DriveCanError: there is none, or it does not answer.
+    :raises NoBridge: there is none, or it does not answer.
     """
 
     def __init__(self, namespace: str | None) -> None:
         self._graph = Graph()
         try:
-            self._namespace = None if namespace is None else '/' + namespace.strip('/')
-            self.bridge, self._names = self._find()
-            self._tables: dict[str, dict[str, Parameter]] = {}
-            self._roles: dict[str, dict[str, Role]] = {}
+            found = find_bridge(
+                self._graph,
+                namespace if namespace is None else f'/{namespace.strip("/")}'.rstrip('/'))
+            self.bridge, self._names = found.name, found.drives or ()
+        except NoBridge as error:
+            self._graph.close()
+            raise NoBridge(f'{error}: start one, or name its file with --params-file to talk to '
+                           'the drives directly') from None
         except BaseException:
             self._graph.close()
             raise
@@ -81,69 +73,8 @@ class BridgeSource:
         """Leave the graph. Idempotent."""
         self._graph.close()
 
-    # -- which bridge -----------------------------------------------------------------------------
-
-    def _find(self) -> tuple[str, tuple[str, ...]]:
-        """Return the full name of the bridge, and its drives."""
-        found: dict[str, tuple[str, ...]] = {}
-        looked: set[str] = set()
-        silent: dict[str, NoAnswer] = {}
-        graph: list[object] = []
-        began = changed = time.monotonic()
-        patience = _SEARCH if self._namespace is None else _EXPECTED
-        last = changed + _LONGEST
-        while time.monotonic() < min(last, changed + patience):
-            before, graph = graph, self._graph.everything()
-            if graph != before:     # they are still being discovered
-                changed = time.monotonic()
-            new = [node for node in self._graph.nodes_with('change_state', _LIFECYCLE)
-                   if node not in looked and self._in_namespace(node)]
-            if not new:
-                self._graph.wait(lambda: False, 0.1)
-            for node in new:
-                looked.add(node)
-                try:
-                    drives = self._drives_of(node)
-                except NoAnswer as error:
-                    silent[node] = error
-                    continue
-                if drives:
-                    found[node] = drives
-                    # asking it took its time: whoever else is there gets as much
-                    changed = time.monotonic()
-                    if len(found) == 1:
-                        patience = min(max(_SETTLE, _AS_LONG * (changed - began)), _EXPECTED)
-                    last = changed + max(_SEARCH, patience)
-        if not found:
-            raise DriveCanError(self._nobody(silent))
-        if len(found) > 1:
-            raise WhichBridge(f'several bridges are running: {", ".join(sorted(found))}; choose '
-                              'one with --namespace')
-        return next(iter(found.items()))
-
-    def _nobody(self, silent: Mapping[str, NoAnswer]) -> str:
-        where = '' if self._namespace is None else f' in namespace {self._namespace}'
-        domain = os.environ.get('ROS_DOMAIN_ID') or '0'
-        if silent:
-            return (f'no bridge answers{where} (ROS domain {domain}): '
-                    + '; '.join(map(str, silent.values())))
-        return (f'no configured bridge is running{where} (ROS domain {domain}): start one, or '
-                'name its file with --params-file to talk to the drives directly')
-
-    def _in_namespace(self, node: str) -> bool:
-        return self._namespace is None or (node.rpartition('/')[0] or '/') == self._namespace
-
-    def _drives_of(self, node: str) -> tuple[str, ...]:
-        """Return the drives of a node; none of one that is no bridge."""
-        names = self._graph.call(node, 'list_parameters', ListParameters.Request(
-            prefixes=['drives']), _ASK_TIMEOUT).result.names
-        return tuple(name.split('.')[1] for name in names
-                     if name.endswith(_MARK) and name.count('.') == 2)
-
     def _node_of(self, drive: str) -> str:
         return f'{self.bridge.rpartition("/")[0]}/{drive}'
-
-    # -- what it says -----------------------------------------------------------------------------
 
     def _values(self, names: Sequence[str]) -> dict[str, Any]:
         """Return parameters of the bridge; None for those that it does not have."""

@@ -5,15 +5,15 @@ from collections.abc import Callable, Iterator, Sequence
 
 from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters
 
+from drive_can_bridge.client.bridged.descriptors import (
+    message_of, parameter_of, raw_of, role_of,
+)
 from drive_can_bridge.client.drive import (
     Drive, DriveFacts, Enabled, ReadOutcome, WriteOutcome,
 )
 from drive_can_bridge.core.directory import ParameterDirectory
 from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.roles import Role
-from drive_can_bridge.ros.client.descriptors import (
-    message_of, parameter_of, raw_of, role_of,
-)
 from drive_can_bridge.ros.client.graph import Graph
 from drive_can_bridge.ros.messages import drive_value, facts_of
 

@@ -1,0 +1,326 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+Services of other nodes, asked without an executor: answers are looked for.
+
+How a client makes sure that a node can answer it: that a server was found does not say that the
+server has found this client. One that has not gives its answer up, though it has done what it was
+asked. So before the first call another one is made that changes nothing, through a client that was
+made later, until it is answered: endpoints are announced in order, so that a server which knows
+the later one knows the earlier ones of this node, too. Nor has this side found all services of a
+node when it has found one: what is sent to one that it does not know yet is lost.
+"""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+import math
+from typing import Any, NamedTuple, Protocol
+
+from rcl_interfaces.srv import (
+    DescribeParameters, GetParameters, GetParameterTypes, ListParameters, SetParameters,
+)
+from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.qos import qos_profile_parameters
+from rclpy.type_support import check_is_valid_srv_type
+from std_srvs.srv import SetBool, Trigger
+
+#: what is asked of a node to know that it knows us: of no parameter
+GREETING = 'get_parameter_types', GetParameterTypes
+#: s after which a greeting is said again for the first time; then twice as many, and so on
+FIRST_PATIENCE = 0.1
+#: what changes nothing
+ASKING: dict[str, Any] = {
+    'get_parameters': GetParameters, 'list_parameters': ListParameters,
+    'describe_parameters': DescribeParameters}
+#: what is done once only; and not for everybody who reads (SROS2)
+CHANGING: dict[str, Any] = {
+    'set_parameters': SetParameters, 'enable': SetBool, 'reset_fault': Trigger}
+SERVICES = {**ASKING, **CHANGING}
+#: s after which a question that changes nothing is asked again: DDS may lose an answer
+AGAIN = 30.0
+#: s that a service which nobody offers yet may still be found in: each is found by itself
+OFFER_TIMEOUT = 2.0
+#: s until a node knows us, or offers what it was asked for
+FIND_TIMEOUT = 10.0
+#: s without the server until it has gone
+GONE = 2.0
+#: s without a question after which a node's clients are closed
+_IDLE = 60.0
+#: s for which one that has answered is taken for the same, and not for one that was started anew
+_FRESH = 2.0
+
+#: takes the response, or None: nobody answered in time
+Done = Callable[[Any], None]
+
+
+class HasHandle(Protocol):
+    """A node of rclpy, or a guest."""
+
+    handle: Any
+
+
+@dataclass(slots=True)
+class _Call:
+    """
+    A question, and until when it may be sent, or answered.
+
+    :ivar seen_at: when somebody offered it last.
+    """
+
+    request: Any
+    done: Done
+    deadline: float
+    again_at: float
+    seen_at: float
+
+
+class Service:
+    """
+    A service that may be asked again and again, by several at once.
+
+    :param node: of ours.
+    :param timeout: s after which an answer is not waited for any more.
+    :param again: s after which it is asked once more while there is no answer.
+    """
+
+    def __init__(self, node: HasHandle, service_type: Any, name: str, timeout: float,
+                 again: float = math.inf) -> None:
+        self._type = service_type
+        self._timeout = timeout
+        self._again = again
+        check_is_valid_srv_type(service_type)
+        with node.handle:
+            self._handle: Any = rclpy_implementation.Client(
+                node.handle, service_type, name, qos_profile_parameters.get_c_qos_profile())
+        self._waiting: dict[int, _Call] = {}
+        self._unsent: list[_Call] = []
+
+    @property
+    def ready(self) -> bool:
+        """Somebody offers it."""
+        with self._handle:
+            return bool(self._handle.service_server_is_available())
+
+    @property
+    def busy(self) -> bool:
+        """Somebody waits for an answer."""
+        return bool(self._waiting or self._unsent)
+
+    def send(self, request: Any, done: Done, now: float,
+             patience: float = OFFER_TIMEOUT) -> None:
+        """
+        Ask, as soon as somebody offers it.
+
+        :param done: takes the response, or None: nobody answered in time.
+        :param patience: s that it may take until it is offered.
+        """
+        call = _Call(request, done, now + patience, math.inf, now)
+        if self.ready:
+            self._send(call, now)
+        else:
+            self._unsent.append(call)
+
+    def _send(self, call: _Call, now: float) -> None:
+        if call.again_at == math.inf:   # for the first time
+            call.deadline = now + self._timeout
+        call.again_at, call.seen_at = now + self._again, now
+        with self._handle:
+            self._waiting[self._handle.send_request(call.request)] = call
+
+    def look(self, now: float) -> None:
+        """Ask what could not be asked before, and hand over the answers that have arrived."""
+        if not self.busy:
+            return
+        ready = self.ready
+        unsent, self._unsent = self._unsent, []
+        for call in unsent:
+            if ready:
+                self._send(call, now)
+            elif now < call.deadline:
+                self._unsent.append(call)
+            else:
+                call.done(None)
+        while self._waiting:
+            with self._handle:
+                header, response = self._handle.take_response(self._type.Response)
+            if response is None:
+                break
+            answered = self._waiting.get(header.request_id.sequence_number)
+            if answered is not None:
+                self._end(answered, response)
+        for call in {id(call): call for call in self._waiting.values()}.values():
+            if ready:
+                call.seen_at = now
+            if now >= call.deadline or now - call.seen_at > GONE:
+                self._end(call, None)
+            elif now >= call.again_at and ready:
+                self._send(call, now)
+
+    def _end(self, call: _Call, response: Any) -> None:
+        self._waiting = {number: other for number, other in self._waiting.items()
+                         if other is not call}
+        call.done(response)
+
+    def forget(self) -> None:
+        """Wait for no answer to what was asked."""
+        self._waiting.clear()
+        self._unsent.clear()
+
+    def close(self) -> None:
+        """Wait for no answer any more."""
+        self._handle.destroy_when_not_in_use()
+
+
+class NodeCalls:
+    """
+    What nodes are asked by clients that stay, once these are known there.
+
+    :param node: of ours.
+    :param timeout: s after which an answer is not waited for any more.
+    """
+
+    def __init__(self, node: HasHandle, timeout: float) -> None:
+        self._node = node
+        self._timeout = timeout
+        self._hosts: dict[str, _Host] = {}
+
+    @property
+    def busy(self) -> bool:
+        """Somebody waits for an answer."""
+        return any(host.busy for host in self._hosts.values())
+
+    def ask(self, host: str, service: str, request: Any, done: Done, now: float,
+            patience: float = FIND_TIMEOUT) -> None:
+        """
+        Ask a node, as soon as it offers the service and knows us.
+
+        :param service: one of :data:`SERVICES`.
+        :param patience: s that it may take, once it knows us, until it is offered.
+        """
+        if host not in self._hosts:
+            self._hosts[host] = _Host(self._node, host, self._timeout)
+        self._hosts[host].ask(service, request, done, now, patience)
+
+    def offered(self, host: str, service: str) -> bool:
+        """Tell whether a service that was asked for is offered."""
+        return host in self._hosts and self._hosts[host].offered(service)
+
+    def drop(self, host: str, service: str) -> None:
+        """Wait for no answer of this service any more."""
+        if host in self._hosts:
+            self._hosts[host].drop(service)
+
+    def look(self, now: float) -> None:
+        """Ask what could not be asked before, and hand over the answers that have arrived."""
+        for name, host in list(self._hosts.items()):
+            host.look(now)
+            if host.asked_at + _IDLE < now and not host.busy:
+                del self._hosts[name]
+                host.close()
+
+
+class _Question(NamedTuple):
+    deadline: float
+    service: Service
+    request: Any
+    done: Done
+    patience: float
+
+
+class _Host:
+    """
+    A node that is asked.
+
+    :ivar asked_at: when it was asked last.
+    """
+
+    def __init__(self, node: HasHandle, name: str, timeout: float) -> None:
+        self.asked_at = self._heard_at = -math.inf
+        self._node, self._name, self._timeout = node, name, timeout
+        self._services: dict[str, Service] = {}
+        self._greeting: Service | None = None   # newer than the others
+        self._greet_at = self._pause = 0.0
+        self._waiting: list[_Question] = []
+
+    @property
+    def busy(self) -> bool:
+        return bool(self._waiting) or any(each.busy for each in self._services.values())
+
+    def ask(self, service: str, request: Any, done: Done, now: float, patience: float) -> None:
+        self.asked_at = now
+        if service not in self._services:
+            self._get_to_know(service)
+        if not self._waiting:
+            self._greet_at, self._pause = now, FIRST_PATIENCE
+        self._waiting.append(_Question(
+            now + min(self._timeout, FIND_TIMEOUT), self._services[service], request, done,
+            min(patience, self._timeout)))
+        self._send(now)
+
+    def offered(self, service: str) -> bool:
+        return service in self._services and self._services[service].ready
+
+    def drop(self, service: str) -> None:
+        found = self._services.get(service)
+        if found is not None:
+            found.forget()
+            self._waiting = [each for each in self._waiting if each.service is not found]
+
+    def look(self, now: float) -> None:
+        self._greet(now)
+        self._send(now)
+        for service in list(self._services.values()):
+            service.look(now)
+
+    def close(self) -> None:
+        for service in (self._greeting, *self._services.values()):
+            if service is not None:
+                service.close()
+
+    def _get_to_know(self, service: str) -> None:
+        for name in _made_with(service):
+            self._services[name] = self._client(
+                name, SERVICES[name], AGAIN if name in ASKING else math.inf)
+        if self._greeting is not None:
+            self._greeting.close()
+        self._greeting = self._client(*GREETING)
+        self._heard_at = -math.inf
+
+    def _client(self, service: str, kind: Any, again: float = math.inf) -> Service:
+        return Service(self._node, kind, f'{self._name}/{service}', self._timeout, again)
+
+    def _greet(self, now: float) -> None:
+        greeting = self._greeting
+        if greeting is None or not self._waiting:
+            return
+        if now >= self._greet_at and greeting.ready:
+            greeting.send(GREETING[1].Request(), self._told(now, _nothing), now)
+            self._greet_at = now + self._pause
+            self._pause *= 2.0
+        greeting.look(now)
+
+    def _told(self, asked_at: float, done: Done) -> Done:
+        def told(response: Any) -> None:
+            if response is not None:
+                self._heard_at = max(self._heard_at, asked_at)
+            done(response)
+        return told
+
+    def _send(self, now: float) -> None:
+        """Send what waits, if the node knows us."""
+        waiting, self._waiting = self._waiting, []
+        for each in waiting:
+            if now - self._heard_at <= _FRESH:
+                each.service.send(each.request, self._told(now, each.done), now, each.patience)
+            elif now < each.deadline:
+                self._waiting.append(each)
+            else:
+                each.done(None)
+
+
+def _made_with(service: str) -> Iterable[str]:
+    """Return the services whose clients are made together: a greeting is enough for them all."""
+    return ASKING if service in ASKING else (service,)
+
+
+def _nothing(_: Any) -> None:
+    pass

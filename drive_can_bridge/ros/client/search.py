@@ -1,0 +1,178 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The search for bridges, the same for all commands.
+
+A process that has just begun does not know the graph, a bridge does. So the first one that answers
+says which others there are (its parameter ``bridges``), and nobody waits for what may still turn
+up. What is in the graph with the services of a bridge counts, whether it answers or not.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+import os
+
+from rcl_interfaces.srv import GetParameters, ListParameters
+
+from drive_can_bridge.core.errors import NoBridge, WhichBridge
+from drive_can_bridge.ros.client.calls import NodeCalls
+from drive_can_bridge.ros.client.graph import Graph
+from drive_can_bridge.ros.client.guest import Guest
+from drive_can_bridge.ros.recognition import BRIDGES, bridges_among, Entries, namespace_of
+
+#: s without anything new in the graph until nobody is there, and how long that may go on
+_QUIET, _LONGEST = 4.0, 12.0
+#: s that a bridge has to answer
+_ANSWER_TIMEOUT = 5.0
+#: s between two looks at the graph
+_GRAPH_PERIOD = 0.01
+_MARK = '.profile_sha256'
+
+
+@dataclass(slots=True)
+class Found:
+    """
+    What is known of a bridge.
+
+    :ivar drives: names of its drives, in the order of the configuration; None: not known yet.
+    :ivar others: the bridges that it sees, itself among them; None: not known yet.
+    :ivar silent: it has not answered in time.
+    """
+
+    name: str
+    drives: tuple[str, ...] | None = None
+    others: tuple[str, ...] | None = None
+    silent: bool = False
+
+    @property
+    def answered(self) -> bool:
+        """All that it was asked is known."""
+        return self.drives is not None and self.others is not None
+
+    @property
+    def nodes(self) -> tuple[str, ...]:
+        """Full names of its drives, as far as they are known."""
+        return tuple(f'{namespace_of(self.name)}/{drive}' for drive in self.drives or ())
+
+
+class Search:
+    """
+    Looks for bridges, and asks each one that it sees.
+
+    :param namespace: of those that are meant, ``/cell``, '' for the root; None: all.
+    :param expected: full names of bridges that are known to be there.
+    :ivar found: by full name, whether they have answered or not.
+    :ivar services: all that have been discovered.
+    """
+
+    def __init__(self, guest: Guest, namespace: str | None,
+                 expected: Iterable[str] = ()) -> None:
+        self._guest = guest
+        self._namespace = namespace
+        self._expected = list(expected)
+        self._calls = NodeCalls(guest, _ANSWER_TIMEOUT)
+        self.found: dict[str, Found] = {}
+        self.services: Entries = ()
+        self._looked_at = self._changed_at = self._began = -1.0
+
+    @property
+    def names(self) -> list[str]:
+        """The full names of all bridges, one as often as there are some of that name."""
+        named = [each.others for each in self.found.values() if each.others]
+        return sorted(name for name in self.found for _ in range(
+            max([1, *(others.count(name) for others in named)])))
+
+    @property
+    def settled(self) -> bool:
+        """All bridges are known, and each one has answered, or is silent."""
+        return (any(each.answered for each in self.found.values())
+                and all(each.answered or each.silent for each in self.found.values()))
+
+    def over(self, now: float) -> bool:
+        """Tell whether nobody is there, or nobody who answers."""
+        return (all(each.silent for each in self.found.values())
+                and now > min(self._changed_at + _QUIET, self._began + _LONGEST))
+
+    def look(self, now: float) -> bool:
+        """Look at the graph, and take answers; return whether there is anything new in it."""
+        if self._began < 0.0:
+            self._began = self._changed_at = now
+            self._see(self._expected, now)
+        self._calls.look(now)
+        if now < self._looked_at + _GRAPH_PERIOD:
+            return False
+        self._looked_at = now
+        services = self._guest.services()
+        if services == self.services:
+            return False
+        self.services, self._changed_at = services, now
+        self._see(bridges_among(services), now)
+        return True
+
+    def _see(self, names: Iterable[str], now: float) -> None:
+        for name in names:
+            if name not in self.found and self._namespace in (None, namespace_of(name)):
+                self.found[name] = Found(name)
+                self._ask(self.found[name], now)
+
+    def _ask(self, bridge: Found, now: float) -> None:
+        def take_others(response: GetParameters.Response | None) -> None:
+            if response is None or not response.values:
+                bridge.silent = True
+                return
+            bridge.others = tuple(response.values[0].string_array_value)
+            self._see(bridge.others, self._looked_at)
+
+        def take_drives(response: ListParameters.Response | None) -> None:
+            if response is None:
+                bridge.silent = True
+                return
+            bridge.drives = tuple(
+                name.split('.')[1] for name in response.result.names
+                if name.endswith(_MARK) and name.count('.') == 2)
+        self._calls.ask(bridge.name, 'get_parameters',
+                        GetParameters.Request(names=[BRIDGES]), take_others, now)
+        self._calls.ask(bridge.name, 'list_parameters',
+                        ListParameters.Request(prefixes=['drives']), take_drives, now)
+
+
+def find_bridge(graph: Graph, namespace: str | None) -> Found:
+    """
+    Return the one bridge that is meant.
+
+    :param namespace: where it runs, ``/cell``, '' for the root; None: anywhere.
+    :raises WhichBridge: there are several, whether they answer or not.
+    :raises NoBridge: there is none, or it does not answer.
+    """
+    search = Search(graph.guest, namespace)
+
+    def done(now: float) -> bool:
+        search.look(now)
+        return len(search.names) > 1 or search.settled or search.over(now)
+    graph.wait(done, 2.0 * _LONGEST)
+    names = search.names
+    if len(names) > 1:
+        raise WhichBridge(_which(names))
+    for each in search.found.values():
+        if each.answered and each.drives:
+            return each
+    raise NoBridge(nobody(namespace, names))
+
+
+def nobody(namespace: str | None, silent: Sequence[str] = ()) -> str:
+    """Say that there is no bridge, or none that answers."""
+    where = '' if namespace is None else f' in namespace {namespace or "/"}'
+    domain = os.environ.get('ROS_DOMAIN_ID') or '0'
+    if silent:
+        return (f'no bridge answers{where} (ROS domain {domain}): {", ".join(silent)} '
+                f'{"does" if len(silent) == 1 else "do"} not')
+    return f'no configured bridge is running{where} (ROS domain {domain})'
+
+
+def _which(names: Sequence[str]) -> str:
+    if len(set(names)) == 1:
+        return (f'{len(names)} bridges are called {names[0]}: start each in a namespace of its '
+                'own')
+    if len({namespace_of(name) for name in names}) == 1:
+        return (f'several bridges are running in one namespace: {", ".join(names)}; start each '
+                'in one of its own')
+    return (f'several bridges are running: {", ".join(names)}; choose one with --namespace')
