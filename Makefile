@@ -13,11 +13,11 @@ export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 
 help:
 	@echo 'make demo    simulated drives, a bridge and the live view; ARGS="..." goes to drive_can demo'
-	@echo 'make test    types and all tests; ARGS="..." goes to pytest (-n 0: one after the other)'
+	@echo 'make test    all tests; ARGS="..." goes to pytest (-n 0: one after the other)'
 	@echo '             DRIVE_CAN_TEST_PROFILE=long: what is random looks longer, as in CI'
 	@echo 'make bench   measurements; ARGS="..." goes to bench/run.py'
 	@echo 'make pictures  those of README and docs, from a demo that runs'
-	@echo 'make lint    style'
+	@echo 'make lint    style and types'
 	@echo 'make setup   only the virtual environment that all of them use, in $(VENV); the demo makes half'
 	@echo 'make clean   removes it and everything else that was built'
 	@echo

@@ -212,6 +212,16 @@ def test_pip_and_rosdep_bring_the_same(
     assert {ROSDEP_KEYS[name] for name in by_pip} == by_rosdep
 
 
+def test_placeholders_stand_where_contributing_says() -> None:
+    text = (CHECKOUT / 'CONTRIBUTING.md').read_text(encoding='utf-8')
+    named = re.findall('`([^`]+)`', ''.join(
+        line for line in text.splitlines() if line.startswith('| address')))
+    holders = [path.relative_to(CHECKOUT).as_posix() for pattern in ('*', 'docs/*.md')
+               for path in CHECKOUT.glob(pattern) if path.is_file()
+               and b'drive-can-bridge.invalid' in path.read_bytes()]
+    assert {*holders, 'CONTRIBUTING.md'} == {*named, 'CONTRIBUTING.md'}
+
+
 def test_drive_can_installs_without_ros(arguments: dict[str, Any]) -> None:
     needed = arguments['install_requires']
     assert not [entry for entry in needed if entry.startswith(('ros', 'rcl'))]
