@@ -26,6 +26,9 @@ from drive_can_bridge.configuration.parameter_file import PARAMETERS_KEY
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.text import printable
 
+#: names that readers of YAML 1.1 take for true, false or nothing
+_WORDS = frozenset(['y', 'yes', 'n', 'no', 'true', 'false', 'on', 'off', 'null'])
+
 
 @dataclass(frozen=True, slots=True)
 class Head:
@@ -75,7 +78,8 @@ class Backup:
 
     def problem(self, name: str, message: str) -> str:
         """Write what is wrong with a value as a line."""
-        return printable(f'{self.file}:{self.lines.get(name, 1)}: {name}: {message}', None)
+        return printable(f'{self.file}:{self.lines.get(name, 1)}: {printable(name)}: {message}',
+                         None)
 
 
 def head_of(facts: DriveFacts, *, time: str, identity: str) -> Head:
@@ -109,4 +113,5 @@ def written(facts: DriveFacts, head: Head, settings: Iterable[tuple[Parameter, i
 
 def _line(parameter: Parameter, raw: int) -> str:
     unit = f'  # {printable(parameter.unit, None)}' if parameter.unit else ''
-    return f'    {parameter.name}: {value_in_file(parameter, raw)}{unit}'
+    name = f"'{parameter.name}'" if parameter.name in _WORDS else parameter.name
+    return f'    {name}: {value_in_file(parameter, raw)}{unit}'

@@ -17,6 +17,7 @@ from drive_can_bridge.client.drive import Drive, ReadOutcome
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.roles import Role
+from drive_can_bridge.core.text import printable
 from drive_can_bridge.core.words import value_text
 
 
@@ -91,6 +92,7 @@ class RestorePlan:
     :param same: names of settings that are as in the file.
     :param words: all that is to be as in the file afterwards, by name.
     :param wanted: the same as values.
+    :param found: what the drive has of all that was read.
     :param unread: what the drive did not give.
     """
 
@@ -99,6 +101,7 @@ class RestorePlan:
     same: tuple[str, ...]
     words: Mapping[str, int]
     wanted: Mapping[str, Value]
+    found: Mapping[str, int]
     unread: tuple[ReadOutcome, ...]
 
 
@@ -135,7 +138,8 @@ def other_type(backup: Backup, drive: Drive) -> str:
     if head.profile_sha256 == facts.profile_sha256 or (head.profile, head.protocol) == (
             facts.profile, facts.protocol):
         return ''
-    return f'it is a backup with profile {head.profile or "?"} ({head.protocol or "?"}), {here}'
+    return (f'it is a backup with profile {printable(head.profile) or "?"} '
+            f'({printable(head.protocol) or "?"}), {here}')
 
 
 def strangers(backup: Backup, drive: Drive, identity: str) -> list[str]:
@@ -144,8 +148,9 @@ def strangers(backup: Backup, drive: Drive, identity: str) -> list[str]:
     found = []
     if head.profile_sha256 and head.profile_sha256 != facts.profile_sha256:
         found.append(
-            f'it is a backup with profile {head.profile or "?"} ({head.profile_sha256[:12]}…), '
-            f'the drive has {facts.profile} ({facts.profile_sha256[:12]}…)')
+            f'it is a backup with profile {printable(head.profile) or "?"} '
+            f'({head.profile_sha256[:12]}…), the drive has {facts.profile} '
+            f'({facts.profile_sha256[:12]}…)')
     if head.identity and head.identity != identity:
         found.append(f'it is a backup of {_difference(head.identity, identity)}')
     return found
@@ -168,6 +173,7 @@ def plan_restore(backup: Backup, drive: Drive, outcomes: Mapping[str, ReadOutcom
     kept: list[Change] = []
     same, unread = [], []
     words: dict[str, int] = {}
+    there: dict[str, int] = {}
     wanted: dict[str, Value] = {}
     settings = names_to_restore(backup, drive)
     for name in names_to_read(backup, drive):
@@ -175,7 +181,7 @@ def plan_restore(backup: Backup, drive: Drive, outcomes: Mapping[str, ReadOutcom
         if parameter is None or outcome.raw is None or outcome.value is None:
             unread.append(outcome)
             continue
-        found = in_file = parameter.word_from_raw(outcome.raw)
+        found = in_file = there[name] = parameter.word_from_raw(outcome.raw)
         value, left_alone = None, None
         if name in settings:
             value = backup.values[name]
@@ -193,7 +199,7 @@ def plan_restore(backup: Backup, drive: Drive, outcomes: Mapping[str, ReadOutcom
         elif name in settings:
             same.append(name)
     return RestorePlan(tuple(changes), tuple(kept), tuple(same), words, wanted,
-                       tuple(unread))
+                       there, tuple(unread))
 
 
 def names_to_restore(backup: Backup, drive: Drive) -> tuple[str, ...]:
@@ -234,5 +240,5 @@ def _difference(wanted: str, found: str) -> str:
     there, here = wanted.split(), found.split()
     only_there = [part for part in there if part not in here]
     only_here = [part for part in here if part not in there]
-    return (f'{" ".join(only_there) or "a drive with less identity"}, the drive is '
+    return (f'{printable(" ".join(only_there)) or "a drive with less identity"}, the drive is '
             f'{" ".join(only_here) or "known by less"}')

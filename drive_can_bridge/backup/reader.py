@@ -16,7 +16,7 @@ from drive_can_bridge.backup.document import Backup, Head
 from drive_can_bridge.configuration.parameter_file import read_sections
 from drive_can_bridge.configuration.problems import report
 from drive_can_bridge.core.errors import ConfigurationError
-from drive_can_bridge.core.text import printable
+from drive_can_bridge.core.text import printable, TEXT_MAX
 from drive_can_bridge.core.words import describe_type, show
 
 #: how ros2 param dump writes what has no value
@@ -54,6 +54,8 @@ def read_backup(path: Path) -> Backup:
     wrong = [backup.problem(name, f'{_described(value)}, allowed is a number, true or false')
              for name, value in backup.values.items()
              if not isinstance(value, (bool, int, float))]
+    wrong += [backup.problem(name, f'a name longer than {TEXT_MAX} characters')
+              for name in backup.lines if len(name) > TEXT_MAX]
     if wrong:
         raise ConfigurationError(wrong)
     if not values:

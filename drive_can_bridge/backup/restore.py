@@ -7,11 +7,13 @@ Bring the settings of a backup back into a drive.
     before      steps of the profile: a device wants to be in a mode for it
     rounds      what differs is written and read back; what a drive refused, or did not take, is
                 tried again after the others, as long as that gets on
-    after       steps of the profile, whatever happened
+    after       steps of the profile, whatever happened: written without a look, for a drive whose
+                answers get lost may hear them all the same
     read back   everything that is to be as in the file
 
 Nothing in here waits for a signal: ``stopped`` is asked between two writes, so that each write is
-verified before anything ends, and the steps afterwards are always attempted.
+verified before anything ends, and the steps afterwards are always attempted. Before each write the
+drive is asked whether somebody has enabled it: then nothing but those steps follows.
 """
 
 from collections.abc import Callable, Sequence
@@ -19,14 +21,20 @@ from dataclasses import dataclass, field
 
 from drive_can_bridge.backup.plan import Change, RestorePlan, value_of_word
 from drive_can_bridge.backup.settings import is_whole
-from drive_can_bridge.client.drive import Drive, ReadOutcome, WriteOutcome
+from drive_can_bridge.client.drive import Drive, Enabled, ReadOutcome, WriteOutcome
 from drive_can_bridge.core.errors import DriveCanError
-from drive_can_bridge.core.parameters import Value
+from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.profile import RestoreStep
+from drive_can_bridge.core.requests import Failure, is_answer
 
 #: s that a drive which has gone away is waited for, so that it is not left in a mode
 PATIENCE = 10.0
 _PATIENCE_STEP = 0.5
+#: times that a step afterwards is written to a drive of which nothing is heard, for its cells may
+#: wear, and to one that is there and does not answer it
+_ATTEMPTS = 3
+_NO_PARAMETER = 'the drive has no such parameter'
+_NO_BITS = 'cannot be read, so its other bits cannot be kept'
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,20 +60,22 @@ class RestoreResult:
     :param written: names of the settings that were written, in that order.
     :param steps: steps of the profile that failed, in words.
     :param wrong: what is not as in the file. Empty after an interruption: nothing was compared.
-    :param stopped: it was interrupted; these were not written.
+    :param enabled: somebody enabled the drive meanwhile.
+    :param stopped: it was interrupted, or the drive enabled; these were not written.
     :param trouble: what ended the conversation with the drive.
     """
 
     written: list[str] = field(default_factory=list)
     steps: list[str] = field(default_factory=list)
     wrong: list[NotAsInFile] = field(default_factory=list)
+    enabled: bool = False
     stopped: list[str] | None = None
     trouble: DriveCanError | None = None
 
     @property
     def complete(self) -> bool:
         """Everything is as in the file."""
-        return not (self.steps or self.wrong or self.stopped or self.trouble)
+        return not (self.steps or self.wrong or self.enabled or self.stopped or self.trouble)
 
 
 class Restorer:
@@ -91,8 +101,11 @@ class Restorer:
         self._hint = hint
         self._is_stopped = stopped
         self._interrupted = False
-        self._lost = False
+        self._lost = False          # of what could be read before, nothing can be now
+        self._unanswered = False    # of a step: nobody knows what became of it
         self._attempted = False
+        self._wrote = False
+        self._words = dict(plan.found)
         self._reasons: dict[str, str] = {}
         self._result = RestoreResult()
         table = drive.facts.restore
@@ -106,14 +119,17 @@ class Restorer:
         """Restore. A lost bus or bridge is in the result; what was written is known."""
         result = self._result
         try:
-            self._steps(self._before)
+            for step in self._before:
+                if self._may_not_write():
+                    break
+                self._note(step, self._take(step))
             if not result.steps:
                 self._rounds()
         except DriveCanError as error:
             result.trouble = error
         self._finish()
         try:
-            if self._stopped:
+            if self._stopped or result.enabled:
                 result.stopped = [change.name for change in self._plan.changes
                                   if change.name not in result.written]
             elif result.trouble is None:
@@ -129,16 +145,22 @@ class Restorer:
 
     # -- the settings -----------------------------------------------------------------------------
 
+    def _may_not_write(self) -> bool:
+        """Tell whether no more settings are to be written."""
+        self._result.enabled = self._result.enabled or (
+            not self._stopped and self._drive.enabled() is Enabled.YES)
+        return self._stopped or self._result.enabled
+
     @property
     def _complete(self) -> bool:
         """All settings have been attempted, nothing has come between."""
-        return self._attempted and not self._stopped
+        return self._attempted and not (self._stopped or self._result.enabled)
 
     def _rounds(self) -> None:
         pending: Sequence[Change] = self._pending
-        while pending and not self._stopped:
+        while pending:
             self._write_all(pending)
-            if self._lost or self._stopped:
+            if self._lost or self._stopped or self._result.enabled:
                 return
             left = self._differing(pending)
             if len(left) == len(pending):
@@ -148,7 +170,7 @@ class Restorer:
 
     def _write_all(self, changes: Sequence[Change]) -> None:
         for change in changes:
-            if self._stopped:
+            if self._may_not_write():
                 return
             outcome = self._write(change.name, change.value)
             # what could be read before, and cannot now: no refusal, the drive has gone
@@ -158,6 +180,7 @@ class Restorer:
 
     def _write(self, name: str, value: Value) -> WriteOutcome:
         heard: list[WriteOutcome] = []
+        self._wrote = True
         try:
             outcome = self._drive.write({name: value}, told=heard.append)[name]
         except KeyboardInterrupt:
@@ -185,22 +208,26 @@ class Restorer:
 
     def _finish(self) -> None:
         """Take the steps afterwards; a drive that has gone away may come back."""
-        if not self._after:
+        if not self._after or self._result.enabled and not self._wrote:
             return
         failed = self._result.steps
-        already = len(failed)
+        already, attempt, there = len(failed), 0, 0
         end: float | None = None
         while True:
-            self._lost = False
+            attempt += 1
+            last = end is not None and self._clock() >= end
+            self._lost = self._unanswered = False
             try:
-                self._steps(self._after)
-                if not self._lost or (end is not None and self._clock() >= end):
-                    return
+                for step in self._after:
+                    self._note(step, self._take_back(step, blind=last or attempt <= _ATTEMPTS))
             except DriveCanError as error:
                 self._result.trouble = self._result.trouble or error
-                failed.extend(f'{step.parameter}: not set back' for step in self._after)
+                failed[already:] = [f'{step.parameter}: not set back' for step in self._after]
                 return
-            if end is None:
+            there += not self._lost
+            if not self._unanswered or there == _ATTEMPTS or last:
+                return
+            if self._lost and end is None:
                 end = self._clock() + PATIENCE
                 names = ', '.join(dict.fromkeys(step.parameter for step in self._after))
                 self._hint(f'{self._drive.name}: answers no more; waiting up to {PATIENCE:g} s '
@@ -208,45 +235,86 @@ class Restorer:
             del failed[already:]
             self._wait(_PATIENCE_STEP)
 
-    def _steps(self, steps: Sequence[RestoreStep]) -> None:
-        for step in steps:
-            reason = self._step(step)
-            if reason:
-                self._result.steps.append(f'{step.parameter}: {reason}')
+    def _note(self, step: RestoreStep, reason: str) -> None:
+        if reason:
+            self._result.steps.append(f'{step.parameter}: {reason}')
 
-    def _step(self, step: RestoreStep) -> str:
-        """Take a step; return why it failed."""
-        name = step.parameter
-        parameter = self._drive.find(name)
+    def _take(self, step: RestoreStep) -> str:
+        """Take a step before the settings; return why it failed."""
+        parameter = self._drive.find(step.parameter)
         if parameter is None:
-            return 'the drive has no such parameter'
-        # its other bits are a setting of the file, unless this is no more than leaving the mode
-        wanted = self._plan.words.get(name) if self._complete else None
-        word: int | None = None
+            return _NO_PARAMETER
         if parameter.readable:
-            outcome = self._drive.read(name)[name]
-            if outcome.raw is None:
-                self._lost = True
-                return outcome.reason
-            word = parameter.word_from_raw(outcome.raw)
+            reason = self._look(step.parameter, parameter)
+            if reason:
+                return reason
         elif not is_whole(step, parameter):
-            return 'cannot be read, so its other bits cannot be kept'
-        new = ((word or 0) if wanted is None else wanted) & ~step.mask | step.bits
-        if new == word:
-            return ''
-        written = self._write_step(name, value_of_word(parameter, new))
-        if written.ok:
-            if any((name, new) == (change.name, change.word) for change in self._plan.changes):
-                self._note_written(name)    # as it is to be, if nothing else was done
-            return ''
-        self._lost = parameter.readable and not self._drive.read(name)[name].ok
-        return written.reason
+            return _NO_BITS
+        found = self._words.get(step.parameter)
+        word = (found or 0) & ~step.mask | step.bits
+        return '' if word == found else self._put(parameter, word, blind=False)
 
-    def _write_step(self, name: str, value: Value) -> WriteOutcome:
+    def _take_back(self, step: RestoreStep, *, blind: bool) -> str:
+        """
+        Take a step after the settings; return why it failed.
+
+        :param blind: nothing is read first, unless nobody knows yet which bits are to be kept.
+        """
+        parameter = self._drive.find(step.parameter)
+        if parameter is None:
+            return _NO_PARAMETER
+        # its other bits are a setting of the file, unless this is no more than leaving the mode
+        kept = self._plan.words.get(step.parameter) if self._complete else None
+        if kept is None:
+            kept = self._words.get(step.parameter)
+        found: int | None = None
+        if parameter.readable and not (blind and (is_whole(step, parameter) or kept is not None)):
+            reason = self._look(step.parameter, parameter)
+            if reason:
+                self._unanswered = True
+                return reason
+            found = self._words[step.parameter]
+            kept = found if kept is None else kept
+        elif kept is None and not is_whole(step, parameter):
+            return _NO_BITS
+        word = (kept or 0) & ~step.mask | step.bits
+        reason = '' if word == found else self._put(parameter, word, blind=True)
+        if not reason and any((parameter.name, word) == (change.name, change.word)
+                              for change in self._plan.changes):
+            self._note_written(parameter.name)      # as it is to be, if nothing else was done
+        return reason
+
+    def _look(self, name: str, parameter: Parameter) -> str:
+        """Read the parameter of a step; return why it could not be read."""
+        outcome = self._drive.read(name)[name]
+        if outcome.raw is None:
+            self._lost = True
+            return outcome.reason
+        self._words[name] = parameter.word_from_raw(outcome.raw)
+        return ''
+
+    def _put(self, parameter: Parameter, word: int, *, blind: bool) -> str:
+        """Write what a step wants; return why it is not there."""
+        name = parameter.name
+        written = self._write_step(name, value_of_word(parameter, word), blind=blind)
+        if not written.ok:
+            if is_answer(Failure(written.reason)):
+                return written.reason
+            # it may have been taken all the same
+            self._unanswered = True
+            self._lost = not parameter.readable or bool(self._look(name, parameter))
+            if self._lost or self._words[name] != word:
+                return written.reason
+            self._unanswered = False
+        self._words[name] = word
+        return ''
+
+    def _write_step(self, name: str, value: Value, *, blind: bool) -> WriteOutcome:
         heard: list[WriteOutcome] = []
+        self._wrote = True
         while True:
             try:
-                return self._drive.write({name: value}, told=heard.append)[name]
+                return self._drive.write({name: value}, blind=blind, told=heard.append)[name]
             except KeyboardInterrupt:
                 self._interrupted = True
                 if heard:

@@ -22,6 +22,7 @@ from drive_can_bridge.client.drive import Drive, Drives
 from drive_can_bridge.configuration.profiles import ProfileStore
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.profile import Profile
+from drive_can_bridge.core.text import printable
 from drive_can_bridge.core.words import value_text
 
 SAME, DIFFERENT = 0, 1
@@ -140,8 +141,9 @@ def _file_alone(backup: Backup, profile: Profile | None) -> Side:
 def _tell_profile(backup: Backup, drive: Drive) -> None:
     head = backup.head
     if head.profile_sha256 and head.profile_sha256 != drive.facts.profile_sha256:
-        complain(f'warning: {backup.file} was made with another profile ({head.profile}) than '
-                 f'the one of {drive.name} ({drive.facts.profile})')
+        complain(f'warning: {backup.file} was made with another profile '
+                 f'({printable(head.profile)}) than the one of {drive.name} '
+                 f'({drive.facts.profile})')
 
 
 def _show(args: Namespace, found: Sequence[Difference]) -> None:

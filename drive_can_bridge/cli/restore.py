@@ -25,6 +25,7 @@ from drive_can_bridge.cli.tables import print_json, print_table
 from drive_can_bridge.client.drive import Drive, Enabled, Source
 from drive_can_bridge.core.parameters import Parameter, Storage, Value
 from drive_can_bridge.core.requests import Failure, is_answer
+from drive_can_bridge.core.text import printable
 from drive_can_bridge.core.words import value_text
 from drive_can_bridge.process.interruption import Interruption, postponed
 
@@ -92,7 +93,8 @@ def _target(backup: Backup, word: str | None, source: Source) -> str:
         return backup.drive
     if not backup.drive and len(source.names) == 1:
         return source.names[0]
-    of = f'is of drive {backup.drive}, which is not here' if backup.drive else 'names no drive'
+    of = (f'is of drive {printable(backup.drive)}, which is not here' if backup.drive
+          else 'names no drive')
     raise WrongUsage(f'{backup.file} {of}: say which one is meant; there are: '
                      f'{", ".join(source.names) or "none"}')
 
@@ -226,10 +228,12 @@ def _report(args: Namespace, drive: Drive, plan: RestorePlan, result: RestoreRes
     if result.trouble is not None:
         complain(f'{drive.name}: {result.trouble}')
     if result.stopped is not None:
+        why = 'was enabled meanwhile' if result.enabled else 'interrupted'
         complain(
-            f'{drive.name}: interrupted. Written: {_list(result.written)}. Not written: '
-            f'{_list(result.stopped)}. Repeat the command to go on')
-        return interrupted.exit_code
+            f'{drive.name}: {why}. Written: {_list(result.written)}. Not written: '
+            f'{_list(result.stopped)}. {"Disable it, then repeat" if result.enabled else "Repeat"}'
+            ' the command to go on')
+        return FAILED if result.enabled else interrupted.exit_code
     if wrong:
         confirmed = [name for name in result.written if name not in wrong]
         complain(f'{drive.name}: confirmed: {_list(confirmed)}; not as in the file:')

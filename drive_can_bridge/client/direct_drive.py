@@ -183,12 +183,13 @@ class DirectDrive(Drive):
 
     # -- writing ----------------------------------------------------------------------------------
 
-    def put(self, name: str, parameter: Parameter, value: Value) -> WriteOutcome:
-        if not self._session.online:    # what does not answer is told nothing
+    def put(self, name: str, parameter: Parameter, value: Value, *, blind: bool) -> WriteOutcome:
+        if not (blind or self._session.online):     # what does not answer is told nothing
             _, failure = self._look()
             if failure is not None:
                 return WriteOutcome(name, False, parameter, self._explained(failure.reason))
-        request = WriteRequest(((parameter, self._directory.raw_from_user(parameter, value)),))
+        request = WriteRequest(((parameter, self._directory.raw_from_user(parameter, value)),),
+                               blind=blind)
         self._conversation.submit(self.name, request)
         outcome, = self._conversation.wait(request)
         if isinstance(outcome, Written):

@@ -214,12 +214,14 @@ class Drive(ABC):
         asked.sort(key=lambda each: (each[1].number or 0, each[1].subindex or 0))
         yield from self.ask(asked)
 
-    def write(self, values: Mapping[str, Value], *,
+    def write(self, values: Mapping[str, Value], *, blind: bool = False,
               told: Callable[[WriteOutcome], object] | None = None) -> dict[str, WriteOutcome]:
         """
         Write parameters one after the other, in the order given, each one verified.
 
         :param values: in the units of the parameters; raw names take raw integers.
+        :param blind: nobody looks first whether the drive is there, or has the value already: it
+            may hear although its answers get lost.
         :param told: is told each outcome before the next write begins.
         :raises KeyboardInterrupt: on Ctrl-C; not before the write under way has its outcome, and
             ``told`` knows it.
@@ -232,7 +234,7 @@ class Drive(ABC):
                 if refusal or parameter is None:
                     outcome = WriteOutcome(name, False, parameter, refusal)
                 else:
-                    outcome = self.put(name, parameter, value)
+                    outcome = self.put(name, parameter, value, blind=blind)
                 found[name] = outcome
                 if told is not None:
                     told(outcome)
@@ -262,8 +264,8 @@ class Drive(ABC):
         """Ask for parameters that can be read; their outcomes come in any order."""
 
     @abstractmethod
-    def put(self, name: str, parameter: Parameter, value: Value) -> WriteOutcome:
-        """Write a value that nothing speaks against."""
+    def put(self, name: str, parameter: Parameter, value: Value, *, blind: bool) -> WriteOutcome:
+        """Write a value that nothing speaks against; without looking first if ``blind``."""
 
 
 class Drives(Mapping[str, Drive]):

@@ -75,6 +75,10 @@ class RestoreTable:
     before: tuple[RestoreStep, ...] = ()
     after: tuple[RestoreStep, ...] = ()
 
+    def ends_mode(self, name: str, word: int) -> bool:
+        """Tell whether a write takes the drive out of the mode for settings."""
+        return any(step.parameter == name and word & step.mask == step.bits for step in self.after)
+
 
 @dataclass(frozen=True)
 class Profile:

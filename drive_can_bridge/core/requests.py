@@ -78,10 +78,12 @@ class WriteRequest:
 
     :param items: (parameter, raw integer).
     :param atomic: all in one frame, or none.
+    :param blind: sent although nobody answers: the drive may hear although its answers get lost.
     """
 
     items: tuple[tuple[Parameter, int], ...]
     atomic: bool = False
+    blind: bool = False
 
     def __len__(self) -> int:
         return len(self.items)

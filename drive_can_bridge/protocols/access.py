@@ -76,6 +76,10 @@ class Access(ABC, Generic[SpanT, StepT, ReplyT]):
     def write(self, items: Sequence[Item]) -> Generator[StepT, ReplyT, Outcomes]:
         """Write what fits one frame, and see that the drive has it."""
 
+    def write_blind(self, items: Sequence[Item]) -> Generator[StepT, ReplyT, Outcomes]:
+        """Write likewise, without waiting for anything that the drive says first."""
+        return self.write(items)
+
     @abstractmethod
     def misfit(self, items: Sequence[Item]) -> str:
         """Say why several parameters do not fit one frame; '' if they do."""
@@ -126,16 +130,17 @@ class Access(ABC, Generic[SpanT, StepT, ReplyT]):
         Or all in one frame, or none (``set_parameters_atomically``).
         """
         items = request.items
+        write = self.write_blind if request.blind else self.write
         if request.atomic and len(items) > 1:
             misfit = self.misfit(items)
-            together = () if misfit else (yield from self.write(items))
+            together = () if misfit else (yield from write(items))
             return together or (Failure(misfit),) * len(items)
         outcomes: list[Outcome] = []
         gone: Failure | None = None
         for parameter, raw in items:
             outcome = self.aside(parameter, write=True) or gone
             if outcome is None:
-                outcome, = yield from self.write([(parameter, raw)])
+                outcome, = yield from write([(parameter, raw)])
                 if isinstance(outcome, Failure) and outcome.reason in (
                         NO_ANSWER_OFFLINE, NOT_SENT):
                     gone = outcome

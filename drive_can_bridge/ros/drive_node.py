@@ -130,7 +130,8 @@ class DriveNode(DriveListener):
         self._services.append(ParameterServices(
             self.node, parameter_thread, directory, clock, submit=submit,
             write_refusal=session.users.write_refusal, role=session.roles.role,
-            active=lambda: session.active, failed=self._parameter_failed).services)
+            active=lambda: session.active, restore=drive.profile.restore,
+            failed=self._parameter_failed).services)
         if session.control is not None:
             self._services.append(control_services(self.node, control_thread, submit))
 

@@ -25,6 +25,7 @@ from rclpy.qos import qos_profile_parameter_events
 from drive_can_bridge.core.directory import NAME_SHOWN, ParameterDirectory
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.profile import RestoreTable
 from drive_can_bridge.core.requests import (
     BRIDGE_INACTIVE, BUS_DOWN, BUSY, Failure, NO_ANSWER_OFFLINE, Outcome, ReadRequest, ReadValue,
     Request, WriteRequest, Written,
@@ -59,6 +60,7 @@ class ParameterServices:
     :param write_refusal: why users may not write a parameter now, or ''.
     :param role: what the bridge itself uses a parameter for.
     :param active: tells whether the bridge is active; nothing is sent otherwise.
+    :param restore: of the drive's profile.
     :param failed: takes (what was tried, reason) for log and diagnostics, and how many parameters
         failed without having reached the session, which counts the others.
     """
@@ -67,7 +69,7 @@ class ParameterServices:
                  clock: Clock, *, submit: Callable[[Request], Question[tuple[Outcome, ...]]],
                  write_refusal: Callable[[Parameter], str],
                  role: Callable[[Parameter], Role | None],
-                 active: Callable[[], bool],
+                 active: Callable[[], bool], restore: RestoreTable,
                  failed: Callable[[str, str, int], None]) -> None:
         self._node = node
         self._directory = directory
@@ -76,6 +78,7 @@ class ParameterServices:
         self._write_refusal = write_refusal
         self._role = role
         self._active = active
+        self._restore = restore
         self._failed = failed
         self._unreadable: set[str] = set()  # what the drive did not give when last asked
         self._errors: dict[str, str] = {}   # why there was no value, whatever the reason
@@ -202,8 +205,11 @@ class ParameterServices:
                 refused.append((message.name, str(error)))
         self._tell('set', refused)
         if items:
-            outcomes = await self._submit(
-                WriteRequest(tuple((parameter, raw) for _, parameter, raw in items)))
+            outcomes = await self._submit(WriteRequest(
+                tuple((parameter, raw) for _, parameter, raw in items),
+                # a drive that nobody hears is not to be left in it
+                blind=all(self._restore.ends_mode(parameter.name, parameter.word_from_raw(raw))
+                          for _, parameter, raw in items)))
             written = []
             for (place, parameter, raw), outcome in zip(items, outcomes):
                 name = request.parameters[place].name

@@ -13,6 +13,8 @@ import pytest
 
 from drive_can_bridge.backup.reader import read_backup
 from drive_can_bridge.cli.main import main
+from drive_can_bridge.client.direct_drive import DirectDrive
+from drive_can_bridge.client.drive import WriteOutcome
 
 
 class Said(NamedTuple):
@@ -197,6 +199,24 @@ class TestRestore:
         assert said.errors[-1] == ('lift: is enabled: settings are not written while it may move. '
                                    'Disable it first. Nothing was written.')
         assert shop.values('lift', 'ramp_time') == (1.0,)
+
+    def test_a_drive_that_somebody_enables_meanwhile(
+            self, shop: Shop, command: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+        put = DirectDrive.put
+
+        def enabled_by_now(*args: Any, **options: Any) -> WriteOutcome:
+            outcome = put(*args, **options)
+            shop.drives['lift'].set_value('status_word', 0x0002)
+            return outcome
+        monkeypatch.setattr(DirectDrive, 'put', enabled_by_now)
+        file = shop.write_backup('lift', ramp_time=5.0, maximum_speed=7.0)
+        said = command('restore', str(file), '--yes')
+        assert said.code == 1
+        assert said.errors[-1] == (
+            'lift: was enabled meanwhile. Written: ramp_time. Not written: maximum_speed. Disable '
+            'it, then repeat the command to go on')
+        assert shop.values('lift', 'ramp_time') == (5.0,)
+        assert shop.values('lift', 'maximum_speed') != (7.0,)
 
     def test_whether_it_is_enabled_is_not_known(self, shop: Shop, command: Command) -> None:
         file = shop.write_backup('mixer', acceleration_time=5.0)

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from hypothesis import given, settings, strategies as st
 import pytest
+import yaml
 
 from drive_can_bridge.backup.document import Backup, Head, head_of, node_of, written
 from drive_can_bridge.backup.reader import read_backup
@@ -142,3 +143,26 @@ def test_any_bytes_are_read_or_refused(tmp_path_factory: pytest.TempPathFactory,
         read_backup(path)
     except ConfigurationError as error:
         assert all(problem.isprintable() for problem in error.problems)
+
+
+@pytest.mark.parametrize('name', ['yes', 'no', 'on', 'off', 'true', 'false', 'null', 'y', 'n'])
+def test_names_that_are_words_of_yaml_are_quoted(tmp_path: Path, name: str) -> None:
+    text = written(FACTS, Head(), [(Parameter(name, number=30), 5)])
+    assert yaml.safe_load(text) == {'/conveyor': {'ros__parameters': {name: 5}}}
+    assert f"    '{name}': 5\n" in text
+    assert read(tmp_path, text).values == {name: 5}
+
+
+@pytest.mark.parametrize('text', [
+    '/conveyor:\n  ros__parameters:\n    {name}: 5\n',
+    '/conveyor:\n  ros__parameters:\n    {name}: null\n',
+    '/conveyor:\n  ros__parameters:\n    {name}: abc\n',
+    '/conveyor:\n  ros__parameters:\n    {name}: 1\n    {name}: 2\n',
+    '/conveyor:\n  ros__parameters:\n    {name}: [1, {name}]\n',
+    '/conveyor:\n  ros__parameters:\n    {name}: &a\n',
+    '/{name}:\n  ros__parameters:\n    a: 1\n/b:\n  ros__parameters:\n    a: 1\n',
+    '/{name}:\n  ros__parameters: 5\n', '{name}: 5\n'])
+def test_what_a_file_brings_is_shown_short(tmp_path: Path, text: str) -> None:
+    with pytest.raises(ConfigurationError) as refused:
+        read(tmp_path, text.replace('{name}', 5000 * 'x'))
+    assert len(str(refused.value)) < 1000

@@ -246,6 +246,38 @@ class TestMode:
             'flc1_ratio', 'flc2_ratio', 'network_fallback'}
         assert result.written == ['motor_trip_class']   # obeyed, though it could not say so
 
+    def test_of_a_drive_whose_answers_get_lost_it_is_ended_all_the_same(self, shop: Shop) -> None:
+        pump = shop.drives['pump']
+        file = shop.write_backup('pump', motor_trip_class=10, flc1_ratio=50, flc2_ratio=51)
+        waited: list[float] = []
+
+        def stopped() -> bool:
+            if 'motor_trip_class' in pump.wear:
+                pump.fault('silent')
+            return False
+        with shop.reached('pump') as drive:
+            result = restored(drive, file, stopped=stopped, wait=waited.append,
+                              clock=lambda: 5.0 * len(waited))
+        assert self.mode(shop) == 0x0010
+        assert result.steps != []
+        assert 'flc2_ratio' not in pump.wear
+
+    def test_in_an_eeprom_that_is_read_back_likewise(self, shop: Shop) -> None:
+        shop.describe_conveyor(
+            '  service_mode: {number: 33, type: uint16, storage: eeprom}\n'
+            '  ramp_time: {number: 30, type: uint16, scale: 0.01, unit: s}\n',
+            'restore: {before: {service_mode: 300}, after: {service_mode: 100}}\n')
+        conveyor = shop.drives['conveyor']
+        file = shop.write_backup('conveyor', ramp_time=7.0)
+
+        def stopped() -> bool:
+            if 'rated_current' in conveyor.wear:
+                conveyor.fault('silent')
+            return False
+        with shop.reached('conveyor') as drive:
+            restored(drive, file, stopped=stopped, clock=iter(range(0, 1000, 20)).__next__)
+        assert shop.values('conveyor', 'rated_current') == (1.0,)
+
     def test_gone_for_good(self, shop: Shop) -> None:
         pump = shop.drives['pump']
         file = shop.write_backup('pump', motor_trip_class=10, flc1_ratio=50, flc2_ratio=51,

@@ -101,24 +101,19 @@ class BridgedDrive(Drive):
                                   DescribeParameters.Request(names=list(names)))
         return list(answer.descriptors)
 
-    def put(self, name: str, parameter: Parameter, value: Value) -> WriteOutcome:
+    def put(self, name: str, parameter: Parameter, value: Value, *, blind: bool) -> WriteOutcome:
+        # the bridge tries what is offline, too
         answer = self._graph.call(self._node, 'set_parameters', SetParameters.Request(
             parameters=[message_of(name, parameter, value)]))
         result, = answer.results
         return WriteOutcome(name, result.successful, parameter, result.reason)
 
     def enabled(self) -> Enabled:
-        wanted = f'{self.facts.through.lstrip("/")}: drive {self.name}'
-        found: list[dict[str, str]] = []
-
-        def look(status: object) -> bool:
-            if getattr(status, 'name', '') == wanted:
-                found.append({pair.key: pair.value for pair in getattr(status, 'values', ())})
-            return bool(found)
-        self._graph.statuses(look, self._period + _DIAGNOSTICS_MARGIN)
-        if not found or 'control_state' not in found[0]:
+        facts = self._graph.newest_status(f'{self.facts.through.lstrip("/")}: drive {self.name}',
+                                          age=self._period, patience=_DIAGNOSTICS_MARGIN)
+        if 'control_state' not in facts:
             return Enabled.UNKNOWN
-        return _ENABLED.get(found[0].get('state', ''), Enabled.UNKNOWN)
+        return _ENABLED.get(facts.get('state', ''), Enabled.UNKNOWN)
 
     def identity(self) -> str:
         return self._identity(self.name)

@@ -34,12 +34,18 @@ class RegisterAccess(Access[Span, Step, Reply]):
         return self.retry.unanswered() if isinstance(reply, Silence) else Failure(reply.text)
 
     def write(self, items: Sequence[Item]) -> Generator[Step, Reply, Outcomes]:
+        return self._write(items, blind=False)
+
+    def write_blind(self, items: Sequence[Item]) -> Generator[Step, Reply, Outcomes]:
+        return self._write(items, blind=True)
+
+    def _write(self, items: Sequence[Item], *, blind: bool) -> Generator[Step, Reply, Outcomes]:
         words: dict[Address, int] = {}
         for parameter, raw in items:
             words.update(zip(self.placement.span(parameter).addresses,
                              self.placement.words(parameter, raw)))
         outcome = yield from self._put(
-            Write(min(words), tuple(words[address] for address in sorted(words))))
+            Write(min(words), tuple(words[address] for address in sorted(words)), blind))
         return (outcome,) * len(items)
 
     def misfit(self, items: Sequence[Item]) -> str:

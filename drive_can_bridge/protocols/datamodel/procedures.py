@@ -96,6 +96,12 @@ class ParameterAccess(Access[Chunk, Step, Reply]):
         return f'cannot be written in one frame, nothing was written: {what}'
 
     def write(self, items: Sequence[Item]) -> Generator[Step, Reply, Outcomes]:
+        return self._write(items, look=True)
+
+    def write_blind(self, items: Sequence[Item]) -> Generator[Step, Reply, Outcomes]:
+        return self._write(items, look=False)
+
+    def _write(self, items: Sequence[Item], *, look: bool) -> Generator[Step, Reply, Outcomes]:
         numbers = [self._numbers.number(parameter) for parameter, _ in items]
         first = min(numbers)
         words = [0] * len(items)
@@ -104,7 +110,7 @@ class ParameterAccess(Access[Chunk, Step, Reply]):
         readable = all(parameter.readable for parameter, _ in items)
         write = Write(first, tuple(words), any(
             parameter.storage is not Storage.RAM for parameter, _ in items))
-        became = yield from put(write, look=write.eeprom and readable,
+        became = yield from put(write, look=look and write.eeprom and readable,
                                 verify=self._verify and readable)
         if not became.sent:
             return (Failure(NOT_SENT),) * len(items)

@@ -40,6 +40,8 @@ class Graph:
         self.guest = Guest('client')
         self._calls: dict[float, NodeCalls] = {}
         self._heard: set[str] = set()
+        self._diagnostics: Inbox | None = None
+        self._statuses: dict[str, tuple[float, dict[str, str]]] = {}
 
     def close(self) -> None:
         """Leave the graph. Idempotent."""
@@ -85,27 +87,29 @@ class Graph:
         raise NoAnswer(f'{node} has gone' if node in self._heard
                        else f'{node} does not offer {service}')
 
-    def statuses(self, taken: Callable[[Any], bool], timeout: float) -> bool:
+    def newest_status(self, name: str, *, age: float, patience: float) -> dict[str, str]:
         """
-        Wait for a diagnostic status.
+        Return the facts of the newest diagnostic status of a name; none: there is none.
 
-        :param taken: is told each one; True: that was it.
+        :param age: s that it may have; else the next one is waited for, so much longer:
+        :param patience: s.
         :raises DriveCanError: it was closed.
         """
         self._check()
-        found: list[bool] = []
+        if self._diagnostics is None:
+            self._diagnostics = Inbox(self.guest, DiagnosticArray, '/diagnostics',
+                                      QoSProfile(depth=50), self._take_statuses)
+        inbox = self._diagnostics
 
-        def take(message: DiagnosticArray) -> None:
-            found.extend(True for status in message.status if taken(status))
-        inbox = Inbox(self.guest, DiagnosticArray, '/diagnostics', QoSProfile(depth=50), take)
-
-        def look(_: float) -> bool:
+        def look(now: float) -> bool:
             inbox.look()
-            return bool(found)
-        try:
-            return self.wait(look, timeout)
-        finally:
-            inbox.close()
+            return name in self._statuses and now - self._statuses[name][0] <= age
+        return self._statuses[name][1] if self.wait(look, age + patience) else {}
+
+    def _take_statuses(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            self._statuses[status.name] = time.monotonic(), {
+                pair.key: pair.value for pair in status.values}
 
     def _check(self) -> None:
         if not self.guest.open:

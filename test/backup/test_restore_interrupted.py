@@ -1,0 +1,90 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""A restore that something comes between: at every write, in virtual time."""
+
+from itertools import product
+
+import pytest
+from scripted_drive import Fate, FILE, MODE, OTHER, restored, ScriptedDrive, SETTINGS
+
+from drive_can_bridge.backup.restore import PATIENCE
+
+#: mode, three settings, mode
+WRITES = range(1, 6)
+
+
+def test_as_it_should_be() -> None:
+    drive = ScriptedDrive()
+    result = restored(drive)
+    assert (result.complete, drive.registers) == (True, FILE)
+    assert [event for event in drive.events if event[0] == 'write'] == [
+        ('write', 'mode', OTHER | MODE), *(('write', *each) for each in SETTINGS.items()),
+        ('write', 'mode', OTHER)]
+
+
+@pytest.mark.parametrize('number', WRITES)
+def test_a_drive_that_hears_and_does_not_answer_is_taken_out_of_its_mode(number: int) -> None:
+    drive = ScriptedDrive({number: Fate.MUTE})
+    result = restored(drive)
+    assert not drive.in_mode
+    assert result.steps != []       # nobody knows that
+    # the rest is not tried: the way out of the mode follows at once, and nobody reads first
+    written = [event for event in drive.events if event[0] == 'write']
+    assert written[number:] == [('write', 'mode', OTHER)] * len(written[number:])
+    assert drive.now < 2 * PATIENCE
+
+
+@pytest.mark.parametrize('number', WRITES)
+def test_the_mode_is_ended_without_a_look(number: int) -> None:
+    drive = ScriptedDrive({number: Fate.SIGNAL})
+    restored(drive)
+    out = drive.events.index(('write', 'mode', OTHER))
+    assert drive.events[out - 1] != ('read', 'mode', 0)
+
+
+@pytest.mark.parametrize('number', range(1, 4))
+def test_nothing_is_written_to_a_drive_that_somebody_enables(number: int) -> None:
+    drive = ScriptedDrive({number: Fate.ENABLED})
+    result = restored(drive)
+    assert result.enabled
+    # it is not left in its mode
+    assert (drive.moving, drive.in_mode) == (['mode'], False)
+    assert result.written == list(SETTINGS)[:number - 1]
+    assert result.stopped == [name for name in SETTINGS if name not in result.written]
+    # asked before each write
+    assert [what for what, *_ in drive.events if what != 'read'] == [
+        *['asked', 'write'] * number, 'asked', 'write']
+
+
+def test_a_drive_that_is_enabled_by_now_is_told_nothing() -> None:
+    drive = ScriptedDrive()
+    drive.is_enabled = True
+    result = restored(drive)
+    assert (result.enabled, result.stopped, drive.writes) == (True, [*SETTINGS], 0)
+
+
+STORIES = [dict(zip(numbers, fates)) for numbers in ((1,), (2,), (3,), (4,), (5,))
+           for fates in product(Fate, repeat=1)]
+STORIES += [{one: first, two: second} for one in WRITES for two in range(one + 1, 9)
+            for first, second in product(Fate, repeat=2)]
+
+
+def test_whatever_comes_between() -> None:
+    for story in STORIES:
+        drive = ScriptedDrive(story)
+        result = restored(drive)
+        fates, told = set(story.values()), f'{story}: {result}'
+        # left in its mode only where nothing could be done about it, and then it is said
+        if drive.in_mode:
+            assert fates & {Fate.DEAF, Fate.BUS, Fate.REFUSED, Fate.LOST}, told
+            assert result.steps, told
+        # nothing is said to be written that is not
+        for name in result.written:
+            assert drive.registers[name] == FILE[name], told
+        assert not result.complete or drive.registers == FILE, told
+        # nothing but the way out of the mode once somebody has enabled it
+        assert set(drive.moving) <= {'mode'}, told
+        assert drive.now < 40.0, told
+        # and repeating it is safe
+        drive.ended()
+        assert restored(drive).complete, told
+        assert drive.registers == FILE, told
