@@ -26,7 +26,9 @@ from bridges import Bridge  # noqa: E402
 import rclpy  # noqa: E402
 from rclpy.executors import SingleThreadedExecutor  # noqa: E402
 from rclpy.signals import SignalHandlerOptions  # noqa: E402
-from ros2_control_twin import HardwareTwin, run, System, TrajectoryTwin  # noqa: E402
+from ros2_control_twin import (  # noqa: E402
+    Constraints, HardwareTwin, run, System, TrajectoryTwin,
+)
 from std_srvs.srv import SetBool, Trigger  # noqa: E402
 import yaml  # noqa: E402
 
@@ -48,7 +50,9 @@ class Arm:
     def __init__(self, node: Any, executor: SingleThreadedExecutor) -> None:
         self._node, self._executor = node, executor
         self.hardware = HardwareTwin(node, System(FOLDER / 'arm.urdf'))
-        self.controller = TrajectoryTwin(self.hardware, list(HOME))
+        text = (FOLDER / 'arm_controllers.yaml').read_text(encoding='utf-8')
+        self.controller = TrajectoryTwin(self.hardware, Constraints.of(
+            yaml.safe_load(text)['arm_controller']['ros__parameters']))
 
     def pass_time(self, seconds: float) -> None:
         """Run the controllers for some time."""
@@ -86,15 +90,13 @@ class Arm:
         self.controller.go(goal, duration, time.monotonic())
 
     def online(self, joint: str) -> bool:
-        """Tell whether a joint is in the last message."""
-        return joint in self.hardware.latest.name
+        """Tell whether the last message says where a joint is."""
+        message = self.hardware.latest
+        return math.isfinite(message.position[message.name.index(joint)])
 
-    def reactivate(self) -> None:
-        """Deactivate and activate the controller: it holds what it finds."""
-        self.controller.deactivate()
-        self.pass_time(0.3)
-        self.controller.activate()
-        self.pass_time(0.3)
+    def aborted(self) -> None:
+        """Wait until the controller has noticed that an axis does not follow."""
+        self.wait(lambda: self.controller.result == 'path')
 
 
 def play(arm: Arm, one: Bridge) -> None:
@@ -109,17 +111,18 @@ def play(arm: Arm, one: Bridge) -> None:
     arm.go(HOME, 3.0)                   # stopped on the way
     arm.pass_time(1.0)
     arm.enable(*AXES, wanted=False)
-    arm.pass_time(0.7)
+    arm.aborted()
+    arm.pass_time(0.5)
     arm.enable(*AXES)
-    arm.pass_time(0.5)                  # the trajectory is over by now, and commands its goal
-    arm.reactivate()
+    arm.pass_time(0.8)
     arm.go(OUT, 2.0)                    # a fault on the way
     arm.pass_time(0.7)
     one.played['shoulder'].fault('trip')
-    arm.pass_time(1.0)
+    arm.aborted()
+    arm.pass_time(0.7)
     arm.call('/shoulder/reset_fault', Trigger)
     arm.enable('shoulder')
-    arm.reactivate()
+    arm.pass_time(0.6)
     arm.go(HOME, 2.0)                   # a lost drive on the way
     arm.pass_time(0.7)
     one.played['shoulder'].fault('power_cut=1')
@@ -127,7 +130,7 @@ def play(arm: Arm, one: Bridge) -> None:
     arm.wait(lambda: arm.online('shoulder_joint'))
     arm.pass_time(0.3)
     arm.enable('shoulder')
-    arm.reactivate()
+    arm.pass_time(0.6)
     arm.go(HOME, 2.0)
     arm.pass_time(2.5)
 

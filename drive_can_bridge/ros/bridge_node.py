@@ -22,6 +22,8 @@ from typing import Any
 from rclpy.context import Context
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.service import Service
+from rclpy.subscription import Subscription
+from rclpy.time_source import CLOCK_TOPIC
 
 from drive_can_bridge.configuration.load import configuration_from_overrides
 from drive_can_bridge.configuration.parameter_file import unseen_problems
@@ -38,6 +40,7 @@ from drive_can_bridge.ros.fleet import Fleet
 from drive_can_bridge.ros.log import Log
 from drive_can_bridge.ros.node_parameters import NodeParameters
 from drive_can_bridge.ros.service_thread import ServiceThread
+from drive_can_bridge.ros.stamps import Stamps
 from drive_can_bridge.ros.transition_guard import guard_transitions
 from drive_can_bridge.transport import adapters
 
@@ -61,6 +64,7 @@ class BridgeNode(LifecycleNode):
                  **options: Any) -> None:
         self._answers = Answers(lambda topic, text: self.log.speaker('').warn(topic, text),
                                 lambda text: self.log.info(text))
+        self._stamps = Stamps(self.get_clock, lambda text: self.log.warning(text))
         super().__init__(NODE_NAME, context=context, enable_logger_service=True,
                          start_parameter_services=False, **options)  # NodeParameters has them
         self._answers.adopt(self.services)  # not all of them are made by create_service
@@ -89,6 +93,13 @@ class BridgeNode(LifecycleNode):
         service = super().create_service(*arguments, **options)
         self._answers.adopt([service])
         return service
+
+    def create_subscription(self, msg_type: Any, topic: str, callback: Callable[[Any], None],
+                            *arguments: Any, **options: Any) -> Subscription:
+        """Create a subscription; that of the simulated clock is made by rclpy itself."""
+        if topic == CLOCK_TOPIC:
+            callback = self._stamps.guarded(callback)
+        return super().create_subscription(msg_type, topic, callback, *arguments, **options)
 
     # -- parameters -------------------------------------------------------------------------------
 
@@ -191,7 +202,7 @@ class BridgeNode(LifecycleNode):
         self._node_parameters.declare(configuration)
         self._fleet = Fleet(
             self, self.log, configuration, self._spinner, self._control_thread,
-            self._parameter_thread, announce=self._node_parameters.announce,
+            self._parameter_thread, self._stamps, announce=self._node_parameters.announce,
             dismiss=self._dismiss, fatal=self._fatal)
         try:
             self._fleet.open()

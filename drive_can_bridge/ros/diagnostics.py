@@ -18,6 +18,7 @@ from drive_can_bridge.core.words import value_text
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.ros.drive_node import DriveNode
 from drive_can_bridge.ros.quality import publisher
+from drive_can_bridge.ros.stamps import Stamps
 from drive_can_bridge.transport.end_point import Counts, REFUSED_FRAMES
 from drive_can_bridge.transport.error_frames import ADVICE_DISTURBED, BUS_OFF, BusError
 from drive_can_bridge.transport.link import steady_now
@@ -273,8 +274,9 @@ class Diagnostics:
     """
 
     def __init__(self, node: Node, exchanges: list[BusExchange], drives: list[DriveNode],
-                 reported: Callable[[Report, str], None]) -> None:
+                 stamps: Stamps, reported: Callable[[Report, str], None]) -> None:
         self._node = node
+        self._stamps = stamps
         self._reported = reported
         self._bus_of = {f'bus {exchange.bus.name}': exchange.bus.name for exchange in exchanges}
         self._bus_of.update({f'drive {drive.name}': drive.drive.bus for drive in drives})
@@ -292,7 +294,7 @@ class Diagnostics:
             return
         message = self._message
         with self._lock:
-            message.header.stamp = self._node.get_clock().now().to_msg()
+            message.header.stamp = self._stamps.now()
             message.status = [self._status(report) for report in self.reports(steady_now())]
             self._publisher.publish(message)
 

@@ -10,7 +10,6 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from rclpy.clock import Clock
 from rclpy.node import Node
 from rclpy.parameter import Parameter as NodeParameter
 from std_msgs.msg import Bool
@@ -59,6 +58,7 @@ class DriveNode(DriveListener):
     :param log: of the bridge.
     :param control_thread: serves ``~/enable`` and its like.
     :param parameter_thread: serves the parameter services.
+    :param stamps: of the bridge.
     :param identified: takes the drive's identity in words whenever it changes.
     :ivar joint_commands: the commands for all joints of its bus, which whichever of its drives is
         served next takes for all of them; None: there are none.
@@ -68,7 +68,7 @@ class DriveNode(DriveListener):
     def __init__(self, bridge: Node, drive: DriveConfiguration, session: Session, family: Family,
                  exchange: BusExchange, spinner: ExecutorThread, log: Log,
                  control_thread: ServiceThread, parameter_thread: ServiceThread,
-                 identified: Callable[[str], None]) -> None:
+                 stamps: Stamps, identified: Callable[[str], None]) -> None:
         self.drive = drive
         self.session = session
         self.exchange = exchange
@@ -99,7 +99,7 @@ class DriveNode(DriveListener):
         try:
             self.commands = CommandIntake(self.node, drive, session, self.warn, self._log.info)
             try:
-                self._populate(bridge.get_clock(), family, control_thread, parameter_thread)
+                self._populate(stamps, family, control_thread, parameter_thread)
             except BaseException:
                 self.commands.destroy()
                 raise
@@ -113,11 +113,10 @@ class DriveNode(DriveListener):
         for services in self._services:
             services.serve()
 
-    def _populate(self, clock: Clock, family: Family, control_thread: ServiceThread,
+    def _populate(self, stamps: Stamps, family: Family, control_thread: ServiceThread,
                   parameter_thread: ServiceThread) -> None:
         """Make the topics and services."""
         drive, session = self.drive, self.session
-        stamps = Stamps(clock)
         self.samples = SamplePublisher(self.node, drive, session.sample_parameters, stamps.at)
         self._request = RequestTopic(self.node, session.sent, stamps)
         self._online = publisher(self.node, Bool, '~/online', latched_quality())
@@ -128,7 +127,7 @@ class DriveNode(DriveListener):
         def submit(request: Any) -> Question[Any]:
             return Question(partial(self._submit, request))
         self._services.append(ParameterServices(
-            self.node, parameter_thread, directory, clock, submit=submit,
+            self.node, parameter_thread, directory, stamps, submit=submit,
             write_refusal=session.users.write_refusal, role=session.roles.role,
             active=lambda: session.active, restore=drive.profile.restore,
             failed=self._parameter_failed).services)

@@ -27,6 +27,7 @@ from drive_can_bridge.ros.joints import Joints
 from drive_can_bridge.ros.log import Log
 from drive_can_bridge.ros.periodic_thread import PeriodicThread
 from drive_can_bridge.ros.service_thread import ServiceThread
+from drive_can_bridge.ros.stamps import Stamps
 from drive_can_bridge.transport.link import steady_now
 
 #: s that is waited for the first attempt to open the buses, to report what can never work
@@ -40,6 +41,7 @@ class Fleet:
     :param spinner: serves the drive nodes.
     :param control_thread: serves what stops drives.
     :param parameter_thread: serves their parameters.
+    :param stamps: of all messages.
     :param announce: changes a read-only parameter of the bridge.
     :param dismiss: takes drives out of the graph; their exchanges are closed.
     :param fatal: takes the reason when the bridge cannot go on; from any thread.
@@ -49,7 +51,8 @@ class Fleet:
 
     def __init__(self, node: Node, log: Log, configuration: BridgeConfiguration,
                  spinner: ExecutorThread, control_thread: ServiceThread,
-                 parameter_thread: ServiceThread, *, announce: Callable[[str, str], None],
+                 parameter_thread: ServiceThread, stamps: Stamps, *,
+                 announce: Callable[[str, str], None],
                  dismiss: Callable[[Iterable[DriveNode]], None],
                  fatal: Callable[[str], None]) -> None:
         self.configuration = configuration
@@ -70,15 +73,16 @@ class Fleet:
             for bus in configuration.buses.values():
                 self._build(bus, lambda drive, session, exchange: DriveNode(
                     node, drive, session, FAMILIES[drive.protocol], exchange, spinner, log,
-                    control_thread, parameter_thread,
+                    control_thread, parameter_thread, stamps,
                     partial(announce, identity_name(drive.name))))
             if any(drive.joint is not None for drive in configuration.drives.values()):
-                self.joints = Joints(node, log, configuration, self.drives)
+                self.joints = Joints(node, log, configuration, self.drives, stamps)
                 closing.callback(self.joints.destroy)
             for exchange in self.exchanges.values():
                 closing.callback(exchange.close)
             self.diagnostics = Diagnostics(node, list(self.exchanges.values()),
-                                           list(self.drives.values()), self._flight.reported)
+                                           list(self.drives.values()), stamps,
+                                           self._flight.reported)
             closing.callback(self.diagnostics.destroy)
             self._reporting = PeriodicThread(
                 'diagnostics', configuration.diagnostics_period, self.diagnostics.publish,

@@ -7,14 +7,16 @@ them in one message (the hardware interface of ros2_control keeps the latest mes
 rate of its own the newest sample of each is taken together, under the stamp of the oldest; by the
 timer thread of an exchange, which is awake in any case (:mod:`~drive_can_bridge.exchange.errand`).
 
-A joint whose drive is not online is left out: nobody is told a position that nobody has measured.
+It always names the same joints: the hardware interface copies a message while it reads the one
+before, and fails when the number of names has changed. A joint whose drive is not online has NaN
+in every quantity: nobody is told a position that nobody has measured. When the last one goes, that
+is published once.
 """
 
 from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import accumulate
 import math
-from typing import Any
 
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
@@ -24,9 +26,10 @@ from drive_can_bridge.ros.audience import Audience
 from drive_can_bridge.ros.drive_node import DriveNode
 from drive_can_bridge.ros.gone import GONE
 from drive_can_bridge.ros.joint_reader import QUANTITIES
+from drive_can_bridge.ros.layout import Number
 from drive_can_bridge.ros.prepared import PreparedMessage
 from drive_can_bridge.ros.quality import publisher, state_quality
-from drive_can_bridge.ros.stamps import Stamps
+from drive_can_bridge.ros.stamps import NO_STAMP, Stamps
 
 
 TOPIC = '~/joint_states'
@@ -41,9 +44,10 @@ class _Joint:
     A joint that is measured.
 
     :ivar width: how many values its samples have.
+    :ivar unknown: a sample of which nothing is known.
     """
 
-    __slots__ = ('_places', 'name', 'samples', 'session', 'width')
+    __slots__ = ('_places', 'name', 'samples', 'session', 'unknown', 'width')
 
     def __init__(self, drive: DriveNode, joint: JointConfiguration) -> None:
         self.session = drive.session
@@ -52,6 +56,7 @@ class _Joint:
         parameters = {parameter.name: (slot, parameter) for slot, parameter
                       in enumerate(drive.session.sample_parameters)}
         self.width = len(parameters)
+        self.unknown = [math.nan] * self.width
         self._places: dict[str, _Cell] = {}
         for quantity in QUANTITIES:
             name = getattr(joint, quantity)
@@ -71,10 +76,11 @@ class JointStates:
     Publishes the message.
 
     :param drives: in the order of the configuration; those without a measured joint are left out.
+    :param stamps: of the bridge.
     :param warn: takes (topic of the warning, text); throttling is its business.
     """
 
-    def __init__(self, node: Node, drives: Sequence[DriveNode],
+    def __init__(self, node: Node, drives: Sequence[DriveNode], stamps: Stamps,
                  warn: Callable[[str, str], None]) -> None:
         joints = [(drive, drive.drive.joint) for drive in drives]
         self._quantities = [quantity for quantity in QUANTITIES if any(
@@ -84,19 +90,26 @@ class JointStates:
             if joint is not None and any(getattr(joint, each) for each in QUANTITIES)]
         self._node = node
         self._warn = warn
-        self._stamps = Stamps(node.get_clock())
+        self._stamps = stamps
         self.publisher = publisher(node, JointState, TOPIC, state_quality())
-        self._present: list[_Joint] = []
-        self._cells: list[_Cell] = []
-        self._message = JointState()
-        self._prepared: PreparedMessage | None = None
         self._audience = Audience(self.publisher)
+        self._known = False     # anything, in the last message
+        firsts = list(accumulate((joint.width for joint in self._joints), initial=0))
+        self._cells = [joint.cell(quantity, first) for quantity in self._quantities
+                       for joint, first in zip(self._joints, firsts)]
+        message = self._message = JointState(name=[joint.name for joint in self._joints])
+        stamp = message.header.stamp
+        numbers: list[Number] = [('i', partial(setattr, stamp, 'sec')),
+                                 ('I', partial(setattr, stamp, 'nanosec'))]
+        numbers += [(f'{len(self._joints)}d', partial(setattr, message, quantity))
+                    for quantity in self._quantities]
+        self._prepared = PreparedMessage.find(self.publisher, message, numbers)
 
     def publish(self, now: float) -> None:
-        """Publish what is known now, if anything is and somebody listens."""
+        """Publish what is known now, if anything is, or was, and somebody listens."""
         try:
             if self._audience.listens(now):
-                self._publish()
+                self._publish(now)
         except GONE as error:
             if self._node.context.ok():
                 self._warn('joint states', f'joint_states cannot be published: {error}')
@@ -105,48 +118,32 @@ class JointStates:
         """Take the publisher out of its node."""
         self._node.destroy_publisher(self.publisher)
 
-    def _publish(self) -> None:
-        present: list[_Joint] = []
+    def _publish(self, now: float) -> None:
         raws: list[float] = []
-        oldest = math.inf
+        oldest, stamp = math.inf, NO_STAMP
         for joint in self._joints:
             last = joint.samples.last
             if last is None or not joint.session.online:
+                raws += joint.unknown
                 continue
-            sample, received_at = last
-            present.append(joint)
+            sample, received_at, stamped = last
             raws += sample
-            if len(sample) < joint.width:   # a short response: what has not arrived is not known
-                raws += [math.nan] * (joint.width - len(sample))
+            raws += joint.unknown[len(sample):]     # a short response
             if received_at < oldest:
-                oldest = received_at
-        if not present:
-            return
-        if present != self._present:
-            self._prepare(present)
+                oldest, stamp = received_at, stamped
+        known = oldest < math.inf
+        if not known:
+            if not self._known:
+                return
+            stamp = self._stamps.at(now)
+        self._known = known
         numbers = [(raws[place] * scale + offset) * factor
                    for place, scale, offset, factor in self._cells]
-        stamp = self._stamps.at(oldest)
         if self._prepared is not None:
             self._prepared.publish([*stamp, *numbers])
             return
-        message = self._message
+        message, count = self._message, len(self._joints)
         message.header.stamp.sec, message.header.stamp.nanosec = stamp
         for column, quantity in enumerate(self._quantities):
-            setattr(message, quantity,
-                    numbers[column * len(present):(column + 1) * len(present)])
+            setattr(message, quantity, numbers[column * count:(column + 1) * count])
         self.publisher.publish(message)
-
-    def _prepare(self, present: list[_Joint]) -> None:
-        """Prepare the message for these joints: others than before are online."""
-        self._present = present
-        firsts = [0, *accumulate(joint.width for joint in present)]
-        self._cells = [joint.cell(quantity, first) for quantity in self._quantities
-                       for joint, first in zip(present, firsts)]
-        message = self._message = JointState(name=[joint.name for joint in present])
-        stamp = message.header.stamp
-        numbers: list[Any] = [('i', partial(setattr, stamp, 'sec')),
-                              ('I', partial(setattr, stamp, 'nanosec'))]
-        numbers += [(f'{len(present)}d', partial(setattr, message, quantity))
-                    for quantity in self._quantities]
-        self._prepared = PreparedMessage.find(self.publisher, message, numbers)

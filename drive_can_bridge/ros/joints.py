@@ -21,6 +21,7 @@ from drive_can_bridge.ros.joint_reader import Column, JointMessage, JointReader
 from drive_can_bridge.ros.joint_states import JointStates
 from drive_can_bridge.ros.log import Log
 from drive_can_bridge.ros.polled_topics import PolledTopics, Warn
+from drive_can_bridge.ros.stamps import Stamps
 from drive_can_bridge.transport.clock import steady_now
 
 COMMANDS = '~/joint_commands'
@@ -33,10 +34,11 @@ class Joints:
     The topics for all joints of a bridge.
 
     :param drives: by name.
+    :param stamps: of the bridge.
     """
 
     def __init__(self, node: Node, log: Log, configuration: BridgeConfiguration,
-                 drives: Mapping[str, DriveNode]) -> None:
+                 drives: Mapping[str, DriveNode], stamps: Stamps) -> None:
         speaker = log.speaker('')
         speaker.reset()
         warn = speaker.warn
@@ -62,7 +64,7 @@ class Joints:
                 drive.joint_commands = taken
         if configuration.joint_state_rate > 0.0:
             self._period = 1.0 / configuration.joint_state_rate
-            self._states = JointStates(node, ordered, warn)
+            self._states = JointStates(node, ordered, stamps, warn)
             self._errand = Errand(self._states.publish)
             for drive in ordered:
                 drive.exchange.errand = self._errand
@@ -79,6 +81,7 @@ class Joints:
         while self._taken:
             self._taken.pop().unsubscribe()
         if self._states is not None:
+            self._states.publish(steady_now())  # the last joints have gone
             self._states.destroy()
             self._states = None
 

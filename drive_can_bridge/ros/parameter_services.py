@@ -18,7 +18,6 @@ from rcl_interfaces.srv import (
     DescribeParameters, GetParameters, GetParameterTypes, ListParameters, SetParameters,
     SetParametersAtomically,
 )
-from rclpy.clock import Clock
 from rclpy.node import Node
 from rclpy.qos import qos_profile_parameter_events
 
@@ -35,6 +34,7 @@ from drive_can_bridge.core.text import printable, TEXT_MAX
 from drive_can_bridge.ros.coroutine_services import CoroutineServices, Question
 from drive_can_bridge.ros.messages import value_of
 from drive_can_bridge.ros.service_thread import ServiceThread
+from drive_can_bridge.ros.stamps import Stamps
 from drive_can_bridge.ros.values import descriptor, PARAMETER_TYPES, parameter_value
 
 #: why a read may fail that says nothing about the parameter
@@ -54,7 +54,7 @@ class ParameterServices:
     The parameter services of one drive.
 
     :ivar services: to be begun, and let go of.
-    :param clock: for the stamps of what is announced.
+    :param stamps: of what is announced.
     :param thread: serves them.
     :param submit: hands a request to the drive's session; answered by one outcome per parameter.
     :param write_refusal: why users may not write a parameter now, or ''.
@@ -66,14 +66,14 @@ class ParameterServices:
     """
 
     def __init__(self, node: Node, thread: ServiceThread, directory: ParameterDirectory,
-                 clock: Clock, *, submit: Callable[[Request], Question[tuple[Outcome, ...]]],
+                 stamps: Stamps, *, submit: Callable[[Request], Question[tuple[Outcome, ...]]],
                  write_refusal: Callable[[Parameter], str],
                  role: Callable[[Parameter], Role | None],
                  active: Callable[[], bool], restore: RestoreTable,
                  failed: Callable[[str, str, int], None]) -> None:
         self._node = node
         self._directory = directory
-        self._clock = clock
+        self._stamps = stamps
         self._submit = submit
         self._write_refusal = write_refusal
         self._role = role
@@ -290,7 +290,7 @@ class ParameterServices:
         if not written:
             return
         self._events.publish(ParameterEvent(
-            stamp=self._clock.now().to_msg(),
+            stamp=self._stamps.now(),
             node=self._node.get_fully_qualified_name(),
             changed_parameters=[
                 ParameterMessage(name=name, value=parameter_value(

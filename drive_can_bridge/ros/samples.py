@@ -120,9 +120,10 @@ class SamplePublisher:
     :param parameters: of a sample, in the order of its raw integers: those that the family has
         built in, which have topics of their own but no part in ``~/response``, and then
         ``cyclic_response``.
-    :param stamp: (receive time of the steady clock) -> seconds and nanoseconds.
-    :ivar last: the raw integers of the last sample and its receive time, in one, because other
-        threads look at them; None: the drive is gone.
+    :param stamp: (receive time of the steady clock) -> seconds and nanoseconds; asked once for
+        each sample, when it arrives: the clock may be set before somebody else wants to know.
+    :ivar last: the raw integers of the last sample, its receive time and its stamp, in one,
+        because other threads look at them; None: the drive is gone.
     """
 
     def __init__(self, node: Node, drive: DriveConfiguration, parameters: tuple[Parameter, ...],
@@ -142,20 +143,19 @@ class SamplePublisher:
         self._wanted_values: list[ValueTopic] = []
         self._wanted_samples: list[EventTopic | JointTopic] = []
         self._count_at = 0.0
-        self.last: tuple[tuple[int, ...], float] | None = None
+        self.last: tuple[tuple[int, ...], float, Stamp] | None = None
 
     def publish(self, raws: tuple[int, ...], received_at: float) -> None:
         """Publish one sample."""
         if received_at >= self._count_at:
             self._look_who_subscribes(received_at)
-        self.last = raws, received_at
+        stamp = self._stamp(received_at)
+        self.last = raws, received_at, stamp
         if self._wanted_values or self._wanted_samples:
             values = [convert(raw) for convert, raw in zip(self._converters, raws)]
             present = len(values)
-            if self._wanted_samples:  # first: these are the stamped ones, others wait for them
-                stamp = self._stamp(received_at)
-                for sample in self._wanted_samples:
-                    sample.publish(values, stamp)
+            for sample in self._wanted_samples:     # first: these are the stamped ones
+                sample.publish(values, stamp)
             for topic in self._wanted_values:
                 if topic.slot < present:
                     topic.publish(values[topic.slot])

@@ -1,9 +1,12 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """From the steady clock of the exchange to the stamps of ROS messages."""
 
+from collections.abc import Callable
 import math
 import time
+from typing import Any
 
+from builtin_interfaces.msg import Time
 from rclpy.clock import Clock, ROSClock
 
 from drive_can_bridge.transport.clock import steady_now
@@ -13,36 +16,79 @@ APART_MAX = 0.0001
 ATTEMPTS = 3
 #: s between two looks at which time it is: simulated or not
 LOOK_PERIOD = 0.1
+#: s since 1970 that ``builtin_interfaces/Time`` can hold: until January 2038
+SECONDS_MAX = 2 ** 31 - 1
+NANOSECONDS = 1_000_000_000
 #: seconds and nanoseconds, as ``builtin_interfaces/Time`` has them
 Stamp = tuple[int, int]
+#: instead of one that cannot be represented
+NO_STAMP: Stamp = (0, 0)
 
 
 class Stamps:
-    """Turns receive times of the steady clock into ROS time (simulated, when that is active)."""
+    """
+    Turns receive times of the steady clock into ROS time (simulated, when that is active).
 
-    def __init__(self, clock: Clock) -> None:
+    A clock may say anything. A time that no message can hold makes stamps of 0, and is told once.
+
+    :param clock: returns that of the node.
+    :param warn: takes what is to be told.
+    """
+
+    def __init__(self, clock: Callable[[], Clock], warn: Callable[[str], None]) -> None:
         self._clock = clock
+        self._warn = warn
+        self._told = False
         self._simulated = False
         self._look_at = -math.inf
-        self._last: tuple[float, int] = (math.nan, 0)   # moment, and the ns that were said of it
+        self._published: int | None = None  # what /clock says where rclpy cannot hold it
 
-    def at(self, received_at: float) -> Stamp:
+    def at(self, moment: float) -> Stamp:
         """Return the stamp of a moment of the steady clock. Simulated time only knows "now"."""
-        if received_at >= self._look_at:
-            self._look_at = received_at + LOOK_PERIOD
-            self._simulated = (isinstance(self._clock, ROSClock)
-                               and self._clock.ros_time_is_active)
-        if self._simulated:
-            return divmod(self._clock.now().nanoseconds, 1_000_000_000)
-        last = self._last
-        if received_at != last[0]:  # else the clocks would say something else each time
-            last = self._last = received_at, self._at(received_at)
-        return divmod(last[1], 1_000_000_000)
+        if moment >= self._look_at:
+            self._look_at = moment + LOOK_PERIOD
+            clock = self._clock()
+            self._simulated = isinstance(clock, ROSClock) and clock.ros_time_is_active
+        if not self._simulated:
+            return self._stamp(_system_time(moment))
+        return self._stamp(self._clock().now().nanoseconds if self._published is None
+                           else self._published)
 
-    @staticmethod
-    def _at(received_at: float) -> int:
-        for _ in range(ATTEMPTS):
-            before, nanoseconds, now = steady_now(), time.time_ns(), steady_now()
-            if now - before < APART_MAX:    # else another thread had the interpreter in between
-                break
-        return nanoseconds - int((now - received_at) * 1e9)
+    def now(self) -> Time:
+        """Return the stamp of this moment as a message."""
+        seconds, nanoseconds = self.at(steady_now())
+        return Time(sec=seconds, nanosec=nanoseconds)
+
+    def guarded(self, callback: Callable[[Any], None]) -> Callable[[Any], None]:
+        """Return a callback for ``/clock`` that hands on only what rclpy can hold."""
+        def take(message: Any) -> None:
+            nanoseconds = message.clock.sec * NANOSECONDS + message.clock.nanosec
+            if _representable(nanoseconds):
+                self._published = None
+                callback(message)
+            else:
+                self._published = nanoseconds
+        return take
+
+    def _stamp(self, nanoseconds: int) -> Stamp:
+        if _representable(nanoseconds):
+            return divmod(nanoseconds, NANOSECONDS)
+        if not self._told:
+            self._told = True
+            self._warn(f'the {"simulated" if self._simulated else "system"} clock says '
+                       f'{nanoseconds // NANOSECONDS} s since 1970, stamps hold 0 to '
+                       f'{SECONDS_MAX}: they are 0 until it is set right')
+        return NO_STAMP
+
+
+def _representable(nanoseconds: int) -> bool:
+    return 0 <= nanoseconds < (SECONDS_MAX + 1) * NANOSECONDS
+
+
+def _system_time(moment: float) -> int:
+    """Return what the system clock said at a moment of the steady clock, in ns."""
+    for _ in range(ATTEMPTS):
+        before, nanoseconds, now = steady_now(), time.time_ns(), steady_now()
+        if now - before < APART_MAX:    # else another thread had the interpreter in between
+            break
+    return nanoseconds - int((now - moment) * 1e9)

@@ -15,7 +15,7 @@ import yaml
 CONFIG = Path(__file__).parents[2] / 'config'
 MAIN = 'import sys; from ros2cli.cli import main; sys.exit(main())'
 #: no daemon: it would outlive the test
-ALONE = ('--no-daemon', '--spin-time', '3')
+ALONE = ('--no-daemon', '--spin-time', '5')
 
 #: runs a command; returns what it says (what its exit code says differs between versions)
 Ros2 = Callable[..., str]

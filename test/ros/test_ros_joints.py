@@ -61,29 +61,58 @@ def test_all_joints_in_the_order_of_the_drives(bridge: StartBridge, client: Clie
     assert abs(message.header.stamp.sec - time.time()) < 60
 
 
-def test_a_drive_that_is_gone_is_left_out(bridge: StartBridge, client: Client) -> None:
+def test_a_drive_that_is_gone_has_nan_and_keeps_its_place(bridge: StartBridge,
+                                                          client: Client) -> None:
+    names = ['wj', 'nj', 'ej']
     one = bridge(two())
-    one.online()
     topic = client.topic(STATES, JointState)
-    topic.wait(lambda m: list(m.name) == ['wj', 'nj', 'ej'])
-    one.played['north'].fault('off')
-    message = topic.wait(lambda m: list(m.name) == ['wj', 'ej'])
-    assert len(message.position) == len(message.velocity) == len(message.effort) == 2
-    one.played['north'].fault('ok')
-    topic.wait(lambda m: list(m.name) == ['wj', 'nj', 'ej'])
-    for name in ('west', 'north', 'east'):
+    one.online()
+    for name in ('west', 'east'):
+        one.played[name].set_value('actual_position', 45.0)
+    one.played['north'].set_value('motor_current', 2.5)
+    topic.wait(lambda m: same(m.effort, [math.nan, 2.5, math.nan]) and same(
+        m.position, [math.pi / 8, math.nan, math.pi / 4]))
+    for name in ('north', 'west'):
         one.played[name].fault('off')
-    wait_until(lambda: not any(one.node.drives[name].session.online
-                               for name in ('west', 'north', 'east')))
-    time.sleep(0.1)     # what was on its way
-    count = len(topic.messages)
-    time.sleep(0.3)
-    assert len(topic.messages) == count, 'nothing is published without a joint'
+    message = topic.wait(lambda m: same(m.effort, [math.nan] * 3) and same(
+        m.position, [math.nan, math.nan, math.pi / 4]))
+    assert same(message.velocity, [math.nan] * 3)
+    one.played['north'].fault('ok')
+    topic.wait(lambda m: math.isfinite(m.effort[1]))    # without power it forgot what it was
+    assert [list(message.name) for message in topic.messages] == [names] * len(topic.messages)
+    for kind in ('position', 'velocity', 'effort'):
+        assert {len(getattr(message, kind)) for message in topic.messages} == {3}
 
 
-@pytest.mark.parametrize('name, joint', [('west', 'wj'), ('east', 'ej')])   # first and last
-def test_the_stamp_is_that_of_the_oldest_sample(bridge: StartBridge, client: Client, name: str,
-                                                joint: str) -> None:
+def unknown(message: JointState) -> bool:
+    return all(map(math.isnan, (*message.position, *message.velocity, *message.effort)))
+
+
+@pytest.mark.parametrize('end', ['power', 'deactivate', 'bridge'])
+def test_when_the_last_joint_goes_that_is_told_once(bridge: StartBridge, client: Client,
+                                                    end: str) -> None:
+    one = bridge(two())
+    topic = client.topic(STATES, JointState)
+    one.online()
+    topic.wait(lambda m: not unknown(m))
+    before = time.time()
+    if end == 'power':
+        for name in ('west', 'north', 'east'):
+            one.played[name].fault('off')
+    elif end == 'deactivate':
+        assert client.transition(label='deactivate')
+    else:
+        one.close()
+    last = wait_until(lambda: topic.messages[-1] if unknown(topic.messages[-1]) else None)
+    assert list(last.name) == ['wj', 'nj', 'ej']
+    assert last.header.stamp.sec + 1e-9 * last.header.stamp.nanosec >= before
+    time.sleep(0.3)     # a second one would have come by now, on most machines
+    assert [unknown(message) for message in topic.messages[-2:]] == [False, True]
+
+
+@pytest.mark.parametrize('name', ['west', 'east'])     # first and last
+def test_the_stamp_is_that_of_the_oldest_sample(bridge: StartBridge, client: Client,
+                                                name: str) -> None:
     """A drive that answers no more, but is not given up yet, makes the whole message old."""
     content = two()
     content['drives'][name]['missed_limit'] = 1000
@@ -97,10 +126,10 @@ def test_the_stamp_is_that_of_the_oldest_sample(bridge: StartBridge, client: Cli
 
     def stamp(message: JointState) -> float:
         return float(message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec)
-    first = topic.wait(lambda m: joint in m.name)
+    first = topic.wait()
     missed = statistics.missed
     wait_until(lambda: statistics.missed > missed + 25)     # half a second
-    later = topic.wait(lambda m: joint in m.name)
+    later = topic.wait()
     assert abs(stamp(later) - stamp(first)) < 0.05, 'of one and the same sample'
     one.played[name].fault('ok')
     topic.wait(lambda m: stamp(m) > stamp(first))
