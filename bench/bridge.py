@@ -20,7 +20,7 @@ import topics  # noqa: F401  sets the environment of rclpy
 from unix_bus import register
 
 from drive_can_bridge.process.scheduling import be_punctual
-from drive_can_bridge.process.standard_error import StandardError
+from drive_can_bridge.process.standard_outputs import StandardOutputs
 from drive_can_bridge.ros import bridge_node
 from drive_can_bridge.ros.bridge_node import BridgeNode
 from drive_can_bridge.ros.executor_thread import ExecutorThread
@@ -141,7 +141,7 @@ def main() -> None:
     level = 'error'
     if 'stuck' in sys.argv[2:]:
         be_stuck()
-        StandardError().__enter__()     # to the end, as in the executable
+        StandardOutputs().__enter__()     # to the end, as in the executable
         level = 'info'
     rclpy.init(args=['bench', '--ros-args', '--log-level', level, '--params-file', sys.argv[1]])
     begun = time.monotonic()

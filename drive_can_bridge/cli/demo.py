@@ -8,6 +8,7 @@ Needs rclpy, but no hardware, no root and no kernel module.
 import argparse
 from pathlib import Path
 import sys
+from threading import Event
 
 from drive_can_bridge.cli.arguments import above_zero, of_drive, whole
 from drive_can_bridge.cli.command import what_is_missing, WrongUsage
@@ -51,13 +52,14 @@ def run(args: argparse.Namespace) -> int:
     """
     Run the demo.
 
-    :return: 0 after SIGINT, SIGTERM or the duration, 1 failure.
+    :return: 0 after SIGINT, SIGTERM or the duration, 131 after SIGQUIT, 1 failure.
     :raises WrongUsage: a fault that no drive can have.
     :raises DriveCanError: a parameter file with problems, no ROS.
     :raises OSError: a file cannot be read or written.
     """
     # before the imports, which take their time: a signal counts from the very beginning
-    with SignalWatcher() as watcher:
+    suspension = Event()
+    with SignalWatcher(refuse=suspension.set) as watcher:
         environment.prepare(args.domain_id)
         try:
             # what the other processes import: better to know now
@@ -78,4 +80,4 @@ def run(args: argparse.Namespace) -> int:
                 raise WrongUsage(f'--fault {text}: {error}') from None
         return watcher.exit_code(run_demo(Options(
             configuration, tuple(args.fault), args.drive, args.log_frames, args.duration),
-            watcher))
+            watcher, suspension))

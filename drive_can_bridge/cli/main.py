@@ -111,16 +111,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _look_after_outputs() -> None:
-    """Let nothing that is said raise an error, whatever the outputs of this process are."""
-    for number, name in enumerate(('stdout', 'stderr'), start=1):
-        stream = getattr(sys, name)
-        if stream is None:  # closed; nor is the next file that is opened to be taken for it
-            sink = os.open(os.devnull, os.O_WRONLY)
-            if sink != number:
-                os.dup2(sink, number)
-                os.close(sink)
-            setattr(sys, name, open(number, 'w', encoding='utf-8', closefd=False))
-        elif isinstance(stream, io.TextIOWrapper):  # may be one that has no … or °
+    """Let nothing that is said raise an error: an output may be one that has no … or °."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors='backslashreplace')
 
 

@@ -23,6 +23,8 @@ from drive_can_bridge.process.signals import leave, SignalWatcher
 #: s between two lines of a drive, and between two looks at what arrives
 LINE_PERIOD = 1.0
 _POLL_PERIOD = 0.1
+#: s that is shown why a view is not suspended
+_REFUSAL_TIME = 5.0
 
 
 def define(parser: argparse.ArgumentParser) -> None:
@@ -36,17 +38,36 @@ def define(parser: argparse.ArgumentParser) -> None:
     # how drive_can demo runs it
     parser.add_argument('--title', default='drive_can monitor', help=argparse.SUPPRESS)
     parser.add_argument('--quit-code', type=int, default=0, help=argparse.SUPPRESS)
+    parser.add_argument('--refuse-to-suspend', metavar='WHY', default='', help=argparse.SUPPRESS)
+
+
+class _Refusal:
+    """Why a view is not suspended, said for a while after somebody wanted it to be."""
+
+    def __init__(self, text: str) -> None:
+        self._text = text
+        self._until = 0.0
+
+    def begin(self) -> None:
+        """Say it from now on. From any thread."""
+        self._until = time.monotonic() + _REFUSAL_TIME
+
+    def __call__(self) -> str:
+        """Return what is to be said now; '' for nothing."""
+        return self._text if time.monotonic() < self._until else ''
 
 
 def run(args: argparse.Namespace) -> int:
     """
     Show what there is.
 
-    :return: 0 after SIGINT or SIGTERM.
+    :return: 0 after SIGINT or SIGTERM, 131 after SIGQUIT.
     :raises DriveCanError: no ROS.
     """
+    refusal = _Refusal(args.refuse_to_suspend)
     # a second signal ends the process at once
-    with SignalWatcher(keep=True) as watcher:
+    with SignalWatcher(keep=True,
+                       refuse=refusal.begin if args.refuse_to_suspend else None) as watcher:
         try:
             from drive_can_bridge.ros.monitor.client import MonitorClient
         except ImportError as error:
@@ -54,13 +75,14 @@ def run(args: argparse.Namespace) -> int:
         model = Model(args.namespace)
         source = MonitorClient(model)
         try:
-            code = _show(source, model, watcher, args)
+            code = _show(source, model, watcher, args, refusal)
         finally:
             source.close()
         leave(watcher.exit_code(code))
 
 
-def _show(source: Source, model: Model, watcher: SignalWatcher, args: argparse.Namespace) -> int:
+def _show(source: Source, model: Model, watcher: SignalWatcher, args: argparse.Namespace,
+          refusal: _Refusal) -> int:
     place = environment.in_words()
     if sys.stdout.isatty() and os.environ.get('TERM', 'dumb') not in ('dumb', 'unknown'):
         try:
@@ -72,7 +94,7 @@ def _show(source: Source, model: Model, watcher: SignalWatcher, args: argparse.N
         else:
             setting = Setting(args.title, place, args.namespace, environment.export_command())
             code = show(source, model, setting, ended=lambda: watcher.signalled,
-                        quit_code=args.quit_code)
+                        quit_code=args.quit_code, notice=refusal)
             for text in balance(model.look(time.monotonic(), time.time())):
                 print(text)
             return code

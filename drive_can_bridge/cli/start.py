@@ -4,12 +4,12 @@
 
 import sys
 
-from drive_can_bridge.process.beginning import hold_signals
+from drive_can_bridge.process.beginning import begin
 
 
 def main() -> int:
     """Run the command; return the exit code."""
-    hold_signals()
+    begin()
     from drive_can_bridge.cli.main import main as run
     return run()
 

@@ -12,7 +12,6 @@ from pathlib import Path
 import signal
 import subprocess
 import sys
-import time
 from typing import IO
 
 #: what can be run: module with ``main()``
@@ -26,7 +25,6 @@ PROGRAMS = {
 _BEGIN = ('import sys; sys.path[:] = filter(None, sys.path); '
           f'from {__name__} import main; sys.exit(main())')
 _PR_SET_PDEATHSIG = 1
-_MOMENT = 0.01
 
 
 class Child:
@@ -71,14 +69,6 @@ class Child:
             # stopped processes have to go on in order to end
             for number in (signum, signal.SIGCONT):
                 self.process.send_signal(number)
-
-    def wait_until_stopped(self, timeout: float) -> None:
-        """Wait until it has obeyed Ctrl-Z, or has ended."""
-        deadline = time.monotonic() + timeout
-        while self.code is None and time.monotonic() < deadline:
-            if os.waitid(os.P_PID, self.process.pid, os.WSTOPPED | os.WNOHANG | os.WNOWAIT):
-                return
-            time.sleep(_MOMENT)
 
     def ends(self, timeout: float) -> bool:
         """Wait for its end; tell whether it has come."""

@@ -16,6 +16,7 @@ import subprocess
 import sys
 import tempfile
 import termios
+from threading import Event
 import time
 
 from drive_can_bridge.configuration.writing import write_parameter_file
@@ -23,7 +24,7 @@ from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.demo.child import Child
 from drive_can_bridge.demo.terminals import on_terminals
-from drive_can_bridge.process.signals import SignalWatcher
+from drive_can_bridge.process.signals import NOT_SUSPENDED, SignalWatcher
 
 TITLE = 'drive_can demo'
 #: with which the view ends when the user has enough, and not somebody else of the view
@@ -65,12 +66,15 @@ class Demo:
     The processes of a demo.
 
     :param directory: a place of its own.
+    :param suspension: set when somebody wants to suspend the demo.
     :param live: there is a terminal that the view takes.
     """
 
-    def __init__(self, options: Options, directory: Path, *, live: bool) -> None:
+    def __init__(self, options: Options, directory: Path, suspension: Event, *, live: bool,
+                 ) -> None:
         self._options = options
         self._directory = directory
+        self._suspension = suspension
         # the view has the terminal: others tell what they have to tell afterwards
         self._quiet = live and os.isatty(2)
         self._live = live
@@ -78,7 +82,6 @@ class Demo:
         self._view: Child | None = None
         self._bridge: Child | None = None
         self._drives: Child | None = None
-        self._suspend_asked = False
 
     def start(self, watcher: SignalWatcher) -> bool:
         """
@@ -88,9 +91,12 @@ class Demo:
         :raises DriveCanError: the drives do not start.
         """
         options, directory = self._options, self._directory
-        signal.signal(signal.SIGTSTP, self._ask_to_suspend)
+        # the view is in the terminal's foreground, too, and must not be suspended either
+        before = signal.signal(signal.SIGTSTP, signal.SIG_IGN)
+        refusal = ['--refuse-to-suspend', NOT_SUSPENDED] if self._live else []
         self._view = self._start('the view', 'drive_can', 'monitor', '--title', TITLE,
-                                 '--quit-code', str(ENOUGH), view=True)
+                                 '--quit-code', str(ENOUGH), *refusal, view=True)
+        signal.signal(signal.SIGTSTP, before)
         configuration = on_terminals(options.configuration, directory)
         file = directory / 'demo.yaml'
         write_parameter_file(configuration, file)
@@ -124,8 +130,9 @@ class Demo:
                 _LOOK_PERIOD, max(0.0, begun + duration - time.monotonic()))
             if watcher.wait(left) is not None:
                 return 0
-            if self._suspend_asked:
-                self._suspend()
+            if self._suspension.is_set():
+                self._suspension.clear()
+                self._refuse_to_suspend()
             for child in self._children:
                 if child.code is None or child.told:
                     continue
@@ -180,22 +187,12 @@ class Demo:
         self._children.append(child)
         return child
 
-    def _ask_to_suspend(self, *_: object) -> None:
-        self._suspend_asked = True
-
-    def _suspend(self) -> None:
-        """
-        Let the shell have the terminal, once the view has given it back (Ctrl-Z).
-
-        Bridge and drives run on: they are no part of the terminal's job.
-        """
-        self._suspend_asked = False
-        if self._view is not None:
-            self._view.wait_until_stopped(_PATIENCE)
-        signal.signal(signal.SIGTSTP, signal.SIG_DFL)
-        os.kill(os.getpid(), signal.SIGTSTP)
-        # continued
-        signal.signal(signal.SIGTSTP, self._ask_to_suspend)
+    def _refuse_to_suspend(self) -> None:
+        """Say why, or have it said by the view, which has the terminal."""
+        if self._live and self._view is not None and self._view.code is None:
+            self._view.process.send_signal(signal.SIGTSTP)
+        else:
+            self._say(NOT_SUSPENDED)
 
     def _tell(self, child: Child) -> None:
         """Say that a process has ended, and that the others go on."""
@@ -212,10 +209,11 @@ class Demo:
         print(f'{TITLE}: {text}', file=sys.stderr, flush=True)
 
 
-def run(options: Options, watcher: SignalWatcher) -> int:
+def run(options: Options, watcher: SignalWatcher, suspension: Event) -> int:
     """
     Run until a signal, or as long as the options say.
 
+    :param suspension: set when somebody wants to suspend the demo, which says why it refuses.
     :return: 0, or 1 when a process could not start or go on.
     :raises DriveCanError: the drives do not start.
     :raises OSError: a file cannot be written.
@@ -227,7 +225,7 @@ def run(options: Options, watcher: SignalWatcher) -> int:
     with ExitStack() as stack:
         directory = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix='drive_can_')))
         stack.enter_context(_terminal_restored())
-        demo = Demo(options, directory, live=live)
+        demo = Demo(options, directory, suspension, live=live)
         try:
             try:
                 code = demo.watch(watcher) if demo.start(watcher) else 0

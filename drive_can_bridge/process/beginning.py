@@ -1,14 +1,35 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Signals that come while a program is still being loaded: they wait for whoever takes them.
+What an executable does first; it imports nothing that takes time.
 
-As long as nobody does, Python answers SIGINT with a traceback. So this is what an executable
-imports first, and it imports nothing that takes time.
+Signals that come while a program is still being loaded wait for whoever takes them: as long as
+nobody does, Python answers SIGINT with a traceback. Standard streams that whoever started it has
+closed (``>&-``) go to nobody: else the next file or socket that is opened would be taken for one.
 """
 
+import os
 import signal
+import sys
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
+
+
+def begin() -> None:
+    """Hold signals, and see that there are all three standard streams."""
+    hold_signals()
+    open_streams()
+
+
+def open_streams() -> None:
+    """Open to nobody what is closed of the descriptors 0, 1 and 2, and of Python's outputs."""
+    for descriptor in range(3):
+        try:
+            os.fstat(descriptor)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)      # takes the lowest number, which is this one
+    for descriptor, name in ((1, 'stdout'), (2, 'stderr')):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(descriptor, 'w', encoding='utf-8', closefd=False))
 
 
 def hold_signals() -> None:

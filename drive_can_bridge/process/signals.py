@@ -1,9 +1,11 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-SIGINT, SIGTERM, SIGHUP: the first asks for a safe stop, a second ends the process at once.
+SIGINT, SIGTERM, SIGHUP, SIGQUIT: the first asks for a safe stop, a second ends the process.
 
 SIGHUP is what a process gets whose terminal is closed, or whose ssh session breaks off: its drives
-are to stop like after any other signal. ``nohup`` still means that it is ignored.
+are to stop like after any other signal. ``nohup`` still means that it is ignored. SIGQUIT is told
+by the exit code. SIGTSTP (Ctrl-Z) can be refused: a process that is suspended leaves motors
+running that it would have to stop.
 
 rclpy's own handlers shut the context down first, so that no neutral frame could follow. Python's
 handlers only run between two bytecodes of the main thread. So the signal is taken from the wake-up
@@ -29,9 +31,12 @@ from drive_can_bridge.process.beginning import let_signals_in, SIGNALS
 #: through the launch that started it: without this grace the second signal would end the process
 #: before its first neutral frame.
 GRACE = 0.3
-#: s within which the same signal counts once: timeout(1), for one, sends it to its child and, in
-#: the next breath, to its whole process group
+#: s within which all signals are one: timeout(1), for one, sends it to its child and, in the next
+#: breath, to its whole process group; a terminal and a launcher both signal
 SAME_BREATH = 0.05
+#: why what moves drives is not suspended
+NOT_SUSPENDED = ('Ctrl-Z refused: drives would run on with nobody to stop them; Ctrl-C stops '
+                 'them')
 
 
 class SignalWatcher:
@@ -42,13 +47,17 @@ class SignalWatcher:
 
     :param keep: go on after the context: in the rest of the process's life, a first signal changes
         nothing any more, and a second still ends it.
-    :ivar last_steps: what is done, in this order, when a second signal ends the process. It must
-        not take long.
+    :param refuse: called in a thread of the watcher when somebody wants to suspend the process
+        (Ctrl-Z), to say why that is refused, without waiting; None: it is not.
+    :ivar last_steps: what is done, in this order, when a second signal ends the process. Each is
+        told by when (of :func:`time.monotonic`) it ends.
     """
 
-    def __init__(self, *, keep: bool = False) -> None:
-        self.last_steps: list[Callable[[], object]] = []
+    def __init__(self, *, keep: bool = False,
+                 refuse: Callable[[], object] | None = None) -> None:
+        self.last_steps: list[Callable[[float], object]] = []
         self._keep = keep
+        self._refuse = refuse
         self._reasons: queue.SimpleQueue[str] = queue.SimpleQueue()
         self._read, self._write = socket.socketpair()
         self._write.setblocking(False)
@@ -59,6 +68,8 @@ class SignalWatcher:
         self._old = [(number, signal.signal(number, _ignore)) for number in SIGNALS
                      if number != signal.SIGHUP
                      or signal.getsignal(number) is not signal.SIG_IGN]
+        if self._refuse is not None:
+            self._old.append((signal.SIGTSTP, signal.signal(signal.SIGTSTP, _ignore)))
         let_signals_in()
         threading.Thread(target=self._watch, name='signals', daemon=True).start()
         return self
@@ -79,12 +90,14 @@ class SignalWatcher:
 
     @property
     def interrupted(self) -> bool:
-        """The first signal was SIGINT: at a terminal, others there have got it as well."""
-        return self._first == signal.SIGINT
+        """The first signal comes from a keyboard: others at the terminal have got it as well."""
+        return self._first in (signal.SIGINT, signal.SIGQUIT)
 
     def exit_code(self, code: int) -> int:
-        """Return what the process ends with: ``code``, or 128 + n after a second signal."""
-        return 128 + self._second if self._second else code
+        """Return what the process ends with: ``code``, or 128 + n after SIGQUIT or a second."""
+        if self._second:
+            return 128 + self._second
+        return code or (128 + signal.SIGQUIT if self._first == signal.SIGQUIT else 0)
 
     def fatal(self, reason: str) -> None:
         """End the process for a reason of its own. From any thread."""
@@ -107,21 +120,20 @@ class SignalWatcher:
             received = self._read.recv(1)
             if not received:
                 return
-            number = received[0]
+            number, now = received[0], time.monotonic()
+            if number == signal.SIGTSTP and self._refuse is not None:
+                _attempt(self._refuse)
             if number not in SIGNALS:
                 continue
             if self._first:
-                if number == self._first and time.monotonic() - first < SAME_BREATH:
+                if now - first < SAME_BREATH:
                     continue
                 self._second = number
-                time.sleep(max(0.0, first + GRACE - time.monotonic()))
+                time.sleep(max(0.0, first + GRACE - now))
                 for step in self.last_steps:
-                    try:
-                        step()
-                    except Exception:  # noqa: BLE001  the process ends, whatever happens
-                        pass
+                    _attempt(step, now + GRACE)
                 os._exit(128 + number)
-            first, self._first = time.monotonic(), number
+            first, self._first = now, number
             self._reasons.put('')
 
 
@@ -138,6 +150,14 @@ def leave(code: int) -> NoReturn:
         except (OSError, ValueError):  # whoever read it has gone
             pass
     os._exit(code)
+
+
+def _attempt(step: Callable[..., object], *arguments: float) -> None:
+    """Do something that must not end the watcher."""
+    try:
+        step(*arguments)
+    except Exception:  # noqa: BLE001  signals are looked after, whatever happens
+        pass
 
 
 def _ignore(*_: object) -> None:

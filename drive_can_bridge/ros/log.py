@@ -15,12 +15,11 @@ import time
 from typing import Any
 
 from drive_can_bridge.core.text import printable
+from drive_can_bridge.process.taking import MOMENT, Taking
 from drive_can_bridge.ros.log_limit import Level, LogLimit, Speaker
 
 #: lines that may wait
 LINES_MAX = 1000
-#: s that the end waits for lines that have not been written yet
-CLOSE_TIMEOUT = 0.3
 
 #: in the queue: the thread has to look what there is to be summed up, or to end
 _LOOK, _END = (Level.INFO, 'look'), (Level.INFO, 'end')
@@ -41,6 +40,7 @@ class Log:
         self._limit = LogLimit(self._put, self._wake, clock)
         self._dropped = 0
         self._closed = False
+        self._taking = Taking()
         self._thread = threading.Thread(target=self._run, name='log', daemon=True)
         self._thread.start()
 
@@ -65,17 +65,22 @@ class Log:
         self._put(Level.FATAL, text)
 
     def close(self) -> None:
-        """Write what waits, for a while at most; what comes later is written at once."""
+        """Write what waits, unless nobody takes it; what comes later is written at once."""
         if self._closed:
             return
         self._limit.sum_up(all_of_it=True)
         self._closed = True
-        try:
-            self._lines.put(_END, timeout=CLOSE_TIMEOUT)
-        except queue.Full:
-            return
-        if self._thread is not threading.current_thread():
-            self._thread.join(CLOSE_TIMEOUT)
+        ended = False
+        while self._thread.is_alive() and not self._taking.nobody:
+            if not ended:
+                try:
+                    self._lines.put(_END, timeout=MOMENT)
+                    ended = True
+                except queue.Full:
+                    continue
+            if self._thread is threading.current_thread():
+                return
+            self._thread.join(MOMENT)
 
     def _put(self, level: Level, text: str) -> None:
         if self._closed:
@@ -99,7 +104,8 @@ class Log:
             except queue.Empty:
                 line = _LOOK
             if line is not _LOOK and line is not _END:
-                self._write(*line)
+                with self._taking:
+                    self._write(*line)
             self._limit.sum_up()
             if self._dropped and (self._lines.empty() or line is _END):
                 dropped, self._dropped = self._dropped, 0

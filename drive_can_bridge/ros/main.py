@@ -21,14 +21,12 @@ from typing import TYPE_CHECKING
 
 from drive_can_bridge.core.told import MAY_RUN
 from drive_can_bridge.process.scheduling import be_punctual
-from drive_can_bridge.process.signals import leave, SignalWatcher
-from drive_can_bridge.process.standard_error import StandardError
+from drive_can_bridge.process.signals import leave, NOT_SUSPENDED, SignalWatcher
+from drive_can_bridge.process.standard_outputs import StandardOutputs
 
 if TYPE_CHECKING:
     from drive_can_bridge.ros.bridge_node import BridgeNode
 
-#: s that the last words wait for whoever reads them, when a second signal ends the process
-LAST_FLUSH = 0.05
 USAGE = """usage: drive_can_bridge --ros-args --params-file FILE [-r ...] [-p ...]
 Bridge motor drives on CAN buses to ROS 2. Only ROS arguments are taken; 'drive_can validate FILE'
 checks a parameter file, 'drive_can demo' shows the bridge with simulated drives."""
@@ -39,16 +37,30 @@ def main(args: Sequence[str] | None = None) -> int:
     arguments = list(sys.argv if args is None else args)
     be_punctual()
     # in a process of our own, signals are looked after to the very end
-    with SignalWatcher(keep=args is None) as watcher, StandardError() as standard_error:
-        watcher.last_steps.append(lambda: standard_error.flush(LAST_FLUSH))
-        if standard_error.is_terminal:  # rcutils sees a pipe
-            os.environ.setdefault('RCUTILS_COLORIZED_OUTPUT', '1')
+    with (SignalWatcher(keep=args is None, refuse=_refuse_to_suspend) as watcher,
+          StandardOutputs() as outputs):
+        watcher.last_steps.append(outputs.flush)
+        _tell_rcutils(outputs)
         code = watcher.exit_code(_main(watcher, arguments))
         if args is None:
+            sys.stdout.flush()
             sys.stderr.flush()
-            standard_error.flush()
+            outputs.flush()
             leave(code)
         return code
+
+
+def _tell_rcutils(outputs: StandardOutputs) -> None:
+    """Have it write as if it did not see a pipe."""
+    on_output = os.environ.get('RCUTILS_LOGGING_USE_STDOUT') == '1'
+    if (outputs.output if on_output else outputs.error).is_terminal:
+        os.environ.setdefault('RCUTILS_COLORIZED_OUTPUT', '1')
+    if on_output:   # in lines; C would keep them until some kilobytes are full
+        os.environ.setdefault('RCUTILS_LOGGING_BUFFERED_STREAM', '1')
+
+
+def _refuse_to_suspend() -> None:
+    print(f'drive_can_bridge: {NOT_SUSPENDED}', file=sys.stderr, flush=True)
 
 
 def _main(watcher: SignalWatcher, arguments: list[str]) -> int:
@@ -130,7 +142,7 @@ def _run(watcher: SignalWatcher, arguments: Sequence[str]) -> int:
     return code
 
 
-def _name_the_unstopped(bridge: 'BridgeNode') -> None:
+def _name_the_unstopped(bridge: 'BridgeNode', _: float) -> None:
     """Say whose stop is cut short by a second signal."""
     for name, drive in list(bridge.drives.items()):
         session = drive.session

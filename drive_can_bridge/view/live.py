@@ -19,10 +19,11 @@ _LOOK_PERIOD = 0.1
 
 
 def show(source: Source, model: Model, setting: Setting, *, ended: Callable[[], bool],
-         quit_code: int) -> int:
+         quit_code: int, notice: Callable[[], str] = str) -> int:
     """
     Draw until the end, or until the user has enough.
 
+    :param notice: returns what is to be said instead of the keys; '' for nothing.
     :return: 0, or ``quit_code`` after the key that quits.
     """
     choice, read = Choice(), None
@@ -35,7 +36,8 @@ def show(source: Source, model: Model, setting: Setting, *, ended: Callable[[], 
             snapshot = model.look(now, time.time())
             drives = [drive.name for drive in snapshot.drives]
             choice = choice.among(drives)
-            screen.draw(page(snapshot, choice, setting, width=size[0], height=size[1]))
+            screen.draw(page(snapshot, choice, setting, notice=notice(), width=size[0],
+                             height=size[1]))
             cost = (time.thread_time() - begun) / _FRAME_SHARE
             due = max(due, now) + min(max(FRAME_PERIOD, cost), _FRAME_PERIOD_MAX)
             while True:

@@ -85,8 +85,12 @@ class _Frame:
 
 
 def page(snapshot: Snapshot, choice: Choice, setting: Setting, *, width: int, height: int,
-         ) -> RenderableType:
-    """Compose the page that was chosen, so many columns wide and lines high."""
+         notice: str = '') -> RenderableType:
+    """
+    Compose the page that was chosen, so many columns wide and lines high.
+
+    :param notice: to be said in the last line, instead of the keys.
+    """
     choice = choice.among([drive.name for drive in snapshot.drives])
     frame = _Frame(width, height - 1)
     frame.bare(_header(snapshot, setting, width))
@@ -105,7 +109,8 @@ def page(snapshot: Snapshot, choice: Choice, setting: Setting, *, width: int, he
         _drives(frame, snapshot, choice)
     if frame.left > 0:
         frame.parts.append(Layout(' ', size=frame.left))
-    frame.parts.append(Layout(_keys(choice.page, width), size=1))
+    frame.parts.append(Layout(Text(notice, no_wrap=True, style='bold') if notice
+                              else _keys(choice.page, width), size=1))
     root = Layout()
     root.split_column(*frame.parts)
     return root

@@ -2,8 +2,8 @@
 """
 The whole terminal, for as long as the view is shown, and its keyboard.
 
-Ctrl-Z gives the terminal back until the process is continued. A terminal that takes nothing
-(Ctrl-S) is drawn on when it does again.
+Ctrl-Z gives the terminal back until the process is continued, unless somebody else looks after
+SIGTSTP. A terminal that takes nothing (Ctrl-S) is drawn on when it does again.
 """
 
 import os
@@ -41,7 +41,7 @@ class Screen:
         self._settings: list[Any] | None = None
         self._readable = self._in >= 0 and os.isatty(self._in)
         self._suspend_asked = False
-        self._old_handler: Any = None
+        self._may_suspend = signal.getsignal(signal.SIGTSTP) is signal.SIG_DFL
         self.gone = False
 
     @property
@@ -57,11 +57,13 @@ class Screen:
 
     def __enter__(self) -> 'Screen':
         self._enter()
-        self._old_handler = signal.signal(signal.SIGTSTP, self._ask_to_suspend)
+        if self._may_suspend:
+            signal.signal(signal.SIGTSTP, self._ask_to_suspend)
         return self
 
     def __exit__(self, *_: object) -> None:
-        signal.signal(signal.SIGTSTP, self._old_handler)
+        if self._may_suspend:
+            signal.signal(signal.SIGTSTP, signal.SIG_DFL)
         self._leave()
 
     def draw(self, page: RenderableType) -> None:

@@ -53,6 +53,20 @@ def test_the_view_comes_and_goes(demo: Running, terminal: Terminal) -> None:
     assert all_gone(children)
 
 
+def test_it_is_not_suspended(demo: Running, terminal: Terminal) -> None:
+    before = len(terminal.read())
+    terminal.type('\x1a')
+    terminal.shows('drives would run on with nobody to stop them', since=before)
+    for process in (demo.process.pid, demo.children()['monitor']):
+        status = Path(f'/proc/{process}/stat').read_text(encoding='ascii')
+        assert status.rpartition(')')[2].split()[0] != 'T'
+    assert LEFT not in terminal.read()
+    terminal.type('\x1c')      # Ctrl-\\: as all of them, but it says so
+    assert demo.process.wait(60.0) == 128 + signal.SIGQUIT
+    assert LEFT in terminal.read()
+    assert terminal.echoes
+
+
 def test_whoever_has_seen_enough_ends_everything(demo: Running, terminal: Terminal) -> None:
     children = demo.children()
     terminal.type('q')

@@ -4,6 +4,7 @@
 from pathlib import Path
 import tempfile
 import threading
+import time
 from typing import Any
 
 import pytest
@@ -58,6 +59,20 @@ def test_nobody_waits_for_a_logger_that_does_not_come_back() -> None:
     assert dropped + len(logger.lines) - 1 == LINES_MAX + 500
     assert logger.lines[:3] == [('info', '0'), ('info', '1'), ('info', '2')]
     log.close()
+
+
+def test_the_last_words_are_written_however_long_that_takes() -> None:
+    class SlowLogger(Logger):
+        def __getattr__(self, level: str) -> Any:
+            time.sleep(0.05)
+            return super().__getattr__(level)
+    logger = SlowLogger()
+    log = Log(logger)
+    for number in range(20):
+        log.info(str(number))
+    log.fatal('why it ends')
+    log.close()
+    assert logger.lines[-1] == ('fatal', 'why it ends')
 
 
 def test_the_end_does_not_wait_for_ever() -> None:

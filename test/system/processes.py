@@ -88,20 +88,20 @@ class Process:
     """
     A process with its standard output and standard error in files.
 
-    :param standard_error: a descriptor that it gets as its standard error instead.
+    :param streams: descriptors that it gets instead, ``stdout``, ``stderr``.
     """
 
-    def __init__(self, command: Sequence[str], directory: Path, name: str, *,
-                 standard_error: int | None = None) -> None:
+    def __init__(self, command: Sequence[str], directory: Path, name: str,
+                 **streams: int) -> None:
         self.name = name
         self.command = list(command)
         self.out = directory / f'{name}.out'
         self.err = directory / f'{name}.err'
         self._out, self._err = _Lines(self.out), _Lines(self.err)
         with self.out.open('wb') as out, self.err.open('wb') as err:
-            self.process = subprocess.Popen(self.command, stdin=subprocess.PIPE, stdout=out,
-                                            stderr=(err if standard_error is None
-                                                    else standard_error), env=environment())
+            self.process = subprocess.Popen(  # type: ignore[call-overload]
+                self.command, env=environment(), stdin=subprocess.PIPE,
+                **{'stdout': out, 'stderr': err, **streams})
 
     @property
     def pid(self) -> int:
@@ -209,12 +209,11 @@ class Processes:
         #: shown and looked at like the others, but not ended with them
         self.guests: list[Process] = []
 
-    def start(self, command: Sequence[str], name: str, *,
-              standard_error: int | None = None) -> Process:
+    def start(self, command: Sequence[str], name: str, **streams: int) -> Process:
         """Start anything."""
         number = sum(process.name.rstrip('0123456789') == name for process in self.started)
         process = Process(command, self.directory, name + (str(number + 1) if number else ''),
-                          standard_error=standard_error)
+                          **streams)
         self.started.append(process)
         return process
 
@@ -235,14 +234,14 @@ class Processes:
         return process
 
     def bridge(self, file: Path | None, namespace: str = '', *arguments: str,
-               standard_error: int | None = None) -> Process:
+               **streams: int) -> Process:
         """Start the bridge."""
         witness()
         options = ['--params-file', str(file)] if file else []
         if namespace:
             options += ['-r', f'__ns:=/{namespace}']
         return self.start([*command_line('drive_can_bridge'), '--ros-args', *options,
-                           *arguments], 'bridge', standard_error=standard_error)
+                           *arguments], 'bridge', **streams)
 
     def end(self) -> None:
         """End what is still running."""

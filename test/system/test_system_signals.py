@@ -25,15 +25,18 @@ def looks_after_signals(process: Process) -> bool:
     return bool(int(caught.split()[1], 16) & 1 << signal.SIGTERM - 1)
 
 
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP],
-                         ids=['SIGINT', 'SIGTERM', 'SIGHUP'])
+@pytest.mark.parametrize(('number', 'code'), [
+    (signal.SIGINT, 0), (signal.SIGTERM, 0), (signal.SIGHUP, 0), (signal.SIGQUIT, 131)],
+    ids=['SIGINT', 'SIGTERM', 'SIGHUP', 'SIGQUIT'])
 def test_while_active(processes: Processes, client: Client, namespace: str, tmp_path: Path,
-                      number: int) -> None:
+                      number: int, code: int) -> None:
     file = bridge_file(tmp_path)
     simulator = processes.simulator(file)
     bridge = processes.bridge(file, namespace)
     start_moving(client, f'/{namespace}/conveyor')
-    assert bridge.end(number) == 0
+    bridge.send(signal.SIGTSTP)     # Ctrl-Z would leave it running
+    bridge.error('drive_can_bridge: Ctrl-Z refused: ')
+    assert bridge.end(number) == code
     # nobody tells the drive that a bridge has gone: three neutral frames have to
     wait_for_end(lambda: simulator.frames('^003FFFF0.* R$'),
                  ['003FFFF0#0000000000000000 R'] * 3)
@@ -143,9 +146,9 @@ def test_second_signal_ends_at_once(processes: Processes, client: Client, namesp
     facts = client.diagnostics(f'{namespace}/drive_can_bridge: bus main', state='opening')
     assert facts['level'] == '2'
     bridge.send(signal.SIGINT)
+    client.ask('rest', seconds=0.1)     # in the same breath they are one signal
     bridge.send(signal.SIGTERM)
-    # which of them comes first is up to the kernel
-    assert bridge.wait() in (128 + signal.SIGINT, 128 + signal.SIGTERM)
+    assert bridge.wait() == 128 + signal.SIGTERM
 
 
 def test_two_signals_while_active(processes: Processes, client: Client, namespace: str,
@@ -156,7 +159,8 @@ def test_two_signals_while_active(processes: Processes, client: Client, namespac
     start_moving(client, f'/{namespace}/conveyor')
     bridge.send(signal.SIGINT)
     bridge.send(signal.SIGTERM)
-    assert bridge.wait() in (128 + signal.SIGINT, 128 + signal.SIGTERM)
+    # one stop, unless this process has to wait for a processor between the two
+    assert bridge.wait() in (0, 128 + signal.SIGINT, 128 + signal.SIGTERM)
     # whoever stops a whole group of processes sends two at once: the drive is told all the same
     wait_for_end(lambda: simulator.frames('^003FFFF0.* R$'), ['003FFFF0#0000000000000000 R'])
 

@@ -1,5 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""Nobody reads standard error any more: the drives must not notice, nor the way out."""
+"""Nobody reads the log any more: the drives must not notice, nor the way out."""
 
 from collections.abc import Iterator
 import os
@@ -8,7 +8,7 @@ import signal
 import tty
 
 from parameter_files import bridge_file, CONVEYOR, NEIGHBOUR
-from processes import Client, Processes
+from processes import Client, command_line, Processes
 import pytest
 from stuck_output import StuckOutput
 from test_system_reconnection import start_moving
@@ -25,12 +25,14 @@ def output() -> Iterator[StuckOutput]:
         yield stuck
 
 
+@pytest.mark.parametrize('stream', ['stderr', 'stdout'])
 def test_a_drive_falls_silent_and_the_bridge_is_stopped(
         processes: Processes, client: Client, namespace: str, tmp_path: Path,
-        output: StuckOutput) -> None:
+        output: StuckOutput, monkeypatch: pytest.MonkeyPatch, stream: str) -> None:
+    monkeypatch.setenv('RCUTILS_LOGGING_USE_STDOUT', str(int(stream == 'stdout')))
     file = bridge_file(tmp_path, drives={'conveyor': CONVEYOR, 'neighbour': NEIGHBOUR})
     simulator = processes.simulator(file)
-    bridge = processes.bridge(file, namespace, standard_error=output.write)
+    bridge = processes.bridge(file, namespace, **{stream: output.write})
     start_moving(client, f'/{namespace}/conveyor')
     client.online(f'/{namespace}/neighbour')
     client.ask('listen_to_log')
@@ -53,7 +55,7 @@ def test_what_was_not_read_is_told_later(processes: Processes, client: Client, n
                                          tmp_path: Path, output: StuckOutput) -> None:
     file = bridge_file(tmp_path)
     processes.simulator(file)
-    bridge = processes.bridge(file, namespace, standard_error=output.write)
+    bridge = processes.bridge(file, namespace, stderr=output.write)
     client.online(f'/{namespace}/conveyor')
     text = ''
 
@@ -76,12 +78,27 @@ def test_second_signal(processes: Processes, client: Client, namespace: str, tmp
         # its reader hangs in an open that never ends, so that the first signal takes its time
         bridge = processes.bridge(
             bridge_file(tmp_path, channel=os.ttyname(slave), bus={'sleep_after_open': 600.0}),
-            namespace, standard_error=output.write)
+            namespace, stderr=output.write)
         client.diagnostics(f'{namespace}/drive_can_bridge: bus main', state='opening')
         bridge.send(signal.SIGINT)
+        client.ask('rest', seconds=0.1)     # in the same breath they are one signal
         bridge.send(signal.SIGTERM)
-        assert bridge.wait(timeout=10.0) in (128 + signal.SIGINT, 128 + signal.SIGTERM)
+        assert bridge.wait(timeout=10.0) == 128 + signal.SIGTERM
         assert output.full
     finally:
         os.close(master)
         os.close(slave)
+
+
+@pytest.mark.parametrize('closed', ['>&-', '2>&-', '<&- >&- 2>&-'])
+def test_whoever_closes_its_outputs_gets_a_bridge_all_the_same(
+        processes: Processes, client: Client, namespace: str, tmp_path: Path, closed: str) -> None:
+    file = bridge_file(tmp_path)
+    simulator = processes.simulator(file)
+    bridge = processes.start(
+        ['sh', '-c', f'exec "$@" {closed}', 'sh', *command_line('drive_can_bridge'), '--ros-args',
+         '--params-file', str(file), '-r', f'__ns:=/{namespace}'], 'bridge')
+    start_moving(client, f'/{namespace}/conveyor')
+    assert bridge.end(signal.SIGTERM) == 0
+    wait_for_end(lambda: simulator.frames(f'^{REQUEST}.* R$'),
+                 [f'{REQUEST}#0000000000000000 R'] * 3)

@@ -1,18 +1,18 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""A standard error that keeps nobody waiting, in a process of its own."""
+"""Standard outputs that keep nobody waiting, in a process of their own."""
 
 import os
 from pathlib import Path
 import subprocess
 import sys
 import textwrap
+import time
 
 import pytest
 
 HEAD = """
 import ctypes, os, sys, threading, time
-from drive_can_bridge.process import standard_error
-from drive_can_bridge.process.standard_error import StandardError
+from drive_can_bridge.process.standard_outputs import Output, StandardOutputs
 libc = ctypes.PyDLL(None)      # holds the interpreter while it writes, as rcutils does
 """
 
@@ -30,7 +30,7 @@ def start(program: str, standard_error: int) -> 'subprocess.Popen[bytes]':
 
 def test_everything_arrives_whoever_writes_it() -> None:
     done = run("""
-        with StandardError() as output:
+        with Output('standard error', 2) as output:
             assert not output.is_terminal
             print('python', file=sys.stderr)
             os.write(2, b'descriptor\\n')
@@ -38,7 +38,7 @@ def test_everything_arrives_whoever_writes_it() -> None:
             for number in range(20_000):
                 libc.write(2, b'x' * 99 + b'\\n', 100)
                 if number % 100 == 99:
-                    assert output.flush(30.0)
+                    assert output.flush(time.monotonic() + 30.0)
         os.write(2, b'afterwards\\n')
         """, stderr=subprocess.PIPE)
     lines = done.stderr.decode().splitlines()
@@ -52,10 +52,10 @@ def test_flushed_is_written(tmp_path: Path) -> None:
         done = run("""
             sys.setswitchinterval(1e-6)
             real = os.dup(2)
-            with StandardError() as output:
+            with Output('standard error', 2) as output:
                 for number in range(1, 5001):
                     os.write(2, b'x' * 9 + b'\\n')
-                    assert output.flush(30.0)
+                    assert output.flush(time.monotonic() + 30.0)
                     assert os.fstat(real).st_size == 10 * number, number
             """, stderr=file)
     assert done.returncode == 0, (tmp_path / 'written').read_text()[-1000:]
@@ -64,7 +64,7 @@ def test_flushed_is_written(tmp_path: Path) -> None:
 def test_nobody_reads() -> None:
     read, write = os.pipe()
     process = start("""
-        output = StandardError().__enter__()
+        output = Output('standard error', 2).__enter__()
         ticks = []
         threading.Thread(target=lambda: [ticks.append(time.monotonic()) or time.sleep(0.001)
                                          for _ in range(500)], daemon=True).start()
@@ -73,7 +73,7 @@ def test_nobody_reads() -> None:
                 time.sleep(0.001)
         while len(ticks) < 500:
             time.sleep(0.01)
-        assert not output.flush(0.05)
+        assert not output.flush(time.monotonic() + 0.05)
         print('on its way', flush=True)
         sys.stdin.read()
         """, write)
@@ -99,11 +99,11 @@ def test_nobody_reads() -> None:
 @pytest.mark.parametrize('end', ['closed', 'gone'])
 def test_nobody_is_there(end: str) -> None:
     program = """
-        with StandardError() as output:
+        with Output('standard error', 2) as output:
             for _ in range(1000):
                 libc.write(2, b'x' * 1000, 1000) if end == 'gone' else None
                 time.sleep(0)
-            assert output.flush(5.0)
+            assert output.flush()
         print('through')
         """
     if end == 'closed':
@@ -116,3 +116,83 @@ def test_nobody_is_there(end: str) -> None:
         done = run('\nend = "gone"\n' + textwrap.dedent(program), stderr=write)
         os.close(write)
     assert (done.returncode, done.stdout) == (0, b'through\n')
+
+
+def test_last_words_wait_until_they_are_taken_unless_nobody_takes_them() -> None:
+    """However long that takes: a reader that reads slowly reads."""
+    program = """
+        output = Output('standard error', 2).__enter__()
+        libc.write(2, b'x' * 200_000, 200_000)
+        print('flushing', flush=True)
+        print(output.flush(), flush=True)
+        libc.write(2, b'x' * 200_000, 200_000)
+        print(output.flush(), flush=True)
+        sys.stdin.read()
+        """
+    read, write = os.pipe()
+    process = start(program, write)
+    os.close(write)
+    assert process.stdin is not None and process.stdout is not None
+    assert process.stdout.readline() == b'flushing\n'
+    taken = 0
+    while taken < 200_000:
+        taken += len(os.read(read, 4096))
+        time.sleep(0.03)    # 1.5 s for all of it
+    assert process.stdout.readline() == b'True\n'
+    assert process.stdout.readline() == b'False\n'
+    process.kill()
+    process.wait()
+    process.stdin.close()
+    process.stdout.close()
+    os.close(read)
+
+
+@pytest.mark.parametrize('number', [1, 2])
+def test_neither_output_keeps_anybody_waiting(number: int) -> None:
+    read, write = os.pipe()
+    streams = {1: {'stdout': write, 'stderr': subprocess.PIPE},
+               2: {'stdout': subprocess.PIPE, 'stderr': write}}[number]
+    process = subprocess.Popen([sys.executable, '-c', HEAD + textwrap.dedent(f"""
+        with StandardOutputs() as outputs:
+            for _ in range(10):
+                libc.write({number}, b'x' * 100_000, 100_000)
+                time.sleep(0)
+            print('through', file=sys.stdout if {number} == 2 else sys.stderr, flush=True)
+            assert not outputs.flush()
+            os._exit(0)
+        """)], **streams)  # type: ignore[call-overload]
+    os.close(write)
+    other = process.stderr if number == 1 else process.stdout
+    assert other is not None and other.readline() == b'through\n'
+    assert process.wait(timeout=60) == 0
+    other.close()
+    os.close(read)
+
+
+def test_lines_of_both_keep_their_order_where_they_go_the_same_way() -> None:
+    done = run("""
+        with StandardOutputs():
+            for number in range(1000):
+                os.write(1 + number % 2, b'%d\\n' % number)
+        """, stderr=subprocess.STDOUT)
+    assert done.stdout == b''.join(b'%d\n' % number for number in range(1000))
+
+
+CLOSED = """
+import os, sys
+from drive_can_bridge.process.beginning import begin
+begin()
+print('output')
+print('error', file=sys.stderr)
+sys.stdout.flush()
+assert os.open(os.devnull, os.O_RDONLY) > 2
+"""
+
+
+@pytest.mark.parametrize('closed', ['<&-', '>&-', '2>&-', '<&- >&- 2>&-'])
+def test_streams_that_somebody_closed_go_to_nobody(closed: str) -> None:
+    done = subprocess.run(['sh', '-c', f'exec "$@" {closed}', 'sh', sys.executable, '-c', CLOSED],
+                          timeout=60, capture_output=True, check=False)
+    assert done.returncode == 0
+    assert done.stdout == (b'' if ' >' in f' {closed}' else b'output\n')
+    assert done.stderr == (b'' if '2>' in closed else b'error\n')
