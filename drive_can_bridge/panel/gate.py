@@ -8,10 +8,15 @@ from typing import Any
 from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from drive_can_bridge.panel.access import Access, Entry, Refusal
+from drive_can_bridge.monitor.source import Stop
+from drive_can_bridge.panel.access import Access, Entry, Refusal, Role
 
 #: where the role of a request stands in its scope
 ROLE = 'drive_can_role'
+#: where it stands how a connection comes in
+ENTER = 'drive_can_enter'
+#: a stop finds a place when all are taken
+_STOPS = frozenset(f'/do/{stop.value}' for stop in Stop)
 #: bytes that a request may carry: a backup has some tens of thousands
 BODY_MAX = 1_000_000
 
@@ -28,6 +33,7 @@ _HEADERS = [
     (b'cross-origin-resource-policy', b'same-origin'),
     (b'cross-origin-opener-policy', b'same-origin'),
 ]
+_NO_PLACE = Refusal(503, 'too many connections are open already: try again in a while')
 _TOO_MUCH = Refusal(413, f'too much at once: at most {BODY_MAX} bytes')
 _PAGE = ('<!doctype html><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
          '<title>drive_can panel</title><body style="font: 1.1em sans-serif; margin: 2em">'
@@ -52,6 +58,8 @@ class Gate:
             return
         judgement = self._access.judge(scope['type'], scope.get('method', 'GET'),
                                        scope['headers'], scope['query_string'])
+        if isinstance(judgement, Entry) and not _enters(scope, judgement):
+            judgement = _NO_PLACE
         if isinstance(judgement, Entry):
             scope = {**scope, ROLE: judgement.role}
             if scope['type'] == 'websocket':
@@ -63,6 +71,13 @@ class Gate:
                 return
             judgement = _TOO_MUCH
         await _refuse(judgement, scope, _dressed(send, None))
+
+
+def _enters(scope: Scope, entry: Entry) -> bool:
+    """Let a connection in; False: all places are taken."""
+    enter = scope.get(ENTER)    # a WebSocket has come in before it became one
+    return enter is None or enter(
+        stop=entry.role is Role.OPERATOR and scope['path'] in _STOPS)
 
 
 def _limited(receive: Receive) -> Receive:

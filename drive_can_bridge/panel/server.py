@@ -5,26 +5,30 @@ import asyncio
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 import errno
+from functools import partial
 import logging
 import math
 import resource
 import socket
 from typing import Any
 
-from starlette.types import ASGIApp
+from starlette.types import ASGIApp, Receive, Scope, Send
 import uvicorn
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.text import printable
+from drive_can_bridge.panel.gate import ENTER
 
 #: what is the matter with a port, not with the address
 _OF_THE_PORT = (errno.EADDRINUSE, errno.EACCES, errno.EPERM)
-#: connections at once; a browser takes a handful
-CONNECTIONS_MAX = 200
+#: connections at once that have shown a token, and of others; a browser takes a handful
+CONNECTIONS_MAX, OUTSIDE_MAX = 200, 100
 #: file descriptors that this takes, beside those of ROS
 _DESCRIPTORS = 1024
-#: s that a connection may take for its first request, and bytes of the request's head
+#: s that a connection may take for its first byte and for its first request, and bytes of the
+#: request's head
+FIRST_BYTE = 2.0
 _FIRST_REQUEST = 10.0
 _HEAD_MAX = 16_384
 #: bytes of one message from a browser: clicks
@@ -36,33 +40,83 @@ _LINES_MAX, _WHILE = 10, 60.0
 _GRACE = 1
 
 
-_FULL_WORDS = f'{CONNECTIONS_MAX} connections are open already: try again in a while\n'
-_FULL = ('HTTP/1.1 503 Service Unavailable\r\nContent-Type: text/plain\r\nConnection: close\r\n'
-         f'Content-Length: {len(_FULL_WORDS)}\r\n\r\n{_FULL_WORDS}').encode()
+_SHOWN_OUT_WORDS = ('too many connections are open already, or nothing came on this one for '
+                    f'{FIRST_BYTE:g} s: try again in a while\n')
+_SHOWN_OUT = ('HTTP/1.1 503 Service Unavailable\r\nContent-Type: text/plain\r\n'
+              f'Connection: close\r\nContent-Length: {len(_SHOWN_OUT_WORDS)}\r\n\r\n'
+              f'{_SHOWN_OUT_WORDS}').encode()
 
 
-class _Connection(H11Protocol):
-    """A connection that is closed at once when there are too many, or when nothing comes."""
+class Connection(H11Protocol):
+    """
+    A connection. It stands outside until the gate has found its token.
+
+    Outside nobody is turned away: where there are too many, whoever has stood there longest has to
+    leave, so that those who say nothing keep nobody from being heard. Inside there is an upper
+    limit, but not for a stop.
+
+    :param outside: those that have shown no token yet, the oldest first; of all connections.
+    """
+
+    def __init__(self, outside: dict['Connection', None], *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        self._outside = outside
+        self._heard = False
+        app = self.app
+
+        async def entering(scope: Scope, receive: Receive, send: Send) -> None:
+            await app({**scope, ENTER: self.enter}, receive, send)
+        self.app = entering
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        if len(self.connections) >= CONNECTIONS_MAX:
-            transport.write(_FULL)
-            transport.close()
-            return
         super().connection_made(transport)
+        self._outside[self] = None
+        if len(self._outside) > OUTSIDE_MAX:
+            next(iter(self._outside)).show_out()
+        self.loop.call_later(FIRST_BYTE, self._first_byte_due)
         self.loop.call_later(_FIRST_REQUEST, self._first_request_due)
 
-    def connection_lost(self, exception: Exception | None) -> None:
-        if self.transport is not None:
-            super().connection_lost(exception)
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._outside.pop(self, None)
+        super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
-        if self.transport is not None:
+        self._heard = True
+        if not self.transport.is_closing():
             super().data_received(data)
 
+    def handle_websocket_upgrade(self, event: Any) -> None:
+        if not self.enter(stop=False):
+            self.show_out()
+            return
+        super().handle_websocket_upgrade(event)
+
+    def enter(self, *, stop: bool) -> bool:
+        """
+        Come in.
+
+        :param stop: a drive is to be stopped: there is always a place.
+        :return: False: all places are taken.
+        """
+        inside = len(self.connections) - len(self._outside)
+        if self in self._outside and inside >= CONNECTIONS_MAX and not stop:
+            return False
+        self._outside.pop(self, None)
+        return True
+
+    def show_out(self) -> None:
+        """Close it, in words."""
+        self._outside.pop(self, None)
+        self.connections.discard(self)
+        self.transport.write(_SHOWN_OUT)
+        self.transport.close()
+
+    def _first_byte_due(self) -> None:
+        if self in self._outside and not self._heard:
+            self.show_out()
+
     def _first_request_due(self) -> None:
-        request: object = self.cycle
-        if request is None and self in self.connections:
+        if self in self._outside:
             self.transport.abort()
 
 
@@ -147,7 +201,8 @@ def serve(app: ASGIApp, listener: socket.socket, *, ended: Callable[[], bool],
         logger.handlers, logger.propagate = [handler], False
         logger.setLevel(level)
     config = uvicorn.Config(
-        app, http=_Connection, ws='auto', loop='asyncio', lifespan='on', log_config=None,
+        app, http=partial(Connection, {}),     # type: ignore[arg-type]
+        ws='auto', loop='asyncio', lifespan='on', log_config=None,
         access_log=False, ws_max_size=_MESSAGE_MAX, h11_max_incomplete_event_size=_HEAD_MAX,
         timeout_keep_alive=20, timeout_graceful_shutdown=_GRACE, server_header=False,
         proxy_headers=False, backlog=128)

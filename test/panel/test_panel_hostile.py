@@ -3,6 +3,7 @@
 
 from collections.abc import Iterator
 from contextlib import ExitStack
+from http.client import HTTPConnection
 import select
 import selectors
 import socket
@@ -260,6 +261,39 @@ def test_a_thousand_connections(site: Site) -> None:
         # who says nothing is shown out after a while: then there is room for those who talk
         wait_for(lambda: room(site), 'room for a viewer')
     assert site.do('quick_stop', 'operator', STOP).said['success'] is True
+
+
+@pytest.mark.parametrize('says', [b'', b'G'])
+def test_who_says_nothing_keeps_nobody_from_stopping(site: Site, says: bytes) -> None:
+    with ExitStack() as stack:
+        def more() -> None:
+            connection = stack.enter_context(
+                socket.create_connection(('127.0.0.1', site.port), timeout=30.0))
+            connection.sendall(says)
+        for _ in range(205):
+            more()
+        for _ in range(20):
+            assert site.do('quick_stop', 'operator', STOP).said['success'] is True
+            for _ in range(20):
+                more()
+
+
+def test_a_viewer_who_takes_all_places_keeps_nobody_from_stopping(site: Site) -> None:
+    with ExitStack() as stack:
+        connections = []
+        for _ in range(230):
+            connection = HTTPConnection('127.0.0.1', site.port, timeout=30.0)
+            stack.callback(connection.close)
+            connections.append(connection)
+            connection.request('GET', FILE_OF_PANEL, headers=site.cookie('viewer'))
+            answer = connection.getresponse()
+            answer.read()
+            if answer.status == 503:
+                break
+        assert answer.status == 503
+        assert site.do('quick_stop', 'operator', STOP).said['success'] is True
+        assert site.do('disable', 'operator', STOP).said['success'] is True
+        assert site.do('disable', 'viewer', STOP).status == 503
 
 
 def room(site: Site) -> bool:
