@@ -18,11 +18,12 @@ from typing import Any, ClassVar
 from hypothesis import settings, strategies as st
 from hypothesis.stateful import invariant, precondition, rule, RuleBasedStateMachine
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
 from drive_can_bridge.core.events import Noted, RequestCompleted
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.core.requests import BUSY, Failure, ReadRequest, WriteRequest
+from drive_can_bridge.core.requests import Failure, ReadRequest, WriteRequest
 from drive_can_bridge.core.setpoints import CommandOutcome
 
 #: more than rounding errors, less than anything that matters
@@ -293,7 +294,8 @@ class AnyOrder(RuleBasedStateMachine):
         self.session.users.submit(request, self.now)
         refused = any(
             isinstance(event, RequestCompleted) and event.request is request
-            and Failure(BUSY) in event.outcomes for event in self.session.report.events)
+            and Failure(sentences.busy()) in event.outcomes
+            for event in self.session.report.events)
         possible = self.observer.active and self.observer.bus and len(request) > 0
         if refused or possible and waiting == 65:   # 64 wait; one more may be under way
             assert refused and possible and waiting in (64, 65)

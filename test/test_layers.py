@@ -231,10 +231,8 @@ def test_ros_packages_are_declared() -> None:
     assert ROS_PACKAGES <= declared
 
 
-# -- size and inheritance -------------------------------------------------------------------------
+# -- inheritance ----------------------------------------------------------------------------------
 
-#: lines that a module has at most
-LINES_MAX = 600
 #: steps from a class to the base of all its ancestors in this package: a base, and its subclasses
 STEPS_MAX = 1
 
@@ -272,11 +270,6 @@ def ancestors(name: str) -> Iterator[tuple[int, Class]]:
         if base in classes() and base != name:
             yield 1, classes()[base]
             yield from ((steps + 1, other) for steps, other in ancestors(base))
-
-
-def test_modules_are_short(source: Path) -> None:
-    lines = len(source.read_text(encoding='utf-8').splitlines())
-    assert lines <= LINES_MAX
 
 
 def test_no_class_has_many_generations_above_it() -> None:

@@ -25,7 +25,7 @@ from drive_can_bridge.client.drive import Drive, Enabled, ReadOutcome, WriteOutc
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.profile import RestoreStep
-from drive_can_bridge.core.requests import Failure, is_answer
+from drive_can_bridge.core.requests import tells_nothing
 
 #: s that a drive which has gone away is waited for, so that it is not left in a mode
 PATIENCE = 10.0
@@ -298,7 +298,7 @@ class Restorer:
         name = parameter.name
         written = self._write_step(name, value_of_word(parameter, word), blind=blind)
         if not written.ok:
-            if is_answer(Failure(written.reason)):
+            if not tells_nothing(written.reason):
                 return written.reason
             # it may have been taken all the same
             self._unanswered = True

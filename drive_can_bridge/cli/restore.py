@@ -24,7 +24,7 @@ from drive_can_bridge.cli.questions import agreed, must_be_answerable
 from drive_can_bridge.cli.tables import print_json, print_table
 from drive_can_bridge.client.drive import Drive, Enabled, Source
 from drive_can_bridge.core.parameters import Parameter, Storage, Value
-from drive_can_bridge.core.requests import Failure, is_answer
+from drive_can_bridge.core.requests import tells_nothing
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.core.words import value_text
 from drive_can_bridge.process.interruption import Interruption, postponed
@@ -139,7 +139,7 @@ def _may_be(args: Namespace, backup: Backup, drive: Drive) -> bool:
     if backup.head.identity and not identity:
         # maybe it says nothing at all: then nobody knows whether it is another one
         for asked in read_all(drive, names_to_read(backup, drive)[:1]).values():
-            if not asked.ok and not is_answer(Failure(asked.reason)):
+            if not asked.ok and tells_nothing(asked.reason):
                 complain(f'{drive.name}: nothing could be read: {asked.reason}\n{_NOTHING}.')
                 return False
     differing = strangers(backup, drive, identity)

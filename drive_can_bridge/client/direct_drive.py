@@ -19,10 +19,10 @@ from drive_can_bridge.core.configuration import BusConfiguration, DriveConfigura
 from drive_can_bridge.core.directory import ParameterDirectory
 from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.requests import (
-    Failure, is_answer, NO_ANSWER, NO_ANSWER_OFFLINE, OFFLINE, Outcome, ReadRequest, ReadValue,
-    WriteRequest, Written,
+    ABSENT, Failure, is_answer, Outcome, ReadRequest, ReadValue, SILENT, WriteRequest, Written,
 )
 from drive_can_bridge.core.roles import Role
+from drive_can_bridge.core.sentences import no_answer_offline, no_result, Sentence
 from drive_can_bridge.core.words import value_text
 from drive_can_bridge.protocols.families import FAMILIES
 
@@ -126,7 +126,7 @@ class DirectDrive(Drive):
                 waiting.append((blocks.pop(0), request))
             block, request = waiting.pop(0)
             outcomes = self._conversation.wait(request)
-            if Failure(NO_ANSWER_OFFLINE) in outcomes:
+            if Failure(no_answer_offline()) in outcomes:
                 # the one before had no answer at all, which may have been the fault of its names
                 blocks.insert(0, block)
             else:
@@ -152,7 +152,7 @@ class DirectDrive(Drive):
         listed = [each for each in self.parameters.values()
                   if each.readable and self._session.roles.cells(each)]
         candidates = dict.fromkeys([*wanted[:1], *listed[:TRIES], *wanted])
-        outcome: Outcome = Failure(NO_ANSWER_OFFLINE)
+        outcome: Outcome = Failure(no_answer_offline())
         for candidate in list(candidates)[:TRIES]:
             outcome, = self._wait_for((candidate,))
             if is_answer(outcome):
@@ -170,13 +170,13 @@ class DirectDrive(Drive):
         if isinstance(outcome, ReadValue):
             return ReadOutcome(name, parameter, outcome.raw,
                                parameter.value_from_raw(outcome.raw))
-        reason = outcome.reason if isinstance(outcome, Failure) else 'no result'
-        return ReadOutcome(name, parameter, reason=self._explained(reason))
+        return ReadOutcome(name, parameter, reason=self._explained(
+            outcome.reason if isinstance(outcome, Failure) else no_result()))
 
-    def _explained(self, reason: str) -> str:
+    def _explained(self, reason: Sentence) -> str:
         """Add what may be the matter with a drive that says nothing at all."""
-        silent = reason.startswith(OFFLINE) or (
-            reason.startswith(NO_ANSWER) and not self._session.online)
+        silent = reason.code in ABSENT or (
+            reason.code in SILENT and not self._session.online)
         if silent and self._start_frame is not None and not self._nmt_start:
             return f'{reason}; {_START_HINT}'
         return reason
@@ -194,7 +194,7 @@ class DirectDrive(Drive):
         outcome, = self._conversation.wait(request)
         if isinstance(outcome, Written):
             return WriteOutcome(name, True, parameter, outcome.note)
-        reason = outcome.reason if isinstance(outcome, Failure) else 'no result'
+        reason = outcome.reason if isinstance(outcome, Failure) else no_result()
         return WriteOutcome(name, False, parameter, self._explained(reason))
 
     # -- state ------------------------------------------------------------------------------------

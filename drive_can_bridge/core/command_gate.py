@@ -11,11 +11,13 @@ has to stay where it is depends on where it is, and on nothing driving it.
 from collections.abc import Sequence
 from typing import Protocol
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import Noted
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.reporter import Reporter
+from drive_can_bridge.core.sentences import Sentence
 from drive_can_bridge.core.setpoints import Setpoints
 
 
@@ -80,7 +82,7 @@ class CommandGate:
         self._setpoints.allow(presence.online and presence.active and (
             obeyed is None or obeyed.operating))
 
-    def withdraw(self, reason: str, now: float) -> None:
+    def withdraw(self, reason: Sentence, now: float) -> None:
         """Go neutral, and back to ``disable``."""
         self._setpoints.allow(False)
         if self._control is not None:
@@ -101,7 +103,7 @@ class CommandGate:
         self._lacking = 0 if raw is not None else self._lacking + 1
         if (self._lacking >= self._missed_limit and control.operating
                 and control.table.enabled is not None):
-            control.drop(f'{self._lacking} answers without a status word')
+            control.drop(sentences.status_missing(self._lacking))
 
     def measured(self, raws: Sequence[int | None]) -> None:
         """Take a sample, for setpoints that stay where the axis is; after its status word."""

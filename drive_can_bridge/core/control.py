@@ -67,6 +67,8 @@ a word that stops it for longer than a request may take is told of
 from dataclasses import dataclass
 from enum import Enum
 
+from drive_can_bridge.core.sentences import Sentence
+
 
 class ControlAction(Enum):
     """What can be asked of a drive; also names the control words of a profile."""
@@ -94,4 +96,4 @@ class ControlCompleted:
 
     request: ControlRequest
     success: bool
-    message: str
+    message: Sentence

@@ -10,6 +10,7 @@ of each request to whoever asked. What it makes of a request stands in :mod:`.co
 from collections.abc import Callable, Sequence
 import math
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.core.control_operation import Answers, Operation
 from drive_can_bridge.core.control_texts import (
@@ -17,6 +18,7 @@ from drive_can_bridge.core.control_texts import (
 )
 from drive_can_bridge.core.disregard import Disregard
 from drive_can_bridge.core.profile import ControlTable, StatusPattern
+from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.status_reports import StatusReports, Wording
 
 #: how often the reset word leaves where nobody acknowledges it
@@ -42,7 +44,7 @@ class ControlMachine:
     """
 
     def __init__(self, table: ControlTable, *, timeout: float, pulse: int = RESET_CYCLES,
-                 members: Sequence[str] = (), unheard: Callable[[], str] = str,
+                 members: Sequence[str] = (), unheard: Callable[[], Sentence] = lambda: NOTHING,
                  wording: Wording | None = None) -> None:
         self.table = self._table = table
         self._timeout = timeout
@@ -62,7 +64,7 @@ class ControlMachine:
         self._operation: Operation | None = None
         self._answers = Answers()
         self.take_completed = self._answers.take
-        self._notes: list[str] = []
+        self._notes: list[Sentence] = []
 
     # -- what the session and diagnostics look at -------------------------------------------------
 
@@ -129,11 +131,11 @@ class ControlMachine:
         return self.pending and not self.pulsing and self._table.enabled is not None
 
     @property
-    def disregard(self) -> str:
+    def disregard(self) -> Sentence:
         """How the drive goes on running although it shall not, and what to do; '' if not."""
         return self._disregard.text
 
-    def take_notes(self) -> list[str]:
+    def take_notes(self) -> list[Sentence]:
         """Return what the log should say of the drive since the last call."""
         notes = self._notes
         if notes:   # seldom, and asked for with every status
@@ -150,8 +152,9 @@ class ControlMachine:
             under_way = self._operation
             if action is ControlAction.QUICK_STOP and under_way is not None and (
                     under_way.action not in _STOPS):
-                self._end(False, 'replaced by quick_stop')  # what stands is to stay so
-            self._answers.complete(request, True, self.state)
+                self._end(False, sentences.replaced('quick_stop'))  # what stands is to stay so
+            self._answers.complete(
+                request, True, sentences.state_reached(self.state))
             return
         refusal = self._refusal(action)
         if refusal is not None:
@@ -161,11 +164,12 @@ class ControlMachine:
         if under_way is None or under_way.action is not action:
             if action is ControlAction.RESET_FAULT and self._nothing_to_do(action) and (
                     under_way is None or under_way.action in _STOPS):
-                self._answers.complete(request, True, self.state)
+                self._answers.complete(
+                request, True, sentences.state_reached(self.state))
                 return
             may_run = self._may_run
             if under_way is not None:
-                self._end(False, f'replaced by {action.value}')
+                self._end(False, sentences.replaced(action.value))
             under_way = self._operation = Operation(action, now + self._timeout)
             if action is ControlAction.QUICK_STOP and may_run and not self._fault:
                 self._send(ControlAction.QUICK_STOP)
@@ -217,10 +221,10 @@ class ControlMachine:
         under_way = self._operation
         if self._reached or (
                 under_way is not None and under_way.action is ControlAction.ENABLE):
-            self.drop(f'{name} offline', 'the group')
+            self.drop(sentences.members_offline([name]), 'the group')
         self._advance()
 
-    def word_refused(self, word: int, reason: str, now: float) -> None:
+    def word_refused(self, word: int, reason: Sentence, now: float) -> None:
         """
         Take note that the drive refused a control word: what is under way fails.
 
@@ -228,7 +232,7 @@ class ControlMachine:
         """
         self.handle_timer(now)
         if word == self.word and self._operation is not None:
-            self._end(False, f'control word {word:04X}h {reason}')
+            self._end(False, sentences.word_refused(word, reason))
 
     def handle_timer(self, now: float) -> None:
         """End what is overdue. Calling it early or late does no harm."""
@@ -249,13 +253,13 @@ class ControlMachine:
         """Return when :meth:`handle_timer` has something to do; ``math.inf`` if never."""
         return math.inf if self._operation is None else self._operation.deadline
 
-    def drop(self, reason: str, whom: str = 'the drive') -> None:
+    def drop(self, reason: Sentence, whom: str = 'the drive') -> None:
         """End what is under way, and what was reached: no user wants that."""
         if self._reached:
-            self._notes.append(f'enable withdrawn: {reason}; only ~/enable starts {whom} again')
+            self._notes.append(sentences.enable_withdrawn(reason, whom))
         self._end(False, reason)
 
-    def withdraw(self, reason: str, now: float, *, lost: bool = True) -> None:
+    def withdraw(self, reason: Sentence, now: float, *, lost: bool = True) -> None:
         """
         Go back to ``disable``: the drive went offline or restarted, or the bridge stops.
 
@@ -278,20 +282,20 @@ class ControlMachine:
             return not self._may_run
         return action is ControlAction.RESET_FAULT and self._fault is False
 
-    def _refusal(self, action: ControlAction) -> str | None:
+    def _refusal(self, action: ControlAction) -> Sentence | None:
         """Return why a request cannot be taken, in words."""
         if action not in self._words:
             return no_word_text(action)
         if action is ControlAction.ENABLE and self._reports.missing:
-            return f'{", ".join(self._reports.missing)} offline'
+            return sentences.members_offline(self._reports.missing)
         if action is ControlAction.ENABLE and self._fault:
-            return 'fault: reset it first'
+            return sentences.reset_first()
         under_way = self._operation
         if under_way is None or under_way.action not in _STOPS or action in _STOPS:
             return None
         if action is ControlAction.RESET_FAULT and self._fault is False:
             return None
-        return f'{under_way.action.value} under way: try {action.value} again when it has ended'
+        return sentences.stop_under_way(under_way.action.value, action.value)
 
     def _advance(self) -> None:
         """Take the next step of what is under way, if the drive confirms the last one."""
@@ -316,8 +320,8 @@ class ControlMachine:
                 self._pulses_left = self._pulse
                 self._send(ControlAction.RESET_FAULT)
             elif self._confirmed(table.fault, False):
-                self._end(True, self.state if table.fault is not None else
-                          'reset_fault sent; the drive does not report faults')
+                self._end(True, sentences.reset_not_reported() if table.fault is None else
+                          sentences.state_reached(self.state))
         elif self._confirmed_off():
             message = success_text(table, self._sending, self.state)
             unheard = self._unheard()
@@ -336,14 +340,13 @@ class ControlMachine:
         had_fault, self._fault = self._fault, fault
         if not self._fault:
             if had_fault:
-                self._notes.append(f'fault gone ({self._reports.text})')
+                self._notes.append(sentences.fault_gone(self._reports.text))
             return
         if not had_fault:
-            again = '; only ~/enable starts the drive again' if self._reached else ''
-            self._notes.append(f'fault ({self._reports.text}){again}')
+            self._notes.append(sentences.fault_came(self._reports.text, self._reached))
         under_way = self._operation
         if under_way is not None and under_way.action is ControlAction.ENABLE:
-            self._end(False, f'fault while enabling ({self._reports.text}): reset it first')
+            self._end(False, sentences.fault_while_enabling(self._reports.text))
         elif self._sending is not ControlAction.RESET_FAULT:
             self._send(ControlAction.DISABLE)
 
@@ -351,9 +354,8 @@ class ControlMachine:
         """Withdraw the enable word from a drive that dropped out by itself."""
         enabled = self._table.enabled
         if self._reached and enabled is not None and not enabled.matches(raw):
-            text = f'no longer enabled, by itself ({self._reports.text})'
-            self._notes.append(f'{text}; only ~/enable starts the drive again')
-            self._end(False, text)
+            self._notes.append(sentences.dropped_out_for_good(self._reports.text))
+            self._end(False, sentences.dropped_out(self._reports.text))
 
     def _watch_disabled(self, now: float) -> None:
         """Tell of a drive that runs on although its control word is there to stop it."""
@@ -390,7 +392,7 @@ class ControlMachine:
         self._sending = action
         self._reached = self._reached and action is ControlAction.ENABLE
 
-    def _end(self, success: bool, message: str) -> None:
+    def _end(self, success: bool, message: Sentence) -> None:
         """Answer what is under way, if anything; only a successful ENABLE keeps its word."""
         under_way, self._operation = self._operation, None
         if under_way is not None:

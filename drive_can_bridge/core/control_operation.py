@@ -4,6 +4,7 @@
 from dataclasses import dataclass, field
 
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
+from drive_can_bridge.core.sentences import Sentence
 
 
 @dataclass(slots=True)
@@ -27,11 +28,11 @@ class Answers:
     def __init__(self) -> None:
         self._completed: list[ControlCompleted] = []
 
-    def complete(self, request: ControlRequest, success: bool, message: str) -> None:
+    def complete(self, request: ControlRequest, success: bool, message: Sentence) -> None:
         """Answer one request."""
         self._completed.append(ControlCompleted(request, success, message))
 
-    def answer(self, operation: Operation, success: bool, message: str) -> None:
+    def answer(self, operation: Operation, success: bool, message: Sentence) -> None:
         """Answer all that wait for an operation."""
         for request in operation.requests:
             self.complete(request, success, message)

@@ -1,8 +1,10 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """What is said of a drive with a control word: its state, and why it does not follow."""
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.profile import ControlTable
+from drive_can_bridge.core.sentences import Sentence
 from drive_can_bridge.core.status_reports import StatusReports, Wording
 
 
@@ -37,7 +39,7 @@ def state_text(reports: StatusReports, table: ControlTable, wording: Wording | N
 
 def stuck_text(reports: StatusReports, table: ControlTable, wording: Wording | None, state: str,
                timeout: float, sending: ControlAction, word: int, *, sent: bool, pulsed: bool,
-               acknowledged: bool) -> str:
+               acknowledged: bool) -> Sentence:
     """
     Say that nothing was confirmed in time, and as much as is known of the reason.
 
@@ -46,43 +48,41 @@ def stuck_text(reports: StatusReports, table: ControlTable, wording: Wording | N
     :param acknowledged: ``sent`` says that the drive has acknowledged the word.
     """
     if pulsed and reports.answered:
-        return f'fault still present after {timeout:g} s ({reports.text})'
-    text = f'no confirmation in {timeout:g} s: stuck in state {state} ({reports.text})'
-    name = f'control word {word:04X}h'
+        return sentences.fault_present(timeout, reports.text)
+    remarks: list[str] = []
     if not sent:
-        text += f'; {name} ' + ('was not acknowledged' if acknowledged else 'could not be sent')
+        remarks.append(sentences.word_not_acknowledged(word) if acknowledged else
+                       sentences.word_not_sent(word))
     elif not reports.answered:
-        text += f'; no status word since {name}'
+        remarks.append(sentences.no_status_since(word))
     elif reports.says(table.enabled):
-        text += f'; it does not follow {name}'
+        remarks.append(sentences.word_not_followed(word))
     if sending is ControlAction.QUICK_STOP:     # which is what keeps it there
-        return text + ('; the word stays' if reports.says(table.braking) else '; now disable')
-    return text if wording is None or reports.telling is None else (
-        text + wording.hint(reports.telling))
+        remarks.append(sentences.word_stays() if reports.says(table.braking) else
+                       sentences.now_disable())
+    elif wording is not None and reports.telling is not None:
+        hint = wording.hint(reports.telling)
+        remarks += [hint] if hint else []
+    return sentences.stuck(timeout, state, reports.text, remarks)
 
 
 #: how a refusal begins where a profile has no quick stop; others tell it by this
 NO_QUICK_STOP = 'no quick stop: '
 
 
-def no_word_text(action: ControlAction) -> str:
+def no_word_text(action: ControlAction) -> Sentence:
     """Say that a profile lacks the word for an action, and what there is instead."""
-    if action is ControlAction.QUICK_STOP:
-        return (f'{NO_QUICK_STOP}the profile has no quick_stop word; '
-                '~/enable false disables the drive')
-    return 'no fault reset: the profile has no reset_fault word'
+    return (sentences.no_quick_stop_word() if action is ControlAction.QUICK_STOP else
+            sentences.no_reset_word())
 
 
-def success_text(table: ControlTable, sending: ControlAction, state: str) -> str:
+def success_text(table: ControlTable, sending: ControlAction, state: str) -> Sentence:
     """Name the state reached, or say that nobody knows."""
-    if table.enabled is None:
-        return f'{sending.value} sent; the drive does not report its state'
-    return state
+    return (sentences.state_not_reported(sending.value) if table.enabled is None else
+            sentences.state_reached(state))
 
 
 def disregard_text(reports: StatusReports, state: str, sending: ControlAction,
-                   word: int) -> str:
+                   word: int) -> Sentence:
     """Say that a drive runs on although it shall not, and what to do."""
-    return (f'still {state} ({reports.text}) although its control word is {sending.value} '
-            f'({word:04X}h): stop it by other means, or set a control_timeout longer than its '
-            f'ramp')
+    return sentences.disregards(state, reports.text, sending.value, word)

@@ -9,10 +9,12 @@ storage, limits. Only its value is raw: the unsigned integer on the wire.
 from collections.abc import Callable
 from dataclasses import replace
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import (
     Access, Parameter, ParameterType, Storage, ValueKind,
 )
+from drive_can_bridge.core.sentences import Sentence
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.core.words import nearest
 
@@ -65,11 +67,11 @@ class ParameterDirectory:
             return [parameter]
         return [other for other in self.listed.values() if _place(other) == _place(parameter)]
 
-    def unknown(self, name: str, *, hint: bool = True) -> str:
+    def unknown(self, name: str, *, hint: bool = True) -> Sentence:
         """Say that a name is unknown, with the nearest known one (which takes milliseconds)."""
         near = nearest(name, self.listed) if hint else None
         shown = printable(name, NAME_SHOWN) or "''"
-        return f'unknown parameter {shown}' + (f', did you mean {near}?' if near else '')
+        return sentences.unknown_parameter(shown, near)
 
     def raw_from_user(self, parameter: Parameter, value: object) -> int:
         """
@@ -78,7 +80,7 @@ class ParameterDirectory:
         :raises ValueRefused: read-only, wrong type, out of range or not representable, in words.
         """
         if not parameter.writable:
-            raise ValueRefused('read-only')
+            raise ValueRefused(sentences.read_only())
         kind = parameter.kind
         if kind is ValueKind.BOOL:
             right = isinstance(value, bool)
@@ -88,10 +90,10 @@ class ParameterDirectory:
             right = isinstance(value, int) and not isinstance(value, bool)
         if right and isinstance(value, int) and value.bit_length() > _BITS_MAX:
             # neither floats nor texts take what no type can carry by far
-            raise ValueRefused(f'a number of {value.bit_length()} bits is out of range: '
-                               f'{parameter.range_text}')
+            raise ValueRefused(sentences.too_many_bits(
+                value.bit_length(), parameter.range_text))
         if not right:
-            raise ValueRefused(f'wrong type: {_type_name(value)}, expected {kind.value}')
+            raise ValueRefused(sentences.wrong_type(_type_name(value), kind.value))
         if parameter.listed:
             return parameter.raw_from_value(value)  # type: ignore[arg-type]
         return self._raw_from_integer(parameter, value)  # type: ignore[arg-type]
@@ -99,8 +101,8 @@ class ParameterDirectory:
     def _raw_from_integer(self, parameter: Parameter, value: int) -> int:
         high = parameter.type.raw_range[1]
         if not -(high + 1) // 2 <= value <= high:
-            raise ValueRefused(f'{value} is not representable in {parameter.type.bits} bits: '
-                               f'{-(high + 1) // 2} to {high}')
+            raise ValueRefused(sentences.not_in_bits(
+                value, parameter.type.bits, -(high + 1) // 2, high))
         if not parameter.width_known:
             return value  # how many bits its two's complement has, the drive tells
         word = parameter.word_from_raw(value)
@@ -108,7 +110,8 @@ class ParameterDirectory:
             try:
                 twin.check_limits(twin.value_from_raw(twin.raw_from_word(word)))
             except ValueRefused as error:
-                raise ValueRefused(f'raw {value} of {twin.name}: {error}') from None
+                raise ValueRefused(sentences.raw_refused(
+                    value, twin.name, error.sentence)) from None
         return word
 
 

@@ -3,6 +3,8 @@
 
 import math
 
+from drive_can_bridge.core.sentences import NOTHING
+
 #: s that a drive may go on running under ``disable`` at least until that is told
 RUNNING_ON_MAX = 1.0
 
@@ -16,7 +18,7 @@ class Disregard:
     """
 
     def __init__(self, timeout: float) -> None:
-        self.text = ''
+        self.text = NOTHING
         self._longest = max(RUNNING_ON_MAX, timeout)
         self._since = math.inf
 
@@ -30,4 +32,4 @@ class Disregard:
 
     def forget(self) -> None:
         """Take note that it is over."""
-        self._since, self.text = math.inf, ''
+        self._since, self.text = math.inf, NOTHING

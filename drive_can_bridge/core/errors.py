@@ -18,9 +18,18 @@ The errors of the package.
 Every message is a sentence for a user, without a trailing period, in the manuals' own terms.
 """
 
+from drive_can_bridge.core import sentences
+from drive_can_bridge.core.sentences import NOTHING, Sentence
+
 
 class DriveCanError(Exception):
     """Base of everything this package raises on purpose."""
+
+    @property
+    def sentence(self) -> Sentence:
+        """What is wrong, with its code; none where it was raised with a mere text."""
+        text = self.args[0] if self.args else NOTHING
+        return text if isinstance(text, Sentence) else sentences.uncoded(str(self))
 
 
 class ConfigurationError(DriveCanError):

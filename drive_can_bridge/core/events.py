@@ -6,6 +6,7 @@ from typing import NamedTuple, Union
 
 from drive_can_bridge.core.control import ControlCompleted
 from drive_can_bridge.core.requests import Outcome, Request
+from drive_can_bridge.core.sentences import Sentence
 
 
 class ProcessDataReceived(NamedTuple):
@@ -32,28 +33,28 @@ class StationFound:
 class StationLost:
     """The drive is offline; ``reason`` says in words what was missing."""
 
-    reason: str
+    reason: Sentence
 
 
 @dataclass(frozen=True)
 class DriveFailed:
     """A defect of this program: the drive is stopped, and offline; ``reason`` has the words."""
 
-    reason: str
+    reason: Sentence
 
 
 @dataclass(frozen=True)
 class MappingDiffered:
     """The drive's maps are not the configured ones: no cyclic frame is sent."""
 
-    text: str
+    text: Sentence
 
 
 @dataclass(frozen=True)
 class MappingWritten:
     """The drive's maps were rewritten (``mapping: configure``)."""
 
-    text: str
+    text: Sentence
 
 
 @dataclass(frozen=True)
@@ -75,14 +76,14 @@ class RequestCompleted:
 class FrameRejected:
     """A frame on the drive's own response identifiers was malformed or unasked."""
 
-    text: str
+    text: Sentence
 
 
 @dataclass(frozen=True)
 class ForeignMasterSeen:
     """Somebody else sends requests to this drive."""
 
-    text: str
+    text: Sentence
 
 
 @dataclass(frozen=True)
@@ -94,7 +95,7 @@ class Noted:
     :param danger: at once: a drive may be running that should not.
     """
 
-    text: str
+    text: Sentence
     warning: bool = False
     danger: bool = False
 

@@ -17,6 +17,7 @@ from functools import cached_property
 import math
 from typing import Union
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.words import value_text
 
@@ -216,28 +217,27 @@ class Parameter:
         if self.type is ParameterType.BOOL:
             if value is True or value is False:
                 return int(value)
-            raise ValueRefused(f'{value!r} is not a bool')
+            raise ValueRefused(sentences.not_a_bool(repr(value)))
         if isinstance(value, bool):
-            raise ValueRefused(f'{value!r} is a bool, not a number')
+            raise ValueRefused(sentences.not_a_number(repr(value)))
         if isinstance(value, float) and not math.isfinite(value):
-            raise ValueRefused(f'{value} is not a finite number')
+            raise ValueRefused(sentences.not_finite(str(value)))
         self.check_limits(value)
         if not self.scaled:
             if isinstance(value, float) and not value.is_integer():
-                raise ValueRefused(f'{value_text(value)} is not an integer')
+                raise ValueRefused(sentences.not_an_integer(value_text(value)))
             raw = int(value)
         else:
             raw = math.floor(self._steps(value) + 0.5)
         low, high = self.type.raw_range
         if not low <= raw <= high:
-            raise ValueRefused(
-                f'{value_text(value)} is not representable: {self.type.value} carries '
-                f'{_in_words(self.value_range)}{self._unit_suffix}')
+            raise ValueRefused(sentences.not_carried(
+                value_text(value), self.type.value,
+                _in_words(self.value_range) + self._unit_suffix))
         low, high = self.raw_limits
         if low > high:
-            raise ValueRefused(
-                f'{value_text(value)} is not representable: {self.type.value} has no value in '
-                f'{self.range_text}')
+            raise ValueRefused(sentences.none_in_range(
+                value_text(value), self.type.value, self.range_text))
         return min(max(raw, low), high)
 
     def raw_nearest(self, value: Value) -> int | None:
@@ -299,7 +299,7 @@ class Parameter:
         """
         low, high = self._limits
         if value < low or value > high:
-            raise ValueRefused(f'{value_text(value)} is out of range: {self.range_text}')
+            raise ValueRefused(sentences.out_of_range(value_text(value), self.range_text))
 
     @property
     def range_text(self) -> str:

@@ -11,8 +11,8 @@ from drive_can_bridge.core.events import (
     Event, FrameRejected, Noted, SetpointsExpired, StationFound, StationLost,
 )
 from drive_can_bridge.core.holding import Setpoint
+from drive_can_bridge.core.sentences import may_still_be_running, NOTHING, Sentence
 from drive_can_bridge.core.statistics import DriveStatistics
-from drive_can_bridge.core.told import MAY_RUN
 
 
 class Reporter:
@@ -26,7 +26,7 @@ class Reporter:
 
     __slots__ = ('_statistics', 'advice', 'events')
 
-    def __init__(self, statistics: DriveStatistics, advice: str) -> None:
+    def __init__(self, statistics: DriveStatistics, advice: Sentence) -> None:
         self.events: list[Event] = []
         self.advice = advice
         self._statistics = statistics
@@ -42,26 +42,26 @@ class Reporter:
         """Tell what happened."""
         self.events.append(event)
 
-    def warn(self, text: str, *, may_run: bool = False) -> None:
+    def warn(self, text: Sentence, *, may_run: bool = False) -> None:
         """
         Tell people what is not as it should be.
 
         :param may_run: the drive may be running for that reason, which is said.
         """
         self.events.append(Noted(
-            f'{text}: {MAY_RUN}' if may_run else text, warning=True, danger=may_run))
+            may_still_be_running(text) if may_run else text, warning=True, danger=may_run))
 
-    def reject(self, text: str) -> None:
+    def reject(self, text: Sentence) -> None:
         """Count and tell a frame of the drive that is malformed or unasked."""
         self._statistics.rejected += 1
         self.events.append(FrameRejected(text))
 
     def found(self) -> None:
         """Tell that the drive exchanges process data."""
-        self.advice = ''
+        self.advice = NOTHING
         self.events.append(StationFound())
 
-    def lost(self, reason: str, *, was_online: bool) -> None:
+    def lost(self, reason: Sentence, *, was_online: bool) -> None:
         """Tell why the drive is offline; people hear of it when it was not."""
         self.advice = reason
         if was_online:

@@ -4,8 +4,10 @@
 from collections.abc import Callable
 from typing import Protocol
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.events import RequestCompleted
-from drive_can_bridge.core.requests import BUSY, Failure, Outcomes, Request
+from drive_can_bridge.core.requests import Failure, Outcomes, Request
+from drive_can_bridge.core.sentences import Sentence
 from drive_can_bridge.core.statistics import DriveStatistics
 
 #: requests of one drive that may wait behind the one being served
@@ -36,7 +38,7 @@ class RequestDesk:
     """
 
     def __init__(self, server: RequestServer, statistics: DriveStatistics,
-                 emit: Callable[[RequestCompleted], None], *, refusal: Callable[[float], str],
+                 emit: Callable[[RequestCompleted], None], *, refusal: Callable[[float], Sentence],
                  answered: Callable[[Request, Outcomes], None]) -> None:
         self._server = server
         self._statistics = statistics
@@ -54,7 +56,7 @@ class RequestDesk:
         """Take a request; it is answered by exactly one ``RequestCompleted``."""
         refusal = self._refusal(now)
         if not refusal and self.waiting >= WAITING_REQUESTS_MAX:
-            refusal = BUSY
+            refusal = sentences.busy()
         if refusal:
             self._refuse(request, refusal)
         elif not len(request):
@@ -63,7 +65,7 @@ class RequestDesk:
             self._open.append(request)
             self._server.serve(request, lambda outcomes: self._done(request, outcomes), now)
 
-    def fail_all(self, reason: str) -> None:
+    def fail_all(self, reason: Sentence) -> None:
         """Forget what is under way, and answer it."""
         self._server.cancel()
         requests, self._open = self._open, []
@@ -75,7 +77,7 @@ class RequestDesk:
         self._complete(request, outcomes)
         self._answered(request, outcomes)
 
-    def _refuse(self, request: Request, reason: str) -> None:
+    def _refuse(self, request: Request, reason: Sentence) -> None:
         """Answer a request with the same failure for every name."""
         self._complete(request, (Failure(reason),) * len(request))
 

@@ -10,14 +10,16 @@ the order asked.
 from dataclasses import dataclass
 from typing import Union
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.sentences import Sentence
 
 
 @dataclass(frozen=True)
 class Failure:
     """One parameter failed; ``reason`` says why in words."""
 
-    reason: str
+    reason: Sentence
 
 
 @dataclass(frozen=True)
@@ -42,23 +44,25 @@ Outcome = Union[Failure, ReadValue, Written]
 #: of a request: one for each name
 Outcomes = tuple[Outcome, ...]
 
-#: what begins every reason of a failure for which no frame of the drive came
-NO_ANSWER = 'no answer'
-SENT_UNACKNOWLEDGED = 'sent; this protocol does not acknowledge writes'
-BUS_DOWN = 'bus down'
-NOT_SENT = 'not sent: the bus takes no frames'
-BRIDGE_INACTIVE = 'bridge inactive'
-BUSY = 'busy'
-OFFLINE = 'drive offline'
-NO_ANSWER_OFFLINE = f'{NO_ANSWER}; {OFFLINE}'
-_NOTHING_SAID = (NO_ANSWER, BUS_DOWN, NOT_SENT, BRIDGE_INACTIVE, BUSY, OFFLINE)
+#: codes of failures for which no frame of the drive came
+SILENT = frozenset(['no_answer', 'no_answer_offline', 'no_answer_because'])
+ABSENT = frozenset(['drive_offline', 'drive_offline_because'])
+_NOTHING_SAID_TEXTS = (
+    'no answer', sentences.drive_offline(), sentences.bus_down(), sentences.not_sent(),
+    sentences.bridge_inactive(), sentences.busy())
+_NOTHING_SAID = SILENT | ABSENT | {'bus_down', 'not_sent', 'bridge_inactive', 'busy'}
 
 
 def is_answer(outcome: Outcome) -> bool:
     """Tell whether an outcome rests on something that the drive said."""
     if isinstance(outcome, Failure):
-        return not outcome.reason.startswith(_NOTHING_SAID)
+        return outcome.reason.code not in _NOTHING_SAID
     return not (isinstance(outcome, Written) and outcome.note)
+
+
+def tells_nothing(reason: str) -> bool:
+    """Tell whether a reason that came as mere text says that no frame of the drive came."""
+    return reason.startswith(_NOTHING_SAID_TEXTS)
 
 
 @dataclass(frozen=True, eq=False)

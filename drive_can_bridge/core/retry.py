@@ -4,7 +4,8 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from drive_can_bridge.core.requests import Failure, NO_ANSWER_OFFLINE
+from drive_can_bridge.core import sentences
+from drive_can_bridge.core.requests import Failure
 
 
 def _never() -> bool:
@@ -28,7 +29,6 @@ class RetryPolicy:
     def unanswered(self, attempts: int | None = None) -> Failure:
         """Say that nobody answered; ``attempts`` None: as many as configured."""
         if self.offline():
-            return Failure(NO_ANSWER_OFFLINE)
-        attempts = self.attempts if attempts is None else attempts
-        noun = 'attempt' if attempts == 1 else 'attempts'
-        return Failure(f'no answer in {self.timeout:g} s, {attempts} {noun}')
+            return Failure(sentences.no_answer_offline())
+        return Failure(sentences.no_answer(
+            self.timeout, self.attempts if attempts is None else attempts))

@@ -11,9 +11,11 @@ word, a setpoint or a map is the bridge's own.
 from collections.abc import Callable, Hashable
 from enum import Enum
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.process_image import control_word
+from drive_can_bridge.core.sentences import NOTHING, Sentence
 
 #: what a parameter addresses; empty: nothing that acyclic frames reach
 Cells = frozenset[Hashable]
@@ -32,9 +34,9 @@ def by_number(parameter: Parameter) -> Cells:
     return frozenset() if parameter.number is None else frozenset([parameter.number])
 
 
-def publish_it(parameter: Parameter) -> str:
+def publish_it(parameter: Parameter) -> Sentence:
     """Say why a setpoint is not written by request."""
-    return f'sent cyclically: publish ~/command/{parameter.name}'
+    return sentences.sent_cyclically(parameter.name)
 
 
 class Roles:
@@ -50,8 +52,8 @@ class Roles:
 
     def __init__(self, drive: DriveConfiguration, *, controlled: bool,
                  cells: Callable[[Parameter], Cells] = by_number, maps: Cells = frozenset(),
-                 cyclic_refusal: Callable[[Parameter], str] = publish_it,
-                 refusal: Callable[[Parameter], str] = lambda parameter: '') -> None:
+                 cyclic_refusal: Callable[[Parameter], Sentence] = publish_it,
+                 refusal: Callable[[Parameter], Sentence] = lambda parameter: NOTHING) -> None:
         self.cells = cells
         self._cyclic_refusal = cyclic_refusal
         self._further_refusal = refusal
@@ -85,7 +87,7 @@ class Roles:
             parameter == other or cells & others for other, others in self._received)
         return Role.CYCLIC if received else None
 
-    def write_refusal(self, parameter: Parameter, *, exchanging: bool) -> str:
+    def write_refusal(self, parameter: Parameter, *, exchanging: bool) -> Sentence:
         """
         Say why users may not write a parameter; '' if they may.
 
@@ -93,9 +95,9 @@ class Roles:
         """
         role, own = self.owner(parameter) or (None, parameter)
         if role is Role.CONTROL:
-            return 'use ~/enable'
+            return sentences.use_enable()
         if role is Role.CYCLIC:
             return self._cyclic_refusal(own)
         if role is Role.MAP and exchanging:
-            return 'mapping parameter: not written while the bridge is active'
+            return sentences.mapping_parameter()
         return self._further_refusal(parameter)

@@ -31,6 +31,7 @@ from enum import Enum
 import math
 from typing import Any
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.command_gate import CommandGate
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control_machine import ControlMachine
@@ -42,16 +43,14 @@ from drive_can_bridge.core.outbox import Outbox
 from drive_can_bridge.core.parts import AcyclicPart, Part
 from drive_can_bridge.core.process_image import ProcessImage
 from drive_can_bridge.core.reporter import Reporter
-from drive_can_bridge.core.requests import BRIDGE_INACTIVE, BUS_DOWN
 from drive_can_bridge.core.retry import RetryPolicy
 from drive_can_bridge.core.roles import Roles
+from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.setpoints import Setpoints
 from drive_can_bridge.core.statistics import DriveStatistics
-from drive_can_bridge.core.told import Told, UNHEARD_STOP
+from drive_can_bridge.core.told import Told
 from drive_can_bridge.core.users import Users
 
-#: advice until more is known
-LOOKING = 'being looked for'
 
 
 class Stage(Enum):
@@ -105,7 +104,7 @@ class Session(ABC):
         self.control = control
         self.statistics = DriveStatistics()
         self.outbox = Outbox()
-        self.report = Reporter(self.statistics, 'not activated')
+        self.report = Reporter(self.statistics, sentences.not_activated())
         self.told = Told()
         self.sent = LastSent(image.request)
         self.sample_parameters = image.sample
@@ -121,7 +120,7 @@ class Session(ABC):
             offline=lambda: self.state is DriveState.OFFLINE)
         self.stage = Stage.IDLE
         self.active = self.serving = self.bus_available = self.online = self.ever_online = False
-        self.defect = ''
+        self.defect = NOTHING
         self.how_to_enable = 'call ~/enable'
         self.partners: Sequence[Session] = ()
         self.phase: float | None = None
@@ -141,7 +140,7 @@ class Session(ABC):
     def activate(self, now: float) -> None:
         """Begin to exchange (as soon as the bus is there)."""
         self.active = True
-        self.defect = ''
+        self.defect = NOTHING
         self.ever_online = False
         self.sent.clear()
         self.setpoints.reset()
@@ -160,9 +159,9 @@ class Session(ABC):
 
     def deactivate(self, now: float) -> None:
         """Begin the safe stop: neutral setpoints, ``disable``; then silence."""
-        self._begin_end(BRIDGE_INACTIVE, now)
+        self._begin_end(sentences.bridge_inactive(), now)
 
-    def fail(self, reason: str, now: float) -> None:
+    def fail(self, reason: Sentence, now: float) -> None:
         """
         Stop the drive as at the end: this program has a defect, and nobody knows what it spoilt.
 
@@ -177,12 +176,12 @@ class Session(ABC):
 
     def begin_anew(self, now: float) -> None:
         """Look for the drive again, after a defect."""
-        self.defect = ''
+        self.defect = NOTHING
         self.active = True
         if self.bus_available:
             self.bus_up(now)
 
-    def _begin_end(self, reason: str, now: float) -> None:
+    def _begin_end(self, reason: Sentence, now: float) -> None:
         self.active = False
         unheard = not self.online and self.told.doubt()
         owes = self.prepare_stop(now)
@@ -193,18 +192,18 @@ class Session(ABC):
         if owes and self.begin_stop(now):
             return
         if owes or unheard or not self.bus_available:
-            self._leave_owing('could not be told to stop')
-        self.go_idle('deactivated')
+            self._leave_owing(sentences.stop_not_possible())
+        self.go_idle(sentences.deactivated())
 
     def stop_left(self) -> None:
         """End a stop that nobody acknowledges: send nothing more."""
-        self._leave_owing(UNHEARD_STOP)
-        self.go_idle('deactivated')
+        self._leave_owing(sentences.stop_not_answered())
+        self.go_idle(sentences.deactivated())
 
     def stop_ended(self) -> None:
         """End a stop by writes, if this one was for that: what it could not do, it has told."""
         if self.stage is Stage.STOPPING:
-            self.go_idle('deactivated')
+            self.go_idle(sentences.deactivated())
 
     @property
     def stopped(self) -> bool:
@@ -220,7 +219,7 @@ class Session(ABC):
         """Begin to use the bus: it was opened."""
         self.bus_available = True
         if self.active and not self.serving:
-            self.report.advice = LOOKING
+            self.report.advice = sentences.looked_for()
             self.start_over(now)
 
     def bus_down(self, now: float, reason: str) -> None:
@@ -228,19 +227,19 @@ class Session(ABC):
         self.bus_available = False
         if not (self.active or self.stopped):
             self.told.doubt()   # no answer to the stop will come
-        self.users.fail_all(BUS_DOWN)
-        self.lose(f'bus down: {reason}', now)
-        self.go_idle(f'bus down: {reason}')
+        self.users.fail_all(sentences.bus_down())
+        self.lose(sentences.bus_is_down(reason), now)
+        self.go_idle(sentences.bus_is_down(reason))
         self.outbox.clear()
-        self._leave_owing('the bus was lost before it could be told to stop')
+        self._leave_owing(sentences.bus_lost_before_stop())
 
     def give_up(self, now: float) -> None:
         """Handle a stop that did not come to its end in time: the bus takes nothing."""
-        self._leave_owing('could not be told to stop')
-        self.go_idle('deactivated')
+        self._leave_owing(sentences.stop_not_possible())
+        self.go_idle(sentences.deactivated())
         self.outbox.clear()
 
-    def go_idle(self, advice: str) -> None:
+    def go_idle(self, advice: Sentence) -> None:
         """Send nothing more, and be offline."""
         self.stage = Stage.IDLE
         self.fall_silent()
@@ -255,7 +254,7 @@ class Session(ABC):
 
     def start_over(self, now: float) -> None:
         """Begin anew: nothing is known of the drive."""
-        reason = 'the drive is being reconnected'
+        reason = sentences.reconnected()
         if self.online:
             self.lose(reason, now)
         else:
@@ -264,21 +263,21 @@ class Session(ABC):
         self.stage = Stage.RUNNING
         self.begin(now)
 
-    def lose(self, reason: str, now: float) -> None:
+    def lose(self, reason: Sentence, now: float) -> None:
         """Make the drive offline, if it is not."""
         was_online = self.online
         self.withdraw(reason, now)
         self.setpoints.forget()
         if was_online and self.gate.mute:
-            self._leave_owing('where its axis is, nobody knows, so that it is told nothing')
+            self._leave_owing(sentences.position_unknown())
         self.be_offline(reason)
         self.lost(now, was_online=was_online)
 
     def stood_still(self, now: float) -> None:
         """Make the drive offline after a stall: nobody has looked after it meanwhile."""
-        self.lose('the bridge stood still', now)
+        self.lose(sentences.bridge_stood_still(), now)
 
-    def withdraw(self, reason: str, now: float) -> None:
+    def withdraw(self, reason: Sentence, now: float) -> None:
         """Go neutral, and back to ``disable``."""
         self.gate.withdraw(reason, now)
         if self.control is not None:
@@ -289,13 +288,13 @@ class Session(ABC):
         self.online = self.ever_online = True
         self.report.found()
 
-    def be_offline(self, reason: str) -> None:
+    def be_offline(self, reason: Sentence) -> None:
         """Take note that the drive is offline, if it was not."""
         self.report.lost(reason, was_online=self.online)
         self.online = False
         self.went_offline()
 
-    def _leave_owing(self, why: str) -> None:
+    def _leave_owing(self, why: Sentence) -> None:
         """Say that the drive is left as it is, if it was told to run and not to stop."""
         if self.told.owed:
             self.report.warn(why, may_run=True)
@@ -411,15 +410,15 @@ class Session(ABC):
         return DriveState.OFFLINE if self.defect else self.gate.state
 
     @property
-    def warning(self) -> str:
+    def warning(self) -> Sentence:
         """Why all is not well although the drive is online, and what to do; '' otherwise."""
-        return ''
+        return NOTHING
 
     def facts(self) -> dict[str, str]:
         """Return what diagnostics show of this family beyond what all families have."""
         return {}
 
     @property
-    def offline_advice(self) -> str:
+    def offline_advice(self) -> Sentence:
         """While not online: what is missing and what to look at; '' while online."""
         return self.defect or self.report.advice

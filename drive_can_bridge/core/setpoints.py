@@ -17,6 +17,7 @@ import math
 from drive_can_bridge.core.holding import HeldSetpoint, make_setpoint, Setpoint
 from drive_can_bridge.core.last_sent import LastSent
 from drive_can_bridge.core.parameters import Parameter, Value
+from drive_can_bridge.core.sentences import NOTHING, Sentence, would_jump
 
 
 class CommandOutcome(Enum):
@@ -170,13 +171,13 @@ class Setpoints:
         return [setpoint for setpoint in self.held if not setpoint.told]
 
     @property
-    def untold_text(self) -> str:
+    def untold_text(self) -> Sentence:
         """Why an axis cannot be driven yet: the drive does not have its position; '' if it has."""
         texts = [
             f'{setpoint.parameter.name} does not have the value of {setpoint.measured.name} yet'
             + ('' if setpoint.known else ', which is not known or which it cannot carry')
             for setpoint in self.untold]
-        return f'it would jump: {"; ".join(texts)}' if texts else ''
+        return would_jump('; '.join(texts)) if texts else NOTHING
 
     def reset(self) -> None:
         """Take note that nothing was ever measured."""

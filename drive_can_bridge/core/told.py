@@ -9,9 +9,6 @@ whether it still owes the drive a stop.
 
 from collections.abc import Hashable
 
-#: what is said of a drive that was told so, and does not answer
-UNHEARD_STOP = 'told to stop, but it does not answer'
-MAY_RUN = 'it may still be running'
 #: what a control word is among the things that travel separately, where it does
 CONTROL_WORD = 'control word'
 #: what a drive that does not answer was told

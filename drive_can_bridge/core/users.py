@@ -9,20 +9,20 @@ been served (:mod:`.request_desk`), or when the control machine says so.
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
 from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import RequestCompleted
 from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.request_desk import RequestDesk, RequestServer
 from drive_can_bridge.core.requests import (
-    BRIDGE_INACTIVE, BUS_DOWN, is_answer, Outcomes, Request,
+    is_answer, Outcomes, Request,
 )
+from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.setpoints import CommandOutcome
 
 if TYPE_CHECKING:
     from drive_can_bridge.core.session import Session
-
-DRIVE_OFFLINE = 'drive offline'
 
 
 class Users:
@@ -38,8 +38,8 @@ class Users:
     """
 
     def __init__(self, session: 'Session', server: RequestServer, *,
-                 blocked: Callable[[float], str] = lambda now: '',
-                 control_refusal: Callable[[ControlAction, str], str] = (
+                 blocked: Callable[[float], Sentence] = lambda now: NOTHING,
+                 control_refusal: Callable[[ControlAction, Sentence], Sentence] = (
                      lambda action, refusal: refusal),
                  answered: Callable[[Request, Outcomes], None] = lambda request, outcomes: None,
                  control: Callable[[ControlRequest, float], None] | None = None) -> None:
@@ -96,7 +96,7 @@ class Users:
         """How many requests for parameters wait behind the one being served."""
         return self._desk.waiting
 
-    def fail_all(self, reason: str) -> None:
+    def fail_all(self, reason: Sentence) -> None:
         """Forget the requests for parameters that are under way, and answer them."""
         self._desk.fail_all(reason)
 
@@ -108,30 +108,31 @@ class Users:
 
     # -- refusals ---------------------------------------------------------------------------------
 
-    def _refusal(self, now: float) -> str:
+    def _refusal(self, now: float) -> Sentence:
         """Say why requests for parameters are not taken now; '' if they are."""
         return self._blocked(now) or self._absence
 
     @property
-    def _absence(self) -> str:
+    def _absence(self) -> Sentence:
         if not self._session.active:
-            return self._session.defect or BRIDGE_INACTIVE
-        return '' if self._session.bus_available else BUS_DOWN
+            return self._session.defect or sentences.bridge_inactive()
+        return NOTHING if self._session.bus_available else sentences.bus_down()
 
-    def control_refusal(self, action: ControlAction) -> str:
+    def control_refusal(self, action: ControlAction) -> Sentence:
         """Say why a control action cannot be asked for now; '' if it can."""
         session = self._session
         if session.control is None:
-            refusal = 'the profile has no control section'
+            refusal = sentences.no_control_section()
         elif self._absence:
             refusal = self._absence
         elif not session.online:
-            refusal = DRIVE_OFFLINE
+            refusal = sentences.drive_offline()
         else:
-            refusal = session.setpoints.untold_text if action is ControlAction.ENABLE else ''
+            refusal = (
+                session.setpoints.untold_text if action is ControlAction.ENABLE else NOTHING)
         return self._judge(action, refusal)
 
-    def write_refusal(self, parameter: Parameter) -> str:
+    def write_refusal(self, parameter: Parameter) -> Sentence:
         """Say why users may not write this parameter now; '' if they may."""
         session = self._session
         return session.roles.write_refusal(

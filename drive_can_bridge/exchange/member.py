@@ -13,6 +13,7 @@ import math
 
 from drive_can_bridge.core.events import DriveFailed, ProcessDataReceived
 from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.sentences import internal_error, partner_failed, Sentence
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.exchange.listeners import DriveListener
 
@@ -131,7 +132,7 @@ class Member:
         text = _in_words(error)
         self._fail(text)
         for partner in self.partners:
-            partner._fail(f'{self.session.configuration.name}: {text}')
+            partner._fail(partner_failed(self.session.configuration.name, text))
 
     def _unheard(self, error: Exception) -> None:
         """Take note that the listener has raised: a stop that takes its course goes on."""
@@ -140,7 +141,7 @@ class Member:
         else:
             self._tell_defect(_in_words(error))
 
-    def _fail(self, text: str) -> None:
+    def _fail(self, text: Sentence) -> None:
         session, now = self.session, self._clock()
         if session.active:
             self.anew_at = now + PAUSE
@@ -152,7 +153,7 @@ class Member:
                 self.due = now + RETRY_AFTER
         self._give_up_at = now + session.longest_stop + STOP_MARGIN
 
-    def _tell_defect(self, text: str) -> None:
+    def _tell_defect(self, text: Sentence) -> None:
         if text == self._defect_told:
             return
         self._defect_told = text
@@ -172,5 +173,5 @@ class Member:
             self.take(session.give_up, now)
 
 
-def _in_words(error: Exception) -> str:
-    return f'internal error: {type(error).__name__}: {error}'
+def _in_words(error: Exception) -> Sentence:
+    return internal_error(type(error).__name__, str(error))

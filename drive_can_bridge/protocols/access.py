@@ -12,12 +12,14 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Generator, Hashable, Sequence
 from typing import Generic, Union
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.requests import (
-    Failure, NO_ANSWER_OFFLINE, NOT_SENT, Outcome, Outcomes, ReadRequest, ReadValue, Request,
+    Failure, Outcome, Outcomes, ReadRequest, ReadValue, Request,
     WriteRequest,
 )
 from drive_can_bridge.core.retry import RetryPolicy
+from drive_can_bridge.core.sentences import Sentence
 from drive_can_bridge.core.words import value_text
 from drive_can_bridge.protocols.channel import Channel, Lane
 from drive_can_bridge.protocols.courier import ReplyT, StepT
@@ -30,8 +32,8 @@ Found = Union[tuple[int, ...], Failure]
 
 def read_back(parameter: Parameter, found: int, wanted: int) -> Failure:
     """Say that a drive has another raw integer than the one that was written."""
-    return Failure(f'read back {value_text(parameter.value_from_raw(found))} '
-                   f'instead of {value_text(parameter.value_from_raw(wanted))}')
+    return Failure(sentences.read_back_differs(
+        value_text(parameter.value_from_raw(found)), value_text(parameter.value_from_raw(wanted))))
 
 
 class Access(ABC, Generic[SpanT, StepT, ReplyT]):
@@ -81,7 +83,7 @@ class Access(ABC, Generic[SpanT, StepT, ReplyT]):
         return self.write(items)
 
     @abstractmethod
-    def misfit(self, items: Sequence[Item]) -> str:
+    def misfit(self, items: Sequence[Item]) -> Sentence:
         """Say why several parameters do not fit one frame; '' if they do."""
 
     def aside(self, parameter: Parameter, *, write: bool) -> Outcome | None:
@@ -104,7 +106,7 @@ class Access(ABC, Generic[SpanT, StepT, ReplyT]):
             found = yield from self.read(span)
             if not isinstance(found, Failure):
                 words.update(zip(placement.addresses(span), found))
-            elif found.reason == NO_ANSWER_OFFLINE:
+            elif found.reason.code == 'no_answer_offline':
                 gone = found
             else:
                 failures[span] = found
@@ -141,8 +143,8 @@ class Access(ABC, Generic[SpanT, StepT, ReplyT]):
             outcome = self.aside(parameter, write=True) or gone
             if outcome is None:
                 outcome, = yield from write([(parameter, raw)])
-                if isinstance(outcome, Failure) and outcome.reason in (
-                        NO_ANSWER_OFFLINE, NOT_SENT):
+                if isinstance(outcome, Failure) and outcome.reason.code in (
+                        'no_answer_offline', 'not_sent'):
                     gone = outcome
             outcomes.append(outcome)
         return tuple(outcomes)

@@ -17,9 +17,10 @@ from collections.abc import Callable
 import math
 from typing import Generic, TypeVar
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.session import Session, Stage
-from drive_can_bridge.core.told import UNHEARD_STOP
 from drive_can_bridge.protocols.exchange_book import ExchangeBook
 
 #: cyclic frames with neutral setpoints that are sent before a drive is left alone
@@ -63,7 +64,7 @@ class CyclicExchange(Generic[TelegramT]):
 
     def __init__(self, session: Session, encode: Callable[[list[int]], TelegramT],
                  send: Callable[[TelegramT, float], None], *, slot: int | None, silence: str,
-                 advice: str = '', missed: Callable[[str, float], None] | None = None,
+                 advice: str = '', missed: Callable[[Sentence, float], None] | None = None,
                  ended: Callable[[float], None] | None = None,
                  settled: Callable[[], None] | None = None,
                  left: Callable[[], None] | None = None,
@@ -235,7 +236,7 @@ class CyclicExchange(Generic[TelegramT]):
         """Tell whether an answer belongs to the last cycle; others are late, or rejected."""
         book = self.book
         if not book.awaiting and not book.take_stale():
-            self._session.report.reject(f'{what} that nobody asked for')
+            self._session.report.reject(sentences.unasked(what))
         return book.awaiting
 
     def answered(self, received_at: float) -> None:
@@ -254,21 +255,22 @@ class CyclicExchange(Generic[TelegramT]):
             too_many = book.missed()
             if session.stage is not Stage.STOPPING:
                 limit = session.configuration.missed_limit
-                self._missed(f'{self._silence} for {limit} cycles' if too_many else '', now)
+                self._missed(sentences.silent_for_cycles(self._silence, limit) if too_many else
+                             NOTHING, now)
 
     def forget(self) -> None:
         """Count anew what is missed."""
         self.book.missed_in_row = 0
 
-    def _lose(self, reason: str, now: float) -> None:
+    def _lose(self, reason: Sentence, now: float) -> None:
         if reason:
             self.forget()
             session = self._session
             if session.online:
                 session.lose(reason, now)
             elif not session.told.owed and session.told.doubt():
-                session.report.warn(UNHEARD_STOP, may_run=True)
-            session.report.advice = f'{self._silence}: {self._advice}'
+                session.report.warn(sentences.stop_not_answered(), may_run=True)
+            session.report.advice = sentences.silent(self._silence, self._advice)
 
     # -- the end ----------------------------------------------------------------------------------
 

@@ -11,7 +11,9 @@ from collections.abc import Callable, Generator, Sequence
 import math
 from typing import Generic
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.events import ProcessDataReceived
+from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.channel import Channel, Lane
 from drive_can_bridge.protocols.courier import ReplyT, StepT
@@ -39,7 +41,7 @@ class PolledExchange(Generic[StepT, ReplyT]):
                  read: Callable[[], Generator[StepT, ReplyT, Raws | None]], *,
                  found: Callable[[float], None],
                  answered: Callable[[Raws, float, bool], None],
-                 missed: Callable[[str, float], None],
+                 missed: Callable[[Sentence, float], None],
                  present: Callable[[], bool] = lambda: True) -> None:
         self._session = session
         self._channel = channel
@@ -111,5 +113,4 @@ class PolledExchange(Generic[StepT, ReplyT]):
 
     def _miss(self, now: float) -> None:
         limit = self._session.configuration.missed_limit
-        self._missed(f'no complete round of reads for {limit} periods'
-                     if self._book.missed() else '', now)
+        self._missed(sentences.no_round(limit) if self._book.missed() else NOTHING, now)

@@ -11,9 +11,11 @@ from collections.abc import Callable, Generator
 import math
 from typing import Generic, NamedTuple, Union
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.events import Noted
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.process_image import control_word
+from drive_can_bridge.core.sentences import Sentence
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.told import CONTROL_WORD
 from drive_can_bridge.protocols.channel import Channel, Lane
@@ -84,7 +86,7 @@ class SafeStop(Generic[StepT, ReplyT]):
                       for setpoint in self._session.setpoints.items if setpoint.known]
         return found
 
-    def begin(self, procedure: Generator[StepT, ReplyT, list[str]], now: float, *,
+    def begin(self, procedure: Generator[StepT, ReplyT, list[Sentence]], now: float, *,
               setpoints: bool = True, insist: bool = False, again: bool = False) -> None:
         """
         Begin.
@@ -111,8 +113,8 @@ class SafeStop(Generic[StepT, ReplyT]):
         """Take note that the channel was cleared."""
         self.running = False
 
-    def _then_look(self, procedure: Generator[StepT, ReplyT, list[str]],
-                   ) -> Generator[StepT, ReplyT, list[str]]:
+    def _then_look(self, procedure: Generator[StepT, ReplyT, list[Sentence]],
+                   ) -> Generator[StepT, ReplyT, list[Sentence]]:
         failed = yield from procedure
         if not failed:
             yield from self._look()
@@ -130,7 +132,7 @@ class SafeStop(Generic[StepT, ReplyT]):
         self.running = False
         self._ended()
 
-    def _done(self, failed: list[str]) -> None:
+    def _done(self, failed: list[Sentence]) -> None:
         session, self.running = self._session, False
         if self._again:
             self.again_at = self._channel.now
@@ -142,9 +144,9 @@ class SafeStop(Generic[StepT, ReplyT]):
                 if not session.active:  # in its end, to be disabled is enough
                     session.told.answered()
             if self._again and not session.told.owed:
-                session.report.note(Noted('told to stop once more, which it has confirmed'))
+                session.report.note(Noted(sentences.stopped_again()))
         elif self._owed or self._insisting:
-            session.report.warn(f'told to stop, but {"; ".join(failed)}', may_run=self._owed)
+            session.report.warn(sentences.stop_failed(failed), may_run=self._owed)
             if not session.active:      # which ends with it: there is no more to be said
                 session.told.stopped()
         self._ended()

@@ -164,7 +164,7 @@ class DriveReporter:
                 advice += ', or set mapping: configure'
             return DiagnosticStatus.ERROR, f'{session.offline_advice}; {advice}'
         if state is DriveState.OFFLINE:
-            what = session.offline_advice
+            what: str = session.offline_advice
             if drive.exchange.bus_state == 'up':
                 what += '; check its power, cable, station number and bit rate'
             if not session.ever_online:
@@ -197,7 +197,7 @@ class DriveReporter:
     def _warnings(self, rejected: int) -> list[str]:
         """Return everything that is not well although the drive answers."""
         drive, session = self._drive, self._drive.session
-        told = []
+        told: list[str] = []
         if session.warning:
             told.append(session.warning)
         slow = self._slowness()

@@ -22,8 +22,9 @@ from drive_can_bridge.core.events import (
     ProcessDataReceived, RequestCompleted, SetpointsExpired, StationFound, StationLost,
 )
 from drive_can_bridge.core.requests import (
-    BRIDGE_INACTIVE, Failure, ReadRequest, Request,
+    Failure, ReadRequest, Request,
 )
+from drive_can_bridge.core.sentences import bridge_inactive
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.exchange.exchange import BusExchange
@@ -147,9 +148,9 @@ class DriveNode(DriveListener):
         """
         while self._asked:
             request, completed = self._asked.popitem()
-            completed(ControlCompleted(request, False, BRIDGE_INACTIVE)
+            completed(ControlCompleted(request, False, bridge_inactive())
                       if isinstance(request, ControlRequest)
-                      else (Failure(BRIDGE_INACTIVE),) * len(request))
+                      else (Failure(bridge_inactive()),) * len(request))
         return not self.calls
 
     @property

@@ -19,7 +19,7 @@ import sys
 import tempfile
 from typing import TYPE_CHECKING
 
-from drive_can_bridge.core.told import MAY_RUN
+from drive_can_bridge.core.sentences import ends_before_stop, may_still_be_running
 from drive_can_bridge.process.scheduling import be_punctual
 from drive_can_bridge.process.signals import leave, NOT_SUSPENDED, SignalWatcher
 from drive_can_bridge.process.standard_outputs import StandardOutputs
@@ -147,7 +147,7 @@ def _name_the_unstopped(bridge: 'BridgeNode', _: float) -> None:
     for name, drive in list(bridge.drives.items()):
         session = drive.session
         if not session.stopped and (session.told.owed or session.told.ran):
-            print(f'{name}: the bridge ends before the drive has confirmed its stop: {MAY_RUN}',
+            print(f'{name}: {may_still_be_running(ends_before_stop())}',
                   file=sys.stderr, flush=True)
 
 

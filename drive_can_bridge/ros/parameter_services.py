@@ -26,10 +26,11 @@ from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.profile import RestoreTable
 from drive_can_bridge.core.requests import (
-    BRIDGE_INACTIVE, BUS_DOWN, BUSY, Failure, NO_ANSWER_OFFLINE, Outcome, ReadRequest, ReadValue,
+    Failure, Outcome, ReadRequest, ReadValue,
     Request, WriteRequest, Written,
 )
 from drive_can_bridge.core.roles import Role
+from drive_can_bridge.core.sentences import bridge_inactive
 from drive_can_bridge.core.text import printable, TEXT_MAX
 from drive_can_bridge.ros.coroutine_services import CoroutineServices, Question
 from drive_can_bridge.ros.messages import value_of
@@ -37,8 +38,8 @@ from drive_can_bridge.ros.service_thread import ServiceThread
 from drive_can_bridge.ros.stamps import Stamps
 from drive_can_bridge.ros.values import descriptor, PARAMETER_TYPES, parameter_value
 
-#: why a read may fail that says nothing about the parameter
-_NOT_ITS_FAULT = frozenset([BRIDGE_INACTIVE, BUS_DOWN, BUSY, NO_ANSWER_OFFLINE])
+#: codes of reasons why a read may fail that say nothing about the parameter
+_NOT_ITS_FAULT = frozenset(['bridge_inactive', 'bus_down', 'busy', 'no_answer_offline'])
 #: names in one call
 NAMES_MAX = 1000
 #: names of one call that are logged, and looked at for what else might be meant, one by one
@@ -134,15 +135,16 @@ class ParameterServices:
                         self._unreadable.discard(parameter.name)
                         self._errors.pop(request.names[place], None)
                     elif isinstance(outcome, Failure):
-                        if parameter.listed and outcome.reason not in _NOT_ITS_FAULT:
+                        if parameter.listed and (
+                                outcome.reason.code not in _NOT_ITS_FAULT):
                             self._unreadable.add(parameter.name)
                         self._failed(f'read {_title(parameter)}', outcome.reason, 0)
                         self._remember(request.names[place], outcome.reason)
         elif request.names:
             for name, known in zip(request.names, found):
                 if known is not None:
-                    self._remember(name, BRIDGE_INACTIVE)
-            self._failed('read parameters', BRIDGE_INACTIVE,
+                    self._remember(name, bridge_inactive())
+            self._failed('read parameters', bridge_inactive(),
                          sum(parameter is not None for parameter in found))
         response.values = [values.get(place, _NOT_SET) for place in range(len(found))]
         return response
@@ -265,7 +267,7 @@ class ParameterServices:
         if parameter is None:
             raise ValueRefused(self._directory.unknown(message.name, hint=hint))
         if not self._active():
-            raise ValueRefused(BRIDGE_INACTIVE)
+            raise ValueRefused(bridge_inactive())
         refusal = self._write_refusal(parameter)
         if refusal:
             raise ValueRefused(refusal)

@@ -12,7 +12,8 @@ from timeline import Timeline
 
 from drive_can_bridge.core.events import Noted
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.core.told import MAY_RUN
+
+MAY_RUN = 'it may still be running'
 
 #: s, just in time: an answer to a stop is waited for for 0.1 s
 SLOW = 0.0995

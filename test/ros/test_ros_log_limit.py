@@ -5,7 +5,6 @@ import re
 
 from hypothesis import given, settings, strategies as st
 
-from drive_can_bridge.core.told import MAY_RUN
 from drive_can_bridge.ros.log_limit import (
     BURST, BURST_OF_ALL, FEW, Level, LogLimit, QUIET, RATE_OF_ALL, SUM_UP, TOPICS_MAX,
 )
@@ -218,15 +217,15 @@ def test_dangers_are_told_whoever_talks() -> None:
         for number in range(BURST):
             log.limit.speaker(f'axis_{name}').info(str(number))
     assert len(log.take()) == BURST_OF_ALL
-    log.lift.warning(f'told to stop, but no answer: {MAY_RUN}', urgent=True)
+    log.lift.warning('told to stop, but no answer: it may still be running', urgent=True)
     log.limit.speaker('axis_7').error('mapping differs')
-    assert log.take() == [f'lift: told to stop, but no answer: {MAY_RUN}',
+    assert log.take() == ['lift: told to stop, but no answer: it may still be running',
                           'axis_7: mapping differs']
 
 
 def test_a_danger_that_comes_again_is_not_only_counted() -> None:
     log = Log()
-    danger = f'told to stop, but no answer: {MAY_RUN}'
+    danger = 'told to stop, but no answer: it may still be running'
     for _ in range(FEW):
         log.lift.warning(danger, urgent=True)
         log.wait(QUIET / 2)

@@ -20,6 +20,7 @@ from collections.abc import Callable, Sequence
 
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.profile import ControlTable, StatusPattern
+from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.status_reports import Wording
 from drive_can_bridge.protocols.cannord.states import (
     ACKNOWLEDGE, is_faulted, parameter_set_bits, QUICK_STOP, READY, RUN, state_of, STATUS_WORD,
@@ -45,7 +46,7 @@ def control_table(parameter_set: int) -> ControlTable:
 
 def make_control(*, parameter_set: int, timeout: float,
                  members: Sequence[str] = (),
-                 unheard: Callable[[], str] = str) -> ControlMachine:
+                 unheard: Callable[[], Sentence] = lambda: NOTHING) -> ControlMachine:
     """
     Make the machine for one inverter, or for the inverters of a broadcast group.
 
@@ -64,9 +65,9 @@ def hint(status: int) -> str:
     if is_faulted(status):
         return ''
     if not status & _VOLTAGE_ENABLED:
-        return '; voltage is disabled: look at the digital inputs with that function'
+        return 'voltage is disabled: look at the digital inputs with that function'
     if not status & _NO_QUICK_STOP:
-        return '; a quick stop is active: look at the digital inputs with that function'
+        return 'a quick stop is active: look at the digital inputs with that function'
     if not status & _BUS_CONTROL:
-        return '; the bus is not in control: look at P509 and P510'
+        return 'the bus is not in control: look at P509 and P510'
     return ''

@@ -17,13 +17,13 @@ All sessions of a group live on one bus, under one lock, so that they may call e
 from collections.abc import Sequence
 import math
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
 from drive_can_bridge.core.events import Event
 from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.session import Stage
-from drive_can_bridge.core.told import MAY_RUN
-from drive_can_bridge.core.users import DRIVE_OFFLINE
 from drive_can_bridge.protocols.cannord.broadcast import broadcast_identifier
 from drive_can_bridge.protocols.cannord.control import make_control
 from drive_can_bridge.protocols.cannord.process_data import values_needed
@@ -128,7 +128,7 @@ class Group:
             self.control.member_lost(member.configuration.name)
             self.leader.gate.follow()
 
-    def end(self, reason: str, now: float) -> None:
+    def end(self, reason: Sentence, now: float) -> None:
         """Take note that all are stopped: that, and no member that goes, takes the enable back."""
         self.control.withdraw(reason, now, lost=False)
 
@@ -137,16 +137,16 @@ class Group:
         self.control.status_received(word, now, member.configuration.name)
         self.leader.control_changed(now)
 
-    def _unheard(self) -> str:
+    def _unheard(self) -> Sentence:
         """Say which inverters were told to run, and have not answered since they were stopped."""
         names = [member.configuration.name for member in self.members
                  if member.told.ran and not member.online]
-        return f'{", ".join(names)} offline: {MAY_RUN}' if names else ''
+        return sentences.members_may_run(names) if names else NOTHING
 
     # -- what the leader does for all -------------------------------------------------------------
 
     def control_refusal(self, member: CannordSession, action: ControlAction,
-                        refusal: str) -> str:
+                        refusal: Sentence) -> Sentence:
         """
         Say why a control action cannot be asked for; '' if it can.
 
@@ -154,10 +154,10 @@ class Group:
         """
         if member is not self.leader and action not in _STOPS:
             lead = self._lead.name
-            return f'{lead} leads the broadcast group: call ~/{_SERVICES[action]} of {lead}'
+            return sentences.group_is_led(lead, _SERVICES[action])
         # a stop is good for those that are there
         there = any(each.online for each in self.members)
-        return '' if refusal == DRIVE_OFFLINE and there else refusal
+        return NOTHING if refusal.code == 'drive_offline' and there else refusal
 
     def stop_for(self, member: CannordSession, request: ControlRequest, now: float) -> None:
         """Stop all, as a user of an inverter that is led has asked for: none stops alone."""
@@ -179,10 +179,9 @@ class Group:
                 member.report.note(event)
         return others
 
-    def cyclic_refusal(self, parameter: Parameter) -> str:
+    def cyclic_refusal(self, parameter: Parameter) -> Sentence:
         """Say why a setpoint of an inverter that is led is not written by request."""
-        return (f'sent cyclically by the broadcast group: publish '
-                f'{self._lead.name}/command/{parameter.name}')
+        return sentences.sent_by_group(parameter.name, self._lead.name)
 
     @property
     def how_to_enable(self) -> str:

@@ -15,6 +15,7 @@ it gets no warning.
 from collections.abc import Callable
 import math
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.events import Noted
 from drive_can_bridge.core.parameters import Parameter
@@ -22,6 +23,7 @@ from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.core.requests import (
     Failure, Outcomes, ReadRequest, ReadValue, Request, WriteRequest, Written,
 )
+from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.protocols.cannord.procedures import TaskAccess
 from drive_can_bridge.protocols.channel import Lane
 
@@ -40,7 +42,7 @@ def timeout_parameter(profile: Profile) -> Parameter | None:
     return None
 
 
-def timeout_warning(parameter: Parameter, timeout: float, period: float) -> str:
+def timeout_warning(parameter: Parameter, timeout: float, period: float) -> Sentence:
     """
     Say that the inverter's time-out is too tight for the period; '' if it is not.
 
@@ -49,10 +51,9 @@ def timeout_warning(parameter: Parameter, timeout: float, period: float) -> str:
     """
     least = PERIODS_MIN * period
     if timeout <= 0.0 or timeout > least - 1e-9:
-        return ''
-    return (f'telegram time-out {timeout:g} s ({parameter.name}, {parameter.address}) is too '
-            f'tight for a period of {period:g} s: set it to {least:g} s or more, or shorten the '
-            'period')
+        return NOTHING
+    return sentences.timeout_too_tight(
+        timeout, parameter.name, parameter.address, period, least)
 
 
 class TimeoutWatch:
@@ -66,7 +67,7 @@ class TimeoutWatch:
 
     def __init__(self, drive: DriveConfiguration, access: TaskAccess,
                  emit: Callable[[Noted], None]) -> None:
-        self.warning = ''
+        self.warning = NOTHING
         self._parameter = timeout_parameter(drive.profile)
         self._period = drive.period
         self._access = access
@@ -98,5 +99,5 @@ class TimeoutWatch:
                 self._emit(Noted(self.warning, warning=True))
         elif isinstance(outcome, Failure):
             self._ask_at = self._access.channel.now + UNKNOWN_PAUSE
-            self._emit(Noted(f'telegram time-out ({self._parameter.address}) unknown: '
-                             f'{outcome.reason}'))
+            self._emit(Noted(sentences.timeout_unknown(
+                self._parameter.address, outcome.reason)))

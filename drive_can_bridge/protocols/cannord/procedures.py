@@ -7,12 +7,14 @@ Every generator here is for :class:`.channel.TaskChannel`.
 
 from collections.abc import Callable, Generator, Iterable, Sequence
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.parameters import Parameter, ParameterType, Storage
 from drive_can_bridge.core.requests import (
-    Failure, NOT_SENT, Outcome, Outcomes, ReadValue, Written,
+    Failure, Outcome, Outcomes, ReadValue, Written,
 )
 from drive_can_bridge.core.retry import RetryPolicy
 from drive_can_bridge.core.roles import Cells
+from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.protocols.access import Access, Found, Item, read_back
 from drive_can_bridge.protocols.cannord.channel import Ask, Reply, TaskChannel
 from drive_can_bridge.protocols.cannord.parameter_frame import (
@@ -21,9 +23,8 @@ from drive_can_bridge.protocols.cannord.parameter_frame import (
 from drive_can_bridge.protocols.placement import OneByOne
 
 WRONG_INDEX = 3
-PROCESS_DATA_ONLY = 'exists in process data only'
-NOT_ATOMIC = ('cannot be written in one frame, nothing was written: a CANnord frame carries one '
-              'parameter')
+PROCESS_DATA_ONLY = sentences.process_data_only()
+NOT_ATOMIC = sentences.not_in_one_frame('a CANnord frame carries one parameter')
 
 
 def cells(parameter: Parameter) -> Cells:
@@ -38,9 +39,9 @@ def signed_cells(parameters: Iterable[Parameter]) -> Cells:
         cells(parameter) for parameter in parameters if parameter.type is ParameterType.INT16))
 
 
-def write_refusal(parameter: Parameter) -> str:
+def write_refusal(parameter: Parameter) -> Sentence:
     """Say why no task writes a parameter; '' if one can."""
-    return PROCESS_DATA_ONLY if parameter.number is None else ''
+    return PROCESS_DATA_ONLY if parameter.number is None else NOTHING
 
 
 class TaskAccess(Access[Parameter, Ask, Reply]):
@@ -72,7 +73,7 @@ class TaskAccess(Access[Parameter, Ask, Reply]):
         (parameter, raw), = items
         return ((yield from self._write(parameter, raw)),)
 
-    def misfit(self, items: Sequence[Item]) -> str:
+    def misfit(self, items: Sequence[Item]) -> Sentence:
         return NOT_ATOMIC
 
     def aside(self, parameter: Parameter, *, write: bool) -> Outcome | None:
@@ -82,7 +83,7 @@ class TaskAccess(Access[Parameter, Ask, Reply]):
             return Failure(PROCESS_DATA_ONLY)
         raw = self._last_value(parameter.name)
         return ReadValue(raw) if raw is not None else Failure(
-            f'{PROCESS_DATA_ONLY}, and none with it was received')
+            sentences.process_data_not_received())
 
     # -- parts ------------------------------------------------------------------------------------
 
@@ -99,7 +100,7 @@ class TaskAccess(Access[Parameter, Ask, Reply]):
                 return answer
             double = answer.identifier in DOUBLE_RESPONSES
             if not double and not -0x8000 <= raw <= 0xFFFF:
-                return Failure(f'{raw} is not representable in 16 bits: -32768 to 65535')
+                return Failure(sentences.not_in_bits(raw, 16, -0x8000, 0xFFFF))
         if not double and cells(parameter) & self._signed:
             raw = (raw + 0x8000 & 0xFFFF) - 0x8000
         array = parameter.subindex is not None
@@ -124,7 +125,7 @@ class TaskAccess(Access[Parameter, Ask, Reply]):
                 return reply.response
             return (yield from _refusal(parameter, reply.response))
         if not reply.sent:
-            return Failure(NOT_SENT)
+            return Failure(sentences.not_sent())
         if reply.contrary is not None:
             # without its sign where users see none
             wrote = parameter.raw_from_word(parameter.word_from_raw(value)) if (
@@ -135,18 +136,16 @@ class TaskAccess(Access[Parameter, Ask, Reply]):
 
 def _refusal(parameter: Parameter, response: ParameterFrame) -> Generator[Ask, Reply, Failure]:
     """Say why the drive refused; where an element does not exist, also how many there are."""
-    text = f'refused by the drive: {error_text(response.word)}'
+    text = error_text(response.word)
     if response.word == WRONG_INDEX and parameter.subindex is not None:
         reply = yield Ask(Task.READ_ELEMENTS, parameter.number or 0)
         answer = reply.response
         if answer is not None and answer.identifier == Response.ELEMENTS:
-            noun = 'element' if answer.word == 1 else 'elements'
-            text = f'{text}; P{parameter.number} has {answer.word} {noun}'
-    return Failure(text)
+            return Failure(sentences.no_such_element(text, parameter.number or 0, answer.word))
+    return Failure(sentences.refused_by_drive(text))
 
 
-def _width_text(parameter: Parameter, *, double: bool) -> str:
+def _width_text(parameter: Parameter, *, double: bool) -> Sentence:
     width = 'a double word' if double else 'a word'
     wanted = 'int32 or uint32' if double else 'bool, int16 or uint16'
-    return (f'the drive answers with {width}, the profile says {parameter.type.value}: '
-            f'correct the profile to {wanted}')
+    return sentences.other_width(width, parameter.type.value, wanted)

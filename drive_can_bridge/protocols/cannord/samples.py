@@ -6,12 +6,11 @@ Values 4 and 5 come in an additional frame. The sample of an exchange waits for 
 without when they do not come.
 """
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.events import ProcessDataReceived
+from drive_can_bridge.core.sentences import NOTHING
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.cannord.process_data import decode_extra, MAIN_VALUES
-
-MISSING = ('values 4 and 5 do not arrive: the drive does not answer the additional frame; '
-           'extra_setpoints is for SK 540E and SK 545E')
 
 
 class Samples:
@@ -24,7 +23,7 @@ class Samples:
 
     def __init__(self, session: Session) -> None:
         self.awaiting = False
-        self.warning = ''
+        self.warning = NOTHING
         self._session = session
         response = session.configuration.cyclic_response
         self._main, self._extra = response[:MAIN_VALUES], response[MAIN_VALUES:]
@@ -35,7 +34,7 @@ class Samples:
         """End an exchange: what has not come does not belong to it any more."""
         self.awaiting = False
         if self._held is not None:
-            self.warning = MISSING
+            self.warning = sentences.extra_values_missing()
             self._publish(self._held)
             self._held = None
 
@@ -48,7 +47,7 @@ class Samples:
         """Take note that the inverter is offline."""
         self._held = None
         self._last = ()
-        self.warning = ''
+        self.warning = NOTHING
 
     def take(self, word: int, values: tuple[int, ...], received_at: float, *,
              asked: bool) -> bool:
@@ -62,7 +61,7 @@ class Samples:
         complete = len(values) >= len(self._main)
         if not complete:
             self._session.report.reject(
-                f'process data with {len(values)} values, {len(self._main)} needed')
+                sentences.short_process_data(len(values), len(self._main)))
         if self._held is not None:      # its values 4 and 5 would come after these
             self._publish(self._held)
             self._held = None
@@ -78,7 +77,7 @@ class Samples:
         self.awaiting = False
         held, self._held = self._held, None
         if held is not None:    # else: nobody wants them, or what they belong to did not come
-            self.warning = ''
+            self.warning = NOTHING
             values = (parameter.raw_from_word(value)
                       for parameter, value in zip(self._extra, decode_extra(data)))
             self._publish(ProcessDataReceived((*held.raws, *values), held.received_at))

@@ -21,14 +21,15 @@ from functools import partial
 import math
 from typing import TYPE_CHECKING
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.events import Event, ForeignMasterSeen
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.process_image import ProcessImage
-from drive_can_bridge.core.requests import BRIDGE_INACTIVE
 from drive_can_bridge.core.roles import publish_it, Roles
+from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.users import Users
 from drive_can_bridge.protocols.cannord import procedures
@@ -128,7 +129,7 @@ class CannordSession(Session):
 
     def prepare_stop(self, now: float) -> bool:
         if self._group is not None:
-            self._group.end(self.defect or BRIDGE_INACTIVE, now)
+            self._group.end(self.defect or sentences.bridge_inactive(), now)
         return super().prepare_stop(now)
 
     def begin_stop(self, now: float) -> bool:
@@ -149,7 +150,7 @@ class CannordSession(Session):
 
     def went_offline(self) -> None:
         self._samples.forget()
-        self._timeout.warning = ''
+        self._timeout.warning = NOTHING
         if self._group is not None:
             self._group.member_lost(self)
 
@@ -197,7 +198,7 @@ class CannordSession(Session):
         received, data, extended = frame
         try:
             if extended != self._extended:
-                self.report.reject(f'{frame}: not of this drive')
+                self.report.reject(sentences.not_of_this_drive(str(frame)))
             elif received == self._response_identifier:
                 if len(data) == EXTRA_LENGTH:
                     self._receive_extra(data)
@@ -209,15 +210,14 @@ class CannordSession(Session):
                 self._channel.receive(data, now)
             elif received in self._masters:
                 self.report.note(ForeignMasterSeen(
-                    f'another master sends to station {self.configuration.station}: {frame}'))
+                    sentences.other_master(self.configuration.station, str(frame))))
             elif received in self._broadcasts:
                 self.report.note(ForeignMasterSeen(
-                    f'another master sends broadcasts, which station '
-                    f'{self.configuration.station} obeys if it is set to listen (P509): {frame}'))
+                    sentences.other_master_broadcasts(self.configuration.station, str(frame))))
             else:
-                self.report.reject(f'{frame}: not of this drive')
+                self.report.reject(sentences.not_of_this_drive(str(frame)))
         except RemoteProtocolError as error:
-            self.report.reject(str(error))
+            self.report.reject(sentences.malformed(str(error)))
 
     def _receive_main(self, data: bytes, now: float, received_at: float) -> None:
         """Take status word and actual values. The fast path of the reader."""
@@ -229,7 +229,7 @@ class CannordSession(Session):
         elif not (is_faulted(word) and self.online):
             # a fault while offline is told again by the first exchange
             if not book.take_stale() and not is_faulted(word):
-                self.report.reject('process data that nobody asked for')
+                self.report.reject(sentences.unasked('process data'))
             return
         if not self.online and self.stage is Stage.RUNNING:
             self.be_online()
@@ -253,17 +253,17 @@ class CannordSession(Session):
         if self._samples.awaiting:
             self._samples.take_extra(data)
         elif not self.exchange.book.take_stale():
-            self.report.reject('additional process data that nobody asked for')
+            self.report.reject(sentences.unasked('additional process data'))
 
     # -- state ------------------------------------------------------------------------------------
 
     @property
-    def warning(self) -> str:
+    def warning(self) -> Sentence:
         return self._timeout.warning or self._samples.warning
 
     # -- as one of a broadcast group --------------------------------------------------------------
 
-    def _control_refusal(self, action: ControlAction, refusal: str) -> str:
+    def _control_refusal(self, action: ControlAction, refusal: Sentence) -> Sentence:
         return refusal if self._group is None else self._group.control_refusal(
             self, action, refusal)
 

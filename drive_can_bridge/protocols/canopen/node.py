@@ -24,7 +24,9 @@ second, however often the node restarts: after a boot-up frame it is put off the
 from enum import Enum
 import math
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.protocols.canopen import network
 from drive_can_bridge.protocols.canopen.network import Emergency, NmtCommand, NmtState
 
@@ -143,7 +145,7 @@ class Node:
             self._start(now)
         return Change.NONE if was_blocked else Change.NOT_OPERATIONAL
 
-    def receive_emergency(self, emergency: Emergency) -> str:
+    def receive_emergency(self, emergency: Emergency) -> Sentence:
         """
         Take an emergency message.
 
@@ -152,10 +154,10 @@ class Node:
         known = self.emergency
         self.emergency = None if emergency.code == network.NO_ERROR else emergency
         if self.emergency == known:
-            return ''
+            return NOTHING
         if self.emergency is None:
-            return 'emergency over: the node reports no error any more'
-        return f'emergency {self.emergency.text}'
+            return sentences.emergency_over()
+        return sentences.emergency(self.emergency.text)
 
     def handle_timer(self, now: float) -> Change:
         """Do what is due."""
@@ -177,25 +179,24 @@ class Node:
 
     # -- state ------------------------------------------------------------------------------------
 
-    def refusal(self, now: float) -> str:
+    def refusal(self, now: float) -> Sentence:
         """Say why no PDO can be sent for a while; '' if it can."""
         if not self._blocked(now) or self.state is None:
-            return ''
-        return f'node is {self.state.text}'
+            return NOTHING
+        return sentences.node_state(self.state.text)
 
     @property
-    def ailing(self) -> str:
+    def ailing(self) -> Sentence:
         """What the node says of its errors, and what to do; '' if nothing."""
         emergency = self.emergency
-        return '' if emergency is None else f'emergency {emergency.text}: remove its cause'
+        return NOTHING if emergency is None else sentences.emergency_lasts(emergency.text)
 
     @property
-    def missing(self) -> str:
+    def missing(self) -> Sentence:
         """What the node should say, but does not; '' if nothing."""
         if self.heartbeat_timeout <= 0.0 or self.heard_heartbeat:
-            return ''
-        return ('no heartbeat although heartbeat_timeout is set: configure the '
-                "device's heartbeat producer (1017h)")
+            return NOTHING
+        return sentences.heartbeat_missing()
 
     def facts(self) -> dict[str, str]:
         """Return its state and its errors in words, for diagnostics."""

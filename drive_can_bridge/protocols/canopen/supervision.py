@@ -8,12 +8,13 @@ When PDOs may be sent, :mod:`.node` knows; what becomes of the exchange, the ses
 import math
 from typing import Protocol
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.events import Noted
 from drive_can_bridge.core.outbox import Outbox
 from drive_can_bridge.core.reporter import Reporter
-from drive_can_bridge.core.requests import NO_ANSWER
-from drive_can_bridge.core.users import DRIVE_OFFLINE, Users
+from drive_can_bridge.core.sentences import NOTHING, Sentence
+from drive_can_bridge.core.users import Users
 from drive_can_bridge.protocols.canopen import network
 from drive_can_bridge.protocols.canopen.node import Change, Node
 
@@ -27,7 +28,7 @@ class NodeUser(Protocol):
     users: Users
     online: bool
 
-    def lose(self, reason: str, now: float) -> None:
+    def lose(self, reason: Sentence, now: float) -> None:
         """Make the drive offline, if it is not."""
 
     def node_free(self, free_at: float, now: float, *, anew: bool) -> None:
@@ -70,10 +71,10 @@ class Supervision:
         self._in_use = False
         self.node.stop()
 
-    def refusal(self, now: float) -> str:
+    def refusal(self, now: float) -> Sentence:
         """Say why nothing can be asked by PDOs for a while; '' if it can."""
-        text = self.node.refusal(now) if self._in_use else ''
-        return f'{DRIVE_OFFLINE}: {text}' if text else ''
+        text = self.node.refusal(now) if self._in_use else NOTHING
+        return sentences.drive_offline_because(text) if text else NOTHING
 
     def receive(self, identifier: int, data: bytes, now: float) -> bool:
         """
@@ -92,7 +93,7 @@ class Supervision:
             return False
         return True
 
-    def silent(self, reason: str, now: float) -> None:
+    def silent(self, reason: Sentence, now: float) -> None:
         """Handle a drive that does not answer, or whose heartbeats have ceased."""
         was_online = self._session.online
         self._session.lose(reason, now)
@@ -100,9 +101,9 @@ class Supervision:
         if was_online:
             self._session.node_silent(now)
 
-    def _close(self, reason: str, what: str, now: float) -> None:
+    def _close(self, reason: Sentence, failure: Sentence, now: float) -> None:
         self._session.lose(reason, now)
-        self._session.users.fail_all(f'{what}: {reason}')
+        self._session.users.fail_all(failure)
         self._session.node_closed(now)
 
     def _take_heartbeat(self, state: network.NmtState, now: float) -> None:
@@ -112,11 +113,13 @@ class Supervision:
             return
         self._send()    # before a stop: the node hears that only when it was started
         if change is Change.RESTARTED:
-            session.report.note(Noted('boot-up: the device has started'))
-            self._close('the device restarted', NO_ANSWER, now)
-            session.report.advice = 'the device restarted: waiting for it to answer'
+            session.report.note(Noted(sentences.booted()))
+            reason = sentences.device_restarted()
+            self._close(reason, sentences.no_answer_because(reason), now)
+            session.report.advice = sentences.restarted_waiting()
         elif change is Change.NOT_OPERATIONAL:
-            self._close(self.node.refusal(now), DRIVE_OFFLINE, now)
+            reason = self.node.refusal(now)
+            self._close(reason, sentences.drive_offline_because(reason), now)
         self._follow(now, fresh=change is not Change.NONE)
 
     def _follow(self, now: float, *, fresh: bool = True) -> None:
@@ -143,7 +146,7 @@ class Supervision:
             change = self.node.handle_timer(now)
             self._send()
             if change is Change.HEARTBEAT_LOST:
-                self.silent(f'no heartbeat for {self.node.heartbeat_timeout:g} s', now)
+                self.silent(sentences.no_heartbeat(self.node.heartbeat_timeout), now)
 
     def next_timer(self) -> float:
         """Return when ``handle_timer`` has something to do."""

@@ -6,10 +6,12 @@ from dataclasses import dataclass
 import re
 from typing import Literal, Union
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.process_image import status_word
 from drive_can_bridge.core.profile import Profile
+from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.protocols.canopen.addressing import object_of_name
 from drive_can_bridge.protocols.canopen_pkw import object_map, pkw
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address
@@ -199,13 +201,12 @@ def keys(parameter: Parameter) -> frozenset[Key]:
     return frozenset(found)
 
 
-def half_refusal(parameter: Parameter, profile: Profile) -> str:
+def half_refusal(parameter: Parameter, profile: Profile) -> Sentence:
     """Say why an unlisted parameter is not written that is one half of a listed one; else ''."""
     if parameter.listed:
-        return ''
+        return NOTHING
     mine = keys(parameter)
     for other in profile.parameters.values():
         if other.type.bits != parameter.type.bits and mine & keys(other):
-            return (f'one half of {other.name}: set that' if other.writable
-                    else f'read-only: one half of {other.name}')
-    return ''
+            return sentences.one_half(other.name, other.writable)
+    return NOTHING

@@ -16,7 +16,9 @@ as it is back under remote control.
 from collections.abc import Callable, Generator
 import math
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control_machine import ControlMachine
+from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.told import CONTROL_WORD
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement
@@ -43,7 +45,7 @@ class ControlWriter:
     def __init__(self, session: Session, control: ControlMachine,
                  channel: MailboxChannel, waits: Callable[[], bool]) -> None:
         drive = session.configuration
-        self.refusal = ''
+        self.refusal = NOTHING
         self._session = session
         self._control = control
         self._channel = channel
@@ -66,7 +68,7 @@ class ControlWriter:
         self._settled = self._doubtful = self._hurried = None
         self._retry_at = math.inf
         self._repetition.forget()
-        self.refusal = ''
+        self.refusal = NOTHING
 
     def update(self, now: float, *, known: bool) -> None:
         """
@@ -135,7 +137,7 @@ class ControlWriter:
             if isinstance(reply, Refused):
                 self._take_refusal(word, reply.text)
             else:
-                self.refusal = ''
+                self.refusal = NOTHING
                 self._settle(word)
             if word == self._control.word:
                 return
@@ -151,11 +153,11 @@ class ControlWriter:
         self._doubtful = None
         return self._parameter.word_from_raw(found) == self._parameter.word_from_raw(word)
 
-    def _take_refusal(self, word: int, reason: str) -> None:
+    def _take_refusal(self, word: int, reason: Sentence) -> None:
         now = self._channel.now
-        text = f'{self._parameter.name} {word:04X}h {reason}'
+        text = sentences.write_refused(f'{self._parameter.name} {word:04X}h', reason)
         if text != self.refusal:
-            self._session.report.warn(f'write of {text}')
+            self._session.report.warn(sentences.write_failed(text))
         self.refusal = text
         self._doubtful = None
         self._settled, self._settled_at = word, now
@@ -166,9 +168,10 @@ class ControlWriter:
 
     def _tell_silence(self, word: int) -> None:
         """Say that a word that stops the drive is not acknowledged, once until one is."""
-        text = f'{self._parameter.name} {word:04X}h: no answer'
+        text = sentences.write_unanswered(f'{self._parameter.name} {word:04X}h')
         if text != self.refusal:
-            self._session.report.warn(f'write of {text}', may_run=self._session.told.owed)
+            self._session.report.warn(
+                sentences.write_failed(text), may_run=self._session.told.owed)
         self.refusal = text
 
     def _settle(self, word: int) -> None:

@@ -27,9 +27,11 @@ from functools import partial
 import math
 from typing import Any, NamedTuple, Union
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.retry import RetryPolicy
+from drive_can_bridge.core.sentences import Sentence
 from drive_can_bridge.protocols.canopen_pkw import pkw, refusals
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Function, Message
@@ -98,9 +100,9 @@ class Refused(NamedTuple):
     code: int
 
     @property
-    def text(self) -> str:
+    def text(self) -> Sentence:
         """The refusal in words."""
-        return f'refused by the drive: {refusals.describe(self.code)}'
+        return sentences.refused_by_drive(refusals.describe(self.code))
 
 
 class Silence(NamedTuple):

@@ -7,7 +7,9 @@ Every generator here is for :class:`.mailbox.MailboxChannel`.
 
 from collections.abc import Generator, Hashable, Sequence
 
-from drive_can_bridge.core.requests import Failure, NOT_SENT, Outcome, Outcomes, Written
+from drive_can_bridge.core import sentences
+from drive_can_bridge.core.requests import Failure, Outcome, Outcomes, Written
+from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.told import Told
 from drive_can_bridge.protocols.access import Access, Found, Item
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
@@ -17,8 +19,8 @@ from drive_can_bridge.protocols.canopen_pkw.mailbox import (
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address
 from drive_can_bridge.protocols.safe_stop import STOP_ATTEMPTS, StopWrite
 
-NOT_TOGETHER = ('cannot be written in one frame, nothing was written: two 16-bit parameters in '
-                'adjacent registers fit, or one of 32 bits')
+NOT_TOGETHER = sentences.not_in_one_frame(
+    'two 16-bit parameters in adjacent registers fit, or one of 32 bits')
 
 
 # -- parameters of users --------------------------------------------------------------------------
@@ -48,11 +50,11 @@ class RegisterAccess(Access[Span, Step, Reply]):
             Write(min(words), tuple(words[address] for address in sorted(words)), blind))
         return (outcome,) * len(items)
 
-    def misfit(self, items: Sequence[Item]) -> str:
+    def misfit(self, items: Sequence[Item]) -> Sentence:
         spans = [self.placement.span(parameter) for parameter, _ in items]
         shared = self.placement.plan(spans)
         fits = len(shared) == 1 and sum(span.count for span in spans) == shared[0].count
-        return '' if fits else NOT_TOGETHER
+        return NOTHING if fits else NOT_TOGETHER
 
     def _put(self, write: Write) -> Generator[Step, Reply, Outcome]:
         """
@@ -68,7 +70,7 @@ class RegisterAccess(Access[Span, Step, Reply]):
             if isinstance(reply, Refused):
                 return Failure(reply.text)
             if reply.refused:
-                return Failure(NOT_SENT)
+                return Failure(sentences.not_sent())
             if reply.sent:
                 return self.retry.unanswered(1)
         return self.retry.unanswered()
@@ -103,7 +105,7 @@ def tell(told: Told, what: Hashable, write: Write, *, runs: bool,
 
 
 #: what became of the last writes: why which one may not have been executed
-StopProcedure = Generator[Step, Reply, list[str]]
+StopProcedure = Generator[Step, Reply, list[Sentence]]
 
 
 def write_until_answered(writes: Sequence[StopWrite], placement: Placement, timeout: float,
@@ -118,7 +120,7 @@ def write_until_answered(writes: Sequence[StopWrite], placement: Placement, time
     :param last: s for that.
     :return: what failed, in words.
     """
-    failed = []
+    failed: list[Sentence] = []
     for parameter, raw, is_word in writes:
         name = f'{parameter.name} {raw:04X}h' if is_word else parameter.name
         reply: Reply = Silence()
@@ -128,8 +130,8 @@ def write_until_answered(writes: Sequence[StopWrite], placement: Placement, time
             if not isinstance(reply, Silence):
                 break
         if isinstance(reply, Refused):
-            failed.append(f'{name} {reply.text}')
+            failed.append(sentences.write_refused(name, reply.text))
         elif isinstance(reply, Silence):
-            failed.append(f'{name} not taken by the bus' if reply.refused else
-                          f'{name} not acknowledged in {STOP_ATTEMPTS} attempts')
+            failed.append(sentences.write_not_taken(name) if reply.refused else
+                          sentences.write_not_acknowledged(name, STOP_ATTEMPTS))
     return failed

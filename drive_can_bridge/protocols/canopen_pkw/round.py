@@ -7,7 +7,9 @@ The status word counts from the moment it was read, before the round is complete
 
 from collections.abc import Callable, Generator, Sequence
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.process_image import status_word
+from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.canopen_pkw.addresses import (
     instead_of, Placement, round_plan, round_spans, Span,
@@ -40,15 +42,15 @@ class Rounds:
         status = status_word(drive)
         self._status = None if status is None else (status, self._placement.span(status))
         self.status_known = status is None
-        self.gap = ''
-        self.refusals: dict[Span, str] = {}
+        self.gap = NOTHING
+        self.refusals: dict[Span, Sentence] = {}
         self._words: dict[Address, int] = {}    # those of refused registers are missing
         self._plan: list[Span] = []
         self.start_over()
 
     def start_over(self) -> None:
         """Forget what was refused."""
-        self.gap = ''
+        self.gap = NOTHING
         self.refusals.clear()
         self._plan = round_plan(self._drive)
 
@@ -62,9 +64,8 @@ class Rounds:
                 self._write(self._channel.now)
             reply = yield Read(span.address, span.count, attempts=1)
             if isinstance(reply, Silence):
-                self.gap = '' if not self._words else (
-                    f'no answer to the read of {self._names(span)}, though others are answered: '
-                    f'does this drive have it')
+                self.gap = NOTHING if not self._words else sentences.one_read_unanswered(
+                    self._names(span))
                 return None
             if isinstance(reply, Refused):
                 pending[:0] = self._instead(span, reply)
@@ -106,8 +107,8 @@ class Rounds:
             return parts
         names = self._names(span)
         if span not in self.refusals:
-            self._session.report.warn(f'read {names}: {refused.text}')
-        self.refusals[span] = f'{names} {refused.text}'
+            self._session.report.warn(sentences.read_refused(names, refused.text))
+        self.refusals[span] = sentences.write_refused(names, refused.text)
         return parts
 
     def _names(self, span: Span) -> str:
@@ -116,7 +117,6 @@ class Rounds:
             self._drive.cyclic_response, self._spans)
             if set(own.addresses) <= set(span.addresses)) or str(span.address)
 
-    def warnings(self) -> list[str]:
+    def warnings(self) -> list[Sentence]:
         """Say what the drive refuses, and what to do."""
-        return [f'poll of {text}: correct cyclic_response or the profile'
-                for text in self.refusals.values()]
+        return [sentences.poll_refused(text) for text in self.refusals.values()]

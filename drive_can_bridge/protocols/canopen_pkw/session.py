@@ -23,6 +23,7 @@ setpoints again after ``refresh_interval``.
 from collections.abc import Collection
 import math
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.errors import RemoteProtocolError
@@ -30,7 +31,8 @@ from drive_can_bridge.core.events import ForeignMasterSeen
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.roles import Roles
-from drive_can_bridge.core.session import LOOKING, Session, Stage
+from drive_can_bridge.core.sentences import Sentence
+from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.users import Users
 from drive_can_bridge.protocols.canopen.supervision import Supervision
 from drive_can_bridge.protocols.canopen_pkw import addresses, pkw, procedures
@@ -42,8 +44,6 @@ from drive_can_bridge.protocols.channel import Lane
 from drive_can_bridge.protocols.placement import SentWrites
 from drive_can_bridge.protocols.polled_exchange import PolledExchange
 
-SILENT = ('no complete round of reads: drive silent, not operational, or other COB-IDs than '
-          'configured')
 
 
 class PkwSession(Session):
@@ -98,7 +98,7 @@ class PkwSession(Session):
         super().bus_down(now, reason)
 
     def begin(self, now: float) -> None:
-        self.report.advice = LOOKING
+        self.report.advice = sentences.looked_for()
         self._forget_exchange()
         self._rounds.start_over()
         self._supervision.begin(now)
@@ -119,11 +119,12 @@ class PkwSession(Session):
         self.control_changed(now)
         self._writers.write_setpoints(now)
 
-    def _missed(self, reason: str, now: float) -> None:
+    def _missed(self, reason: Sentence, now: float) -> None:
         if reason and self.online:
-            self._supervision.silent(': '.join(filter(None, (reason, self._rounds.gap))), now)
+            gap = self._rounds.gap
+            self._supervision.silent(sentences.lost_because(reason, gap) if gap else reason, now)
         elif reason and not self._node.heartbeat_lost:
-            self.report.advice = self._rounds.gap or SILENT
+            self.report.advice = self._rounds.gap or sentences.rounds_unanswered()
 
     def lost(self, now: float, *, was_online: bool) -> None:
         self._forget_exchange()
@@ -192,16 +193,15 @@ class PkwSession(Session):
                 self._exchange.received_at = now - age
                 message = pkw.decode(data, self._layout)
                 if not self._channel.receive(message, now):
-                    self.report.reject(f'PKW response that nobody asked for: {message}')
+                    self.report.reject(sentences.unasked_pkw(str(message)))
             elif self._supervision.receive(identifier, data, now):
                 self._end_futile_stop(now)
                 self._writers.again.heard(now, hurry=True)
             elif identifier == options.request_cob_id:
                 self.report.note(ForeignMasterSeen(
-                    f'another master sends PKW requests to node {self.configuration.station}: '
-                    f'{frame}'))
+                    sentences.other_master_asks_node(self.configuration.station, str(frame))))
         except RemoteProtocolError as error:
-            self.report.reject(str(error))
+            self.report.reject(sentences.malformed(str(error)))
 
     # -- timer ------------------------------------------------------------------------------------
 
@@ -239,10 +239,10 @@ class PkwSession(Session):
     # -- state ------------------------------------------------------------------------------------
 
     @property
-    def warning(self) -> str:
-        return '; '.join(filter(None, (
+    def warning(self) -> Sentence:
+        return sentences.together((
             self._node.ailing, *self._rounds.warnings(), *self._writers.warnings(),
-            self._node.missing)))
+            self._node.missing))
 
     def facts(self) -> dict[str, str]:
         return self._node.facts()

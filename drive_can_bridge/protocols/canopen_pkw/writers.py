@@ -10,10 +10,12 @@ One that takes back a command is repeated soon while nobody answers where there 
 from collections import Counter
 from collections.abc import Callable, Generator
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.holding import Setpoint
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.process_image import status_word
+from drive_can_bridge.core.sentences import Sentence
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement
 from drive_can_bridge.protocols.canopen_pkw.control_writer import ControlWriter
@@ -150,11 +152,13 @@ class Writers:
         if isinstance(reply, Silence):
             self._schedule.failed(index)
             if self._silences[index] >= self._session.configuration.missed_limit:
-                self._failed(setpoint, ': no answer', neutral=neutral)
+                self._failed(setpoint, sentences.write_unanswered(setpoint.parameter.name),
+                             neutral=neutral)
             return neutral
         del self._silences[index]
         if isinstance(reply, Refused):
-            self._failed(setpoint, f' {reply.text}', neutral=neutral)
+            self._failed(setpoint, sentences.write_refused(setpoint.parameter.name, reply.text),
+                         neutral=neutral)
             return neutral
         self._failures.pop(setpoint.parameter.name, None)
         if self._first.written(index):
@@ -191,24 +195,24 @@ class Writers:
                 break
         return raw, reply
 
-    def _failed(self, setpoint: Setpoint, why: str, *, neutral: bool) -> None:
+    def _failed(self, setpoint: Setpoint, text: Sentence, *, neutral: bool) -> None:
         """
         Take note of a setpoint that the drive does not take.
 
         :param neutral: it is the neutral one: a drive that is enabled would run on.
         """
         session, name = self._session, setpoint.parameter.name
-        control, now, text = session.control, self._channel.now, name + why
+        control, now = session.control, self._channel.now
         if self._warned.get(name) != text:  # once: commands may go to and fro
-            session.report.warn(f'write of {text}',
+            session.report.warn(sentences.write_failed(text),
                                 may_run=neutral and control is None and session.told.owed)
         self._warned[name] = self._failures[name] = text
         if control is None:
             return
         if self._first.look():
-            control.word_refused(control.word, f'not sent: write of {text}', now)
+            control.word_refused(control.word, sentences.word_held_back(text), now)
         elif neutral and control.operating:
-            control.drop(f'neutral is not taken, write of {text}')
+            control.drop(sentences.neutral_not_taken(text))
         else:
             return
         session.control_changed(now)
@@ -250,19 +254,18 @@ class Writers:
 
     # -- what the drive refuses -------------------------------------------------------------------
 
-    def control_refusal(self, action: ControlAction, refusal: str) -> str:
+    def control_refusal(self, action: ControlAction, refusal: Sentence) -> Sentence:
         """Say why a control action cannot be asked for, besides the usual."""
         if action is ControlAction.ENABLE:
             for setpoint in self._setpoints.held:  # the drive has another position
                 failed = self._failures.get(setpoint.parameter.name)
                 if failed:
-                    return f'it would jump: write of {failed}'
+                    return sentences.would_jump(sentences.write_failed(failed))
         return refusal
 
-    def warnings(self) -> list[str]:
+    def warnings(self) -> list[Sentence]:
         """Say what the drive refuses, and what to do."""
-        texts = [f'write of {text}: correct cyclic_request, the command or the profile'
-                 for text in self._failures.values()]
+        texts = [sentences.setpoint_not_taken(text) for text in self._failures.values()]
         if self.control is not None and self.control.refusal:
-            texts.append(f'write of {self.control.refusal}: look at the device')
+            texts.append(sentences.word_not_taken(self.control.refusal))
         return texts

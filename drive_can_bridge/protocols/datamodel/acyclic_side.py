@@ -9,12 +9,14 @@ from collections.abc import Callable, Generator, Sequence
 import math
 from typing import Union
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.events import ForeignMasterSeen
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter, Storage
 from drive_can_bridge.core.process_image import control_word, status_word
 from drive_can_bridge.core.roles import Cells
+from drive_can_bridge.core.sentences import Sentence
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.users import Users
 from drive_can_bridge.protocols.channel import Channel
@@ -105,7 +107,7 @@ class AcyclicSide:
         try:
             words = self._decode(frame, self.courier.outstanding)
         except RemoteProtocolError as error:
-            session.report.reject(str(error))
+            session.report.reject(sentences.malformed(str(error)))
             return
         if len(frame.data) != PAYLOAD:
             session.statistics.short += 1
@@ -115,7 +117,7 @@ class AcyclicSide:
         """Take note of a request that is not ours."""
         session = self._session
         session.report.note(ForeignMasterSeen(
-            f'another master sends requests to station {session.configuration.station}: {frame}'))
+            sentences.other_master_asks(session.configuration.station, str(frame))))
 
     # -- control and status word without a slot ---------------------------------------------------
 
@@ -177,7 +179,7 @@ class AcyclicSide:
 
 
 def confirm(writes: Sequence[tuple[Parameter, Write]], timeout: float,
-            ) -> Generator[Step, Words | None, list[str]]:
+            ) -> Generator[Step, Words | None, list[Sentence]]:
     """
     Read back what stops a drive, since nobody acknowledges it, and write it again as needed.
 
@@ -186,7 +188,7 @@ def confirm(writes: Sequence[tuple[Parameter, Write]], timeout: float,
     """
     blind = [each for each in writes if not each[0].readable]
     wrong = [each for each in writes if each[0].readable]
-    failed: list[str] = []
+    failed: list[Sentence] = []
     for attempt in range(STOP_ATTEMPTS):
         for each in (*blind, *wrong) if attempt else ():
             yield each[1]
@@ -199,9 +201,9 @@ def confirm(writes: Sequence[tuple[Parameter, Write]], timeout: float,
             if reply == write.words:
                 continue
             wrong.append((parameter, write))
-            failed.append(f'{parameter.name} ({parameter.address}): ' + (
-                'no answer' if reply is None else
-                f'read back {reply[0]} instead of {write.words[0]}'))
+            what = f'{parameter.name} ({parameter.address})'
+            failed.append(sentences.write_unanswered(what) if reply is None else
+                          sentences.write_read_back(what, reply[0], write.words[0]))
         if not wrong and not blind:
             break
     return failed

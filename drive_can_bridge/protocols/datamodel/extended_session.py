@@ -23,12 +23,14 @@ life. With ``mapping: assume`` there is neither CHECKING nor LEAVING: cycling ne
 from enum import Enum
 import math
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import Event, MappingDiffered, ProcessDataReceived
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.roles import Roles
+from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.told import UNHEARD
 from drive_can_bridge.protocols.cyclic_exchange import CYCLE, CyclicExchange
@@ -155,7 +157,7 @@ class ExtendedSession(Session):
                 self.told.ran = False
                 self.told.note(CYCLE, runs=True)
             owed = self.told.owed
-            self.lose(f'mapping differs: {text}', now)
+            self.lose(sentences.mapping_differs(text), now)
             # a request map that is right still takes neutral cycles, unless it is to be rewritten
             by_cycles = owed and self._maps.request_agrees and not (
                 self.gate.mute or self.told.runs(UNHEARD))
@@ -177,8 +179,7 @@ class ExtendedSession(Session):
                 self.report.warn(self._maps.unknown)
         else:
             self._phase = Phase.CHECKING
-            self.report.advice = ('no answer to mapping read: drive silent, wrong station, bit '
-                                  'rate or identifier mode')
+            self.report.advice = sentences.maps_unread()
             self._maps.look_at = now  # paced by the time-out of the read
             if self._side.shows_up:   # and answers a part of what it is asked
                 self._side.shows_up = False
@@ -186,7 +187,7 @@ class ExtendedSession(Session):
 
     def _maps_reported(self, event: Event) -> None:
         if isinstance(event, MappingDiffered):
-            self.report.advice = f'mapping differs: {event.text}'
+            self.report.advice = sentences.mapping_differs(event.text)
         self.report.note(event)
 
     # -- cyclic exchange --------------------------------------------------------------------------
@@ -217,7 +218,7 @@ class ExtendedSession(Session):
         self._phase = Phase.CYCLIC
         self._exchange.book.stale = 0
         self._exchange.start(now, in_turn=True)
-        self.report.advice = 'no cyclic response: drive silent or response identifier taken'
+        self.report.advice = sentences.cycles_unanswered()
 
     def _send_cycle(self, request: Frame, now: float) -> None:
         self._exchange.put(request)
@@ -240,7 +241,7 @@ class ExtendedSession(Session):
             self._exchange.doubt_the_end()
             self.stop_left()
 
-    def _missed(self, reason: str, now: float) -> None:
+    def _missed(self, reason: Sentence, now: float) -> None:
         if self._phase is Phase.LEAVING:
             if self._exchange.cycles_left == 0:
                 self.told.doubt()   # if nobody answers any more: next it is told by number
@@ -281,7 +282,7 @@ class ExtendedSession(Session):
             return
         raws, wrong = self._codec.decode_response(data)
         if wrong:
-            self.report.reject(f'cyclic response with {wrong}')
+            self.report.reject(sentences.bad_cyclic_response(wrong))
             if not raws:
                 return
         elif len(data) != extended.PAYLOAD:
@@ -324,8 +325,8 @@ class ExtendedSession(Session):
         return {'short_frames': str(self.statistics.short)}
 
     @property
-    def warning(self) -> str:
-        return self._maps.unknown if self._phase is Phase.CYCLIC else ''
+    def warning(self) -> Sentence:
+        return self._maps.unknown if self._phase is Phase.CYCLIC else NOTHING
 
     @property
     def state(self) -> DriveState:

@@ -15,7 +15,9 @@ from collections.abc import Callable
 from enum import Enum
 import math
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.events import Event, MappingDiffered, MappingWritten
+from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.protocols.datamodel import procedures
 from drive_can_bridge.protocols.datamodel.channel import AcyclicChannel
 from drive_can_bridge.protocols.datamodel.mapping import differences, effective
@@ -96,11 +98,10 @@ class MapSupervision:
         self._running = self._agreed = False
 
     @property
-    def unknown(self) -> str:
+    def unknown(self) -> Sentence:
         """Say that nobody knows whether the maps are still right; '' as long as somebody may."""
-        return '' if self.silent_looks < SILENT_LOOKS else (
-            f'no answer to {self.silent_looks} mapping reads in a row, although cyclic '
-            f'requests are answered: nobody knows whether the maps are still right')
+        return NOTHING if self.silent_looks < SILENT_LOOKS else sentences.maps_unknown(
+            self.silent_looks)
 
     # -- inside -----------------------------------------------------------------------------------
 
@@ -130,12 +131,12 @@ class MapSupervision:
             return
         self._judged(Verdict.DIFFER, found, now)
         if not self._rewrite:
-            self._tell(found)
+            self._tell(sentences.maps_found(found))
         elif now >= self._rewritten_at + self._pause:
             self._begin_rewrite(now)
         else:
             self.look_at = self._rewritten_at + self._pause
-            self._tell(f'{found}; rewritten before, not again within {self._pause:g} s')
+            self._tell(sentences.maps_wait(found, self._pause))
 
     def _begin_rewrite(self, now: float) -> None:
         if self._rewritten_at > -math.inf:
@@ -146,19 +147,18 @@ class MapSupervision:
             procedures.write_maps(*self._bases, request=self._request, response=self._response),
             self._rewritten, now)
 
-    def _rewritten(self, failure: str) -> None:
+    def _rewritten(self, failure: Sentence) -> None:
         now = self._rewritten_at = self._channel.now
         self._running = False
         if failure:
-            self._tell(f'could not be rewritten: {failure}')
+            self._tell(sentences.maps_not_written(failure))
             self.look_at = now + self._pause
             return
-        self._emit(MappingWritten(
-            f'request map {list(self._request)}, response map {list(self._response)}'))
+        self._emit(MappingWritten(sentences.maps_written(self._request, self._response)))
         self._told = ''
         self.handle_timer(now)
 
-    def _tell(self, text: str) -> None:
+    def _tell(self, text: Sentence) -> None:
         """Report a difference, once."""
         if text != self._told:
             self._emit(MappingDiffered(text))

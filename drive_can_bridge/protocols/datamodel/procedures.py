@@ -8,11 +8,13 @@ Every generator here is for :class:`.channel.AcyclicChannel`.
 from collections.abc import Generator, Sequence
 from typing import NamedTuple
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.parameters import Parameter, ParameterType, Storage
 from drive_can_bridge.core.requests import (
-    Failure, NOT_SENT, Outcome, Outcomes, SENT_UNACKNOWLEDGED, Written,
+    Failure, Outcome, Outcomes, Written,
 )
 from drive_can_bridge.core.retry import RetryPolicy
+from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.protocols.access import Access, Found, Item, read_back
 from drive_can_bridge.protocols.datamodel.channel import (
     AcyclicChannel, Read, Reply, Step, Words, Write,
@@ -22,7 +24,7 @@ from drive_can_bridge.protocols.datamodel.mapping import effective, padded
 from drive_can_bridge.protocols.datamodel.numbers import Numbers
 from drive_can_bridge.protocols.polling import Chunk
 
-NOT_WRITABLE = f'parameter {CYCLIC_PARAMETER} is never written: its number marks cyclic frames'
+NOT_WRITABLE = sentences.never_written(CYCLIC_PARAMETER)
 
 
 class Put(NamedTuple):
@@ -84,16 +86,16 @@ class ParameterAccess(Access[Chunk, Step, Reply]):
         words = yield Read(span.address, span.size)
         return self.retry.unanswered() if words is None else words
 
-    def misfit(self, items: Sequence[Item]) -> str:
+    def misfit(self, items: Sequence[Item]) -> Sentence:
         numbers = sorted(parameter.number or 0 for parameter, _ in items)
         consecutive = numbers == list(range(numbers[0], numbers[0] + len(numbers)))
         volatile = all(parameter.storage is Storage.RAM for parameter, _ in items)
         if len(items) <= self._together and consecutive and volatile:
-            return ''
+            return NOTHING
         what = ('one parameter fits' if self._together == 1 else
                 f'at most {self._together} parameters with consecutive numbers and storage ram '
                 'fit')
-        return f'cannot be written in one frame, nothing was written: {what}'
+        return sentences.not_in_one_frame(what)
 
     def write(self, items: Sequence[Item]) -> Generator[Step, Reply, Outcomes]:
         return self._write(items, look=True)
@@ -113,11 +115,11 @@ class ParameterAccess(Access[Chunk, Step, Reply]):
         became = yield from put(write, look=look and write.eeprom and readable,
                                 verify=self._verify and readable)
         if not became.sent:
-            return (Failure(NOT_SENT),) * len(items)
+            return (Failure(sentences.not_sent()),) * len(items)
         if became.found is None:
             return (self.retry.unanswered(),) * len(items)
         if not became.found:
-            return (Written(SENT_UNACKNOWLEDGED),) * len(items)
+            return (Written(sentences.sent_unacknowledged()),) * len(items)
         return tuple(
             _compare(parameter, parameter.raw_from_word(became.found[number - first]), raw)
             for number, (parameter, raw) in zip(numbers, items))
@@ -148,7 +150,7 @@ def read_maps(request_base: int, response_base: int, *, needed: tuple[int, ...] 
 
 
 def write_maps(request_base: int, response_base: int, *, request: Sequence[int],
-               response: Sequence[int]) -> Generator[Step, Reply, str]:
+               response: Sequence[int]) -> Generator[Step, Reply, Sentence]:
     """
     Rewrite both maps in the safe order: request slot 0 off first and on last.
 
@@ -165,12 +167,12 @@ def write_maps(request_base: int, response_base: int, *, request: Sequence[int],
     for number, word in sequence:
         became = yield from put(Write(number, (word,), eeprom=True), look=True)
         if not became.sent:
-            return f'map parameter {number}: {NOT_SENT}'
+            return sentences.write_refused(f'map parameter {number}:', sentences.not_sent())
         if not became.found:
-            return f'no answer for map parameter {number}'
+            return sentences.no_answer_for_map(number)
         if became.found[0] != word:
-            return f'map parameter {number}: read back {became.found[0]} instead of {word}'
-    return ''
+            return sentences.write_read_back(f'map parameter {number}', became.found[0], word)
+    return NOTHING
 
 
 def _compare(parameter: Parameter, found: int, wanted: int) -> Outcome:

@@ -3,8 +3,10 @@
 
 import math
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import worst_bits
+from drive_can_bridge.core.sentences import NOTHING
 from drive_can_bridge.protocols.datamodel.channel import ParameterCourier, Procedure, Read
 from drive_can_bridge.protocols.datamodel.extended import PAYLOAD
 from drive_can_bridge.protocols.datamodel.numbers import Numbers
@@ -49,7 +51,7 @@ class StandardRound:
 
     def __init__(self, drive: DriveConfiguration, courier: ParameterCourier,
                  status_slot: int | None) -> None:
-        self.gap = ''
+        self.gap = NOTHING
         self.status_asked_at = -math.inf
         self._courier = courier
         self._parameters = drive.cyclic_response
@@ -64,9 +66,8 @@ class StandardRound:
         for chunk in self._reads:
             words = yield Read(chunk.address, chunk.size, attempts=1)
             if words is None:
-                self.gap = '' if chunk is self._reads[0] else (
-                    f'no answer to the read of {self._names(chunk)}, though others are answered: '
-                    f'does this drive have it')
+                self.gap = (NOTHING if chunk is self._reads[0] else
+                            sentences.one_read_unanswered(self._names(chunk)))
                 return None
             if chunk is self._status_read:
                 self.status_asked_at = self._courier.asked_at

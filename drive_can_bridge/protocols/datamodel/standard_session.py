@@ -9,10 +9,12 @@ silent; that is how it is found. Setpoints are written only to a drive that answ
 back (:mod:`.acyclic_side`).
 """
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.roles import Roles
+from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.protocols.datamodel import standard
 from drive_can_bridge.protocols.datamodel.acyclic_side import AcyclicSide, map_cells
@@ -21,7 +23,6 @@ from drive_can_bridge.protocols.datamodel.standard_round import StandardRound
 from drive_can_bridge.protocols.polled_exchange import PolledExchange, Raws
 from drive_can_bridge.protocols.polling import TOLERANCE
 
-SILENT = 'no answer to reads: drive silent, wrong station, bit rate or identifier mode'
 
 
 class StandardSession(Session):
@@ -81,8 +82,8 @@ class StandardSession(Session):
             self._timer.start(now)
 
     def begin(self, now: float) -> None:
-        self.report.advice = SILENT
-        self._round.gap = ''
+        self.report.advice = sentences.reads_unanswered()
+        self._round.gap = NOTHING
         self._tell_to_stop(now)
         self._timer.start(now)
 
@@ -167,11 +168,12 @@ class StandardSession(Session):
         if known and self._side.control_slot is not None:
             self._writer.write_word(now, known=True)
 
-    def _missed(self, reason: str, now: float) -> None:
+    def _missed(self, reason: Sentence, now: float) -> None:
         if not self.online:
-            self.report.advice = self._round.gap or SILENT
+            self.report.advice = self._round.gap or sentences.reads_unanswered()
         elif reason:
-            self.lose(': '.join(filter(None, (reason, self._round.gap))), now)
+            gap = self._round.gap
+            self.lose(sentences.lost_because(reason, gap) if gap else reason, now)
 
     # -- control ----------------------------------------------------------------------------------
 
@@ -186,7 +188,7 @@ class StandardSession(Session):
 
     def receive_frame(self, frame: Frame, now: float, age: float = 0.0) -> None:
         if frame.extended or frame.identifier not in self._identifiers:
-            self.report.reject(f'{frame}: of somebody else')
+            self.report.reject(sentences.of_somebody_else(str(frame)))
             return
         if frame.identifier == self._request_identifier:
             self._side.foreign_master(frame)
@@ -199,7 +201,7 @@ class StandardSession(Session):
             if self._expected:
                 self._expected = False
             else:
-                self.report.reject(f'{frame}: nobody asked for it')
+                self.report.reject(sentences.nobody_asked(str(frame)))
             return
         self._exchange.received_at = now - age
         self._side.receive(frame, now)

@@ -9,7 +9,8 @@ from pkw_builders import CONTROL, driven, echo, online, READ_0, SPEED, SPEED_1
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import Noted
 from drive_can_bridge.core.setpoints import CommandOutcome
-from drive_can_bridge.core.told import MAY_RUN
+
+MAY_RUN = 'it may still be running'
 
 #: what is not answered: the setpoint, whatever it is
 SPEEDS = '505#C60200'

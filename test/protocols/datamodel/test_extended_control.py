@@ -16,7 +16,8 @@ from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import FrameRejected, Noted, StationLost
 from drive_can_bridge.core.setpoints import CommandOutcome
-from drive_can_bridge.core.told import MAY_RUN
+
+MAY_RUN = 'it may still be running'
 
 READY, ENABLED, FAULT = (
     ANSWER, '103FFFF0#03E800FA00030000', '103FFFF0#03E800FA00080000')
