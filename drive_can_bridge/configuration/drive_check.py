@@ -18,7 +18,7 @@ from drive_can_bridge.configuration.schema import ALL_OPTIONS, complete
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Access, Parameter, Storage
 from drive_can_bridge.core.profile import Profile
-from drive_can_bridge.core.words import show, suggestion
+from drive_can_bridge.core.words import seems_limit, show, suggestion
 from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.protocols.family import Complaint, Family
 
@@ -66,7 +66,9 @@ class DriveChecker:
             self._wrong((LISTS[1],), f'empty, allowed in {family.name} is at least one parameter')
         self._place(family.check(drive), Tree.wrong)
         self._place(family.warnings(drive), Tree.suspicious)
-        return replace(drive, joint=check_joint(self._tree, drive))
+        drive = replace(drive, joint=check_joint(self._tree, drive))
+        self._look_for_limits(drive)
+        return drive
 
     def is_sound(self, *keys: str) -> bool:
         """Tell whether none of these keys has a problem."""
@@ -149,6 +151,10 @@ class DriveChecker:
         control = drive.profile.control
         for position, parameter in enumerate(drive.cyclic_request):
             is_word = control is not None and control.parameter == parameter.name
+            if parameter.limit and is_word:
+                self._wrong(('cyclic_request',), f'{show(parameter.name)} is the control word, '
+                            'which is no limit; allowed in what bounds the drive',
+                            at=(*self._path, 'cyclic_request', position))
             if parameter.neutral_from:
                 self._check_held(drive, parameter, is_word=is_word, at=(
                     *self._path, 'cyclic_request', position))
@@ -163,6 +169,24 @@ class DriveChecker:
                             'and raw 0 is out of its range, allowed is a neutral of '
                             f'{parameter.range_text}',
                             at=(*self._path, 'cyclic_request', position))
+
+    def _look_for_limits(self, drive: DriveConfiguration) -> None:
+        """Point to limits that nobody said are limits: the drive has none of it until armed."""
+        control, joint = drive.profile.control, drive.joint
+        no_limits = {None if control is None else control.parameter}
+        if joint is not None:
+            no_limits |= {joint.position_command, joint.velocity_command, joint.effort_command}
+        for position, parameter in enumerate(drive.cyclic_request):
+            if (parameter.limit or not parameter.listed or parameter.name in no_limits
+                    or not seems_limit(parameter.name, parameter.description)):
+                continue
+            rest = parameter.neutral_from or show(parameter.value_from_raw(parameter.neutral_raw))
+            self._tree.suspicious(
+                (*self._path, 'cyclic_request'),
+                f'{show(parameter.name)} looks like a limit, and is sent as {rest}'
+                f'{parameter.unit and " " + parameter.unit} until it is armed: if it bounds the '
+                'drive and moves nothing, give it limit: true and a neutral in the profile',
+                at=(*self._path, 'cyclic_request', position))
 
     def _check_held(self, drive: DriveConfiguration, parameter: Parameter, *, is_word: bool,
                     at: Path) -> None:

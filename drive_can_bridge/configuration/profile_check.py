@@ -78,6 +78,7 @@ def profile_from_tree(tree: Tree) -> LoadedProfile:
         _check_names(tree, path, parameter)
         _check_parameter(tree, path, parameter, entry)
         _check_neutral_from(tree, path, parameter, entry)
+        _check_limit(tree, path, parameter, entry)
         # An entry of which a part was cut out would be checked with values it never had.
         if tree.is_sound(path):
             parameters[name] = _narrowed(tree, path, parameter)
@@ -160,6 +161,20 @@ def _check_neutral_from(tree: Tree, path: Path, parameter: Parameter,
     if not parameter.writable:
         tree.wrong((*path, 'neutral_from'), f'{show(parameter.name)} is read-only, allowed in '
                                             'parameters with access rw or wo')
+
+
+def _check_limit(tree: Tree, path: Path, parameter: Parameter, entry: dict[str, Any]) -> None:
+    """Check what bounds and moves nothing."""
+    if not parameter.limit:
+        return
+    if 'neutral_from' in entry:
+        tree.wrong((*path, 'limit'), 'stands beside neutral_from, allowed is one of them')
+    elif 'neutral' not in entry and not tree.is_damaged((*path, 'neutral')):
+        tree.wrong((*path, 'limit'), 'needs neutral: what is sent until the first command, '
+                                     'allowed is to give it too')
+    if not parameter.writable:
+        tree.wrong((*path, 'limit'), f'{show(parameter.name)} is read-only, allowed in parameters '
+                                     'with access rw or wo')
 
 
 def _check_measured(tree: Tree, parameters: dict[str, Parameter], names: tuple[str, ...]) -> None:

@@ -21,6 +21,8 @@ it was armed, and is still driven            is latched at what was *sent* last:
 
 When the drive was lost, nobody knows where the axis is: the position is to be measured anew. What
 is measured is not limited by ``minimum..maximum``: an axis outside of them stays there, too.
+
+A :class:`Limit` travels with the setpoints, but moves nothing.
 """
 
 from drive_can_bridge.core.last_sent import LastSent
@@ -152,6 +154,35 @@ class HeldSetpoint(Setpoint):
         return before != (self._known, self.neutral)
 
 
+class Limit(Setpoint):
+    """
+    What bounds a drive and moves nothing, such as a torque limit (``limit: true``).
+
+    Commands always go through, and the last one stands, whatever becomes of the drive: what is
+    sent without a fresh command is what was commanded last. So it is never more than neutral.
+    """
+
+    __slots__ = ()
+
+    def __init__(self, parameter: Parameter) -> None:
+        super().__init__(parameter)
+        self.reset()
+
+    def disarm(self) -> None:
+        """Stay as it is: a stop may need that torque to brake."""
+
+    def reset(self) -> None:
+        """Be what an activation begins with."""
+        self.take(self.parameter.neutral_raw)
+        self.armed = True
+
+    def take(self, raw: int) -> bool:
+        """Take a command; tell whether something else is to be sent."""
+        changed = self.raw != raw
+        self.raw = self.neutral = raw
+        return changed
+
+
 def make_setpoint(parameter: Parameter, sample: tuple[Parameter, ...],
                   sent: LastSent | None) -> Setpoint:
     """
@@ -160,6 +191,8 @@ def make_setpoint(parameter: Parameter, sample: tuple[Parameter, ...],
     :param sample: what is measured, in the order of ``ProcessDataReceived.raws``.
     :param sent: what the drive was told last; needed for ``neutral_from``.
     """
+    if parameter.limit:
+        return Limit(parameter)
     if sent is not None:
         for place, measured in enumerate(sample):
             if measured.name == parameter.neutral_from:

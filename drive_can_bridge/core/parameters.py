@@ -105,6 +105,7 @@ class Parameter:
     :param neutral: value sent while there is no fresh command; None means what encodes to raw 0.
     :param neutral_from: name of the actual value that is sent instead of it: the axis stays where
         it is; '': ``neutral`` holds.
+    :param limit: it bounds, and moves nothing: it needs no arming, and the last command stands.
     :param arming_tolerance: how far from neutral a command may be and still arm.
     :param bits: named bits, (name, bit number).
     :param subindex: array index (CANnord) or CANopen sub-index.
@@ -129,6 +130,7 @@ class Parameter:
     maximum: float | None = None
     neutral: float | None = None
     neutral_from: str = ''
+    limit: bool = False
     arming_tolerance: float = 0.0
     description: str = ''
     bits: tuple[tuple[str, int], ...] = ()

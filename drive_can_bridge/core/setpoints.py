@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from enum import Enum
 import math
 
-from drive_can_bridge.core.holding import HeldSetpoint, make_setpoint, Setpoint
+from drive_can_bridge.core.holding import HeldSetpoint, Limit, make_setpoint, Setpoint
 from drive_can_bridge.core.last_sent import LastSent
 from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.sentences import NOTHING, Sentence, would_jump
@@ -31,7 +31,7 @@ class CommandOutcome(Enum):
 
 class Setpoints:
     """
-    All setpoints of a drive, in slot order.
+    All setpoints of a drive, in slot order, with the limits among them.
 
     :param timeout: s without a fresh command until a setpoint goes neutral; 0: never.
     :param rearm_immediate: any valid command arms, not only a neutral one.
@@ -60,14 +60,19 @@ class Setpoints:
         self._timeout = timeout
         self._expired: list[Setpoint] = []  # found overdue by a command, not told yet
 
-    def command(self, index: int, value: Value, now: float) -> CommandOutcome:
+    def command(self, index: int, value: Value, now: float, *,
+                active: bool = True) -> CommandOutcome:
         """
         Take a command for one setpoint. The newest one wins.
 
+        :param active: the bridge is: a limit is taken, whatever the drive is doing.
         :raises ValueRefused: the value cannot be sent. Nothing changes then, the age included.
         """
         setpoint = self.items[index]
         raw = setpoint.parameter.raw_from_value(value)
+        if isinstance(setpoint, Limit) and active:
+            self.changed |= setpoint.take(raw)
+            return CommandOutcome.ACCEPTED
         if not self.enabled:
             self.ignored_at = now
             return CommandOutcome.NOT_ARMED
@@ -180,9 +185,11 @@ class Setpoints:
         return would_jump('; '.join(texts)) if texts else NOTHING
 
     def reset(self) -> None:
-        """Take note that nothing was ever measured."""
-        for setpoint in self.held:
-            setpoint.reset()
+        """Begin anew: nothing was ever measured, and limits are neutral."""
+        for setpoint in self.items:
+            if isinstance(setpoint, (HeldSetpoint, Limit)):
+                setpoint.reset()
+        self.changed = True
 
     def forget(self) -> None:
         """Take note that the axes may be anywhere by now: the drive was lost."""

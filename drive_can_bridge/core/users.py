@@ -61,7 +61,8 @@ class Users:
         """
         session = self._session
         try:
-            outcome = session.setpoints.command(index, value, now)
+            outcome = session.setpoints.command(
+                index, value, now, active=session.active)
         except ValueError:
             session.statistics.commands_refused += 1
             raise

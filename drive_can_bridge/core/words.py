@@ -31,6 +31,11 @@ def show(value: Any) -> str:
     return describe_type(value)
 
 
+def seems_limit(*texts: str) -> bool:
+    """Tell whether names and descriptions speak of something that bounds."""
+    return any(word in text.lower() for text in texts for word in ('limit', 'max'))
+
+
 def describe_type(value: Any) -> str:
     """Name the type of a value in words."""
     if isinstance(value, bool):

@@ -2,6 +2,7 @@
 """How to talk to a drive from another terminal: command lines that work as they stand."""
 
 from drive_can_bridge.core.parameters import ValueKind
+from drive_can_bridge.core.words import seems_limit
 from drive_can_bridge.monitor.snapshot import DriveSnapshot
 from drive_can_bridge.monitor.values import ParameterInfo
 
@@ -34,8 +35,9 @@ def _commands(drive: DriveSnapshot) -> list[tuple[str, str]]:
     if drive.control:
         found.append((f"ros2 service call {drive.name}/enable std_srvs/srv/SetBool "
                       f"'{{data: true}}'", 'by its control word'))
-    setpoint = next((info for info in drive.parameters if info.facts.get('role') == 'cyclic'
-                     and not info.read_only), None)
+    commanded = [info for info in drive.parameters if info.facts.get('role') == 'cyclic'
+                 and not info.read_only]
+    setpoint = min(commanded, key=lambda info: seems_limit(info.name), default=None)
     if setpoint is not None:
         kind = setpoint.kind
         zero = 'false' if kind is ValueKind.BOOL else '0.0' if kind is ValueKind.DOUBLE else '0'

@@ -112,6 +112,7 @@ def description(name: str, parameter: Parameter, entry: dict[str, Any]) -> dict[
         'storage': parameter.storage.value if parameter.storage else None,
         'minimum': parameter.minimum, 'maximum': parameter.maximum,
         'neutral': parameter.neutral, 'neutral_from': parameter.neutral_from or None,
+        'limit': parameter.limit,
         'arming_tolerance': parameter.arming_tolerance, 'bits': dict(parameter.bits),
         'word_order': parameter.word_order, 'protected': parameter.protected,
         'description': parameter.description, 'source': entry.get('source'),

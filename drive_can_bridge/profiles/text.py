@@ -17,7 +17,7 @@ WIDTH = 99
 #: keys of an entry, in the order in which they are written; each group begins a line
 GROUPS = (
     ('number', 'index', 'subindex', 'type', 'scale', 'offset', 'unit', 'access', 'storage',
-     'minimum', 'maximum', 'neutral', 'neutral_from', 'arming_tolerance', 'word_order',
+     'minimum', 'maximum', 'neutral', 'neutral_from', 'limit', 'arming_tolerance', 'word_order',
      'protected'),
     ('description',),
     ('bits',),

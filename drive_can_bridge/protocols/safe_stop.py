@@ -73,7 +73,7 @@ class SafeStop(Generic[StepT, ReplyT]):
         """
         Return what the drive has to be told: ``disable``, then neutral setpoints.
 
-        But no position where the axis may not be any more.
+        But no position where the axis may not be any more, and no limit.
 
         :param word: the control word has to be told.
         :param setpoints: they have to be told.
@@ -83,7 +83,8 @@ class SafeStop(Generic[StepT, ReplyT]):
             found.append(StopWrite(self._word, control.table.disable, is_word=True))
         if setpoints:
             found += [StopWrite(setpoint.parameter, setpoint.neutral)
-                      for setpoint in self._session.setpoints.items if setpoint.known]
+                      for setpoint in self._session.setpoints.items
+                      if setpoint.known and not setpoint.parameter.limit]
         return found
 
     def begin(self, procedure: Generator[StepT, ReplyT, list[Sentence]], now: float, *,

@@ -126,8 +126,9 @@ class Motor:
         """Speed as a share of the rated one, with sign."""
         return self.shaft.speed / self.rated_speed
 
-    def advance(self, duration: float, *, energised: bool) -> None:
-        """Take note of how the shaft has moved for some time."""
+    def advance(self, duration: float, *, energised: bool,
+                torque_max: float = TORQUE_MAX) -> None:
+        """Take note of how the shaft has moved for some time, by what torque at most."""
         goal = AMBIENT_TEMPERATURE + TEMPERATURE_RISE * self.current ** 2
         self.temperature += (goal - self.temperature) * -math.expm1(
             -duration / TEMPERATURE_TIME_CONSTANT)
@@ -138,5 +139,5 @@ class Motor:
         friction = math.copysign(FRICTION_TORQUE, speed) if speed else 0.0
         torque = (LOAD_TORQUE * speed + friction + self.load
                   + INERTIA_TORQUE * self.shaft.slope / self.rated_speed)
-        self.torque = min(max(torque, -TORQUE_MAX), TORQUE_MAX)
+        self.torque = min(max(torque, -torque_max), torque_max)
         self.current = math.hypot(MAGNETISING_CURRENT, self.torque)

@@ -20,8 +20,9 @@ import random
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.simulation import names, scales
+from drive_can_bridge.simulation.bounds import Bounds, Reach
 from drive_can_bridge.simulation.control import ENDS, machine_of, Operation, Report, StatusWord
-from drive_can_bridge.simulation.motor import Motor, Rates, Travel
+from drive_can_bridge.simulation.motor import Motor, Rates, TORQUE_MAX, Travel
 from drive_can_bridge.simulation.names import Quantity, RampParameter, RampUse
 from drive_can_bridge.simulation.plant import Mechanics
 from drive_can_bridge.simulation.registers import Refusal, Registers
@@ -75,6 +76,7 @@ class MotorPlant:
         self.speed_setpoint = speed = mover if by_speed else None
         other_kind = Quantity.POSITION if by_speed else Quantity.SPEED
         self._positioned = mover is not speed
+        self._bounds = Bounds(registers, parameters, mover)
         self._travels: dict[str, tuple[Parameter, Travel]] = {}     # by setpoint
         self._followers: dict[str, tuple[Parameter, Travel]] = {}
         self._actuals: dict[str, Callable[[], float]] = {}
@@ -109,6 +111,9 @@ class MotorPlant:
         if parameter.name in self._ramps:
             value = self._initial_ramp(self._ramps[parameter.name])
             return scales.nearest_raw(parameter, value, parameter.raw_limits)
+        limit = self._bounds.initial(parameter.name, self.motor.rated_speed)
+        if limit is not None:
+            return scales.nearest_raw(parameter, limit, parameter.raw_limits)
         if parameter.name in self._setpoints and parameter.neutral is None:
             return scales.clamp(0, parameter.raw_limits)
         return scales.plausible(parameter)
@@ -166,7 +171,9 @@ class MotorPlant:
         """The speed that is commanded."""
         if self.speed_setpoint is None:
             return 0.0
-        return self.command(self.registers.commanded(self.speed_setpoint.name))
+        fastest = self._bounds.speed
+        value = self.command(self.registers.commanded(self.speed_setpoint.name))
+        return min(max(value, -fastest), fastest)
 
     def advance(self, now: float) -> None:
         operation = self.operation
@@ -176,15 +183,20 @@ class MotorPlant:
         if duration > 0.0 and noise:
             self._jitter = self._noise.randint(-noise, noise)
         motor, rated = self.motor, self.motor.rated_speed
-        driven = energised and not operation.stopping
+        torque = self._bounds.torque
+        reach = Reach.of(torque, load, 1.0 / COAST_TIME)
+        driven = energised and not operation.stopping and reach.speed > 0.0
         falling = self._rate(self._falling, rated / RAMP_TIME)
-        rates = Rates(self._rate(self._rising, rated / RAMP_TIME), falling)
+        rates = reach.rates(Rates(self._rate(self._rising, rated / RAMP_TIME), falling), rated)
         held = not energised and self._mechanics.brake
         # where to, and how fast, as shares of the rated speed, while nothing is commanded
-        drift = 0.0 if energised or held else -SINKING_SPEED * load
+        drift = -SINKING_SPEED * load
+        if held or energised and torque >= load:
+            drift = 0.0
         stop = 1.0 / COAST_TIME
         if energised:
-            stop = self._rate(self._quick_stop, max(rated / QUICK_STOP_TIME, falling)) / rated
+            stop = min(reach.falling, self._rate(
+                self._quick_stop, max(rated / QUICK_STOP_TIME, falling)) / rated)
         for name, (setpoint, follower) in self._followers.items():
             rate = scales.rated_speed(setpoint) / RAMP_TIME
             target = self.registers.commanded(name) if driven else 0.0
@@ -194,7 +206,8 @@ class MotorPlant:
             if held:
                 travel.speed = 0.0
             if driven:
-                travel.go(duration, self.registers.commanded(name), limit,
+                travel.go(duration, self.registers.commanded(name),
+                          limit * min(reach.speed, 1.0),
                           limit * rates.rising / rated)
             else:
                 travel.run(duration, drift * limit, Rates(stop * limit, stop * limit))
@@ -202,9 +215,12 @@ class MotorPlant:
             if held:
                 motor.shaft.speed = 0.0
             if duration > 0.0:
-                motor.shaft.run(duration, self.target if driven else drift * rated,
-                                rates if driven else Rates(stop * rated, stop * rated))
-        motor.advance(duration, energised=energised)
+                fastest = reach.speed * rated
+                motor.shaft.run(
+                    duration,
+                    min(max(self.target, -fastest), fastest) if driven else drift * rated,
+                    rates if driven else Rates(stop * rated, stop * rated))
+        motor.advance(duration, energised=energised, torque_max=min(torque, TORQUE_MAX))
         if operation.state in ENDS and motor.speed == 0.0:
             operation.standstill()
             motor.advance(0.0, energised=operation.enabled)

@@ -37,7 +37,8 @@ BY_UNIT = {
                     Quantity.SPEED),
     **dict.fromkeys(('rev', 'rad', 'deg', '°', 'mm', 'm'), Quantity.POSITION),
 }
-_LIMIT_WORDS = frozenset(('limit', 'maximum', 'minimum', 'max', 'min'))
+_UPPER_WORDS = frozenset(('limit', 'maximum', 'max'))
+_LIMIT_WORDS = _UPPER_WORDS | {'minimum', 'min'}
 # A "nominal_current" or "speed_limit" is a setting, even where it is read-only.
 _SETTING_WORDS = _LIMIT_WORDS | {'nominal', 'rated', 'reference', 'threshold', 'setpoint',
                                  'target', 'command'}
@@ -102,7 +103,7 @@ def mover(found: Sequence[Pair], cyclic: Sequence[Parameter], control: str | Non
     for parameter in cyclic:
         quantity = quantity_of(parameter) or BY_UNIT.get(parameter.unit)
         if (quantity in _MOVING and parameter.name != control
-                and not words_of(parameter) & _LIMIT_WORDS):
+                and not parameter.limit and not words_of(parameter) & _LIMIT_WORDS):
             return parameter, quantity
     return next(((pair.setpoint, kind) for kind in _MOVING for pair in found
                  if quantity_of(pair.setpoint) is kind), (None, None))
@@ -120,7 +121,7 @@ def pairs(parameters: Mapping[str, Parameter], *, without: str | None = None) ->
     """
     found = []
     for parameter in parameters.values():
-        if not parameter.writable or parameter.name == without:
+        if not parameter.writable or parameter.name == without or parameter.limit:
             continue
         match = _SETPOINT.fullmatch(parameter.name)
         subject = parameter.name if match is None else match['after'] or match['before']
@@ -149,6 +150,15 @@ def ramp_parameters(parameters: Mapping[str, Parameter]) -> list[RampParameter]:
         is_time = 'time' in words or parameter.unit in ('s', 'ms') or not rate
         found.append(RampParameter(parameter, is_time, use))
     return found
+
+
+def limits(parameters: Mapping[str, Parameter]) -> list[tuple[Parameter, Quantity]]:
+    """Find ``torque_limit``, ``maximum_speed`` … and what is a limit by its profile."""
+    return [
+        (parameter, quantity) for parameter in parameters.values()
+        if (quantity := quantity_of(parameter)) in (
+            Quantity.SPEED, Quantity.TORQUE, Quantity.CURRENT)
+        and parameter.writable and (parameter.limit or words_of(parameter) & _UPPER_WORDS)]
 
 
 def crossings(parameters: Mapping[str, Parameter]) -> dict[str, list[tuple[str, str]]]:

@@ -98,9 +98,19 @@ def mains_swing(now: float) -> float:
     return 0.005 * math.sin(2.0 * math.pi * 0.3 * max(now, 0.0))
 
 
+def full(unit: str, quantity: Quantity) -> float:
+    """Return 100 % of a quantity in a unit."""
+    return _RATINGS.get(quantity, {}).get(unit, _DEFAULT_RATING)
+
+
+def measures(unit: str, quantity: Quantity) -> bool:
+    """Tell whether a unit says how much of a quantity there is."""
+    return unit == '%' or unit in _RATINGS[quantity]
+
+
 def rating(parameter: Parameter, quantity: Quantity) -> float:
     """Return what a parameter shows at 100 % of a quantity."""
-    wanted = _RATINGS.get(quantity, {}).get(parameter.unit, _DEFAULT_RATING)
+    wanted = full(parameter.unit, quantity)
     # a voltage hardly exceeds its rating, everything else may double
     headroom = 1.2 if quantity is Quantity.VOLTAGE else 2.0
     return min(wanted, highest(parameter) / headroom)

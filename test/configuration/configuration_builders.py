@@ -48,7 +48,7 @@ description: for tests
 protocols: [datamodel_extended]
 parameters:
   speed: {number: 50, type: int16, scale: 0.1, unit: rpm, minimum: -3000, maximum: 3000}
-  limit: {number: 51, type: uint16}
+  limit: {neutral: 100, limit: true, number: 51, type: uint16}
   word: {number: 52, type: uint16, storage: ram}
   flag: {number: 53, type: bool}
   angle: {number: 54, type: int16, unit: deg}

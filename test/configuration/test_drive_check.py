@@ -344,6 +344,36 @@ def test_control_without_its_status_word(tmp_path: Path) -> None:
         'bridge cannot tell whether the drive is enabled']
 
 
+@pytest.mark.parametrize('entry', [
+    'limit: {number: 51}',
+    'limit: {number: 51, neutral: 300, scale: 0.1}',
+    'limit: {number: 51, limit: false}'])
+def test_what_looks_like_a_limit_and_is_none(tmp_path: Path, entry: str) -> None:
+    """Until somebody arms it, the drive has none of it."""
+    old = 'limit: {neutral: 100, limit: true, number: 51, type: uint16}'
+    found, = warnings(tmp_path, profile=changed(PROFILE, old, entry))
+    assert found.startswith('f.yaml:16: drives.conveyor.cyclic_request: ')
+    assert 'looks like a limit' in found
+
+
+def test_what_may_look_like_a_limit(tmp_path: Path) -> None:
+    """By its description, too; not what a joint is commanded by, nor the control word."""
+    table = changed(PROFILE, 'maximum: 3000}', 'maximum: 3000, description: Of the Maximum speed}')
+    found = warnings(tmp_path, profile=table)
+    assert [line.split(':')[1] for line in found] == ['16', '24']
+    joint = changed(FILE, '        rearm: neutral\n',
+                    '        joint: {name: j, velocity_command: speed, velocity: actual}\n')
+    assert [line.split(':')[1] for line in warnings(tmp_path, joint, table)] == ['24']
+    word = changed(PROFILE, 'word: {number: 52', 'word: {description: Limits, number: 52')
+    assert warnings(tmp_path, changed(FILE, '[speed, limit]', '[word, speed]'), word) == []
+
+
+def test_control_word_is_no_limit(tmp_path: Path) -> None:
+    table = changed(PROFILE, 'storage: ram}', 'storage: ram, limit: true, neutral: 0}')
+    found, = problems(tmp_path, changed(FILE, '[speed, limit]', '[word, speed]'), table)
+    assert found.startswith('f.yaml:16: drives.conveyor.cyclic_request: ')
+
+
 def test_control_word_may_be_sent_cyclically(tmp_path: Path) -> None:
     assert problems(tmp_path, changed(FILE, '[speed, limit]', '[word, speed]')) == []
 

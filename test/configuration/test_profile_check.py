@@ -125,10 +125,10 @@ CASES = [
     ('type: uint16}', 'type: uint16, maximum: 0.5}',
      ['table.yaml:5: parameters.limit.maximum: 0.5 is no integer, allowed without scale, '
       'offset and unit are integers']),
-    ('type: uint16}', 'type: uint16, neutral: 0.5}',
+    ('neutral: 100,', 'neutral: 0.5,',
      ['table.yaml:5: parameters.limit.neutral: 0.5 cannot be sent, allowed is an integer, 0 to '
       '65535']),
-    ('type: uint16}', 'type: uint16, neutral: 70000}',
+    ('neutral: 100,', 'neutral: 70000,',
      ['table.yaml:5: parameters.limit.neutral: 70000 cannot be sent, allowed is an integer, 0 '
       'to 65535']),
     ('type: uint16}', 'type: uint16, minimum: .inf}',
@@ -227,8 +227,20 @@ CASES = [
      [f'table.yaml:1: protocols: missing, allowed is a list of {PROTOCOLS}',
       'table.yaml:1: parameters: missing, allowed is a mapping',
       'table.yaml:2: yaml: a second document, allowed is one']),
-    ('limit: {number: 51, type: uint16}', 'limit: 5',
+    ('limit: {neutral: 100, limit: true, number: 51, type: uint16}', 'limit: 5',
      ['table.yaml:5: parameters.limit: 5 is an integer, allowed is a mapping']),
+    ('limit: {neutral: 100, limit', 'limit: {limit',
+     ['table.yaml:5: parameters.limit.limit: needs neutral: what is sent until the first command, '
+      'allowed is to give it too']),
+    ('limit: true, number: 51', 'limit: 1, number: 51',
+     ['table.yaml:5: parameters.limit.limit: 1 is an integer, allowed is true or false']),
+    ('access: ro, bits', 'access: ro, neutral: 0, limit: true, bits',
+     ["table.yaml:12: parameters.status.limit: 'status' is read-only, allowed in parameters with "
+      'access rw or wo']),
+    ('maximum: 3000}', 'maximum: 3000, limit: true, neutral_from: actual, arming_tolerance: 1}',
+     ['table.yaml:4: parameters.speed.limit: stands beside neutral_from, allowed is one of '
+      'them']),
+    ('storage: ram}', 'storage: ram, limit: true, neutral: 0}', []),
     ('parameters:', 'parametrs:',
      ['table.yaml:1: parameters: missing, allowed is a mapping',
       "table.yaml:3: parametrs: unknown key, did you mean 'parameters'?"]),

@@ -88,7 +88,7 @@ class TestShow:
             'name': 'flc1_ratio', 'address': 'P652', 'number': 652, 'index': 0x2007,
             'subindex': 3, 'type': 'uint16', 'scale': 1.0, 'offset': 0.0, 'unit': '%',
             'access': 'rw', 'storage': 'eeprom', 'minimum': 5.0, 'maximum': 100.0,
-            'neutral': None, 'neutral_from': None, 'arming_tolerance': 0.0,
+            'neutral': None, 'neutral_from': None, 'limit': False, 'arming_tolerance': 0.0,
             'bits': {}, 'word_order': None, 'protected': False,
             'description': 'Full load current in percent of the largest one of the controller; a '
                            'small contactor rating raises the minimum',

@@ -190,6 +190,7 @@ class CannordPartner(Partner):
         if identifier == '002':
             status = 0x0B37 if text.startswith('7F04') else 0x0B31
             self.registers[50] = int.from_bytes(data[2:4], 'little')
+            self.registers[51] = int.from_bytes(data[4:6], 'little')
             words = (status, self.registers[209], self.registers[210], 0)
             return ['003#' + b''.join(word.to_bytes(2, 'little') for word in words).hex()]
         assert identifier == '202'

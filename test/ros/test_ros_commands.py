@@ -13,6 +13,8 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Int64
 
 SPEED, LIMIT = '/conveyor/command/speed_setpoint', '/conveyor/command/torque_limit'
+POSITION = '/conveyor/command/position_setpoint'
+TWO_SETPOINTS = {**CONVEYOR, 'cyclic_request': ['speed_setpoint', 'position_setpoint']}
 DRIVE = 'drive_can_bridge: drive conveyor'
 
 
@@ -39,7 +41,7 @@ def arm(client: Client, recorder: Recorder, speed: float = 100.0) -> None:
 
 
 def test_only_neutral_arms(bridge: StartBridge, client: Client) -> None:
-    one = bridge()
+    one = bridge(parameters(conveyor=TWO_SETPOINTS))
     one.online()
     with one.record() as recorder:
         client.publish(SPEED, Float64(data=100.0))
@@ -52,12 +54,27 @@ def test_only_neutral_arms(bridge: StartBridge, client: Client) -> None:
         client.publish(SPEED, Float64(data=123.4))
         until_sent(recorder, 0, 1234)
         # each setpoint has to be armed by itself
-        client.publish(LIMIT, Float64(data=50.0))
+        client.publish(POSITION, Float64(data=50.0))
         cycles_pass(one)
         assert recorder.words()[:2] == (1234, 0)
-        client.publish(LIMIT, Float64(data=0.0))
+        client.publish(POSITION, Float64(data=0.0))
+        client.publish(POSITION, Float64(data=50.0))
+        until_sent(recorder, 1, 500)
+    assert refused(one) == 0
+
+
+def test_a_limit_needs_no_arming_and_does_not_age(bridge: StartBridge, client: Client) -> None:
+    one = bridge(parameters(conveyor={**CONVEYOR, 'command_timeout': 0.3}))
+    one.online()
+    with one.record() as recorder:
+        until_sent(recorder, 1, 1000)       # neutral: 100 %
         client.publish(LIMIT, Float64(data=50.0))
         until_sent(recorder, 1, 500)
+        arm(client, recorder)
+        until_sent(recorder, 0, 0)          # too old by now
+        assert recorder.words()[1] == 500
+    status = client.diagnostics(DRIVE, lambda drive: drive['state'] == 'not armed')
+    assert 'torque_limit' not in status['message']
     assert refused(one) == 0
 
 
@@ -74,20 +91,21 @@ def test_newest_wins(bridge: StartBridge, client: Client) -> None:
 
 
 def test_time_out_goes_neutral_by_setpoint(bridge: StartBridge, client: Client) -> None:
-    one = bridge(parameters(conveyor={**CONVEYOR, 'command_timeout': 2.0}))
+    one = bridge(parameters(conveyor={**TWO_SETPOINTS, 'command_timeout': 2.0}))
     one.online()
     with one.record() as recorder:
-        client.publish(LIMIT, Float64(data=0.0))
-        client.publish(LIMIT, Float64(data=30.0))
+        client.publish(POSITION, Float64(data=0.0))
+        client.publish(POSITION, Float64(data=30.0))
         arm(client, recorder)
         until_sent(recorder, 1, 300)
 
         def kept() -> bool:
             client.publish(SPEED, Float64(data=100.0))
             return recorder.words()[1] == 0
-        wait_until(kept, what='the limit alone to go neutral')
+        wait_until(kept, what='the position alone to go neutral')
         assert recorder.words()[0] == 1000
-        client.wait_logged('conveyor: no command for 2 s: torque_limit neutral until armed again')
+        client.wait_logged(
+            'conveyor: no command for 2 s: position_setpoint neutral until armed again')
         until_sent(recorder, 0, 0)
         client.publish(SPEED, Float64(data=100.0))
         cycles_pass(one)
@@ -112,7 +130,7 @@ def test_refused_commands_change_nothing(bridge: StartBridge, client: Client, va
         wait_until(lambda: refused(one) == 1)
         client.wait_logged(f'conveyor: command speed_setpoint refused: {reason}')
         cycles_pass(one)
-        assert set(recorder.cycles()) == {(1000, 0, 0, 0)}
+        assert set(recorder.cycles()) == {(1000, 1000, 0, 0)}
         client.diagnostics(DRIVE, lambda drive: drive['commands_refused'] == '1')
         client.publish(SPEED, Float64(data=200.0))
         until_sent(recorder, 0, 2000)

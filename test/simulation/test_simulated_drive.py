@@ -37,13 +37,13 @@ class TestCyclicExchange:
 
     def test_speed_follows_with_a_ramp(self) -> None:
         made = drive()
-        # 1500 rpm = 3A98h, at 3000 rpm per second
-        ask(made, f'{CYCLIC}#3A98000000000000', 10.0)
-        assert ask(made, f'{CYCLIC}#3A98000000000000', 10.25)[0][9:13] == '1D4C'    # 750.0
-        assert ask(made, f'{CYCLIC}#3A98000000000000', 10.75)[0][9:13] == '3A98'    # 1500.0
-        assert ask(made, f'{CYCLIC}#0000000000000000', 10.75)[0][9:13] == '3A98'
-        assert ask(made, f'{CYCLIC}#0000000000000000', 11.00)[0][9:13] == '1D4C'
-        assert ask(made, f'{CYCLIC}#0000000000000000', 11.50)[0][9:13] == '0000'
+        # 1500 rpm = 3A98h, at 3000 rpm per second; 100.0 % torque
+        ask(made, f'{CYCLIC}#3A9803E800000000', 10.0)
+        assert ask(made, f'{CYCLIC}#3A9803E800000000', 10.25)[0][9:13] == '1D4C'    # 750.0
+        assert ask(made, f'{CYCLIC}#3A9803E800000000', 10.75)[0][9:13] == '3A98'    # 1500.0
+        assert ask(made, f'{CYCLIC}#000003E800000000', 10.75)[0][9:13] == '3A98'
+        assert ask(made, f'{CYCLIC}#000003E800000000', 11.00)[0][9:13] == '1D4C'
+        assert ask(made, f'{CYCLIC}#000003E800000000', 11.50)[0][9:13] == '0000'
 
     def test_setpoint_beyond_the_limits_is_clamped(self) -> None:
         made = drive(response=(SPEED_SETPOINT,))
@@ -134,7 +134,7 @@ class TestAcyclicAccess:
     def test_ramp_time_takes_effect(self) -> None:
         made = drive()
         ask(made, '003001E1#00C8000000000000', 0.0)     # 2 s from 0 to 3000 rpm
-        ask(made, f'{CYCLIC}#7530000000000000', 1.0)
+        ask(made, f'{CYCLIC}#753003E800000000', 1.0)
         assert made.value('actual_speed', 2.0) == 1500.0
 
     def test_what_is_not_for_this_drive(self) -> None:
@@ -314,8 +314,8 @@ class TestByHand:
     def test_actual_value_is_held_until_released(self) -> None:
         made = drive()
         made.set_value('actual_speed', 12.3)
-        assert ask(made, f'{CYCLIC}#3A98000000000000', 0.0)[0][9:13] == '007B'
-        assert ask(made, f'{CYCLIC}#3A98000000000000', 1.0)[0][9:13] == '007B'
+        assert ask(made, f'{CYCLIC}#3A9803E800000000', 0.0)[0][9:13] == '007B'
+        assert ask(made, f'{CYCLIC}#3A9803E800000000', 1.0)[0][9:13] == '007B'
         made.release('actual_speed')
         assert made.value('actual_speed', 1.0) == 1500.0
 

@@ -264,13 +264,13 @@ class TestDrive:
 
     def test_trip_without_control_section(self) -> None:
         made = drive([*EXAMPLE, parameter('fault_code', 217)])
-        ask(made, '003FFFF0#7530000000000000', 0.0)
+        ask(made, '003FFFF0#753003E800000000', 0.0)
         made.fault('trip', 1.0)
-        assert ask(made, '003FFFF0#7530000000000000', 1.0) == ['103FFFF0#753000000008A5A5']
+        assert ask(made, '003FFFF0#753003E800000000', 1.0) == ['103FFFF0#753000000008A5A5']
         assert made.faults_text == 'tripped'
-        assert ask(made, '003FFFF0#7530000000000000', 9.0) == ['103FFFF0#000000000008A5A5']
+        assert ask(made, '003FFFF0#753003E800000000', 9.0) == ['103FFFF0#000000000008A5A5']
         made.fault('ok', 9.0)
-        assert ask(made, '003FFFF0#7530000000000000', 9.0)[0][17:21] == '0003'
+        assert ask(made, '003FFFF0#753003E800000000', 9.0)[0][17:21] == '0003'
 
     def test_restart(self) -> None:
         made = drive([*EXAMPLE, CONTROL_WORD, parameter('gain', 60, storage=RAM)],

@@ -222,6 +222,10 @@ class Cannord(Family):
                     yield Complaint('cyclic_request', f"'{mine.name}' has another minimum, "
                                                       f'maximum or neutral than for {led}, '
                                                       'allowed is the same')
+                elif mine.limit is not other.limit:
+                    yield Complaint('cyclic_request', f"'{mine.name}' has another limit (true or "
+                                                      f'false) than for {led}, allowed is the '
+                                                      'same')
         if member.period != leader.period:
             yield Complaint('period', f'{member.period:g} s differs from {leader.period:g} s of '
                                       f'{led}, allowed is the same')

@@ -148,7 +148,7 @@ class Writers:
         """Write one as it is then; tell whether it was neutral."""
         setpoint = self._setpoints.items[index]
         raw, reply = yield from self._tell_setpoint(index, setpoint)
-        neutral = raw == setpoint.neutral
+        neutral = raw == setpoint.neutral and not setpoint.parameter.limit
         if isinstance(reply, Silence):
             self._schedule.failed(index)
             if self._silences[index] >= self._session.configuration.missed_limit:

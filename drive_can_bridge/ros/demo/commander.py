@@ -3,7 +3,7 @@
 Somebody who commands the drives, as any other ROS node would: ``drive_can demo --drive``.
 
 ``~/enable`` where there is control, then neutral until every setpoint is armed, then a slow sine.
-Setpoints without a negative side (limits) get a steady value.
+Setpoints without a negative side get a steady value; what the profile calls a limit gets none.
 """
 
 import math
@@ -52,7 +52,7 @@ class _DriveCommander:
         table = drive.profile.control
         self._setpoints: list[tuple[Parameter, Publisher, Any]] = []
         for parameter in drive.cyclic_request:
-            if table is None or parameter.name != table.parameter:
+            if not parameter.limit and (table is None or parameter.name != table.parameter):
                 message_type = TOPIC_TYPES[parameter.kind]
                 self._setpoints.append((parameter, node.create_publisher(
                     message_type, f'/{drive.name}/command/{parameter.name}', 8), message_type()))

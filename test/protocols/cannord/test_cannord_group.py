@@ -996,6 +996,14 @@ def test_the_same_words_are_allowed_everywhere(limit: dict[str, float]) -> None:
                             'neutral than for drive lift')
 
 
+def test_a_limit_is_one_for_all() -> None:
+    bounded = drive('cannord', name='turn', station=3, broadcast='group', response=(ACTUAL,),
+                    request=(replace(FREQUENCY, neutral=0.0, limit=True),), table=PARAMETERS)
+    (name, found), = complaints(*members(1), bounded)
+    assert name == 'turn'
+    assert found.startswith("cyclic_request: 'frequency_setpoint' has another limit")
+
+
 def test_members_that_have_not_answered_yet_do_not_run_on() -> None:
     """They are polled in turn: in a large group that takes longer than any stop."""
     control = make_control(parameter_set=1, timeout=2.0, members=['a', 'b', 'c'])
