@@ -4,9 +4,10 @@ A process that calls parameter services.
 
 ``ping N`` calls the bridge's drive and a bare node in turn, one call at a time; ``flood N`` keeps
 N calls to each drive under way until ``calm``; ``pester N`` the same to the first drive only, and
-eight calls for a thousand names each that nobody knows.
+eight calls for a thousand names each that nobody knows; ``trace`` has the bridge write its traces.
 """
 
+import re
 import sys
 import threading
 import time
@@ -18,9 +19,11 @@ import rclpy  # isort: skip
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import qos_profile_parameters
+from std_srvs.srv import Trigger
 import topics  # noqa: F401  sets the environment of rclpy
 
 DISCOVERY_TIMEOUT = 10.0
+TRACE_TIMEOUT = 60.0
 
 
 class Caller:
@@ -31,6 +34,7 @@ class Caller:
         self._bare = self._client(node, 'bare_drive0')
         self._request = GetParameters.Request(names=['ramp_time'])
         self._nonsense = GetParameters.Request(names=[f'name_{each}' for each in range(1000)])
+        self._save = node.create_client(Trigger, '/drive_can_bridge/save_trace')
         self._flooding = False
         self._answered = 0
 
@@ -57,6 +61,23 @@ class Caller:
                 found[name].append(time.monotonic() - begun)
                 time.sleep(0.002)
         return found
+
+    def trace(self) -> dict[str, float]:
+        """Have traces written; return how long that took, and how many frames they have."""
+        if not self._save.wait_for_service(DISCOVERY_TIMEOUT):
+            raise SystemExit('no service')
+        begun = time.monotonic()
+        future = self._save.call_async(Trigger.Request())
+        done = threading.Event()
+        future.add_done_callback(lambda _: done.set())
+        if not done.wait(TRACE_TIMEOUT) or not future.result().success:
+            raise SystemExit('no trace was written')
+        elapsed = time.monotonic() - begun
+        frames = 0
+        for path in re.findall(r'/\S+\.log', future.result().message):
+            with open(path, encoding='ascii') as file:
+                frames += sum(1 for _ in file)
+        return {'elapsed': elapsed, 'frames': frames}
 
     def flood(self, under_way: float) -> bool:
         """Keep so many calls to each drive under way."""
@@ -102,7 +123,7 @@ def main() -> None:
     executor.add_node(node)
     threading.Thread(target=executor.spin, daemon=True).start()
     serve({'ping': caller.ping, 'flood': caller.flood, 'calm': caller.calm,
-           'pester': caller.pester})
+           'pester': caller.pester, 'trace': caller.trace})
 
 
 if __name__ == '__main__':

@@ -40,6 +40,7 @@ class Drives:
         self._wire = wire
         self._spent = 0.0
         self._last = [0.0] * STATIONS
+        self._first: dict[int, float] = {}
         self._distances = array('d')
         self._values = 0
         self._enabled: set[int] = set()
@@ -54,6 +55,8 @@ class Drives:
             last, self._last[station] = self._last[station], now
             if last:
                 self._distances.append(now - last)
+            elif station not in self._first:
+                self._first[station] = now
             self._values = self._values + 1 & 0x7FFF
             enabled = request[7] & 1
             if enabled:
@@ -85,6 +88,10 @@ class Drives:
     def distances(self) -> list[float]:
         """Return the times between two requests to the same drive in s."""
         return list(self._distances)
+
+    def first(self) -> list[float]:
+        """Return when each drive was asked for the first time (steady clock, s)."""
+        return list(self._first.values())
 
     def stops(self) -> list[float]:
         """Return when a drive got the first word that was not ``enable`` any more."""
@@ -126,8 +133,8 @@ def main() -> None:
     bitrate, answer = map(float, sys.argv[2:4] or (math.inf, 0.0))
     drives = Drives(2 * FRAME_BITS / bitrate + answer)
     threading.Thread(target=drives.run, args=(server,), daemon=True).start()
-    serve({'clear': drives.clear, 'distances': drives.distances, 'stops': drives.stops,
-           'spent': drives.spent})
+    serve({'clear': drives.clear, 'distances': drives.distances, 'first': drives.first,
+           'stops': drives.stops, 'spent': drives.spent})
 
 
 if __name__ == '__main__':

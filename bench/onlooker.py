@@ -28,7 +28,7 @@ class Panel:
     def __init__(self) -> None:
         # the bridge of a bench is sought in the domain that topics.py sets, as everybody's
         self.process = subprocess.Popen(
-            [sys.executable, '-m', 'drive_can_bridge.cli.main', 'panel', '--port', '0'],
+            [sys.executable, '-m', 'drive_can_bridge.cli.start', 'panel', '--port', '0'],
             stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, env={
                 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', 'ROS_DOMAIN_ID': '97', **os.environ})
         assert self.process.stdout is not None

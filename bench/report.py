@@ -99,7 +99,7 @@ def latency_figures(found: dict[str, list[float]]) -> list[Figure]:
 def service_figures(found: dict[str, list[float]]) -> list[Figure]:
     """Parameter services."""
     drive, bare = median(found['drive']), median(found['bare'])
-    exchange = median(found['exchange'])
+    exchange = found['exchange']
     return [Figure('get_parameters, median', f'{1e3 * drive:.3f} ms',
                    f'{1e3 * bare:.3f} ms + exchange {1e3 * exchange:.3f} ms',
                    drive / (bare + exchange), 1.2)]
@@ -226,13 +226,10 @@ def decode_figures(found: dict[str, dict[str, float]]) -> list[Figure]:
 
 def flight_figures(found: dict[str, Any]) -> list[Figure]:
     """Cost of the flight recorder, and what it disturbs."""
-    recording, writing = found['recording'], found['writing']
-    exchange = sum(recording['cpu'].values()) / max(1, recording['exchanges'])
-    trace = found['trace']
+    recording, writing, trace = found['recording'], found['writing'], found['trace']
     periods = [p99(each['period_errors']) for each in (writing, recording)]
     return [
-        Figure('flight recorder, share of an exchange', f'{1e6 * 2 * found["note"]:.2f} µs',
-               f'{1e6 * exchange:.0f} µs', 2 * found['note'] / exchange, 0.03),
+        _beside_figure('CPU with the flight recorder', found['share'], 1.03),
         Figure('exchanges missed while a trace is written',
                f'{writing["missed"]} of {writing["exchanges"]}, {trace["frames"]} frames in '
                f'{trace["elapsed"]:.1f} s, period error p99 {1e3 * periods[0]:.3f} ms',
@@ -242,23 +239,17 @@ def flight_figures(found: dict[str, Any]) -> list[Figure]:
 
 
 def joints_figures(found: dict[str, Any]) -> list[Figure]:
-    """Compare a bridge with and without the messages of all joints, in turn: by pairs."""
-    shares = {name: [result['process_cpu'] / result['elapsed'] for result in found[name]]
-              for name in ('without', 'states', 'states and commands')}
-    missed = {name: sum(result['missed'] for result in found[name]) for name in shares}
-    errors = {name: 1e3 * p99([error for result in found[name]
-                               for error in result['period_errors']]) for name in shares}
-    figures = []
-    for name, goal in (('states', 1.05), ('states and commands', 1.3)):
-        ratios = [with_it / without for with_it, without in zip(shares[name], shares['without'])]
-        figures.append(Figure(
-            f'CPU with all joints in one message, 100 Hz, {name}',
-            f'{100 * median(shares[name]):.1f} % ({missed[name]} missed, period error p99 '
-            f'{errors[name]:.2f} ms)',
-            f'without {100 * median(shares["without"]):.1f} % ({missed["without"]} missed, '
-            f'{errors["without"]:.2f} ms)',
-            median(ratios), goal))
-    return figures
+    """Compare a bridge with and one without the messages of all joints, by pairs."""
+    return [_beside_figure(f'CPU with all joints in one message, 100 Hz, {name}', found[name],
+                           goal)
+            for name, goal in (('states', 1.05), ('states and commands', 1.3))]
+
+
+def _beside_figure(name: str, pairs: list[tuple[float, float]], goal: float) -> Figure:
+    """Compare two bridges that ran at the same time."""
+    with_it, without = (median([pair[place] for pair in pairs]) for place in (0, 1))
+    return Figure(name, f'{100 * with_it:.1f} %', f'without {100 * without:.1f} %',
+                  median([one / other for one, other in pairs]), goal)
 
 
 def start_figures(found: dict[str, Any]) -> list[Figure]:
@@ -267,8 +258,9 @@ def start_figures(found: dict[str, Any]) -> list[Figure]:
     further = ((found['resident_mb_twice'] - found['resident_mb_one'])
                / (2 * found['drives'] - 1))
     return [
-        Figure('rclpy.init to the first exchange of all', f'{found["first_exchange_s"]:.2f} s',
-               f'bare nodes {found["bare_nodes_s"]:.2f} s', found['first_exchange_s'], 1.0),
+        Figure('begin of the bridge to the first exchange of all',
+               f'{found["first_exchange_s"]:.2f} s', f'bare nodes {found["bare_nodes_s"]:.2f} s',
+               found['first_exchange_s'], 1.0),
         Figure('resident memory', f'{memory[-1]:.0f} MB', f'bare nodes '
                f'{found["bare_nodes_mb"]:.0f} MB', memory[-1], 105.0),
         Figure('memory of each further drive', f'{further:.2f} MB',
@@ -304,13 +296,13 @@ def figures(results: dict[str, list[Any]]) -> list[Figure]:
     return lines
 
 
-def table(lines: list[Figure]) -> str:
-    """Return a table in Markdown."""
-    rows = ['| figure | measured | beside it | ratio or value | goal | met |', '|' + '---|' * 6]
-    rows += [f'| {line.name} | {line.value} | {line.floor} | {line.judged:.3g} '
-             f'| {"≥" if line.at_least else "≤"} {line.goal:g} | {"yes" if line.met else "no"} |'
-             for line in lines]
-    return '\n'.join(rows)
+HEAD = '| figure | measured | beside it | ratio or value | goal | met |\n' + '|' + '---|' * 6
+
+
+def row(line: Figure) -> str:
+    """Return a row of a table in Markdown."""
+    return (f'| {line.name} | {line.value} | {line.floor} | {line.judged:.3g} '
+            f'| {"≥" if line.at_least else "≤"} {line.goal:g} | {"yes" if line.met else "no"} |')
 
 
 def as_json(lines: list[Figure]) -> list[dict[str, Any]]:

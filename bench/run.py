@@ -2,17 +2,20 @@
 """
 What the bridge costs and how regular it is, each figure beside its floor from the same run.
 
+Rows are printed as they are measured; what fails is told, and the others go on (exit code 1).
 Compare the ratios, not the milliseconds: machines differ and are noisy.
 """
 
 import argparse
 from collections.abc import Callable
+from dataclasses import dataclass
 import json
 import os
 from pathlib import Path
 import platform
 import sys
 from tempfile import TemporaryDirectory
+import traceback
 from typing import Any
 
 import plots
@@ -26,9 +29,26 @@ SWEEP = (1, 2, 4, 8, 15, 22, 30)
 NAMED_ONLY = ('sweep',)
 
 
+@dataclass(frozen=True)
+class Pace:
+    """How much of everything is measured."""
+
+    calls: int = 300
+    stops: int = 200
+    rounds: int = 40
+    turns: int = 4
+    backups: int = 5
+    sweep: tuple[int, ...] = SWEEP
+
+
+#: each scenario for a second or two, to see that it runs
+SMOKE = Pace(calls=5, stops=4, rounds=2, turns=1, backups=1, sweep=(1, 2))
+
+
 def plan(options: argparse.Namespace) -> dict[str, Callable[[], Any]]:
     """Return the scenarios by name."""
     drives, period, duration = options.drives, options.period, options.duration
+    pace = SMOKE if options.smoke else Pace()
     return {
         'full': lambda: scenarios.exchange(Load(drives, period, commands=200.0), duration),
         'subscribed': lambda: scenarios.exchange(Load(drives, period), duration),
@@ -40,27 +60,42 @@ def plan(options: argparse.Namespace) -> dict[str, Callable[[], Any]]:
             Load(2 * drives, period, commands=800.0, buses=2), duration),
         'latency': lambda: scenarios.latency(Load(drives, period), duration),
         'diy': lambda: scenarios.do_it_yourself(Load(8, 0.01, commands=100.0), duration),
-        'service': lambda: scenarios.service(Load(1, 0.02, subscribed=False), 300),
+        'service': lambda: scenarios.service(Load(1, 0.02, subscribed=False), pace.calls),
         'flood': lambda: scenarios.flood(Load(8, 0.01, subscribed=False), duration, 10000.0),
-        'monitor': lambda: scenarios.monitor(Load(drives, period, subscribed=False), duration),
+        'monitor': lambda: scenarios.monitor(
+            Load(drives, period, subscribed=False), duration, pace.turns),
         'panel': lambda: scenarios.panel(
             Load(drives, period, subscribed=False, commands=20.0), duration),
         'stop': lambda: scenarios.stop(
-            Load(8, 0.01, subscribed=False, control=True, stuck=True), 200, 10000.0, 64),
-        'backup': lambda: scenarios.backup(Load(8, 0.01, subscribed=False, settings=119)),
+            Load(8, 0.01, subscribed=False, control=True, stuck=True), pace.stops, 10000.0, 64),
+        'backup': lambda: scenarios.backup(
+            Load(8, 0.01, subscribed=False, settings=119), pace.backups),
         'drives': lambda: {number: scenarios.exchange(
             Load(number, period, subscribed=False), duration, floor=False)
             for number in sorted({1, 4, 8, drives})},
         'alone': lambda: scenarios.exchange(
             Load(1, 0.01, subscribed=False), duration, floor=False),
         'flight': lambda: scenarios.flight(
-            Load(drives, period, subscribed=False, trace=2 * duration), duration),
+            Load(drives, period, subscribed=False, trace=2 * duration), duration, pace.rounds),
         'joints': lambda: scenarios.joints(
-            Load(drives, period, subscribed=False), duration, 100.0),
+            Load(drives, period, subscribed=False), duration, 100.0, pace.rounds),
         'decode': lambda: scenarios.decode(options.frames),
         'start': lambda: scenarios.start(drives, options.memory_duration),
-        'sweep': lambda: scenarios.sweep(SWEEP, 0.01, duration),
+        'sweep': lambda: scenarios.sweep(pace.sweep, 0.01, duration),
     }
+
+
+def measured(name: str, scenario: Callable[[], Any]) -> Any:
+    """Run a scenario and print its rows; return what it found; None: it failed, which is told."""
+    print(f'{name} …', file=sys.stderr, flush=True)
+    try:
+        found = scenario()
+        print('\n'.join(map(report.row, report.figures({name: [found]}))), flush=True)
+    except (Exception, SystemExit) as error:    # noqa: BLE001  the others are measured all the same
+        traceback.print_exc()
+        print(f'{name} failed: {type(error).__name__}: {error}', file=sys.stderr, flush=True)
+        return None
+    return found
 
 
 def machine() -> str:
@@ -93,7 +128,13 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument('--plot', type=Path, help='write the distributions to this PNG file')
     parser.add_argument('--sweep-plot', type=Path,
                         help='write CPU and period error over the number of drives to this PNG')
+    parser.add_argument('--smoke', action='store_true',
+                        help='every scenario, for a second each: does it run?')
     options = parser.parse_args(arguments)
+    if options.smoke:
+        options.drives, options.period, options.duration = 2, 0.02, 1.0
+        options.memory_duration, options.frames = 1.0, 20_000
+        scenarios.SETTLE = 0.5
     planned = plan(options)
     unknown = [name for name in options.scenarios if name not in planned]
     if unknown:
@@ -102,16 +143,23 @@ def main(arguments: list[str] | None = None) -> int:
     logs = TemporaryDirectory(prefix='drive_can_bridge_bench_log_')
     os.environ.setdefault('ROS_LOG_DIR', logs.name)     # nobody wants them later
     results: dict[str, list[Any]] = {}
-    names = options.scenarios or [each for each in planned if each not in NAMED_ONLY]
+    names = options.scenarios or [
+        each for each in planned if options.smoke or each not in NAMED_ONLY]
+    failed: list[str] = []
+    print(f'before: {begun}\n\n{report.HEAD}', flush=True)
     try:
         for name in names * options.repeat:
-            print(f'{name} …', file=sys.stderr, flush=True)
-            found = planned[name]()
-            results.setdefault(name, []).append(found)
+            found = measured(name, planned[name])
+            if found is None:
+                failed.append(name)
+            else:
+                results.setdefault(name, []).append(found)
     except KeyboardInterrupt:
-        print('ended early; what was measured so far:', file=sys.stderr)
+        print('ended early', file=sys.stderr)
     lines = report.figures(results)
-    print(f'before: {begun}\nafter:  {machine()}\n\n{report.table(lines)}')
+    if options.repeat > 1:
+        print('\nmedians:\n\n' + '\n'.join([report.HEAD, *map(report.row, lines)]))
+    print(f'\nafter:  {machine()}')
     if options.json:
         options.json.write_text(json.dumps(
             {'machine': begun, 'figures': report.as_json(lines), 'results': results}))
@@ -119,7 +167,9 @@ def main(arguments: list[str] | None = None) -> int:
         reason = draw(results, path) if path else ''
         if reason:
             print(f'no plot: {reason}', file=sys.stderr)
-    return 0
+    if failed:
+        print(f'failed: {", ".join(failed)}', file=sys.stderr)
+    return 1 if failed else 0
 
 
 if __name__ == '__main__':

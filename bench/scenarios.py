@@ -5,7 +5,7 @@ What is measured. Each scenario runs the bridge and its floor one after the othe
 All return plain numbers: times in s, CPU time in s, memory in MB; lists are samples.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager, ExitStack, nullcontext
 from dataclasses import dataclass, replace
 import os
@@ -17,17 +17,15 @@ import tempfile
 import time
 from typing import Any
 
-from child import Child, child, HERE
-from unix_bus import INTERFACE, register
+from child import child, HERE
+from unix_bus import INTERFACE
 from viewer import Viewer
-
-from drive_can_bridge.configuration.load import configuration_from_file
-from drive_can_bridge.configuration.writing import of_one_bus, write_parameter_file
-from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.trace.ring import Ring
 
 #: s until discovery and the first publishes are over
 SETTLE = 2.0
+ONLINE_TIMEOUT = 30.0
+#: the program that a user types
+DRIVE_CAN = (sys.executable, '-m', 'drive_can_bridge.cli.start')
 REQUESTS = 'speed_setpoint, torque_limit, position_setpoint, digital_outputs'
 #: number of the first setting
 SETTINGS_AT = 1000
@@ -72,22 +70,29 @@ class Load:
 
 class Bus:
     """
-    The drives, and the parameter file of a bridge for them.
+    The drives of one bus, or of several, and the parameter file of a bridge for them.
 
     :param pace: bit rate, and s that a drive takes for an answer; none: everything at once.
     """
 
     def __init__(self, stack: ExitStack, load: Load, *pace: float) -> None:
-        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        self.channels = [folder / f'bus{number}' for number in range(load.buses)]
-        self.channel = self.channels[0]
-        self.file = folder / 'bench.yaml'
-        lines = ['/**/drive_can_bridge:', '  ros__parameters:', '    buses:']
-        for channel in self.channels:
-            lines += [f'      {channel.name}:', f'        interface: {INTERFACE}',
-                      f'        channel: {channel}', '        bitrate: 1000000',
+        self._folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        self._load = load
+        self.buses = [f'bus{number}' for number in range(load.buses)]
+        self.channel = self._folder / self.buses[0]
+        self.file = self.file_of(self.buses, 'drive_can_bridge')
+        self.drives = [stack.enter_context(child('drives.py', self._folder / bus, *pace))
+                       for bus in self.buses]
+
+    def file_of(self, buses: Sequence[str], name: str) -> Path:
+        """Write a parameter file for these buses and a bridge of this name."""
+        load = self._load
+        lines = [f'/**/{name}:', '  ros__parameters:', '    buses:']
+        for bus in buses:
+            lines += [f'      {bus}:', f'        interface: {INTERFACE}',
+                      f'        channel: {self._folder / bus}', '        bitrate: 1000000',
                       f'        trace_seconds: {load.trace}',
-                      f'        trace_directory: {folder}']
+                      f'        trace_directory: {self._folder}']
         lines += [f'    joint_state_rate: {load.joints or 0.0}', '    drives:']
         profile, requests, responses = HERE / 'profile.yaml', REQUESTS, RESPONSES
         if load.control:
@@ -95,12 +100,15 @@ class Bus:
             requests = requests.replace('digital_outputs', 'control_word')
             responses = responses.replace('digital_inputs', 'status_word')
         if load.settings:
-            profile = folder / 'profile.yaml'
+            profile = self._folder / 'profile.yaml'
             profile.write_text((HERE / 'profile.yaml').read_text() + ''.join(
-                f'  setting_{place}: {{number: {SETTINGS_AT + 2 * place}, type: uint16}}\n'
-                for place in range(load.settings)), encoding='utf-8')
+                f'  setting_{place}: {{number: {SETTINGS_AT + 2 * place}, type: uint16, '
+                f'access: rw}}\n' for place in range(load.settings)), encoding='utf-8')
         for number in range(load.drives):
-            lines += [f'      drive{number}:', f'        bus: bus{number % load.buses}',
+            bus = self.buses[number % load.buses]
+            if bus not in buses:
+                continue
+            lines += [f'      drive{number}:', f'        bus: {bus}',
                       '        protocol: datamodel_extended',
                       f'        station: {number // load.buses + 1}',
                       f'        profile: {profile}', '        rearm: immediate',
@@ -110,30 +118,84 @@ class Bus:
                 lines += [f'        joint: {{name: joint{number}, position: actual_position, '
                           'velocity: actual_speed, effort: motor_current, '
                           'velocity_command: speed_setpoint}']
-        self.file.write_text('\n'.join(lines) + '\n', encoding='utf-8')
-        self.drives, *_ = [stack.enter_context(child('drives.py', channel, *pace))
-                           for channel in self.channels]
+        file = self._folder / f'{name}.yaml'
+        file.write_text('\n'.join(lines) + '\n', encoding='utf-8')
+        return file
 
-    @property
-    def file_each(self) -> list[Path]:
-        """A parameter file for each bus, as ``bridge_per_bus.launch.py`` makes them."""
-        register()
-        whole = configuration_from_file(self.file)
-        files = []
-        for channel in self.channels:
-            files.append(channel.with_suffix('.yaml'))
-            write_parameter_file(of_one_bus(whole, channel.name), files[-1])
-        return files
+    def files_each(self) -> list[tuple[object, ...]]:
+        """Return the arguments of a bridge for each bus, as ``bridge_per_bus.launch.py`` does."""
+        names = [f'drive_can_bridge_{bus}' for bus in self.buses]
+        return [(self.file_of([bus], name), '-r', f'__node:={name}')
+                for bus, name in zip(self.buses, names)]
+
+
+class Bridges:
+    """
+    The processes of one bridge, or of several, that share out the drives; seen from outside.
+
+    What the drives notice, what diagnostics say, and CPU time.
+    """
+
+    def __init__(self, stack: ExitStack, load: Load, bus: Bus, *each: tuple[object, ...]) -> None:
+        self._bus, self._load = bus, load
+        self._diagnostics = stack.enter_context(child('subscriber.py', 'diagnostics'))
+        self.processes = [stack.enter_context(child('bridge.py', *load.how, *arguments))
+                          for arguments in each or [(bus.file,)]]
+        begun = min(process.ready for process in self.processes)
+        until = begun + ONLINE_TIMEOUT
+        while True:
+            asked = [at for drives in bus.drives for at in drives.ask('first')]
+            if len(asked) == load.drives:
+                break
+            if time.monotonic() > until:
+                raise SystemExit(f'{len(asked)} of {load.drives} drives came online')
+            time.sleep(0.02)
+        #: s until every drive had its first cyclic frame
+        self.ready = max(asked) - begun
+        self.clear()
+
+    def clear(self) -> None:
+        """Begin a measurement."""
+        self._totals = self._diagnostics.ask(f'totals {self._load.drives}')
+        for drives in self._bus.drives:
+            drives.ask('clear')
+        self._before = time.monotonic(), self.cpu(), self._threads()
+
+    def result(self) -> dict[str, Any]:
+        """Return what happened since."""
+        at, cpu, threads = self._before
+        now, threads_now = time.monotonic(), self._threads()
+        found = {'elapsed': now - at, 'process_cpu': self.cpu() - cpu,
+                 'cpu': {name: threads_now[name] - threads[name] for name in threads}}
+        distances = [each for drives in self._bus.drives for each in drives.ask('distances')]
+        totals = self._diagnostics.ask(f'totals {self._load.drives}')
+        return {**found, 'exchanges': len(distances) + self._load.drives,
+                'period_errors': [abs(each - self._load.period) for each in distances],
+                'missed': totals['missed'] - self._totals['missed'],
+                'latency': totals['latency']}
+
+    def cpu(self) -> float:
+        """Return the CPU time of all processes in s."""
+        return sum(process.cpu() for process in self.processes)
+
+    def resident_mb(self) -> float:
+        """Return their resident memory in MB."""
+        return sum(process.resident_mb() for process in self.processes)
+
+    def _threads(self) -> dict[str, float]:
+        each = [process.ask('cpu') for process in self.processes]
+        return {name: sum(one[name] for one in each) for name in each[0]}
 
 
 @contextmanager
-def bridge_under(load: Load, bus: Bus) -> Iterator[Child]:
+def bridge_under(load: Load, bus: Bus, *each: tuple[object, ...]) -> Iterator[Bridges]:
     """Run the bridge, and whoever commands it."""
-    with child('bridge.py', bus.file, *load.how) as bridge, ExitStack() as stack:
+    with ExitStack() as stack:
+        bridges = Bridges(stack, load, bus, *each)
         if load.commands:
             stack.enter_context(child('publisher.py', 'commands', load.drives, load.commands))
         time.sleep(SETTLE)
-        yield bridge
+        yield bridges
 
 
 def subscribers(stack: ExitStack, load: Load) -> None:
@@ -153,12 +215,10 @@ def exchange(load: Load, duration: float, *, floor: bool = True) -> dict[str, An
                 loop.ask(f'run {SETTLE}')
                 found['floor'] = loop.ask(f'run {duration}')
         with bridge_under(load, bus) as bridge, child('sleeper.py', load.period) as sleeper:
-            begun = bridge.cpu()
-            for each in (bridge, sleeper):
-                each.ask('clear')
+            sleeper.ask('clear')
+            bridge.clear()
             time.sleep(duration)
-            found['bridge'] = bridge.ask('result')
-            found['bridge']['process_cpu'] = bridge.cpu() - begun
+            found['bridge'] = bridge.result()
             found['sleeper'] = sleeper.ask('errors')
             found['resident_mb'] = bridge.resident_mb()
     return found
@@ -171,22 +231,15 @@ def buses(load: Load, duration: float) -> dict[str, Any]:
         with ExitStack() as stack:
             bus = Bus(stack, load)
             subscribers(stack, load)
-            files = [bus.file] if name == 'one process' else bus.file_each
-            bridges = [stack.enter_context(child('bridge.py', file, *load.how))
-                       for file in files]
-            if load.commands:
-                stack.enter_context(child('publisher.py', 'commands', load.drives, load.commands))
-            time.sleep(SETTLE)
-            for bridge in bridges:
-                bridge.ask('clear')
+            each = [(bus.file,)] if name == 'one process' else bus.files_each()
+            bridges = stack.enter_context(bridge_under(load, bus, *each))
+            bridges.clear()
             time.sleep(duration)
-            results = [bridge.ask('result') for bridge in bridges]
-        found[name] = {     # each with its own time: they are asked one after the other
-            'exchanges_per_s': sum(result['exchanges'] / result['elapsed'] for result in results),
-            'missed': sum(result['missed'] for result in results),
-            'cpu': sum(result['process_cpu'] / result['elapsed'] for result in results),
-            'period_errors': [error for result in results for error in result['period_errors']],
-            'wanted': load.drives / load.period}
+            result = bridges.result()
+        found[name] = {
+            'exchanges_per_s': result['exchanges'] / result['elapsed'],
+            'missed': result['missed'], 'cpu': result['process_cpu'] / result['elapsed'],
+            'period_errors': result['period_errors'], 'wanted': load.drives / load.period}
     return found
 
 
@@ -204,16 +257,15 @@ def latency(load: Load, duration: float) -> dict[str, list[float]]:
     return found
 
 
-def service(load: Load, calls: int) -> dict[str, list[float]]:
+def service(load: Load, calls: int) -> dict[str, Any]:
     """Measure parameter service calls beside those of a bare service, and exchanges."""
     with ExitStack() as stack:
         bus = Bus(stack, load)
         with (bridge_under(load, bus) as bridge, child('bare_nodes.py', 1),
               child('caller.py', load.drives) as caller):
             caller.ask('ping 20')
-            bridge.ask('clear')
-            found: dict[str, list[float]] = caller.ask(f'ping {calls}')
-            found['exchange'] = bridge.ask('result')['latencies']
+            found: dict[str, Any] = caller.ask(f'ping {calls}')
+            found['exchange'] = bridge.result()['latency']
     return found
 
 
@@ -231,10 +283,10 @@ def flood(load: Load, duration: float, commands: float) -> dict[str, Any]:
                         child('publisher.py', 'commands', load.drives, commands / load.drives))
                     caller.ask('flood 4')
                     time.sleep(SETTLE)
-                bridge.ask('clear')
+                bridge.clear()
                 sleeper.ask('clear')
                 time.sleep(duration)
-                result = bridge.ask('result')
+                result = bridge.result()
                 found[name] = {'period_errors': result['period_errors'],
                                'missed': result['missed'], 'exchanges': result['exchanges'],
                                'sleeper': sleeper.ask('errors')}
@@ -256,12 +308,13 @@ def monitor(load: Load, duration: float, rounds: int = 4) -> dict[str, Any]:
                     name = 'with' if number % 2 else 'without'
                     watcher = stack.enter_context(closing(Viewer())) if number % 2 else None
                     time.sleep(2 * SETTLE)
-                    bridge.ask('clear')
+                    bridge.clear()
                     begun = watcher.cpu() if watcher else 0.0
                     time.sleep(duration)
-                    result = bridge.ask('result')
+                    spent = watcher.cpu() - begun if watcher else 0.0
+                    result = bridge.result()
                     if watcher:
-                        found['monitor'].append((watcher.cpu() - begun) / result['elapsed'])
+                        found['monitor'].append(spent / result['elapsed'])
                     found[name]['period_errors'] += result['period_errors']
                     for key in ('missed', 'elapsed'):
                         found[name][key] += result[key]
@@ -295,27 +348,25 @@ def backup(load: Load, rounds: int = 5) -> dict[str, Any]:
     """Measure backups on a slow bus beside its frames and answers, and what a bridge misses."""
     found: dict[str, Any] = {'backups': [], 'through': []}
     with ExitStack() as stack:
-        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         bus = Bus(stack, replace(load, drives=1), *SLOW)
-        with child('backup_client.py', folder / 'backup.yaml', bus.file) as client:
+        with child('backup_client.py', bus.file) as client:
             for _ in range(rounds):
-                bus.drives.ask('clear')
+                bus.drives[0].ask('clear')
                 each = client.ask('backup')
-                found['backups'].append({**each, 'spent': bus.drives.ask('spent')})
+                found['backups'].append({**each, 'spent': bus.drives[0].ask('spent')})
     with ExitStack() as stack:
-        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         bus = Bus(stack, load)
         with (bridge_under(load, bus) as bridge,
-              child('backup_client.py', folder / 'backup.yaml') as client):
+              child('backup_client.py') as client):
             for name in ('quiet', 'during'):
-                bridge.ask('clear')
+                bridge.clear()
                 end = time.monotonic() + 2 * SETTLE
                 while time.monotonic() < end:
                     if name == 'during':
                         found['through'].append(client.ask('backup'))
                     else:
                         time.sleep(SETTLE)
-                found[name] = bridge.ask('result')
+                found[name] = bridge.result()
     return found
 
 
@@ -334,9 +385,9 @@ def stop(load: Load, calls: int, commands: float, under_way: int) -> dict[str, A
                     caller.ask(f'pester {under_way}')
                     time.sleep(SETTLE)
                 sleeper.ask('clear')
-                bus.drives.ask('clear')
+                bus.drives[0].ask('clear')
                 answer = stopper.ask(f'stop {calls}')
-                stops = bus.drives.ask('stops')
+                stops = bus.drives[0].ask('stops')
                 found[name] = {
                     'latencies': [min((at - called for at in stops if at > called),
                                       default=float('inf')) for called in answer['called']],
@@ -353,17 +404,17 @@ def do_it_yourself(load: Load, duration: float) -> dict[str, Any]:
         subscribers(stack, load)
         for name, script, arguments in (
                 ('diy', 'diy_node.py', (bus.channel, load.drives, load.period)),
-                ('bridge', 'bridge.py', (bus.file, *load.how))):
+                ('bridge', 'bridge.py', (*load.how, bus.file))):
             with child(script, *arguments) as process, ExitStack() as inner:
                 if load.commands:
                     inner.enter_context(
                         child('publisher.py', 'commands', load.drives, load.commands))
                 time.sleep(SETTLE)
-                bus.drives.ask('clear')
+                bus.drives[0].ask('clear')
                 cpu, begun = process.cpu(), time.monotonic()
                 time.sleep(duration)
                 elapsed = time.monotonic() - begun
-                distances = bus.drives.ask('distances')
+                distances = bus.drives[0].ask('distances')
                 found[name] = {
                     'cpu': (process.cpu() - cpu) / elapsed,
                     'requests_per_s': len(distances) / elapsed,
@@ -404,62 +455,58 @@ def start(drives: int, duration: float) -> dict[str, Any]:
     return found
 
 
-def flight(load: Load, duration: float) -> dict[str, Any]:
-    """Measure the flight recorder: what a frame costs, and exchanges while a trace is written."""
-    found: dict[str, Any] = {'note': _note_time()}
+def flight(load: Load, duration: float, rounds: int = 40) -> dict[str, Any]:
+    """Measure what the flight recorder costs, and exchanges while a trace is written."""
+    found: dict[str, Any] = {'share': _beside(load, replace(load, trace=0.0), duration / 10,
+                                              rounds)[1]}
     with ExitStack() as stack:
         bus = Bus(stack, load)
-        with bridge_under(load, bus) as bridge:
+        with bridge_under(load, bus) as bridge, child('caller.py', load.drives) as caller:
             for name in ('recording', 'writing'):
                 time.sleep(duration)
-                bridge.ask('clear')
+                bridge.clear()
                 if name == 'writing':   # the duration before is what is written
-                    found['trace'] = bridge.ask('trace')
+                    found['trace'] = caller.ask('trace')
                 else:
                     time.sleep(duration)
-                found[name] = bridge.ask('result')
+                found[name] = bridge.result()
     return found
 
 
 def joints(load: Load, duration: float, rate: float, rounds: int = 40) -> dict[str, Any]:
-    """
-    Measure the CPU time of one bridge with and without the message of all joints, in turn.
-
-    Then the same with commands for all joints as often. Short turns: the machine is not as fast in
-    one second as in another, and what stands beside each other should have met the same.
-    """
-    names = ('without', 'states', 'states and commands')
-    found: dict[str, Any] = {name: [] for name in names}
-    found['received'] = 0
-    load = replace(load, joints=rate)
+    """Measure what the message of all joints costs, and then commands for all joints as often."""
+    load, without = replace(load, joints=rate), replace(load, joints=0.0)
     with ExitStack() as stack:
-        bus = Bus(stack, load)
         listener = stack.enter_context(child('subscriber.py', 'joints'))
         commander = stack.enter_context(child('publisher.py', 'joints', load.drives))
-        bridge = stack.enter_context(bridge_under(load, bus))
-        for _ in range(rounds):
-            for name in names:
-                bridge.ask(f'joints {0.0 if name == "without" else rate}')
-                commander.ask(f'rate {rate if "commands" in name else 0.0}')
-                time.sleep(0.1)
-                bridge.ask('clear')
-                listener.ask('clear')
-                time.sleep(duration / 10)
-                found[name].append(bridge.ask('result'))
-                found['received'] += listener.ask('count')
+        states, commands = _beside(load, without, duration / 10, rounds, lambda commanded: (
+            listener.ask('clear'), commander.ask(f'rate {rate if commanded else 0.0}')))
+        return {'states': states, 'states and commands': commands,
+                'received': listener.ask('count')}
+
+
+def _beside(load: Load, without: Load, duration: float, rounds: int,
+            before: Callable[[bool], object] = lambda _: None) -> list[list[tuple[float, float]]]:
+    """
+    Measure two bridges at the same time, so that the machine is as fast for the one as the other.
+
+    :param before: is called before each measurement, with False and True in turn.
+    :return: pairs of CPU shares of the bridge with this load and of that without, by ``before``.
+    """
+    found: list[list[tuple[float, float]]] = [[], []]
+    with ExitStack() as stack:
+        bridges = [stack.enter_context(bridge_under(each, bus, (bus.file, *words)))
+                   for each, words in ((load, ()), (without, ('-r', '__ns:=/without')))
+                   for bus in [Bus(stack, each)]]
+        for number in range(2 * rounds):
+            before(number % 2 == 1)
+            time.sleep(0.1)
+            begun, spent = time.monotonic(), [bridge.cpu() for bridge in bridges]
+            time.sleep(duration)
+            elapsed = time.monotonic() - begun
+            one, other = ((bridge.cpu() - cpu) / elapsed for bridge, cpu in zip(bridges, spent))
+            found[number % 2].append((one, other))
     return found
-
-
-def _note_time() -> float:
-    """Return the time that keeping one frame takes, in s."""
-    ring, sample, count = Ring(60.0), Frame(0x103FFFF0, bytes(8), True), 200_000
-    best = float('inf')
-    for _ in range(5):
-        begun = time.perf_counter()
-        for step in range(count):
-            ring.note(sample, float(step), True)
-        best = min(best, time.perf_counter() - begun)
-    return best / count
 
 
 def decode(frames: int) -> dict[str, dict[str, float]]:
@@ -480,7 +527,7 @@ def decode(frames: int) -> dict[str, dict[str, float]]:
                     stream.write(f'({begin:.6f}) can0 003FFFF0#{word:04X}03E800000000 T\n'
                                  f'({begin + 0.001:.6f}) can0 103FFFF0#{word:04X}00C8000001F4 R\n')
             for what in ('lines', '--summary'):
-                command = [sys.executable, '-m', 'drive_can_bridge.cli.main', 'decode', str(trace),
+                command = [*DRIVE_CAN, 'decode', str(trace),
                            '--params-file', str(file), *([] if what == 'lines' else [what])]
                 begun = time.monotonic()
                 with subprocess.Popen(command, stdout=subprocess.DEVNULL) as process:

@@ -8,6 +8,8 @@ which would not keep up with 15,000 messages a second and starve the bench on a 
 
 ``subscriber.py joints`` counts messages with all joints.
 
+``subscriber.py diagnostics`` adds up what the drives of all bridges say about their exchanges.
+
 ``subscriber.py listen NAME …`` measures from the stamp of ``/NAME/response`` to the callback.
 """
 
@@ -16,6 +18,7 @@ import threading
 import time
 
 from child import serve
+from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import ParameterEvent
 import rclpy  # isort: skip
 from rclpy.executors import SingleThreadedExecutor
@@ -23,6 +26,9 @@ from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import JointState
 from topics import TYPES
+
+#: s for a drive to appear in /diagnostics
+PATIENCE = 30.0
 
 
 class Listener:
@@ -68,6 +74,40 @@ class Counter:
         return True
 
 
+class Diagnostics:
+    """What all drives said last."""
+
+    def __init__(self, node: Node) -> None:
+        self._said: dict[str, dict[str, str]] = {}
+        self._fresh = threading.Condition()
+        node.create_subscription(DiagnosticArray, '/diagnostics', self._received, 10)
+
+    def _received(self, message: DiagnosticArray) -> None:
+        with self._fresh:
+            for status in message.status:
+                values = {each.key: each.value for each in status.values}
+                if 'missed_exchanges' in values:
+                    self._said[status.name] = values
+            self._fresh.notify_all()
+
+    def totals(self, drives: float) -> dict[str, float]:
+        """Wait until so many drives have said something new; return missed, and latency in s."""
+        with self._fresh:
+            self._said.clear()
+            if not self._fresh.wait_for(lambda: len(self._said) >= drives, PATIENCE):
+                raise SystemExit(f'{len(self._said)} of {drives:.0f} drives in /diagnostics')
+            said = list(self._said.values())
+        return {'missed': sum(int(each['missed_exchanges']) for each in said),
+                'latency': sum(1e-3 * float(each['latency_mean_ms']) for each in said) / len(said)}
+
+
+def spun(node: Node) -> None:
+    """Have somebody take what arrives."""
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    threading.Thread(target=executor.spin, daemon=True).start()
+
+
 def main() -> None:
     """Subscribe."""
     rclpy.init(args=[])
@@ -82,15 +122,14 @@ def main() -> None:
         serve({})
     elif sys.argv[1] == 'joints':
         counter = Counter(node)
-        executor = SingleThreadedExecutor()
-        executor.add_node(node)
-        threading.Thread(target=executor.spin, daemon=True).start()
+        spun(node)
         serve({'clear': counter.clear, 'count': lambda: counter.number})
-        return
+    elif sys.argv[1] == 'diagnostics':
+        diagnostics = Diagnostics(node)
+        spun(node)
+        serve({'totals': diagnostics.totals})
     listener = Listener(node, sys.argv[2:])
-    executor = SingleThreadedExecutor()
-    executor.add_node(node)
-    threading.Thread(target=executor.spin, daemon=True).start()
+    spun(node)
     serve({'clear': listener.clear, 'latencies': listener.latencies})
 
 

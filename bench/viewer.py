@@ -24,7 +24,7 @@ class Viewer:
         self._near, far = pty.openpty()
         fcntl.ioctl(far, termios.TIOCSWINSZ, struct.pack('HHHH', SIZE[1], SIZE[0], 0, 0))
         self.process = subprocess.Popen(
-            [sys.executable, '-m', 'drive_can_bridge.cli.main', 'monitor'],
+            [sys.executable, '-m', 'drive_can_bridge.cli.start', 'monitor'],
             stdin=far, stdout=far, env={**os.environ, 'TERM': 'xterm-256color'})
         os.close(far)
         self.written = 0
