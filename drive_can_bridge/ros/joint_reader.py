@@ -19,12 +19,17 @@ from typing import NamedTuple
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
+from drive_can_bridge.ros.command_topic import HEADER
 from drive_can_bridge.ros.layout import find_layout, Layout, Number
 
 #: what a JointState carries beside names
 QUANTITIES = ('position', 'velocity', 'effort')
 #: so many messages in a row have the same names before it is worth while to look where numbers are
 ALIKE = 8
+#: bytes of its stamp
+STAMP = 8
+#: names of a message that is looked at
+NAMES_MAX = 1000
 #: one quantity, and its values for all joints of a message
 Column = tuple[str, Sequence[float]]
 
@@ -80,12 +85,15 @@ class JointReader:
         Read a message.
 
         :raises RuntimeError: what the middleware says of bytes that are none.
+        :raises ValueError: it has too many names.
         """
         if self._pattern is not None:
             known = self._pattern.read(data)
             if known is not None:
                 return known
+        _check(_name_count(data))   # before anybody makes objects of them
         raw = deserialize_message(data, JointState)
+        _check(len(raw.name))
         message = JointMessage(list(raw.name), [
             (quantity, values) for quantity in QUANTITIES
             if len(values := getattr(raw, quantity))])
@@ -96,6 +104,25 @@ class JointReader:
         if self._alike == ALIKE:
             self._pattern = _pattern(raw, message, data)
         return message
+
+
+def _check(names: int) -> None:
+    if names > NAMES_MAX:
+        raise ValueError(f'{names} names, at most {NAMES_MAX} are allowed')
+
+
+def _name_count(data: bytes) -> int:
+    """Return how many names a message says it has; 0 where it is encoded in another way."""
+    if data[:1] != b'\0' or data[1:2] not in (b'\0', b'\1'):     # plain CDR
+        return 0
+    number = struct.Struct('<I' if data[1] else '>I')
+    try:
+        (frame_id,) = number.unpack_from(data, HEADER + STAMP)
+        after = HEADER + STAMP + number.size + frame_id
+        (count,) = number.unpack_from(data, after + -after % number.size)
+    except struct.error:    # it ends too soon: the middleware has words for it
+        return 0
+    return int(count)
 
 
 def _pattern(raw: JointState, message: JointMessage, data: bytes) -> _Pattern | None:

@@ -7,6 +7,7 @@ because each bus has a thread that takes commands just before its cycles; what c
 of other buses is left to theirs.
 """
 
+from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 
 from rclpy.node import Node
@@ -157,7 +158,7 @@ class _Taker:
                     f'{len(values)} {quantity} values for {len(names)} names; allowed are as '
                     f'many as names, with NaN for joints that are to be left alone, or none')
         if names != self._names and len(set(names)) != len(names):
-            twice = next(name for name in names if names.count(name) > 1)
+            twice, _ = Counter(names).most_common(1)[0]
             return 'twice', f'{printable(twice)} stands twice, allowed is once'
         return None
 

@@ -80,6 +80,33 @@ def test_high_byte_first() -> None:
     assert (read.names, exact(read.columns)) == (['ab'], exact([('velocity', [-2.5])]))
 
 
+def too_many(count: int, order: str, frame_id: bytes) -> bytes:
+    """Return a message without an end that says that it has so many names."""
+    body = struct.pack(f'{order}iII', 1, 2, len(frame_id)) + frame_id
+    body += bytes(-len(body) % 4) + struct.pack(f'{order}I', count)
+    return struct.pack('>HH', int(order == '<'), 0) + body
+
+
+@pytest.mark.parametrize('frame_id', [b'\0', b'a\0', b'ab\0', b'abc\0', b'x' * 60_000])
+@pytest.mark.parametrize('order', ['<', '>'])
+def test_too_many_names_are_refused_before_anybody_looks_at_them(order: str,
+                                                                 frame_id: bytes) -> None:
+    """There are none at all in these messages: whoever looked for them would say so."""
+    for count in (1001, 8170, 2 ** 32 - 1):
+        with pytest.raises(ValueError, match=f'{count} names, at most 1000 are allowed'):
+            JointReader()(too_many(count, order, frame_id))
+    with pytest.raises(RuntimeError):
+        JointReader()(too_many(1000, order, frame_id))
+
+
+def test_as_many_as_are_allowed() -> None:
+    names = [f'joint_{number}' for number in range(1000)]
+    read = JointReader()(serialize_message(JointState(name=names, velocity=[1.0] * 1000)))
+    assert read.names == names
+    with pytest.raises(ValueError):
+        JointReader()(serialize_message(JointState(name=[*names, 'one more'])))
+
+
 @pytest.mark.parametrize('data', [b'', b'\x00\x01\x00\x00', b'\xff' * 200])
 def test_rubbish(data: bytes) -> None:
     reader = knowing(JointState(name=NAMES, velocity=VALUES))

@@ -234,6 +234,25 @@ def test_array_of_another_length_is_refused_whole(bridge: StartBridge, client: C
     assert one.node.drives['east'].session.statistics.commands_refused == 0
 
 
+@pytest.mark.parametrize('names', [
+    ['wj', *(f'j{number:x}' for number in range(5000)), 'j0'], ['wj'] * 1001],
+    ids=['twice in the end', 'all alike'])
+def test_more_names_than_anybody_has_are_refused_whole(bridge: StartBridge, client: Client,
+                                                       names: list[str]) -> None:
+    one = bridge(two())
+    one.online()
+    client.listen()
+    client.publish(COMMANDS, JointState(name=names))
+    client.wait_logged(f'command on {COMMANDS} cannot be read: {len(names)} names, at most 1000 '
+                       f'are allowed')
+    client.publish('/west/joint_command', JointState(name=names))
+    client.wait_logged(f'west: command on /west/joint_command cannot be read: {len(names)} names')
+    for name, count in (('west', 2), ('north', 1), ('south', 1), ('plain', 0)):
+        wait_until(lambda name=name, count=count: one.node.drives[
+            name].session.statistics.commands_refused == count)
+    assert not any('is no joint of this bridge' in text for text in client.logged(0))
+
+
 def test_joints_of_others_are_told_once(bridge: StartBridge, client: Client) -> None:
     one = bridge(two())
     one.online()
