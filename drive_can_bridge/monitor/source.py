@@ -1,7 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Where a model comes from, as a view sees it, and what may be asked of drives."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol
@@ -61,12 +61,12 @@ class Operations(Protocol):
     Whoever asks is told in a later :meth:`poll`, in its thread.
     """
 
-    def poll(self, controlled: Iterable[str], now: float) -> bool:
+    def poll(self, stops: Mapping[str, Collection[Stop]], now: float) -> bool:
         """
         Take the answers that have arrived.
 
-        :param controlled: drives with a control word: their services are kept at hand, so that a
-            stop waits for no discovery.
+        :param stops: of each drive: their services are kept at hand, so that a stop waits for no
+            discovery.
         :return: somebody still waits for an answer.
         """
 

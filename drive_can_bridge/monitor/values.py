@@ -14,6 +14,11 @@ _WIDTH = 8
 #: what a drive says about its states is read in hexadecimal
 _WORD_SUFFIX = 'word'
 _BOOLS = {'true': True, 'on': True, 'false': False, 'off': False}
+#: what the bridge uses a parameter for, and so writes itself
+_ROLES = {'cyclic': 'sent cyclically: a setpoint', 'control': 'control word: use ~/enable',
+          'map': 'a map: not written while the bridge runs'}
+#: names that say what a profile cannot
+_MOVING = ('setpoint', 'control_word')
 #: of an integer in a message, without its sign
 _BITS_MAX = 63
 _EXAMPLES = {ValueKind.INTEGER: ', such as 12 or 0x0C', ValueKind.DOUBLE: ', such as 12.5'}
@@ -126,9 +131,17 @@ class ParameterInfo:
         return value
 
     @property
-    def settable(self) -> bool:
-        """Can be written by a service, as far as is told."""
-        return not self.read_only and self.facts.get('role') is None
+    def refusal(self) -> str:
+        """Say why a view does not write it: what moves a drive, or is protected; '' if it may."""
+        if self.read_only:
+            return 'read-only'
+        role = self.facts.get('role')
+        if role is not None:
+            return _ROLES.get(role, role)
+        if self.name.endswith(_MOVING):     # also while nobody maps it
+            return 'moves the drive: not written here'
+        return 'protected by its profile: not written here' * (
+            self.facts.get('protected') == 'true')
 
     def _number(self, fact: str, default: float) -> float:
         try:

@@ -2,7 +2,8 @@
 """
 What a browser may ask for: each a request of its own, whose role the gate has found.
 
-None of it moves a drive. Answers are JSON, ``{"success": bool, "text": words}`` at least.
+None of it moves a drive. Answers are JSON, ``{"success": bool, "text": words}`` at least; whoever
+stops all gets ``failed``, a line for each drive that does not stand, which ``text`` begins with.
 """
 
 import asyncio
@@ -16,11 +17,12 @@ from starlette.routing import Route
 
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.text import printable
+from drive_can_bridge.core.words import counted
 from drive_can_bridge.monitor.snapshot import DriveSnapshot
 from drive_can_bridge.monitor.source import Outcome, Stop
 from drive_can_bridge.panel.access import Role
 from drive_can_bridge.panel.backups import Backups
-from drive_can_bridge.panel.feed import Feed, has_control
+from drive_can_bridge.panel.feed import Feed
 from drive_can_bridge.panel.gate import ROLE
 
 ALL = '*'
@@ -60,21 +62,22 @@ class Actions:
         async def action(request: Request) -> Response:
             _operator(request, stop.value.replace('_', ' '))
             wanted = (await _fields(request)).get('drive')
-            if wanted != ALL:
-                return _said(await self._feed.stop(self._drive(wanted).name, stop))
-            drives = self._feed.snapshot.drives
-            controlled = [drive for drive in drives if has_control(drive)]
-            if not controlled:
-                return _said(Outcome(False, 'no drive here has a control word'))
-            outcomes = await asyncio.gather(
-                *(self._feed.stop_as_it_can(drive, stop) for drive in controlled))
-            told = [f'{drive.name[1:]}: {outcome.text or "done"}'
-                    for drive, outcome in zip(controlled, outcomes)]
-            # whoever stops all must not think that those stand still
-            told += [f'{drive.name[1:]}: not told, it has no control word'
-                     for drive in drives if not has_control(drive)]
-            return _said(Outcome(all(outcome.success for outcome in outcomes), '\n'.join(told)))
+            if wanted != ALL or stop is not Stop.QUICK_STOP:
+                return _said(await self._feed.stop(self._drive(wanted), stop))
+            return await self._stop_all()
         return _answering(action)
+
+    async def _stop_all(self) -> Response:
+        """Stop all drives at once; say first which do not stand."""
+        drives = self._feed.snapshot.drives
+        outcomes = await asyncio.gather(*(self._feed.stop(drive, Stop.QUICK_STOP)
+                                          for drive in drives))
+        failed = [f'{drive.name[1:]}: {outcome.text or "not stopped"}'
+                  for drive, outcome in zip(drives, outcomes) if not outcome.success]
+        count = (f'{len(drives) - len(failed)} of {counted(len(drives), "drive", "drives")} '
+                 'stopped' if drives else 'no drive is known here: nothing was stopped')
+        return JSONResponse({'success': bool(drives) and not failed, 'failed': failed,
+                             'text': '\n'.join([*failed, count])})
 
     async def _write(self, request: Request) -> Response:
         self._writer(request, 'writing a parameter')
@@ -86,6 +89,8 @@ class Actions:
             return _said(Outcome(False, f'{drive.label} has not told of its parameters yet'))
         if info is None:
             raise _Refused(400, f'{drive.label} has no such parameter')
+        if info.refusal:
+            return _said(Outcome(False, f'{info.name}: {info.refusal}'))
         if not isinstance(text, str):
             raise _Refused(400, f'{info.name}: no value, allowed is a string: what a person types')
         try:

@@ -13,7 +13,7 @@ from typing import TypeVar
 
 from drive_can_bridge.core.control_texts import NO_QUICK_STOP as REFUSED
 from drive_can_bridge.core.parameters import Value
-from drive_can_bridge.monitor.drive import CONTROL_STATE, NO_QUICK_STOP, QUICK_STOP
+from drive_can_bridge.monitor.drive import CONTROL_STATE
 from drive_can_bridge.monitor.model import Model
 from drive_can_bridge.monitor.snapshot import DriveSnapshot, Snapshot
 from drive_can_bridge.monitor.source import Operations, Outcome, Source, Stop
@@ -78,7 +78,7 @@ class Feed:
         closely = frozenset().union(*(view.focus for view in self._views))
         self._source.focus(*closely)
         waiting = self._operations.poll(
-            (drive.name for drive in self.snapshot.drives if has_control(drive)), now)
+            {drive.name: stops(drive) for drive in self.snapshot.drives}, now)
         if now >= self._due:
             self._due = now + PERIOD
             self._look(now)
@@ -116,21 +116,21 @@ class Feed:
         """Return a drive by its full name."""
         return self.snapshot.drive(name)
 
-    async def stop(self, drive: str, stop: Stop) -> Outcome:
+    async def stop(self, drive: DriveSnapshot, stop: Stop) -> Outcome:
         """Stop a drive; return what became of it."""
-        return await self._told(lambda done: self._operations.stop(
-            drive, stop, done, time.monotonic()))
-
-    async def stop_as_it_can(self, drive: DriveSnapshot, stop: Stop) -> Outcome:
-        """Stop a drive, by ``disable`` if it has no quick stop; return what became of it."""
-        if stop in stops(drive):
-            outcome = await self.stop(drive.name, stop)
-            # a bridge that does not say beforehand what it has refuses
-            if outcome.success or not outcome.text.startswith(REFUSED):
-                return outcome
-        outcome = await self.stop(drive.name, Stop.DISABLE)
+        if stop not in stops(drive):
+            return Outcome(False, 'no control word: only quick stop stops it')
+        outcome = await self._stop(drive, stop)
+        # a bridge of an older version does not disable by itself what has no quick stop
+        if outcome.success or not outcome.text.startswith(REFUSED):
+            return outcome
+        outcome = await self._stop(drive, Stop.DISABLE)
         return Outcome(outcome.success,
                        f'has no quick stop, told to disable: {outcome.text or "done"}')
+
+    async def _stop(self, drive: DriveSnapshot, stop: Stop) -> Outcome:
+        return await self._told(lambda done: self._operations.stop(
+            drive.name, stop, done, time.monotonic()))
 
     async def write(self, drive: str, name: str, value: Value) -> Outcome:
         """Write a parameter; return what became of it."""
@@ -156,15 +156,6 @@ class Feed:
         return await future
 
 
-def has_control(drive: DriveSnapshot) -> bool:
-    """Tell whether a drive has a control word."""
-    return CONTROL_STATE in drive.facts
-
-
 def stops(drive: DriveSnapshot) -> tuple[Stop, ...]:
-    """Return what ends the movement of a drive, as far as its bridge says."""
-    if not has_control(drive):
-        return ()
-    if drive.facts.get(QUICK_STOP) == NO_QUICK_STOP:
-        return (Stop.DISABLE,)
-    return (Stop.QUICK_STOP, Stop.DISABLE)
+    """Return what stops a drive: quick stop each of them, disable one with a control word."""
+    return tuple(Stop) if CONTROL_STATE in drive.facts else (Stop.QUICK_STOP,)

@@ -34,8 +34,8 @@ _HEAD = ''.join((
 _TITLE = 'drive_can panel'
 _PAGES = {'/': 'Drives', '/log': 'Log'}
 #: what the button does, said beside it
-_STOP_ALL = ('Quick stop of every drive that has one; other drives with a control word are '
-             'disabled; drives with none are named, and told nothing')
+_STOP_ALL = ('Quick stop of every drive; one that has none is disabled, one without a control '
+             'word gets neutral setpoints')
 #: pages at once for each role, so that viewers do not keep operators out: each takes memory until
 #: its browser has gone for a while
 PAGES_MAX = 20

@@ -123,7 +123,7 @@ class _Row:
                     info.address, info.facts.get('type', ''), info.facts.get('storage', '')))),
                     'small')
             with box('value'):
-                if writes and info.settable:
+                if writes and not info.refusal:
                     script = (f"panel.write({in_script(drive)}, {in_script(info.name)}, "
                               f"event.target.closest('.parameter'))")
                     self._field = ui.input().props('dense outlined').on(
@@ -165,11 +165,9 @@ class _Row:
 def _limits(info: ParameterInfo) -> str:
     if info.kind is ValueKind.BOOL:
         return 'true, false'
-    access = 'read only' if info.read_only else {
-        'cyclic': 'sent cyclically', 'control': 'control word', 'map': 'map'}.get(
-            info.facts.get('role', ''), '')
     return ' · '.join(filter(None, (
-        f'{info.range_text} {info.unit}'.strip() if info.range_text else '', access)))
+        f'{info.range_text} {info.unit}'.strip() if info.range_text else '',
+        info.refusal.partition(':')[0])))
 
 
 def _searchable(info: ParameterInfo) -> str:

@@ -76,6 +76,8 @@ parameters:
   ramp_time: {{number: 30, type: uint16, scale: 0.01, unit: s, access: rw, storage: eeprom,
     minimum: 0, maximum: 100, description: '{script}'}}
   mode: {{number: 33, type: uint16, access: rw, storage: ram}}
+  address: {{number: 34, type: uint16, access: rw, storage: ram, protected: true}}
+  other_setpoint: {{number: 35, type: int16, access: rw, storage: ram}}
   serial: {{number: 40, type: uint16, access: ro}}
 """
 #: costs nothing, unlike a page

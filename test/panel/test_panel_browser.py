@@ -121,7 +121,7 @@ def test_all_drives_are_stopped_by_one_button(
     phone.open(site.addresses['operator'])
     phone.open(f'http://{site.host}/log')
     phone.click('.bar button', 'Quick stop all')
-    phone.shows('lift: ready')
+    phone.shows('of 3 drives stopped')
     wait_for(lambda: '005FFFF0#0000' in last_line(site, '005FFFF0'), 'that it is disabled')
 
 

@@ -154,14 +154,6 @@ def test_what_is_no_request_is_refused(site: Site, body: bytes) -> None:
     assert answer.said['text'] == 'that is no JSON object'
 
 
-def test_all_are_stopped_and_those_that_cannot_be_are_named(site: Site) -> None:
-    said = site.do('quick_stop', 'operator', {'drive': '*'}).said
-    assert said['success'] is True
-    lift, press, conveyor = said['text'].splitlines()
-    assert (lift.partition(':')[0], press.partition(':')[0]) == ('lift', 'press')
-    assert conveyor == 'conveyor: not told, it has no control word'
-
-
 @pytest.mark.parametrize('value', ['1_5', '１５', '\x1b[2J', 'nan', '9' * 30, '1' * 900_000, ''])
 def test_what_is_no_number_is_refused(site: Site, value: str) -> None:
     fields = {'drive': '/conveyor', 'name': 'mode', 'value': value}
@@ -195,6 +187,10 @@ def test_setpoints_and_control_words_are_no_parameters(site: Site) -> None:
         answer = site.do('write', 'operator', {'drive': drive, 'name': name, 'value': '1'})
         assert answer.said['success'] is False
         assert 'use ~/enable' in answer.said['text'] or 'sent cyclically' in answer.said['text']
+    for name, why in (('address', 'protected'), ('other_setpoint', 'moves the drive')):
+        said = site.do('write', 'operator',
+                       {'drive': '/conveyor', 'name': name, 'value': '1'}).said
+        assert (said['success'], why in said['text']) == (False, True)
 
 
 # -- too much of everything -----------------------------------------------------------------------

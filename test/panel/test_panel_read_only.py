@@ -22,15 +22,14 @@ def test_nothing_is_written_and_stops_are_always_there(run: Run, tmp_path: Path)
         assert answer.status == 403
         assert 'without --allow-writes' in answer.said['text']
     for action in ('quick_stop', 'disable'):
-        for drive in ('/lift', '*'):
-            said = site.do(action, 'operator', {'drive': drive}).said
-            assert said['success'] is True, (action, drive, said, site.bridge.errors)
+        said = site.do(action, 'operator', {'drive': '/lift'}).said
+        assert said['success'] is True, (action, said, site.bridge.errors)
 
     # what reaches nobody is said, of one drive and of all; each takes its time-out, so at once
     assert site.bridge.end(signal.SIGKILL) == -signal.SIGKILL
     with ThreadPoolExecutor() as pool:
         for said in pool.map(lambda wanted: site.do(wanted[0], 'operator', {
-                'drive': wanted[1]}).said, (('quick_stop', '/lift'), ('disable', '*'))):
+                'drive': wanted[1]}).said, (('disable', '/lift'), ('quick_stop', '*'))):
             assert said['success'] is False
             assert 'nobody' in said['text']
     site.bridge = site.start_bridge()

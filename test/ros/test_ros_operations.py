@@ -69,7 +69,7 @@ def test_what_is_asked_of_a_drive_is_asked_once_it_knows_us(client: Client) -> N
 
     def write(value: float) -> Outcome:
         operations.write('/lift', 'ramp_time', value, told.append, now())
-        wait_until(lambda: not operations.poll([], now()), what='an answer')
+        wait_until(lambda: not operations.poll({}, now()), what='an answer')
         return told[-1]
     try:
         with asking(client) as operations:
@@ -84,9 +84,9 @@ def test_what_is_asked_of_a_drive_is_asked_once_it_knows_us(client: Client) -> N
             # nobody
             shy.known_after, later = 1_000_000, 20.0
             operations.write('/lift', 'ramp_time', 4.5, told.append, now())
-            assert operations.poll([], now())
+            assert operations.poll({}, now())
             later += PARAMETER_TIMEOUT
-            assert not operations.poll([], now())
+            assert not operations.poll({}, now())
             assert 'nobody answered' in told[3].text
             assert shy.writes == 3
     finally:
@@ -101,17 +101,17 @@ def test_a_stop_waits_a_moment_for_whoever_offers_it(client: Client) -> None:
 
     now, told = 100.0, list[Outcome]()
     with asking(client) as operations:
-        operations.poll(['/lift'], now)
+        operations.poll({'/lift': Stop}, now)
         operations.stop('/lift', Stop.QUICK_STOP, told.append, now)
-        assert operations.poll(['/lift'], now)
+        assert operations.poll({'/lift': Stop}, now)
         assert told == []
         service = client.node.create_service(Trigger, '/lift/quick_stop', answer)
         try:
-            wait_until(lambda: not operations.poll(['/lift'], now), what='an answer')
+            wait_until(lambda: not operations.poll({'/lift': Stop}, now), what='an answer')
             assert told == [Outcome(True, 'stopped')]
             operations.stop('/lift', Stop.DISABLE, told.append, now)
-            assert operations.poll(['/lift'], now + OFFER_TIMEOUT - 0.1)
-            assert not operations.poll(['/lift'], now + OFFER_TIMEOUT)
+            assert operations.poll({'/lift': Stop}, now + OFFER_TIMEOUT - 0.1)
+            assert not operations.poll({'/lift': Stop}, now + OFFER_TIMEOUT)
             assert told[1:] == [Outcome(False, 'nobody answered: is its bridge still running?')]
             operations.stop('/conveyor', Stop.DISABLE, told.append, now)
             assert 'nobody offers /conveyor/enable: no control word' in told[-1].text

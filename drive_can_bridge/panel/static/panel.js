@@ -28,11 +28,17 @@ const panel = (() => {
 
   // -- requests -----------------------------------------------------------------------------------
 
-  function tell(success, text, stays) {
+  // failed: the lines that the text begins with
+  function tell(success, text, stays, failed = []) {
     const told = document.createElement('div');
     told.className = `told ${success ? 'ok' : 'error'}`;
     told.setAttribute('role', success ? 'status' : 'alert');
-    told.textContent = text;
+    text.split('\n').forEach((line, place) => {
+      const shown = document.createElement('div');
+      shown.className = place < failed.length ? 'failed' : '';
+      shown.textContent = line;
+      told.append(shown);
+    });
     told.title = 'click to close';
     told.addEventListener('click', () => told.remove());
     let list = document.getElementById('told');
@@ -64,9 +70,9 @@ const panel = (() => {
   async function stop(action, drive, name) {
     const answer = await send(action, {drive});
     const text = answer.text || `${action.replace('_', ' ')} done`;
-    // of all drives, each is named in the answer, also those that were told nothing
+    // of all drives, those that do not stand are named in the answer
     const all = drive === '*';
-    tell(answer.success, all ? text : `${name}: ${text}`, all);
+    tell(answer.success, all ? text : `${name}: ${text}`, all, answer.failed);
   }
 
   async function write(drive, name, row) {

@@ -1,7 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """What a person may ask of a drive: reads, writes, stops. Nothing here can move one."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
 from rcl_interfaces.srv import GetParameters, SetParameters
@@ -35,34 +35,30 @@ class Operations:
 
     def __init__(self, node: HasHandle) -> None:
         self._node = node
-        self._stops: dict[str, dict[Stop, Service]] = {}
+        self._stops: dict[tuple[str, Stop], Service] = {}
         self._calls = NodeCalls(node, PARAMETER_TIMEOUT)
 
-    def poll(self, controlled: Iterable[str], now: float) -> bool:
+    def poll(self, stops: Mapping[str, Collection[Stop]], now: float) -> bool:
         """Take the answers that have arrived; return whether somebody still waits for one."""
-        wanted = set(controlled)
-        for drive in self._stops.keys() - wanted:
-            if not any(service.busy for service in self._stops[drive].values()):
-                for service in self._stops.pop(drive).values():
-                    service.close()
-        for drive in wanted - self._stops.keys():
-            self._stops[drive] = {
-                stop: Service(self._node, kind, f'{drive}/{name}', STOP_TIMEOUT)
-                for stop, (name, kind, _) in _STOPS.items()}
-        for services in self._stops.values():
-            for service in services.values():
-                if service.busy:
-                    service.look(now)
+        wanted = {(drive, stop) for drive, each in stops.items() for stop in each}
+        for gone in self._stops.keys() - wanted:
+            if not self._stops[gone].busy:
+                self._stops.pop(gone).close()
+        for drive, stop in wanted - self._stops.keys():
+            name, kind, _ = _STOPS[stop]
+            self._stops[drive, stop] = Service(self._node, kind, f'{drive}/{name}', STOP_TIMEOUT)
+        for service in self._stops.values():
+            if service.busy:
+                service.look(now)
         self._calls.look(now)
-        return self._calls.busy or any(
-            service.busy for services in self._stops.values() for service in services.values())
+        return self._calls.busy or any(service.busy for service in self._stops.values())
 
     def stop(self, drive: str, stop: Stop, done: Callable[[Outcome], None], now: float) -> None:
         """Stop a drive."""
         def take(response: Any) -> None:
             done(_SILENCE if response is None
                  else Outcome(response.success, printable(response.message)))
-        service = self._stops.get(drive, {}).get(stop)
+        service = self._stops.get((drive, stop))
         if service is None:
             done(Outcome(False, f'nobody offers {drive}/{_STOPS[stop][0]}: no control word, or '
                                 f'its bridge does not run'))
