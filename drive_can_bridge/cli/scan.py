@@ -17,7 +17,7 @@ from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.text import column_lines
 from drive_can_bridge.exchange.one_master import END_FIRST, Ownership
 from drive_can_bridge.protocols.families import FAMILIES
-from drive_can_bridge.transport.adapters import adapter_keywords, check_interface
+from drive_can_bridge.transport.adapters import adapter_keywords, check_channel, check_interface
 from drive_can_bridge.transport.end_point import EndPoint
 from drive_can_bridge.transport.port import open_port
 
@@ -69,6 +69,9 @@ def run(args: Namespace) -> int:
     reason = check_interface(args.interface)
     if reason is not None:
         raise WrongUsage(f'--interface: {reason}')
+    reason = check_channel(args.interface, args.channel)
+    if reason is not None:
+        raise WrongUsage(f'--channel: {reason}')
     bus = BusConfiguration('main', args.interface, args.channel, args.bitrate)
     if args.bitrates:
         if args.output is not None:

@@ -27,6 +27,9 @@ class Adapters(Protocol):
     def check_interface(self, interface: str) -> str | None:
         """Say why an interface cannot be used here; None: it can."""
 
+    def check_channel(self, interface: str, channel: str | int) -> str | None:
+        """Say why a channel can be none of an interface; None: it may."""
+
     def check_bitrate(self, interface: str, bitrate: int) -> str | None:
         """Say why an adapter cannot be set to a bit rate; None: it may be possible."""
 
@@ -60,6 +63,9 @@ def _check_adapter(tree: Tree, path: Path, values: dict[str, Any], adapters: Ada
     if message is not None:
         tree.wrong((*path, 'interface'), message)
         return None
+    message = adapters.check_channel(interface, values['channel']) if 'channel' in values else None
+    if message is not None:
+        tree.wrong((*path, 'channel'), message)
     message = adapters.check_bitrate(interface, values['bitrate'])
     if message is not None:
         tree.wrong((*path, 'bitrate'), message)

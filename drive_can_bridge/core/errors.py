@@ -61,7 +61,15 @@ class TransportError(DriveCanError):
 
 
 class BusUnavailable(DriveCanError, OSError):
-    """The device is absent, busy or lost. Worth another attempt."""
+    """
+    The device is absent, busy or lost. Worth another attempt.
+
+    :param taken: another process has it: no reason to wait for it at the beginning.
+    """
+
+    def __init__(self, text: str, *, taken: bool = False) -> None:
+        super().__init__(text)
+        self.taken = taken
 
 
 class BusMisconfigured(DriveCanError):

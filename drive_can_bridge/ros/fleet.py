@@ -121,7 +121,7 @@ class Fleet:
         """
         Open the buses, and begin to tell of them; nothing is sent.
 
-        :raises ConfigurationError: what can never be opened.
+        :raises ConfigurationError: what can never be opened, or belongs to another process.
         """
         for exchange in self.exchanges.values():
             exchange.open()
@@ -178,7 +178,10 @@ class Fleet:
         self._log.speaker(f'bus {bus}').info('open')
 
     def bus_lost(self, bus: str, reason: str) -> None:
-        """Log it."""
+        """Log it; at the start somebody else's bus is none that is waited for."""
+        if self._misconfigured is not None and self.exchanges[bus].link.taken:
+            self._misconfigured.append(f'bus {bus}: {reason}')
+            return
         if bus in self.exchanges:   # else it was given up while it was still being opened
             again = self.configuration.buses[bus].reconnect_period
             self._log.speaker(f'bus {bus}').error(f'{reason}; tried again every {again:g} s')

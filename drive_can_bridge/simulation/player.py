@@ -73,11 +73,14 @@ class BusPlayer:
         Open the bus and begin to play. A bus that is not there yet is waited for.
 
         :raises BusMisconfigured: no attempt will ever succeed.
+        :raises BusUnavailable: another process has the device.
         """
         self._link.start()
         self._link.wait_first_attempt(_OPEN_TIMEOUT)
         if self._misconfigured:
             raise BusMisconfigured(self._misconfigured)
+        if self._link.taken:
+            raise BusUnavailable(f'bus {self.bus.name}: {self._link.last_error}')
         self._thread.start()
 
     def stop(self) -> None:

@@ -18,6 +18,10 @@ import can
 import can.interfaces
 
 from drive_can_bridge.core.words import show, suggestion
+from drive_can_bridge.transport.places import SERIAL_INTERFACES
+
+#: how a channel begins that pyserial opens, but is no device here; others may write files
+_REMOTE = ('socket://', 'rfc2217://')
 
 
 def adapter_keywords(interface: str) -> set[str] | None:
@@ -58,6 +62,17 @@ def check_interface(interface: str) -> str | None:
         return f"the driver of interface '{interface}' is missing (Python module pyserial), " \
                'allowed is one that is installed'
     return None
+
+
+def check_channel(interface: str, channel: str | int) -> str | None:
+    """Say why a channel can be no channel of an interface; None: it may."""
+    if interface not in SERIAL_INTERFACES:
+        return None
+    text = str(channel)
+    if isinstance(channel, str) and ('://' not in text or text.lower().startswith(_REMOTE)):
+        return None
+    return (f'{show(channel)} is no serial port, allowed are a device such as /dev/ttyACM0, '
+            'socket://HOST:PORT and rfc2217://HOST:PORT')
 
 
 def check_bitrate(interface: str, bitrate: int) -> str | None:

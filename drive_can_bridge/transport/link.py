@@ -73,6 +73,7 @@ class Link:
     :param prepare_thread: called first in the reader thread.
     :param opener: opens the bus; None: python-can, by the configuration.
     :ivar error_witness: sees error frames, in the reader thread; to be set before ``start``.
+    :ivar taken: another process has the bus.
     """
 
     def __init__(self, bus: BusConfiguration, routes: Sequence[Route], listener: LinkListener, *,
@@ -82,6 +83,7 @@ class Link:
         self.bus = bus
         self._open = opener or (lambda: open_port(bus, routes, stations=stations))
         self.error_witness: Callable[[int, bytes], None] | None = None
+        self.taken = False
         self._listener = listener
         self._send_timeout = send_timeout
         self._prepare_thread = prepare_thread
@@ -213,6 +215,7 @@ class Link:
             try:
                 self._loss = NOT_READ_YET
                 self._port = port = self._open()
+                self.taken = False
                 port.error_witness = self.error_witness
                 frame = port.receive(RECEIVE_TIMEOUT)
                 self._loss = self._blocked = self._no_room_since = None
@@ -226,6 +229,7 @@ class Link:
                 self._first_attempt.set()
                 self._read(port, frame)
             except BusUnavailable as error:
+                self.taken = error.taken
                 reason = in_words(error)
                 self.last_error = reason
                 self._close_port()

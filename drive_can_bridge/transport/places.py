@@ -19,7 +19,7 @@ SERIAL_INTERFACES = frozenset(('slcan', 'robotell', 'serial', 'seeedstudio'))
 #: options without which a channel does not say which bus is meant
 _DISTINGUISHING = ('host', 'port', 'unique_hardware_id', 'serial', 'device_id')
 #: major device numbers of pseudo-terminals
-_PSEUDO_TERMINALS = range(136, 144)
+PSEUDO_TERMINALS = range(136, 144)
 _FLEETING = '/dev/pts/'
 
 
@@ -40,7 +40,7 @@ def place_of(bus: BusConfiguration) -> Place:
     """Say where a bus is."""
     channel = str(bus.channel)
     if bus.interface in SERIAL_INTERFACES:
-        return Place(_port_names(channel), channel)
+        return Place(_port_names(channel, device_of(bus)), channel)
     words = [bus.interface, channel]
     if bus.interface == 'virtual':      # of one process only
         words.append(str(os.getpid()))
@@ -48,10 +48,17 @@ def place_of(bus: BusConfiguration) -> Place:
     return Place(('/'.join(words),))
 
 
-def _port_names(channel: str) -> tuple[str, ...]:
-    if '://' in channel:
+def device_of(bus: BusConfiguration) -> str | None:
+    """Return the path of the serial device of a bus; None: there is none."""
+    channel = str(bus.channel)
+    if bus.interface not in SERIAL_INTERFACES or '://' in channel:
+        return None
+    return channel.split('@')[0]        # slcan: the speed of the port may follow
+
+
+def _port_names(channel: str, path: str | None) -> tuple[str, ...]:
+    if path is None:
         return (f'port {channel}',)
-    path = channel.split('@')[0]        # slcan: the speed of the port may follow
     # the number of a pseudo-terminal soon belongs to another one
     names = [] if path.startswith(_FLEETING) else [f'port {os.path.abspath(path)}']
     try:
@@ -61,6 +68,6 @@ def _port_names(channel: str) -> tuple[str, ...]:
     if not stat.S_ISCHR(found.st_mode):
         return (*names, f'port file {found.st_dev} {found.st_ino}')
     device = f'port device {os.major(found.st_rdev)} {os.minor(found.st_rdev)}'
-    if os.major(found.st_rdev) in _PSEUDO_TERMINALS:
+    if os.major(found.st_rdev) in PSEUDO_TERMINALS:
         device += f' of {found.st_dev} since {found.st_ctime_ns}'
     return (*names, device)

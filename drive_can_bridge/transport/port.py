@@ -21,7 +21,9 @@ from drive_can_bridge.core.frame import (
     EXTENDED_IDENTIFIER_MAX, Frame, Route, STANDARD_IDENTIFIER_MAX,
 )
 from drive_can_bridge.transport.adapter_answers import AdapterAnswers
+from drive_can_bridge.transport.adapters import check_channel
 from drive_can_bridge.transport.clock import steady_now
+from drive_can_bridge.transport.device_lock import DeviceLock
 from drive_can_bridge.transport.end_point import Counts, EndPoint, REFUSED_FRAMES
 from drive_can_bridge.transport.error_frames import (
     ADVICE_ALONE, ADVICE_DISTURBED, BUS_OFF, BusError, decode_error_frame,
@@ -29,8 +31,9 @@ from drive_can_bridge.transport.error_frames import (
 from drive_can_bridge.transport.failures import (
     in_words, is_full_queue, is_malformed, is_misconfiguration, with_cause,
 )
+from drive_can_bridge.transport.places import device_of, SERIAL_INTERFACES
 from drive_can_bridge.transport.raw_socket import RawSocket
-from drive_can_bridge.transport.serial_writer import SerialWriter, watched
+from drive_can_bridge.transport.serial_writer import announcing, SerialWriter, watched
 
 # A frame's own time stamp is believed if it is that much older than now at most, or if the frame
 # may have waited for so long: adapters that count from power-up, and clocks that were set, fall
@@ -46,8 +49,11 @@ _MALFORMED_MAX = 1000
 _LINE_MAX = 4096
 # Interfaces whose error frames are those of the Linux kernel; others have layouts of their own.
 _KERNEL_ERRORS = ('socketcan', 'socketcand')
-# Interfaces on a serial port that python-can keeps in ``serialPortOrig``.
-_SERIAL = ('slcan', 'robotell')
+# Where python-can keeps the serial port of an interface. What is in ``serialPortOrig`` has text
+# protocols, and is watched.
+_PORTS = {'slcan': 'serialPortOrig', 'robotell': 'serialPortOrig', 'seeedstudio': 'ser',
+          'serial': '_ser'}
+_WATCHED = 'serialPortOrig'
 
 
 class Port(EndPoint):
@@ -57,12 +63,15 @@ class Port(EndPoint):
     It rejects what has other identifiers (where the adapter does not keep them away), remote and
     CAN FD frames, which no protocol here has, and a serial adapter's line with bytes lost.
 
+    :param lock: of its device, released when it is closed.
     :ivar witness: sees every message that arrives, whatever it is; None: nobody does.
     """
 
-    def __init__(self, bus: can.BusABC, *, kernel_errors: bool = False) -> None:
+    def __init__(self, bus: can.BusABC, *, kernel_errors: bool = False,
+                 lock: DeviceLock | None = None) -> None:
         super().__init__()
         self._bus = bus
+        self._lock = lock
         # what python-can documents for adapters to implement; the ``recv`` around it looks at the
         # system clock, and waits for hours when that is set back
         self._receive = bus._recv_internal
@@ -178,6 +187,8 @@ class Port(EndPoint):
         if self._serial is not None:
             # python-can's slcan leaves the port open when its last command cannot be written
             steps.append(self._serial.close)
+        if self._lock is not None:
+            steps.append(self._lock.release)
         for step in steps:
             try:
                 step()
@@ -230,8 +241,31 @@ def open_port(bus: BusConfiguration, routes: Sequence[Route] = (), *, stations: 
     :param stations: for so many drives there should be room in the transmit queue of the kernel,
         one frame for each; 0 leaves the queue as long as it is.
     :raises BusMisconfigured: unknown interface, missing driver, impossible bit rate or option.
-    :raises BusUnavailable: device absent, busy, or refusing for now.
+    :raises BusUnavailable: device absent, busy, or refusing for now; or another process has it:
+        nothing was written then.
     """
+    where = f'{bus.interface} {bus.channel}'
+    reason = check_channel(bus.interface, bus.channel)
+    if reason is not None:
+        raise BusMisconfigured(f'{where}: {reason}')
+    device = device_of(bus)
+    try:
+        lock = None if device is None else DeviceLock(device)
+    except BusUnavailable as error:
+        raise BusUnavailable(f'{where}: {error}', taken=error.taken) from None
+    try:
+        port = _open(bus, routes, lock, where)
+    except BaseException:
+        if lock is not None:
+            lock.release()
+        raise
+    if stations:
+        port.shorten_queue(stations)
+    return port
+
+
+def _open(bus: BusConfiguration, routes: Sequence[Route], lock: DeviceLock | None,
+          where: str) -> Port:
     options: dict[str, Any] = dict(bus.options)
     if bus.interface == 'slcan':
         options.setdefault('sleep_after_open', 0.0)
@@ -244,14 +278,14 @@ def open_port(bus: BusConfiguration, routes: Sequence[Route] = (), *, stations: 
         adapter = can.interface._get_class_for_interface(bus.interface)
         if _takes(adapter, 'bitrate'):
             options['bitrate'] = bus.bitrate
-        opened = (watched(adapter, slcan=bus.interface == 'slcan')(
-                      bus.channel, **options) if bus.interface in _SERIAL else
+        opened = (_open_serial(adapter, bus, lock, options)
+                  if bus.interface in SERIAL_INTERFACES else
                   can.Bus(interface=bus.interface, channel=bus.channel, ignore_config=True,
                           **options))
-        port = Port(opened, kernel_errors=bus.interface in _KERNEL_ERRORS)
+        port = Port(opened, kernel_errors=bus.interface in _KERNEL_ERRORS, lock=lock)
     except Exception as error:  # the one place where adapters may throw anything
         _abandon(error)
-        text = f'{bus.interface} {bus.channel}: {in_words(error)}'
+        text = f'{where}: {in_words(error)}'
         if is_misconfiguration(error):
             raise BusMisconfigured(text) from error
         raise BusUnavailable(text) from error
@@ -262,10 +296,19 @@ def open_port(bus: BusConfiguration, routes: Sequence[Route] = (), *, stations: 
             _check_carrier(str(bus.channel))
     except BusUnavailable as error:
         port.close()
-        raise BusUnavailable(f'{bus.interface} {bus.channel}: {in_words(error)}') from error
-    if stations:
-        port.shorten_queue(stations)
+        raise BusUnavailable(f'{where}: {in_words(error)}') from error
     return port
+
+
+def _open_serial(adapter: type[Any], bus: BusConfiguration, lock: DeviceLock | None,
+                 options: dict[str, Any]) -> can.BusABC:
+    attribute = _PORTS[bus.interface]
+    if attribute == _WATCHED:
+        adapter = watched(adapter, slcan=bus.interface == 'slcan')
+    if lock is not None:    # before the first byte
+        adapter = announcing(adapter, attribute, lock.keep_out)
+    opened: can.BusABC = adapter(bus.channel, **options)
+    return opened
 
 
 def _check_carrier(channel: str) -> None:

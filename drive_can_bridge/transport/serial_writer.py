@@ -109,7 +109,16 @@ class _WatchedSlcan(_WatchedPort):
 _WATCHED: dict[type, type] = {}
 
 
-def watched(adapter: type[Any], *, slcan: bool) -> Callable[..., Any]:
+def announcing(adapter: type[Any], attribute: str, opened: Callable[[], object]) -> type[Any]:
+    """Return a serial adapter's class that tells when it has a port, before it writes to it."""
+    def set_attribute(self: Any, name: str, value: Any) -> None:
+        if name == attribute and value is not None:
+            opened()
+        object.__setattr__(self, name, value)
+    return type(adapter.__name__, (adapter,), {'__setattr__': set_attribute})
+
+
+def watched(adapter: type[Any], *, slcan: bool) -> type[Any]:
     """
     Return a serial adapter's class, made so that opening it cannot hang.
 

@@ -4,7 +4,9 @@
 import can.interfaces
 import pytest
 
-from drive_can_bridge.transport.adapters import adapter_keywords, check_bitrate, check_interface
+from drive_can_bridge.transport.adapters import (
+    adapter_keywords, check_bitrate, check_channel, check_interface,
+)
 
 
 def test_keywords_of_an_adapter() -> None:
@@ -59,6 +61,24 @@ def test_bit_rates() -> None:
     found = check_bitrate('slcan', 123456)
     assert found is not None
     assert found.startswith('123456 is impossible with slcan, allowed is one of 10000, 20000, ')
+
+
+@pytest.mark.parametrize('interface', ['slcan', 'robotell', 'seeedstudio', 'serial'])
+def test_channels_of_serial_interfaces(interface: str) -> None:
+    for good in ('/dev/ttyACM0', '/dev/ttyACM0@115200', 'COM3', 'can0', 'socket://host:7000',
+                 'RFC2217://host:7000'):
+        assert check_channel(interface, good) is None, good
+    # URLs of pyserial: this one overwrites a file
+    for bad in ('spy:///dev/ttyACM0?file=/etc/passwd', 'loop://', 'alt:///dev/ttyS0',
+                'hwgrep://.*', 'file:///dev/ttyS0', 'xsocket://host:1', 0):
+        found = check_channel(interface, bad)
+        assert found is not None and 'is no serial port, allowed are ' in found, bad
+
+
+@pytest.mark.parametrize(('interface', 'channel'), [
+    ('socketcan', 'can0'), ('pcan', 'PCAN_USBBUS1'), ('kvaser', 0), ('virtual', 'a://b')])
+def test_channels_of_others_are_theirs(interface: str, channel: str | int) -> None:
+    assert check_channel(interface, channel) is None
 
 
 def test_every_adapter_can_be_looked_at() -> None:

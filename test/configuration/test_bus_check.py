@@ -92,6 +92,9 @@ class Adapters:
     def check_interface(self, interface: str) -> str | None:
         return None if interface in ('virtual', 'closed') else 'no such thing, allowed is virtual'
 
+    def check_channel(self, interface: str, channel: str | int) -> str | None:
+        return 'no channel, allowed is room' if channel == 7 else None
+
     def check_bitrate(self, interface: str, bitrate: int) -> str | None:
         return 'impossible, allowed is 500000' if bitrate == 500 * 100 else None
 
@@ -99,6 +102,8 @@ class Adapters:
 @pytest.mark.parametrize(('old', 'new', 'expected'), [
     ('interface: virtual', 'interface: virtul',
      ['f.yaml:6: buses.main.interface: no such thing, allowed is virtual']),
+    ('channel: demo', 'channel: 7',
+     ['f.yaml:7: buses.main.channel: no channel, allowed is room']),
     ('bitrate: 125000', 'bitrate: 50000',
      ['f.yaml:8: buses.main.bitrate: impossible, allowed is 500000']),
     # close to a key of ours, but the adapter knows it

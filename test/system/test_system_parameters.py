@@ -2,6 +2,7 @@
 """``drive_can read`` and ``write`` as a user starts them: directly and through a bridge."""
 
 import json
+import os
 from pathlib import Path
 import signal
 from typing import Any
@@ -10,6 +11,8 @@ from parameter_files import bridge_file, CONVEYOR
 from processes import Client, Process, Processes
 import pytest
 from waiting import wait_for
+
+from drive_can_bridge.transport.device_lock import DeviceLock
 
 #: nothing here may depend on how busy the machine is
 PATIENT: dict[str, Any] = {'missed_limit': 100, 'parameter_timeout': 10.0}
@@ -103,6 +106,29 @@ def test_a_second_bridge_names_the_first_and_a_killed_one_leaves_no_lock(
     third = processes.bridge(file, f'{namespace}_c')
     third.error('active: 1 drive')
     assert third.end() == 0
+
+
+def test_where_only_the_device_is_shared_nothing_is_written_to_it(
+        processes: Processes, namespace: str, tmp_path: Path) -> None:
+    """As with two containers: the locks of the host do not meet."""
+    file = bridge_file(tmp_path)
+    simulator = processes.simulator(file)
+    port = simulator.line('^bus main: slcan ').split()[-1]
+    file = bridge_file(tmp_path, channel=port)
+    lock = DeviceLock(port)
+    for begin in (lambda: processes.bridge(file, namespace),
+                  lambda: processes.drive_can('read', '--params-file', str(file)),
+                  lambda: processes.drive_can('simulate', '--params-file', str(file)),
+                  lambda: processes.drive_can('scan', '--interface', 'slcan', '--channel', port)):
+        process = begin()
+        assert process.wait() == 1
+        assert any(f'slcan {port}: the serial port is used by process {os.getpid()}; a drive has '
+                   f'one master' in line for line in process.errors), process.errors
+    assert simulator.frames() == []
+    lock.release()
+    bridge = processes.bridge(file, namespace)
+    bridge.error('conveyor: online')
+    assert bridge.end() == 0
 
 
 @pytest.mark.parametrize('way', ['directly', 'through a bridge'])
