@@ -14,7 +14,8 @@ export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 help:
 	@echo 'make demo    simulated drives, a bridge and the live view; ARGS="..." goes to drive_can demo'
 	@echo 'make test    all tests; ARGS="..." goes to pytest (-n 0: one after the other)'
-	@echo '             DRIVE_CAN_TEST_PROFILE=long: what is random looks longer, as in CI'
+	@echo '             DRIVE_CAN_TEST_PROFILE=long: what is random looks longer, as in CI;'
+	@echo '             DRIVE_CAN_TEST_SEED=...: for the same random examples again'
 	@echo 'make bench   measurements; ARGS="..." goes to bench/run.py'
 	@echo 'make pictures  those of README and docs, from a demo that runs'
 	@echo 'make lint    style and types'
@@ -32,8 +33,8 @@ demo:
 	@.ci/setup '$(PYTHON)' '$(VENV)' demo
 	@exec $(BIN)/python .ci/foreground $(BIN)/drive_can demo $(ARGS)
 
-test: setup
-	@.ci/test '$(VENV)' $(ARGS)
+test:
+	@.ci/test '$(PYTHON)' '$(VENV)' $(ARGS)
 
 bench: setup
 	@exec $(BIN)/python .ci/foreground $(BIN)/python bench/run.py $(ARGS)

@@ -19,6 +19,9 @@ of a module stay together, because they may share what is expensive to start; th
 waiting for something of their own are spread. Long ones come first. What measures time has the
 mark ``alone``: nothing else of the test run happens meanwhile.
 
+*Seed.* All that is random follows DRIVE_CAN_TEST_SEED, by default another one in each run. Behind
+the failures stand the commands that run each of them alone, with the seed.
+
 *Signals.* Who runs us under ``nohup``, or in the background of a script, has us ignore some
 signals, and what is started here would inherit that.
 """
@@ -29,16 +32,23 @@ from functools import cache
 import gc
 import os
 from pathlib import Path
+import random
+import shlex
 import signal
+import sys
 import tempfile
 import time
 from typing import Any
 
-from hypothesis import HealthCheck, settings
+from hypothesis import core as hypothesis_core, HealthCheck, settings
 from middleware import tell_in_messages
 import pytest
 
 PROFILE = 'DRIVE_CAN_TEST_PROFILE'
+SEED = 'DRIVE_CAN_TEST_SEED'
+#: what a test looks at that is run again
+REPEATED = (SEED, PROFILE, 'DRIVE_CAN_SOAK_SECONDS')
+os.environ.setdefault(SEED, str(random.randrange(1_000_000)))   # workers inherit it
 PATIENT = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.register_profile('short', PATIENT, max_examples=25)
 settings.register_profile('long', PATIENT, max_examples=150)
@@ -104,6 +114,8 @@ def pytest_configure(config: pytest.Config) -> None:
                                            ignore_cleanup_errors=True)
         os.environ['ROS_LOG_DIR'] = logs.name
         config.add_cleanup(logs.cleanup)
+    if config.getoption('--hypothesis-seed') is None:
+        hypothesis_core.global_force_seed = int(os.environ[SEED])
     if config.getoption('dist', 'no') != 'no':
         return  # only starts those who run the tests
     os.environ['ROS_DOMAIN_ID'] = _domain(False)
@@ -117,6 +129,18 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_runtest_setup(item: pytest.Item) -> None:
     """Choose the domain of a test."""
     os.environ['ROS_DOMAIN_ID'] = _domain(item.nodeid.startswith('test/ros/'))
+
+
+def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
+    """Say how each test that failed is run alone."""
+    failed = [report.nodeid for kind in ('failed', 'error')
+              for report in terminalreporter.stats.get(kind, ())]
+    if failed:
+        given = ' '.join(f'{name}={os.environ[name]}' for name in REPEATED if name in os.environ)
+        terminalreporter.section('alone, with the same seed')
+        for nodeid in dict.fromkeys(failed):
+            terminalreporter.line(f'{given} {os.path.relpath(sys.executable)} -m pytest '
+                                  f'-n 0 {shlex.quote(nodeid)}')
 
 
 # -- beside each other ----------------------------------------------------------------------------
