@@ -11,12 +11,12 @@ from pathlib import Path
 import sys
 
 from drive_can_bridge.cli.main import main as drive_can
+from drive_can_bridge.clock import SteadyClock
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.protocols.families import FAMILIES, make_sessions
 from drive_can_bridge.simulation.simulation import Simulation
-from drive_can_bridge.transport.clock import steady_now
 
 FILE = """\
 /**/drive_can_bridge:
@@ -31,6 +31,7 @@ FILE = """\
 #: s after the beginning, and rpm from then on
 STEPS = ((0.0, 0.0), (0.8, 1500.0), (2.0, -750.0), (3.2, 0.0))
 SECONDS = 4.0
+CLOCK = SteadyClock()
 
 
 class Commander:
@@ -38,7 +39,7 @@ class Commander:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._begun = steady_now()
+        self._begun = CLOCK.now()
 
     def take_commands(self, now: float) -> None:
         """Say what the drive is to do now."""
@@ -65,7 +66,7 @@ def main() -> int:
         commander = Commander(session)
         exchange = BusExchange(
             bus, [session],
-            [[claim.route for claim in FAMILIES[drive.protocol].claims(drive)]], commander)
+            [[claim.route for claim in FAMILIES[drive.protocol].claims(drive)]], commander, CLOCK)
         exchange.attach(session, commander)
         exchange.open()
         exchange.activate()

@@ -7,7 +7,6 @@ one of the drives ends it.
 """
 
 from collections.abc import Callable, Sequence
-import time
 
 from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration
 from drive_can_bridge.core.errors import BusUnavailable, DriveCanError, TransportError
@@ -37,7 +36,7 @@ class Asker:
 
     def __init__(self, bus: BusConfiguration, port: EndPoint,
                  drives: Sequence[DriveConfiguration],
-                 clock: Callable[[], float] = time.monotonic) -> None:
+                 clock: Callable[[], float]) -> None:
         self._bus = bus
         self._port = port
         self._clock = clock

@@ -102,12 +102,12 @@ class _Made:
     """A backup, ready to be written."""
 
     def __init__(self, drive: Drive, settings: Sequence[tuple[Parameter, int]],
-                 left_out: Sequence[tuple[str, str]]) -> None:
+                 left_out: Sequence[tuple[str, str]], today: float) -> None:
         self._name = drive.name
         self._count = len(settings)
         self._identity = drive.identity()
         self._left_out = left_out
-        time = datetime.now(timezone.utc).strftime('%Y-%m-%dT%H:%M:%SZ')
+        time = datetime.fromtimestamp(today, timezone.utc).strftime('%Y-%m-%dT%H:%M:%SZ')
         self.text = written(
             drive.facts, head_of(drive.facts, time=time, identity=self._identity), settings,
             remarks=[f'left out: {name}: {reason}' for name, reason in left_out])
@@ -127,7 +127,7 @@ class _Made:
 def _text(args: Namespace, drive: Drive) -> _Made | None:
     """Read a drive; None: there is to be no file, and it was said why."""
     names = settings_of(drive)
-    outcomes = read_all(drive, names)
+    outcomes = read_all(drive, names, args.clock)
     settings: list[tuple[Parameter, int]] = []
     missing: list[tuple[str, str]] = []
     useless: list[tuple[str, str]] = []
@@ -152,7 +152,7 @@ def _text(args: Namespace, drive: Drive) -> _Made | None:
     if not settings:
         complain(f'{drive.name}: has no settings that could be written to a file')
         return None
-    return _Made(drive, settings, [*missing, *useless])
+    return _Made(drive, settings, [*missing, *useless], 1e-9 * args.clock.stamp())
 
 
 def _why_not_restorable(drive: Drive, outcome: ReadOutcome) -> str:

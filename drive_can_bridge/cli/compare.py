@@ -19,6 +19,7 @@ from drive_can_bridge.cli.drives import (
 )
 from drive_can_bridge.cli.tables import print_json, print_table
 from drive_can_bridge.client.drive import Drive, Drives
+from drive_can_bridge.clock import Clock
 from drive_can_bridge.configuration.profiles import ProfileStore
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.profile import Profile
@@ -83,7 +84,7 @@ def _sides_of(args: Namespace) -> list[Side]:
             for word in wanted:
                 chosen_one(source.names, word)
             with opened(source, list(dict.fromkeys(wanted))) as drives:
-                sides = _sides(words, files, drives)
+                sides = _sides(words, files, drives, args.clock)
     for word, side in zip(words, sides, strict=True):
         if side.left_out:
             names = ', '.join(side.left_out[:_NAMED_MAX])
@@ -93,7 +94,8 @@ def _sides_of(args: Namespace) -> list[Side]:
     return sides
 
 
-def _sides(words: Sequence[str], files: dict[str, Backup], drives: Drives) -> list[Side]:
+def _sides(words: Sequence[str], files: dict[str, Backup], drives: Drives,
+           clock: Clock) -> list[Side]:
     found = []
     for word in words:
         if word in files:
@@ -102,18 +104,18 @@ def _sides(words: Sequence[str], files: dict[str, Backup], drives: Drives) -> li
             found.append(side_of_file_and_drive(files[word], drive))
             _tell_profile(files[word], drive)
         else:
-            found.append(_drive(drives[word], list(files.values())))
+            found.append(_drive(drives[word], list(files.values()), clock))
     return found
 
 
-def _drive(drive: Drive, files: Sequence[Backup]) -> Side:
+def _drive(drive: Drive, files: Sequence[Backup], clock: Clock) -> Side:
     """
     Read a drive.
 
     :raises DriveCanError: something cannot be read: nobody knows whether it differs.
     """
     names = names_to_read(drive, *files)
-    outcomes = read_all(drive, names)
+    outcomes = read_all(drive, names, clock)
     problems = unread(drive, outcomes.values())
     if problems:
         raise DriveCanError('\n'.join(problems))

@@ -172,7 +172,7 @@ def _run_through(records: Iterable[Record], tracer: Tracer) -> bool:
 
 
 def _live(args: Namespace, configuration: BridgeConfiguration, tracer: Tracer) -> int:
-    with closing(Taps(configuration)) as taps:
+    with closing(Taps(configuration, args.clock)) as taps:
         try:
             for record in taps.records(args.seconds):
                 if isinstance(record, float):

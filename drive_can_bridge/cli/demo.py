@@ -75,9 +75,9 @@ def run(args: argparse.Namespace) -> int:
         for text in args.fault:
             name, fault = of_drive('--fault', text, configuration, parse_fault)
             try:
-                Simulation(configuration).drives[name].fault(fault)
+                Simulation(configuration, args.clock).drives[name].fault(fault)
             except ValueRefused as error:
                 raise WrongUsage(f'--fault {text}: {error}') from None
         return watcher.exit_code(run_demo(Options(
             configuration, tuple(args.fault), args.drive, args.log_frames, args.duration),
-            watcher, suspension))
+            watcher, suspension, args.clock))

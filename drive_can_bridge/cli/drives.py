@@ -15,6 +15,7 @@ from drive_can_bridge.cli.command import complain, what_is_missing, WrongUsage
 from drive_can_bridge.cli.progress import Bar, waiting
 from drive_can_bridge.client.drive import Drive, Drives, ReadOutcome, Source
 from drive_can_bridge.client.opening import find_source
+from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.errors import DriveCanError, WhichBridge
 
 
@@ -55,7 +56,7 @@ def source_of(args: Namespace) -> Iterator[Source]:
     try:
         with waiting('looking for a bridge' if args.params_file is None else 'reading the file'):
             source = find_source(args.params_file, namespace=args.namespace,
-                                 nmt_start=args.nmt_start)
+                                 nmt_start=args.nmt_start, clock=args.clock)
     except WhichBridge as error:
         raise WrongUsage(str(error)) from None
     except ImportError as error:
@@ -139,7 +140,7 @@ def unread(drive: Drive, outcomes: Iterable[ReadOutcome]) -> list[str]:
             for outcome in wrong]
 
 
-def read_all(drive: Drive, names: Sequence[str]) -> dict[str, ReadOutcome]:
+def read_all(drive: Drive, names: Sequence[str], clock: Clock) -> dict[str, ReadOutcome]:
     """Read parameters of a drive, none if there are no names; show how far it is."""
-    with Bar(f'reading {drive.name}', len(names)) as bar:
+    with Bar(f'reading {drive.name}', len(names), clock.now) as bar:
         return drive.read(*names, told=bar.step) if names else {}

@@ -2,10 +2,10 @@
 """What ``record`` and ``decode --live`` have in common: the buses of a file, listened to."""
 
 from collections.abc import Iterator
-import queue
-import time
+import math
 
 from drive_can_bridge.cli.command import complain
+from drive_can_bridge.clock import Clock, Mailbox
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.record import Record
 from drive_can_bridge.exchange.one_master import END_FIRST, Ownership
@@ -23,8 +23,9 @@ class Taps:
     :raises DriveCanError: a bus that cannot be opened.
     """
 
-    def __init__(self, configuration: BridgeConfiguration) -> None:
-        self._queue: queue.Queue[Record] = queue.Queue(QUEUE_MAX)
+    def __init__(self, configuration: BridgeConfiguration, clock: Clock) -> None:
+        self._now = clock.now
+        self._queue: Mailbox[Record] = Mailbox(clock, QUEUE_MAX)
         self.taps: list[Tap] = []
         # nothing is sent: only serial ports, which one process can read, are locked
         self._ownership = Ownership([(bus, ()) for bus in configuration.buses.values()],
@@ -32,25 +33,26 @@ class Taps:
         channels = labels(configuration.buses.values())
         try:
             for bus in configuration.buses.values():
-                self.taps.append(Tap(bus, channels[bus.name], self._queue, complain))
+                self.taps.append(Tap(bus, channels[bus.name], self._queue, complain,
+                                     clock))
         except BaseException:
             self.close()
             raise
 
     def records(self, seconds: float) -> Iterator[Record | float]:
         """Yield entries for so long; now and then, while there are none, until when there are."""
-        end = time.monotonic() + seconds
-        while time.monotonic() < end:
+        end = self._now() + seconds
+        while self._now() < end:
             # asked before the queue: what was heard until then is in it, or was taken out of it
             heard_until = min(tap.heard_until for tap in self.taps)
             try:
-                yield self._queue.get(timeout=_PATIENCE)
-            except queue.Empty:
+                yield self._queue.get(self._now() + _PATIENCE)
+            except TimeoutError:
                 yield heard_until
         while True:     # what arrived in time
             try:
-                yield self._queue.get_nowait()
-            except queue.Empty:
+                yield self._queue.get(-math.inf)
+            except TimeoutError:
                 return
 
     def close(self) -> None:

@@ -20,6 +20,7 @@ from typing import Any
 from drive_can_bridge import __version__
 from drive_can_bridge.cli.argcomplete_hook import complete, typed
 from drive_can_bridge.cli.command import complain, FAILED, Parser, WRONG_USAGE, WrongUsage
+from drive_can_bridge.clock import Clock, SteadyClock
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.process.beginning import let_signals_in
 
@@ -56,11 +57,12 @@ TROUBLE = {'compare': 2}
 INTERRUPTED = 130
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def main(argv: Sequence[str] | None = None, clock: Clock | None = None) -> int:
     """
     Run the command.
 
     :param argv: arguments without the program's name; None: those of the process.
+    :param clock: what everything waits by; None: that of this machine.
     :return: exit code.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
@@ -76,7 +78,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         if argv is None:
             let_signals_in()
-        code = _run(arguments)
+        code = _run(arguments, clock or SteadyClock())
         sys.stdout.flush()
         return code
     except BrokenPipeError:
@@ -150,8 +152,9 @@ def understood(arguments: list[str]) -> tuple[Any, argparse.Namespace]:
     return module, args
 
 
-def _run(arguments: list[str]) -> int:
+def _run(arguments: list[str], clock: Clock) -> int:
     module, args = understood(arguments)
+    args.clock = clock
     try:
         code: int = module.run(args)
     except WrongUsage as error:

@@ -7,12 +7,13 @@ on this host or others, and detaches again without any of them noticing.
 """
 
 import argparse
+from collections.abc import Callable
 import os
 import sys
-import time
 
 from drive_can_bridge.cli.arguments import namespace
 from drive_can_bridge.cli.command import what_is_missing
+from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.monitor.lines import balance, Lines
 from drive_can_bridge.monitor.model import Model
@@ -44,17 +45,18 @@ def define(parser: argparse.ArgumentParser) -> None:
 class _Refusal:
     """Why a view is not suspended, said for a while after somebody wanted it to be."""
 
-    def __init__(self, text: str) -> None:
+    def __init__(self, text: str, now: Callable[[], float]) -> None:
         self._text = text
+        self._now = now
         self._until = 0.0
 
     def begin(self) -> None:
         """Say it from now on. From any thread."""
-        self._until = time.monotonic() + _REFUSAL_TIME
+        self._until = self._now() + _REFUSAL_TIME
 
     def __call__(self) -> str:
         """Return what is to be said now; '' for nothing."""
-        return self._text if time.monotonic() < self._until else ''
+        return self._text if self._now() < self._until else ''
 
 
 def run(args: argparse.Namespace) -> int:
@@ -64,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
     :return: 0 after SIGINT or SIGTERM, 131 after SIGQUIT.
     :raises DriveCanError: no ROS.
     """
-    refusal = _Refusal(args.refuse_to_suspend)
+    refusal = _Refusal(args.refuse_to_suspend, args.clock.now)
     # a second signal ends the process at once
     with SignalWatcher(keep=True,
                        refuse=refusal.begin if args.refuse_to_suspend else None) as watcher:
@@ -83,6 +85,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _show(source: Source, model: Model, watcher: SignalWatcher, args: argparse.Namespace,
           refusal: _Refusal) -> int:
+    clock: Clock = args.clock
     place = environment.in_words()
     if sys.stdout.isatty() and os.environ.get('TERM', 'dumb') not in ('dumb', 'unknown'):
         try:
@@ -93,26 +96,26 @@ def _show(source: Source, model: Model, watcher: SignalWatcher, args: argparse.N
                   file=sys.stderr)
         else:
             setting = Setting(args.title, place, args.namespace, environment.export_command())
-            code = show(source, model, setting, ended=lambda: watcher.signalled,
+            code = show(source, model, setting, clock, ended=lambda: watcher.signalled,
                         quit_code=args.quit_code, notice=refusal)
-            for text in balance(model.look(time.monotonic(), time.time())):
+            for text in balance(model.look(clock.now(), 1e-9 * clock.stamp())):
                 print(text)
             return code
     print(f'{args.title}: {place}', file=sys.stderr, flush=True)
-    return _print_lines(source, model, watcher)
+    return _print_lines(source, model, watcher, clock)
 
 
-def _print_lines(source: Source, model: Model, watcher: SignalWatcher) -> int:
+def _print_lines(source: Source, model: Model, watcher: SignalWatcher, clock: Clock) -> int:
     """Print one line per drive and second, until a signal."""
     lines = Lines()
-    due = time.monotonic() + LINE_PERIOD
+    due = clock.now() + LINE_PERIOD
     while watcher.wait(_POLL_PERIOD) is None:
-        now = time.monotonic()
+        now = clock.now()
         source.poll(now)
         if now < due:
             continue
         due = max(due + LINE_PERIOD, now)
-        found = lines.look(model.look(now, time.time()), now)
+        found = lines.look(model.look(now, 1e-9 * clock.stamp()), now)
         if found:
             print('\n'.join(found), flush=True)
     return 0

@@ -89,7 +89,7 @@ def _serve(args: argparse.Namespace, ended: Callable[[], bool]) -> bool:
         for role in (Role.OPERATOR, Role.VIEWER):
             print(f'{role.value}: {address(listener, access.tokens[role])}', flush=True)
     try:
-        app = application(Feed(source, Operations(source.node), model), access,
+        app = application(Feed(source, Operations(source.node), model, args.clock), access,
                           Setting(place, args.allow_writes))
         serve(app, listener, ended=ended, ready=ready)
     finally:

@@ -66,7 +66,7 @@ def run(args: Namespace) -> int:
     results: list[tuple[Prober, list[Finding]]] = []
     for bus in dict.fromkeys(drive.bus for drive in drives):
         together = [prober for prober in probers if prober.drive.bus == bus]
-        results += _probe_bus(configuration, bus, together, args.nmt_start)
+        results += _probe_bus(configuration, bus, together, args)
     for prober, _ in results:
         for note in prober.notes:
             complain(f'warning: {prober.drive.name}: {note}')
@@ -75,17 +75,17 @@ def run(args: Namespace) -> int:
 
 
 def _probe_bus(configuration: BridgeConfiguration, name: str, probers: Sequence[Prober],
-               nmt_start: bool) -> Iterator[tuple[Prober, list[Finding]]]:
+               args: Namespace) -> Iterator[tuple[Prober, list[Finding]]]:
     bus = configuration.buses[name]
     drives = [drive for drive in configuration.drives.values() if drive.bus == name]
     with Ownership([(bus, drives)], 'drive_can probe', END_FIRST):
-        port = open_port(bus)
+        port = open_port(bus, args.clock)
         try:
-            asker = Asker(bus, port, drives)
+            asker = Asker(bus, port, drives, args.clock.now)
             asker.listen(LISTEN)
             for prober in probers:
                 start = prober.start_frame()
-                if nmt_start and start is not None:
+                if args.nmt_start and start is not None:
                     asker.tell(start)
                 yield prober, asker.probe(prober)
         finally:

@@ -1,10 +1,9 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """A bar on standard error for what takes its time; only in a terminal."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 import sys
-import time
 from types import TracebackType
 
 from rich.console import Console
@@ -30,13 +29,15 @@ class Bar:
 
     :param what: what they are for, ``reading conveyor``.
     :param total: how many there are.
+    :param now: the steady time.
     """
 
-    def __init__(self, what: str, total: int) -> None:
+    def __init__(self, what: str, total: int, now: Callable[[], float]) -> None:
+        self._now = now
         self._what = what
         self._total = total
         self._done = 0
-        self._began = time.monotonic()
+        self._began = self._now()
         self._progress: Progress | None = None
 
     def __enter__(self) -> 'Bar':
@@ -51,7 +52,7 @@ class Bar:
         """Take note of a step."""
         self._done += 1
         if self._progress is None:
-            if time.monotonic() - self._began < PATIENCE or not sys.stderr.isatty():
+            if self._now() - self._began < PATIENCE or not sys.stderr.isatty():
                 return
             self._progress = Progress(
                 TextColumn('{task.description}'), BarColumn(), MofNCompleteColumn(),

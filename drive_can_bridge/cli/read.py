@@ -4,7 +4,6 @@
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 import sys
-import time
 from typing import Any
 
 from rich.live import Live
@@ -15,6 +14,7 @@ from drive_can_bridge.cli.completion import complete_words
 from drive_can_bridge.cli.drives import add_words, opened, read_all, source_of, split_words
 from drive_can_bridge.cli.tables import fitting_table, print_json, print_table
 from drive_can_bridge.client.drive import Drive, Drives, ReadOutcome
+from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.words import value_text
 
 _HEADINGS = ('drive', 'name', 'value', 'unit', 'raw', 'number', 'storage', 'description',
@@ -55,7 +55,7 @@ def _read(args: Namespace, drives: Drives, wanted: Sequence[str]) -> int:
     outcomes = []
     for drive in drives.values():
         names = wanted or drive.readable_names
-        outcomes += [(drive, outcome) for outcome in read_all(drive, names).values()]
+        outcomes += [(drive, outcome) for outcome in read_all(drive, names, args.clock).values()]
     if args.json:
         for drive, outcome in outcomes:
             print_json(document(drive, outcome))
@@ -66,7 +66,8 @@ def _read(args: Namespace, drives: Drives, wanted: Sequence[str]) -> int:
 
 def _watch(args: Namespace, drives: Drives, wanted: Sequence[str]) -> int:
     """Read again and again."""
-    due = time.monotonic()
+    clock: Clock = args.clock
+    due = clock.now()
     live = Live(auto_refresh=False) if sys.stdout.isatty() and not args.json else None
     first = True
     try:
@@ -79,7 +80,7 @@ def _watch(args: Namespace, drives: Drives, wanted: Sequence[str]) -> int:
                 live.update(fitting_table(_HEADINGS, _rows(drives, outcomes), _NUMBERS),
                             refresh=True)
             elif args.json:
-                now = time.time()
+                now = 1e-9 * clock.stamp()
                 for drive, outcome in outcomes:
                     print_json({'time': round(now, 3), **document(drive, outcome)})
             else:
@@ -88,8 +89,8 @@ def _watch(args: Namespace, drives: Drives, wanted: Sequence[str]) -> int:
                 print_table(_HEADINGS, _rows(drives, outcomes), numbers=_NUMBERS)
             first = False
             sys.stdout.flush()
-            due = max(due + args.watch, time.monotonic())
-            time.sleep(due - time.monotonic() if due > time.monotonic() else 0.0)
+            due = max(due + args.watch, clock.now())
+            clock.wait(due)
     finally:
         if live is not None:
             live.stop()

@@ -2,11 +2,10 @@
 """``drive_can record``: everything on the buses of a parameter file, in a trace file."""
 
 from argparse import ArgumentParser, Namespace
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from pathlib import Path
 import sys
-import time
 from typing import Any, TextIO
 
 from drive_can_bridge.cli.arguments import (
@@ -15,6 +14,7 @@ from drive_can_bridge.cli.arguments import (
 from drive_can_bridge.cli.command import complain, WrongUsage
 from drive_can_bridge.cli.listening import Taps
 from drive_can_bridge.cli.tables import print_json
+from drive_can_bridge.clock import Clock
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.frame import bits_on_bus, STUFFING
 from drive_can_bridge.core.record import Record, RecordKind
@@ -66,12 +66,13 @@ def run(args: Namespace) -> int:
     for loss in LOSSES.get(args.output.suffix.lower(), ()):
         complain(f'warning: {args.output.suffix} does not keep {loss}; .log does')
     status = _Status(sys.stderr)
-    with closing(Taps(configuration)) as taps:      # before a file is replaced
+    with closing(Taps(configuration, args.clock)) as taps:      # before a file is replaced
         channels = labels(buses)
-        counters = {channels[bus.name]: _Counter(bus.name, bus.bitrate) for bus in buses}
+        counters = {channels[bus.name]: _Counter(bus.name, bus.bitrate, args.clock.now)
+                    for bus in buses}
         output = _Rotating(args.output, list(counters), args.rotate)
         try:
-            _record(taps.records(args.seconds), output, counters, status)
+            _record(taps.records(args.seconds), args.clock, output, counters, status)
         except KeyboardInterrupt:
             pass
         finally:
@@ -87,14 +88,14 @@ def run(args: Namespace) -> int:
     return 0
 
 
-def _record(records: Iterator[Record | float], output: '_Rotating',
+def _record(records: Iterator[Record | float], clock: Clock, output: '_Rotating',
             counters: dict[str, '_Counter'], status: '_Status') -> None:
-    look_at = time.monotonic() + _LOOK_PERIOD
+    look_at = clock.now() + _LOOK_PERIOD
     for record in records:
         if not isinstance(record, float):
             output.write(record)
             counters[str(record.channel)].take(record)
-        now = time.monotonic()
+        now = clock.now()
         if now >= look_at:
             look_at = now + _LOOK_PERIOD
             output.look()
@@ -104,10 +105,11 @@ def _record(records: Iterator[Record | float], output: '_Rotating',
 class _Counter:
     """What was recorded of one bus."""
 
-    def __init__(self, name: str, bitrate: int) -> None:
+    def __init__(self, name: str, bitrate: int, now: Callable[[], float]) -> None:
+        self._now = now
         self._name = name
         self._bitrate = bitrate
-        self._began = time.monotonic()
+        self._began = self._now()
         self._seconds = 0.0
         self._frames = self._sent = self._error_frames = 0
         self._bits = self._bits_shown = 0
@@ -124,7 +126,7 @@ class _Counter:
 
     def status(self) -> str:
         """Say how much there is so far, and how busy the bus is now."""
-        now = time.monotonic()
+        now = self._now()
         load = self._load(self._bits - self._bits_shown, now - self._shown_at)
         self._bits_shown, self._shown_at = self._bits, now
         return (f'{self._name}: {self._frames} frames, {self._error_frames} error frames, '
@@ -132,7 +134,7 @@ class _Counter:
 
     def end(self) -> None:
         """Take the time; what is written still may take its own."""
-        self._seconds = time.monotonic() - self._began
+        self._seconds = self._now() - self._began
 
     def line(self, output: '_Rotating') -> str:
         """Sum up."""

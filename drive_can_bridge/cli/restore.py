@@ -4,7 +4,6 @@
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from pathlib import Path
-import time
 
 from drive_can_bridge.backup.document import Backup
 from drive_can_bridge.backup.plan import (
@@ -23,6 +22,7 @@ from drive_can_bridge.cli.progress import Bar
 from drive_can_bridge.cli.questions import agreed, must_be_answerable
 from drive_can_bridge.cli.tables import print_json, print_table
 from drive_can_bridge.client.drive import Drive, Enabled, Source
+from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.parameters import Parameter, Storage, Value
 from drive_can_bridge.core.requests import tells_nothing
 from drive_can_bridge.core.text import printable
@@ -103,7 +103,7 @@ def _restore(args: Namespace, backup: Backup, drive: Drive) -> int:
     if not _may_be(args, backup, drive):
         return FAILED
     names = names_to_read(backup, drive)
-    outcomes = read_all(drive, names)
+    outcomes = read_all(drive, names, args.clock)
     plan = plan_restore(backup, drive, outcomes, include_protected=args.include_protected)
     if plan.unread:
         complain('\n'.join([*unread(drive, outcomes.values()), f'{_NOTHING}.']))
@@ -118,11 +118,12 @@ def _restore(args: Namespace, backup: Backup, drive: Drive) -> int:
         return FAILED
     if drive.enabled() is Enabled.YES:      # since it was asked
         return _is_enabled(drive)
-    with Bar(f'writing {drive.name}', len(plan.changes)) as bar, \
+    with Bar(f'writing {drive.name}', len(plan.changes), args.clock.now) as bar, \
             postponed(lambda: complain(f'{drive.name}: ending after the write under way')) \
             as interrupted:
         result = Restorer(drive, plan, stopped=lambda: bool(interrupted),
-                          clock=time.monotonic, wait=time.sleep,
+                          clock=args.clock.now,
+                          wait=lambda s: args.clock.wait(args.clock.now() + s),
                           told=bar.step, hint=complain).run()
     return _report(args, drive, plan, result, interrupted)
 
@@ -135,10 +136,11 @@ def _may_be(args: Namespace, backup: Backup, drive: Drive) -> bool:
         complain(f'{backup.file}: of another drive type: {other}' if other else
                  '\n'.join(problems))
         return False
-    identity = _identity(backup, drive)
+    identity = _identity(backup, drive, args.clock)
     if backup.head.identity and not identity:
         # maybe it says nothing at all: then nobody knows whether it is another one
-        for asked in read_all(drive, names_to_read(backup, drive)[:1]).values():
+        for asked in read_all(drive, names_to_read(backup, drive)[:1],
+                              args.clock).values():
             if not asked.ok and tells_nothing(asked.reason):
                 complain(f'{drive.name}: nothing could be read: {asked.reason}\n{_NOTHING}.')
                 return False
@@ -162,14 +164,14 @@ def _may_be(args: Namespace, backup: Backup, drive: Drive) -> bool:
     return True
 
 
-def _identity(backup: Backup, drive: Drive) -> str:
+def _identity(backup: Backup, drive: Drive, clock: Clock) -> str:
     """Return who a drive is; a bridge that has just started is about to find out."""
-    end = time.monotonic() + _PATIENCE
+    end = clock.now() + _PATIENCE
     while True:
         found = drive.identity()
-        if found or not (drive.facts.through and backup.head.identity) or time.monotonic() > end:
+        if found or not (drive.facts.through and backup.head.identity) or clock.now() > end:
             return found
-        time.sleep(_PATIENCE / 10.0)
+        clock.wait(clock.now() + _PATIENCE / 10.0)
 
 
 def _is_enabled(drive: Drive) -> int:

@@ -96,9 +96,9 @@ def _may_write(output: Path, *, yes: bool) -> bool:
 
 def _scan(args: Namespace, bus: BusConfiguration) -> int:
     with Ownership([(bus, ())], 'drive_can scan', END_FIRST):
-        port = open_port(bus)
+        port = open_port(bus, args.clock)
         try:
-            survey = Survey(bus, port)
+            survey = Survey(bus, port, args.clock.now)
             survey.listen(args.listen)
             if not args.passive:
                 _ask(args, survey)
@@ -174,9 +174,10 @@ def _compare_bitrates(args: Namespace, bus: BusConfiguration) -> int:
     heard = 0
     for bitrate in args.bitrates:
         with Ownership([(bus, ())], 'drive_can scan', END_FIRST):
-            port = open_port(replace(bus, bitrate=bitrate, options={'listen_only': True}))
+            port = open_port(replace(bus, bitrate=bitrate, options={'listen_only': True}),
+                             args.clock)
             try:
-                survey = Survey(bus, port)
+                survey = Survey(bus, port, args.clock.now)
                 survey.listen(args.listen)
             finally:
                 port.close()

@@ -16,11 +16,11 @@ import select
 import signal
 import sys
 import threading
-import time
 from typing import Any, TextIO
 
 from drive_can_bridge.cli.arguments import of_drive
 from drive_can_bridge.cli.command import FAILED, WrongUsage
+from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.configuration import BridgeConfiguration, BusConfiguration
 from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, ValueRefused
 from drive_can_bridge.exchange.one_master import END_FIRST, Ownership
@@ -85,7 +85,7 @@ def run(args: argparse.Namespace) -> int:
         mechanics = dict(of_drive('--axis', text, configuration, Mechanics.parse)
                          for text in args.axis)
         with ExitStack() as stack:
-            return _simulate(stack, configuration, faults, mechanics, pty=pty,
+            return _simulate(stack, args.clock, configuration, faults, mechanics, pty=pty,
                              link=args.pty_link, log_frames=args.log_frames,
                              strict=args.bitrate is not None)
     except (BusMisconfigured, BusUnavailable) as error:
@@ -93,7 +93,7 @@ def run(args: argparse.Namespace) -> int:
         return FAILED
 
 
-def _simulate(stack: ExitStack, configuration: BridgeConfiguration,
+def _simulate(stack: ExitStack, clock: Clock, configuration: BridgeConfiguration,
               faults: list[tuple[str, Fault]], mechanics: dict[str, Mechanics], *, pty: bool,
               link: Path | None, log_frames: Path | None, strict: bool) -> int:
     # before anything is announced: whoever reads the first line may send the signal at once
@@ -108,8 +108,9 @@ def _simulate(stack: ExitStack, configuration: BridgeConfiguration,
         return terminals[bus.name]
 
     simulation = Simulation(
-        configuration, open_bus=open_terminal if pty else None, say=output.say,
-        complain=_complain, show_frame=_frame_log(stack, output, log_frames), mechanics=mechanics)
+        configuration, clock, open_bus=open_terminal if pty else None, say=output.say,
+        complain=_complain, show_frame=_frame_log(stack, clock, output, log_frames),
+        mechanics=mechanics)
     for name, fault in faults:
         try:
             simulation.drives[name].fault(fault)
@@ -117,7 +118,8 @@ def _simulate(stack: ExitStack, configuration: BridgeConfiguration,
             raise WrongUsage(f'--fault {name}:{fault}: {error}') from None
     for bus in configuration.buses.values():
         if pty:
-            terminals[bus.name] = terminal = SlcanTerminal(bus.bitrate if strict else None)
+            terminals[bus.name] = terminal = SlcanTerminal(
+                clock.now, bus.bitrate if strict else None)
             stack.callback(terminal.close)
             if link is not None:
                 terminal.link(link / bus.name)
@@ -137,7 +139,8 @@ def _simulate(stack: ExitStack, configuration: BridgeConfiguration,
     return status
 
 
-def _frame_log(stack: ExitStack, output: '_Output', path: Path | None) -> ShowFrame | None:
+def _frame_log(stack: ExitStack, clock: Clock, output: '_Output',
+               path: Path | None) -> ShowFrame | None:
     """
     Return what takes the frames: standard output (``-``), a file as candump -L writes it, or None.
 
@@ -147,9 +150,9 @@ def _frame_log(stack: ExitStack, output: '_Output', path: Path | None) -> ShowFr
         return None
     if path == Path('-'):
         return lambda bus, frame, sent: output.say(
-            f'({time.time():.6f}) {bus} {frame} {"T" if sent else "R"}')
+            f'({1e-9 * clock.stamp():.6f}) {bus} {frame} {"T" if sent else "R"}')
     file = _Output(stack.enter_context(path.open('w', encoding='ascii')), path)
-    return lambda bus, frame, _: file.say(f'({time.time():.6f}) {bus} {frame}')
+    return lambda bus, frame, _: file.say(f'({1e-9 * clock.stamp():.6f}) {bus} {frame}')
 
 
 def _wait(simulation: Simulation, wake: int, console: Console) -> int:

@@ -8,7 +8,6 @@ once a CANopen node was heard or has answered, whose process data it might overw
 """
 
 from collections.abc import Callable
-import time
 
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusUnavailable, TransportError
@@ -38,7 +37,7 @@ class Survey:
     """
 
     def __init__(self, bus: BusConfiguration, port: EndPoint,
-                 clock: Callable[[], float] = time.monotonic) -> None:
+                 clock: Callable[[], float]) -> None:
         self._bus = bus
         self._port = port
         self._clock = clock

@@ -71,7 +71,7 @@ def _write(args: Namespace, drives: Drives, wanted: dict[str, str]) -> int:
     outcomes: list[tuple[Drive, WriteOutcome]] = []
     try:
         for drive in drives.values():
-            with Bar(f'writing {drive.name}', len(wanted)) as bar:
+            with Bar(f'writing {drive.name}', len(wanted), args.clock.now) as bar:
                 for name, text in wanted.items():
                     _write_one(drive, name, text, outcomes)
                     bar.step()

@@ -9,8 +9,8 @@ not sent by this process, ends the conversation.
 
 from collections.abc import Sequence
 import threading
-import time
 
+from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration
 from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, DriveCanError
 from drive_can_bridge.core.events import Event, RequestCompleted
@@ -24,7 +24,7 @@ from drive_can_bridge.protocols.families import FAMILIES
 
 #: s that a bus has to open
 _OPEN_TIMEOUT = 5.0
-#: s between two looks whether all is well while nothing happens
+#: s between two looks whether all is well, however many wait for something
 _PATIENCE = 0.1
 
 
@@ -43,10 +43,13 @@ class BusConversation:
     """
 
     def __init__(self, bus: BusConfiguration, drives: Sequence[DriveConfiguration],
-                 neighbours: Sequence[DriveConfiguration], ownership: Ownership) -> None:
+                 neighbours: Sequence[DriveConfiguration], ownership: Ownership,
+                 clock: Clock) -> None:
         self.bus = bus
+        self.now = clock.now
         self._ownership = ownership
-        self._changed = threading.Condition()
+        self._changed = clock.alarm()
+        self._lock = threading.Lock()
         self._outcomes: dict[int, tuple[Outcome, ...]] = {}
         self._trouble: DriveCanError | None = None
         self._opened = False
@@ -59,18 +62,19 @@ class BusConversation:
             bus, list(self.sessions.values()),
             [[claim.route for claim in FAMILIES[drive.protocol].claims(drive) if claim.heard]
              for drive in drives],
-            self, counted=[route for _, route in self._requests], note=self._note)
+            self, clock, counted=[route for _, route in self._requests], note=self._note)
         for session in self.sessions.values():
             self._exchange.attach(session, _Ears(self))
         self._exchange.serve()
         self._exchange.open()
         try:
             self._exchange.link.wait_first_attempt(_OPEN_TIMEOUT)
-            with self._changed:
-                self._changed.wait_for(lambda: self._opened or self._trouble, _OPEN_TIMEOUT)
-                if not self._opened and self._trouble is None:
-                    self._trouble = BusUnavailable(f'bus {bus.name}: it does not open')
-                self._check()
+            end = self.now() + _OPEN_TIMEOUT
+            while not self._opened and self._trouble is None and self.now() < end:
+                self._changed.wait(end)
+            if not self._opened:
+                self._fail(BusUnavailable(f'bus {bus.name}: it does not open'))
+            self._check()
         except BaseException:
             self.close()
             raise
@@ -81,14 +85,11 @@ class BusConversation:
 
         :raises DriveCanError: another master talks to a drive, or the bus is lost.
         """
-        end = time.monotonic() + seconds
-        with self._changed:
-            while True:
-                self._check()
-                left = end - time.monotonic()
-                if left <= 0.0:
-                    return
-                self._changed.wait(left)
+        end = self.now() + seconds
+        self._check()
+        while self.now() < end:
+            self._changed.wait(min(end, self.now() + _PATIENCE))
+            self._check()
 
     def submit(self, drive: str, request: Request) -> None:
         """
@@ -96,8 +97,7 @@ class BusConversation:
 
         :raises DriveCanError: another master talks to a drive, or the bus is lost or closed.
         """
-        with self._changed:
-            self._check()
+        self._check()
         self._exchange.submit(self.sessions[drive], request)
 
     def wait(self, request: Request) -> tuple[Outcome, ...]:
@@ -106,12 +106,11 @@ class BusConversation:
 
         :raises DriveCanError: another master talks to a drive, or the bus is lost.
         """
-        with self._changed:
+        self._check()
+        while id(request) not in self._outcomes:
+            self._changed.wait(self.now() + _PATIENCE)
             self._check()
-            while id(request) not in self._outcomes:
-                self._changed.wait(_PATIENCE)
-                self._check()
-            return self._outcomes.pop(id(request))
+        return self._outcomes.pop(id(request))
 
     def send(self, frame: Frame) -> None:
         """
@@ -133,17 +132,16 @@ class BusConversation:
             raise self._trouble
 
     def _fail(self, trouble: DriveCanError) -> None:
-        with self._changed:
+        with self._lock:
             self._trouble = self._trouble or trouble
-            self._changed.notify_all()
+        self._changed.ring()
 
     # -- from the exchange ------------------------------------------------------------------------
 
     def completed(self, request: Request, outcomes: tuple[Outcome, ...]) -> None:
         """Take what became of a request."""
-        with self._changed:
-            self._outcomes[id(request)] = outcomes
-            self._changed.notify_all()
+        self._outcomes[id(request)] = outcomes
+        self._changed.ring()
 
     def _note(self, frame: Frame, now: float, sent: bool) -> None:
         if sent:
@@ -155,9 +153,8 @@ class BusConversation:
 
     def bus_opened(self, bus: str) -> None:
         """Take note that the bus is there."""
-        with self._changed:
-            self._opened = True
-            self._changed.notify_all()
+        self._opened = True
+        self._changed.ring()
 
     def bus_lost(self, bus: str, reason: str) -> None:
         """End: what the drives do now nobody knows."""

@@ -8,6 +8,7 @@ import sys
 from drive_can_bridge.client.conversation import BusConversation
 from drive_can_bridge.client.direct_drive import DirectDrive
 from drive_can_bridge.client.drive import Drives
+from drive_can_bridge.clock import Clock
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.exchange.one_master import Ownership
@@ -26,8 +27,9 @@ class DirectSource:
     :raises ConfigurationError: the file is wrong.
     """
 
-    def __init__(self, params_file: str | Path, *, nmt_start: bool = False) -> None:
+    def __init__(self, params_file: str | Path, clock: Clock, *, nmt_start: bool = False) -> None:
         self.configuration: BridgeConfiguration = configuration_from_file(Path(params_file))
+        self._clock = clock
         self._nmt_start = nmt_start
 
     @property
@@ -59,7 +61,7 @@ class DirectSource:
             for bus, drives in groups.items():
                 conversations[bus] = BusConversation(
                     configuration.buses[bus], [drive for drive in wanted if drive.bus == bus],
-                    drives, ownership)
+                    drives, ownership, self._clock)
             seconds = LISTEN    # they all hear at the same time
             for conversation in conversations.values():
                 conversation.listen(seconds)

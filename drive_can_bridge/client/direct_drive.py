@@ -9,7 +9,6 @@ is not greeted again at once.
 """
 
 from collections.abc import Iterator, Sequence
-import time
 
 from drive_can_bridge.client.conversation import BusConversation
 from drive_can_bridge.client.drive import (
@@ -67,14 +66,14 @@ class DirectDrive(Drive):
         """Start the node where that is wanted; yield what the user should know."""
         if self._nmt_start and self._start_frame is not None:
             self._start()
-            end = time.monotonic() + _START_PATIENCE
+            end = self._conversation.now() + _START_PATIENCE
             while True:     # until its heartbeat, too, says that it has started
                 self._conversation.listen(_START_PAUSE)
                 failure = self._greet()[1]
-                if failure is None or time.monotonic() >= end:
+                if failure is None or self._conversation.now() >= end:
                     break
             if failure is not None:
-                self._absent = time.monotonic(), failure
+                self._absent = self._conversation.now(), failure
         supervision = self._family.supervision(self._drive)
         if supervision is not None:
             outcome, = self._wait_for((supervision,))
@@ -135,7 +134,7 @@ class DirectDrive(Drive):
     def _look(self, wanted: Sequence[Parameter] = (),
               ) -> tuple[dict[Parameter, Outcome], Failure | None]:
         """Greet a drive, which may have restarted, unless that was done just now."""
-        if self._absent is not None and time.monotonic() - self._absent[0] < _ABSENT_FOR:
+        if self._absent is not None and self._conversation.now() - self._absent[0] < _ABSENT_FOR:
             return {}, self._absent[1]
         self._absent = None
         self._start()

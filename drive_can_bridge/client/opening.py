@@ -6,21 +6,24 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from drive_can_bridge.client.drive import Drives, Source
+from drive_can_bridge.clock import Clock, SteadyClock
 from drive_can_bridge.core.errors import DriveCanError
 
 
 def find_source(params_file: str | Path | None = None, *, namespace: str | None = None,
-                nmt_start: bool = False) -> Source:
+                nmt_start: bool = False, clock: Clock | None = None) -> Source:
     """
     Say which drives there are, before anything is sent.
 
     :param params_file: its drives, directly on its buses; None: those of a running bridge.
     :param namespace: of the bridge, where several run.
     :param nmt_start: directly: start CANopen nodes before they are asked.
+    :param clock: what everything waits by; None: that of this machine.
     :raises ConfigurationError: the file is wrong.
     :raises DriveCanError: the file cannot be read; no bridge is running, or several in different
         namespaces; an argument that means nothing to the way that is taken.
     """
+    clock = clock or SteadyClock()
     if params_file is not None and namespace is not None:
         raise DriveCanError('namespace is of a running bridge, params_file goes without one')
     if params_file is None and nmt_start:
@@ -29,12 +32,12 @@ def find_source(params_file: str | Path | None = None, *, namespace: str | None 
     if params_file is not None:
         from drive_can_bridge.client.direct import DirectSource
         try:
-            return DirectSource(params_file, nmt_start=nmt_start)
+            return DirectSource(params_file, clock, nmt_start=nmt_start)
         except OSError as error:
             raise DriveCanError(f'{error.filename or params_file}: '
                                 f'{error.strerror or error}') from error
     from drive_can_bridge.client.bridged.source import BridgeSource
-    return BridgeSource(namespace)
+    return BridgeSource(namespace, clock)
 
 
 def open_drives(params_file: str | Path | None = None, *, only: str | Sequence[str] = ('*',),

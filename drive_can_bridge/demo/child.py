@@ -14,6 +14,7 @@ import subprocess
 import sys
 from typing import IO
 
+
 #: what can be run: module with ``main()``
 PROGRAMS = {
     'drive_can_bridge': 'drive_can_bridge.ros.start',
@@ -37,8 +38,9 @@ class Child:
     :param log: takes its standard error; None: it is the demo's.
     """
 
-    def __init__(self, what: str, program: str, *arguments: str, shared: bool = False,
-                 log: Path | None = None, output: IO[bytes] | int | None = None) -> None:
+    def __init__(self, what: str, program: str, *arguments: str,
+                 shared: bool = False, log: Path | None = None,
+                 output: IO[bytes] | int | None = None) -> None:
         self.what = what
         self.log = log
         self.told = False

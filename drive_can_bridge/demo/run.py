@@ -17,8 +17,8 @@ import sys
 import tempfile
 import termios
 from threading import Event
-import time
 
+from drive_can_bridge.clock import Clock
 from drive_can_bridge.configuration.writing import write_parameter_file
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.errors import DriveCanError
@@ -70,8 +70,9 @@ class Demo:
     :param live: there is a terminal that the view takes.
     """
 
-    def __init__(self, options: Options, directory: Path, suspension: Event, *, live: bool,
-                 ) -> None:
+    def __init__(self, options: Options, directory: Path, suspension: Event, clock: Clock, *,
+                 live: bool) -> None:
+        self._clock = clock
         self._options = options
         self._directory = directory
         self._suspension = suspension
@@ -106,11 +107,11 @@ class Demo:
         if options.frame_log is not None:
             arguments += ['--log-frames', str(options.frame_log)]
         self._drives = self._start('the simulation', 'drive_can', 'simulate', *arguments)
-        deadline = time.monotonic() + _DRIVES_TIMEOUT
+        deadline = self._clock.now() + _DRIVES_TIMEOUT
         while not all((directory / name).is_symlink() for name in configuration.buses):
             if watcher.wait(_LOOK_PERIOD / 4) is not None:
                 return False
-            if self._drives.code is not None or time.monotonic() > deadline:
+            if self._drives.code is not None or self._clock.now() > deadline:
                 raise DriveCanError(f'{TITLE}: the simulated drives did not start')
         self._bridge = self._start('the bridge', 'drive_can_bridge', '--ros-args',
                                    '--params-file', str(file))
@@ -124,10 +125,10 @@ class Demo:
 
         :return: exit code: 0 after a signal, the duration, or when the user has enough.
         """
-        begun, duration = time.monotonic(), self._options.duration
+        begun, duration = self._clock.now(), self._options.duration
         while True:
             left = _LOOK_PERIOD if duration is None else min(
-                _LOOK_PERIOD, max(0.0, begun + duration - time.monotonic()))
+                _LOOK_PERIOD, max(0.0, begun + duration - self._clock.now()))
             if watcher.wait(left) is not None:
                 return 0
             if self._suspension.is_set():
@@ -142,7 +143,7 @@ class Demo:
                     return 1
                 child.told = True
                 self._tell(child)
-            if duration is not None and time.monotonic() >= begun + duration:
+            if duration is not None and self._clock.now() >= begun + duration:
                 return 0
 
     def stop(self, *, view_knows: bool) -> None:
@@ -209,7 +210,7 @@ class Demo:
         print(f'{TITLE}: {text}', file=sys.stderr, flush=True)
 
 
-def run(options: Options, watcher: SignalWatcher, suspension: Event) -> int:
+def run(options: Options, watcher: SignalWatcher, suspension: Event, clock: Clock) -> int:
     """
     Run until a signal, or as long as the options say.
 
@@ -225,7 +226,7 @@ def run(options: Options, watcher: SignalWatcher, suspension: Event) -> int:
     with ExitStack() as stack:
         directory = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix='drive_can_')))
         stack.enter_context(_terminal_restored())
-        demo = Demo(options, directory, suspension, live=live)
+        demo = Demo(options, directory, suspension, clock, live=live)
         try:
             try:
                 code = demo.watch(watcher) if demo.start(watcher) else 0

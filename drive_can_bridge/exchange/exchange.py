@@ -17,21 +17,21 @@ from collections.abc import Callable, Sequence
 from itertools import chain, zip_longest
 import math
 import threading
-import time
 from typing import Any
 
+from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.control import ControlRequest
 from drive_can_bridge.core.frame import bits_on_bus, Frame, Route
 from drive_can_bridge.core.requests import Request
 from drive_can_bridge.core.session import Session
-from drive_can_bridge.exchange.alarm import Alarm
 from drive_can_bridge.exchange.errand import Errand
 from drive_can_bridge.exchange.listeners import BusListener, DriveListener
 from drive_can_bridge.exchange.member import Member, STOP_MARGIN
 from drive_can_bridge.exchange.phases import spread
 from drive_can_bridge.exchange.router import Router
-from drive_can_bridge.transport.link import Link, steady_now
+from drive_can_bridge.transport.end_point import EndPoint
+from drive_can_bridge.transport.link import Link
 
 #: the timer thread passes at least this often (s), so that a longer gap means lost time
 PASS_PERIOD = 0.25
@@ -52,44 +52,45 @@ class BusExchange:
     :param routes: for each session, in the same order, the identifiers it wants to see.
     :param counted: further identifiers, on which nobody else should send.
     :param overheard: for each session those on which another master tells several drives at once.
+    :param open_bus: opens the bus; None: python-can, by the configuration.
     :param prepare_thread: called first in each of the two threads.
     :param note: sees every frame that was sent or received: (frame, time, sent).
     :ivar errand: what its timer thread sees to beside its drives; to be set before ``open``.
     """
 
     def __init__(self, bus: BusConfiguration, sessions: Sequence[Session],
-                 routes: Sequence[Sequence[Route]], listener: BusListener, *,
+                 routes: Sequence[Sequence[Route]], listener: BusListener, clock: Clock, *,
                  counted: Sequence[Route] = (), overheard: Sequence[Sequence[Route]] = (),
-                 clock: Callable[[], float] = steady_now,
+                 open_bus: Callable[[BusConfiguration], EndPoint] | None = None,
                  prepare_thread: Callable[[], object] = lambda: None,
                  note: Callable[[Frame, float, bool], object] | None = None) -> None:
         self.bus = bus
         self._note = note
         self.lock = threading.Lock()
-        self._clock = clock
+        self._clock, self._sleep = clock.now, clock.wait
         self._prepare_thread = prepare_thread
         self._listener = listener
         self._members: list[Member] = []
         self._sessions = list(sessions)
         self._router: Router[Member] = Router()
         self._routes = list(zip_longest(routes, overheard, fillvalue=()))
-        # a send may hold up every drive of the bus: never for more than half a cycle
         periods = [session.configuration.period for session in sessions]
-        shortest = min(periods, default=0.1)
-        self.link = Link(bus, list(dict.fromkeys(chain(*routes, counted, *overheard))), self,
-                         send_timeout=min(0.5 * shortest, 0.05), stations=len(self._sessions),
-                         prepare_thread=prepare_thread)
+        # a send may hold up every drive of the bus: never for more than half a cycle
+        send_timeout = min(0.05, 0.5 * min(periods, default=0.1))
+        filters = list(dict.fromkeys(chain(*routes, counted, *overheard)))
+        self.link = Link(bus, filters, self, clock, send_timeout=send_timeout,
+                         stations=len(self._sessions), prepare_thread=prepare_thread,
+                         opener=open_bus and (lambda: open_bus(bus)))
         for session, phase in zip(sessions, spread(periods)):
             session.phase = phase
         self.errand: Errand | None = None
-        self._alarm = Alarm()
+        self._alarm = clock.alarm()
         self._wake_at = 0.0
         self._meant_at = 0.0    # when the next pass was to be
         self._last_pass = 0.0
         self._tell_at = 0.0
         self._closing = False
-        self._thread = threading.Thread(target=self._run, name=f'exchange {bus.name}',
-                                        daemon=True)
+        self._thread = clock.worker(self._run, f'exchange {bus.name}')
         self.active = False
         self.bus_state = 'opening'
         self.bus_reason = ''
@@ -160,7 +161,7 @@ class BusExchange:
             if not self._thread.is_alive():  # the neutral frames go out all the same
                 self._pass_to_stop()
                 now = self._clock()
-            time.sleep(0.002)
+            self._sleep(now + 0.002)
             asleep = self._clock() - now
             if asleep > LATENESS_MAX:   # a process that stood still: not the bus blocks
                 end += asleep
@@ -187,8 +188,7 @@ class BusExchange:
         """End both threads and close the bus."""
         self._closing = True
         self._alarm.ring()
-        if self._thread.is_alive() and self._thread is not threading.current_thread():
-            self._thread.join(timeout=2.0)
+        self._thread.join(2.0)
         self.link.stop()
 
     def _stopped(self) -> bool:
@@ -236,7 +236,7 @@ class BusExchange:
                     self._wake_at = self._pass()
                 if self.errand is not None:
                     self._wake_at = min(self._wake_at, self.errand.run(self._clock()))
-                self._alarm.sleep(self._wake_at - self._clock())
+                self._alarm.wait(self._wake_at)
         except Exception as error:  # noqa: BLE001  outermost loop: no failure is silent
             self._fail(f'{type(error).__name__}: {error}')
 

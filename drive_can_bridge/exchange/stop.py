@@ -2,12 +2,13 @@
 """Stop all buses at the same time: the slowest one decides, not the sum."""
 
 from collections.abc import Iterable
-import threading
+from functools import partial
 
+from drive_can_bridge.clock import Clock
 from drive_can_bridge.exchange.exchange import BusExchange
 
 
-def stop_all(exchanges: Iterable[BusExchange]) -> dict[str, str]:
+def stop_all(exchanges: Iterable[BusExchange], clock: Clock) -> dict[str, str]:
     """
     Stop the drives of every exchange that is active, and wait until it is done.
 
@@ -24,7 +25,7 @@ def stop_all(exchanges: Iterable[BusExchange]) -> dict[str, str]:
             reason = f'{type(error).__name__}: {error}'
         failures[exchange.bus.name] = reason
 
-    threads = [threading.Thread(target=stop, args=(exchange,), name=f'stop {exchange.bus.name}')
+    threads = [clock.worker(partial(stop, exchange), f'stop {exchange.bus.name}')
                for exchange in exchanges if exchange.active]
     for thread in threads:
         thread.start()

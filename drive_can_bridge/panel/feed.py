@@ -8,9 +8,9 @@ Everything happens in the thread of the web server, between two of its requests:
 import asyncio
 from collections.abc import Callable, Iterable, Sequence
 import logging
-import time
 from typing import TypeVar
 
+from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.control_texts import NO_QUICK_STOP as REFUSED
 from drive_can_bridge.core.parameters import Value
 from drive_can_bridge.monitor.drive import CONTROL_STATE
@@ -48,7 +48,9 @@ class Feed:
     :param model: what ``source`` fills.
     """
 
-    def __init__(self, source: Source, operations: Operations, model: Model) -> None:
+    def __init__(self, source: Source, operations: Operations, model: Model,
+                 clock: Clock) -> None:
+        self._clock = clock
         self._source = source
         self._operations = operations
         self._model = model
@@ -62,7 +64,7 @@ class Feed:
         while True:
             pause = PERIOD
             try:
-                pause = self._turn(time.monotonic())
+                pause = self._turn(self._clock.now())
             except Exception as error:  # noqa: BLE001  whatever it is, others want to see and stop
                 _LOG.error('%s: %s', type(error).__name__, error)
             self._wake.clear()
@@ -70,7 +72,7 @@ class Feed:
                 await asyncio.wait_for(self._wake.wait(), pause)
             except (asyncio.TimeoutError, TimeoutError):
                 continue
-            self._due = min(self._due, time.monotonic() + _WAITING_PERIOD)
+            self._due = min(self._due, self._clock.now() + _WAITING_PERIOD)
 
     def _turn(self, now: float) -> float:
         """Do what is due; return s until the next time."""
@@ -88,12 +90,12 @@ class Feed:
             self._source.glance(now)
         if waiting:
             return _WAITING_PERIOD
-        pause = max(0.0, self._due - time.monotonic())
+        pause = max(0.0, self._due - self._clock.now())
         return min(pause, _GLANCE_PERIOD) if closely or self._source.busy else pause
 
     def _look(self, now: float) -> None:
         self._source.poll(now)
-        self.snapshot = self._model.look(now, time.time())
+        self.snapshot = self._model.look(now, 1e-9 * self._clock.stamp())
         for view in list(self._views):
             try:
                 view.update(self.snapshot)
@@ -130,20 +132,20 @@ class Feed:
 
     async def _stop(self, drive: DriveSnapshot, stop: Stop) -> Outcome:
         return await self._told(lambda done: self._operations.stop(
-            drive.name, stop, done, time.monotonic()))
+            drive.name, stop, done, self._clock.now()))
 
     async def write(self, drive: str, name: str, value: Value) -> Outcome:
         """Write a parameter; return what became of it."""
         return await self._told(lambda done: self._operations.write(
-            drive, name, value, done, time.monotonic()))
+            drive, name, value, done, self._clock.now()))
 
     async def read(self, drive: str, names: Sequence[str]) -> None:
         """Read parameters of a drive into the model."""
         found: Sequence[Value | None] = await self._told(lambda done: self._operations.read(
-            drive, names, done, time.monotonic()))
-        now = time.monotonic()
+            drive, names, done, self._clock.now()))
+        now = self._clock.now()
         self._model.read(drive, zip(names, found), now)
-        self.snapshot = self._model.look(now, time.time())
+        self.snapshot = self._model.look(now, 1e-9 * self._clock.stamp())
 
     async def _told(self, ask: Callable[[Callable[[Result], None]], None]) -> Result:
         future: asyncio.Future[Result] = asyncio.get_running_loop().create_future()

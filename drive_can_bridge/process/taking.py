@@ -1,6 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Last words: waited for until they are written, unless nobody takes them."""
 
+from collections.abc import Callable
 import time
 
 #: s after which nobody takes what is being written
@@ -15,13 +16,16 @@ class Taking:
 
     That a thread has not begun to write says nothing: on a busy machine it has to wait for its
     turn. A write that does not end does.
+
+    :param now: the steady time.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
+        self._now = now
         self._since: float | None = None
 
     def __enter__(self) -> None:
-        self._since = time.monotonic()
+        self._since = self._now()
 
     def __exit__(self, *_: object) -> None:
         self._since = None
@@ -30,4 +34,4 @@ class Taking:
     def nobody(self) -> bool:
         """What is being written has not been taken for so long that it never will be."""
         since = self._since
-        return since is not None and time.monotonic() - since > PATIENCE
+        return since is not None and self._now() - since > PATIENCE

@@ -10,13 +10,13 @@ for it afterwards is left to a thread of their own, until one of them arrives.
 
 from collections.abc import Callable, Iterable
 from functools import partial
-import queue
 import threading
 from typing import Any
 import warnings
 
 from rclpy.service import Service
 
+from drive_can_bridge.clock import Clock, Mailbox, Worker
 from drive_can_bridge.ros.gone import GONE
 from drive_can_bridge.ros.rcl_response import RclResponses, Response, Unfit, Unreachable
 
@@ -34,7 +34,9 @@ class Answers:
     :param info: takes one line for the log.
     """
 
-    def __init__(self, warn: Callable[[str, str], None], info: Callable[[str], None]) -> None:
+    def __init__(self, warn: Callable[[str, str], None], info: Callable[[str], None],
+                 clock: Clock) -> None:
+        self._clock = clock
         self._warn = warn
         self._info = info
         self._rcl: RclResponses | None = None
@@ -42,8 +44,8 @@ class Answers:
         self._lock = threading.Lock()
         #: clients out of reach: how many answers for them wait
         self._waiting: dict[bytes, int] = {}
-        self._late: queue.SimpleQueue[Callable[[], None] | None] = queue.SimpleQueue()
-        self._thread: threading.Thread | None = None
+        self._late: Mailbox[Callable[[], None] | None] = Mailbox(clock)
+        self._thread: Worker | None = None
         self._ending = False
 
     def adopt(self, services: Iterable[Service]) -> None:
@@ -82,7 +84,7 @@ class Answers:
             self._ending = True
         self._late.put(None)
         if self._thread is not None:
-            self._thread.join(timeout=5.0)
+            self._thread.join(5.0)
 
     def _leave_to_rclpy(self, reason: Unfit) -> None:
         with self._lock:
@@ -102,8 +104,7 @@ class Answers:
             if room:
                 self._waiting[caller] = waiting + 1
                 if self._thread is None:
-                    self._thread = threading.Thread(target=self._run,
-                                                    name='late answers', daemon=True)
+                    self._thread = self._clock.worker(self._run, 'late answers')
                     self._thread.start()
         if room:
             self._late.put(partial(self._deliver_late, rcl, response))

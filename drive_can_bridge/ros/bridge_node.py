@@ -16,7 +16,6 @@ shutdown   deactivate and cleanup as far as needed
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-import threading
 from typing import Any
 
 from rclpy.context import Context
@@ -25,10 +24,11 @@ from rclpy.service import Service
 from rclpy.subscription import Subscription
 from rclpy.time_source import CLOCK_TOPIC
 
+from drive_can_bridge.clock import Clock
 from drive_can_bridge.configuration.load import configuration_from_overrides
 from drive_can_bridge.configuration.parameter_file import unseen_problems
 from drive_can_bridge.configuration.problems import report
-from drive_can_bridge.core.configuration import BridgeConfiguration
+from drive_can_bridge.core.configuration import BridgeConfiguration, BusConfiguration
 from drive_can_bridge.core.errors import ConfigurationError
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.process.scheduling import raise_priority
@@ -43,6 +43,7 @@ from drive_can_bridge.ros.service_thread import ServiceThread
 from drive_can_bridge.ros.stamps import Stamps
 from drive_can_bridge.ros.transition_guard import guard_transitions
 from drive_can_bridge.transport import adapters
+from drive_can_bridge.transport.end_point import EndPoint
 
 NODE_NAME = 'drive_can_bridge'
 
@@ -56,29 +57,34 @@ class BridgeNode(LifecycleNode):
 
     :param spinner: serves this node and all drive nodes.
     :param fatal: takes the reason when the bridge cannot go on; from any thread.
+    :param open_bus: opens a bus; None: python-can, by its configuration.
     :param files: the parameter files that were given to this process.
     """
 
-    def __init__(self, spinner: ExecutorThread, fatal: Callable[[str], None], *,
-                 context: Context | None = None, files: Sequence[str] = (),
+    def __init__(self, spinner: ExecutorThread, fatal: Callable[[str], None], clock: Clock, *,
+                 context: Context | None = None,
+                 open_bus: Callable[[BusConfiguration], EndPoint] | None = None,
+                 files: Sequence[str] = (),
                  **options: Any) -> None:
         self._answers = Answers(lambda topic, text: self.log.speaker('').warn(topic, text),
-                                lambda text: self.log.info(text))
-        self._stamps = Stamps(self.get_clock, lambda text: self.log.warning(text))
+                                lambda text: self.log.info(text), clock)
+        self._stamps = Stamps(self.get_clock, lambda text: self.log.warning(text), clock)
         super().__init__(NODE_NAME, context=context, enable_logger_service=True,
                          start_parameter_services=False, **options)  # NodeParameters has them
         self._answers.adopt(self.services)  # not all of them are made by create_service
-        self.log = Log(self.get_logger())
+        self.log = Log(self.get_logger(), clock)
+        self._steady = clock      # the node has a clock of its own: ROS time
+        self._open_bus = open_bus
         self._spinner = spinner
         self._fatal = fatal
         # now: later on, somebody may have edited or removed them
         self._unseen = unseen_problems(map(Path, files), self.get_fully_qualified_name())
-        self._transition_lock = threading.RLock()
-        self._control_thread = ServiceThread('control', self.context, self.log.error,
+        self._transition_lock = clock.lock()
+        self._control_thread = ServiceThread('control', self.context, self.log.error, clock,
                                              raise_priority, share=1.0,
                                              send=self._answers.send)
         self._parameter_thread = ServiceThread('parameters', self.context, self.log.error,
-                                               send=self._answers.send)
+                                               clock, send=self._answers.send)
         self._ending = False
         self._leaving: list[DriveNode] = []
         self._fleet: Fleet | None = None
@@ -202,8 +208,8 @@ class BridgeNode(LifecycleNode):
         self._node_parameters.declare(configuration)
         self._fleet = Fleet(
             self, self.log, configuration, self._spinner, self._control_thread,
-            self._parameter_thread, self._stamps, announce=self._node_parameters.announce,
-            dismiss=self._dismiss, fatal=self._fatal)
+            self._parameter_thread, self._stamps, self._steady, open_bus=self._open_bus,
+            announce=self._node_parameters.announce, dismiss=self._dismiss, fatal=self._fatal)
         try:
             self._fleet.open()
         except BaseException:

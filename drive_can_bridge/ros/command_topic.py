@@ -18,7 +18,6 @@ from contextlib import suppress
 from functools import partial
 import math
 import struct
-import time
 from typing import Any
 
 from rclpy.qos import HistoryPolicy
@@ -48,12 +47,13 @@ class CommandTopic:
     :param old: takes each that is thrown away for its age, for what it may stop.
     :param late: takes by how many s a command that is thrown away came too late.
     :param unreadable: takes why a message cannot be read.
+    :param stamp: this machine's time of the day, in ns.
     :param read: makes of the bytes what ``use`` takes; None: the number, or a message of the type.
     """
 
     def __init__(self, subscription: Subscription, *, use: Callable[[Any, float], None],
                  old: Callable[[Any], None], late: Callable[[float], None],
-                 unreadable: Callable[[str], None],
+                 unreadable: Callable[[str], None], stamp: Callable[[], int],
                  read: Callable[[bytes], Any] | None = None) -> None:
         self.subscription = subscription
         self.handle: Any = subscription.handle
@@ -63,6 +63,7 @@ class CommandTopic:
         self._depth = (quality.depth if quality.history is HistoryPolicy.KEEP_LAST
                        else DEPTH_UNBOUNDED) or 1
         self._use, self._old = use, old
+        self._stamp = stamp
         self._late = late
         self._unreadable = unreadable
         code = _CODES.get(self._type)
@@ -116,7 +117,7 @@ class CommandTopic:
         source = info['source_timestamp']
         if not source:  # this middleware does not tell
             return 0.0
-        age = (info['received_timestamp'] or time.time_ns()) - source
+        age = (info['received_timestamp'] or self._stamp()) - source
         if age < self._quickest:
             self._quickest = age
         return float(age - self._quickest)

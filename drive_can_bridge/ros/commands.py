@@ -16,6 +16,7 @@ from typing import NamedTuple
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
+from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import Value, ValueKind
@@ -47,13 +48,13 @@ class CommandIntake:
     """
 
     def __init__(self, node: Node, drive: DriveConfiguration, session: Session,
-                 warn: Warn, inform: Callable[[str], None]) -> None:
+                 clock: Clock, warn: Warn, inform: Callable[[str], None]) -> None:
         self._session = session
         self._warn = warn
         self._inform = inform
         self._told: set[str] = set()
         self._joint = joint = drive.joint
-        self._topics = PolledTopics(node, warn, self.refuse)
+        self._topics = PolledTopics(node, clock, warn, self.refuse)
         self._joint_targets: dict[str, _Target] = {}    # by quantity of the joint
         try:
             for index, setpoint in enumerate(session.setpoints.items):

@@ -10,6 +10,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
+from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.frame import STUFFING
 from drive_can_bridge.core.statistics import Statistic
@@ -21,7 +22,6 @@ from drive_can_bridge.ros.quality import publisher
 from drive_can_bridge.ros.stamps import Stamps
 from drive_can_bridge.transport.end_point import Counts, REFUSED_FRAMES
 from drive_can_bridge.transport.error_frames import ADVICE_DISTURBED, BUS_OFF, BusError
-from drive_can_bridge.transport.link import steady_now
 
 #: bus load above which a bus is never OK
 LOAD_WARNING = 70.0
@@ -274,7 +274,8 @@ class Diagnostics:
     """
 
     def __init__(self, node: Node, exchanges: list[BusExchange], drives: list[DriveNode],
-                 stamps: Stamps, reported: Callable[[Report, str], None]) -> None:
+                 stamps: Stamps, reported: Callable[[Report, str], None], clock: Clock) -> None:
+        self._now = clock.now
         self._node = node
         self._stamps = stamps
         self._reported = reported
@@ -295,7 +296,7 @@ class Diagnostics:
         message = self._message
         with self._lock:
             message.header.stamp = self._stamps.now()
-            message.status = [self._status(report) for report in self.reports(steady_now())]
+            message.status = [self._status(report) for report in self.reports(self._now())]
             self._publisher.publish(message)
 
     def _status(self, report: Report) -> DiagnosticStatus:

@@ -14,6 +14,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter as NodeParameter
 from std_msgs.msg import Bool
 
+from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlCompleted, ControlRequest
 from drive_can_bridge.core.directory import ParameterDirectory
@@ -69,7 +70,7 @@ class DriveNode(DriveListener):
     def __init__(self, bridge: Node, drive: DriveConfiguration, session: Session, family: Family,
                  exchange: BusExchange, spinner: ExecutorThread, log: Log,
                  control_thread: ServiceThread, parameter_thread: ServiceThread,
-                 stamps: Stamps, identified: Callable[[str], None]) -> None:
+                 stamps: Stamps, identified: Callable[[str], None], clock: Clock) -> None:
         self.drive = drive
         self.session = session
         self.exchange = exchange
@@ -98,7 +99,8 @@ class DriveNode(DriveListener):
                                  NodeParameter('use_sim_time', value=False),
                                  *quality_overrides(bridge)])
         try:
-            self.commands = CommandIntake(self.node, drive, session, self.warn, self._log.info)
+            self.commands = CommandIntake(self.node, drive, session, clock, self.warn,
+                                          self._log.info)
             try:
                 self._populate(stamps, family, control_thread, parameter_thread)
             except BaseException:

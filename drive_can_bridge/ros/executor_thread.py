@@ -16,6 +16,8 @@ from rclpy.executors import (
     ExternalShutdownException, ShutdownException, SingleThreadedExecutor,
 )
 
+from drive_can_bridge.clock import Clock
+
 #: s between two failures: one that comes at once again must not take the machine
 ERROR_PAUSE = 0.05
 
@@ -27,12 +29,14 @@ class ExecutorThread:
     :param report: takes one line about an exception that a callback let escape.
     """
 
-    def __init__(self, name: str, report: Callable[[str], None], context: Context) -> None:
+    def __init__(self, name: str, report: Callable[[str], None], context: Context,
+                 clock: Clock) -> None:
+        self._clock = clock
         self.executor = SingleThreadedExecutor(context=context)
         self._report = report
-        self._stopping = threading.Event()
+        self._stopping = False
         self._ending = threading.Lock()
-        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+        self._thread = clock.worker(self._run, name)
 
     def start(self) -> None:
         """Start to serve."""
@@ -41,29 +45,31 @@ class ExecutorThread:
     def later(self, job: Callable[..., object], *arguments: Any) -> None:
         """Have something done in this thread soon. From any thread; once it stops, nothing is."""
         with self._ending:
-            if not self._stopping.is_set():
+            if not self._stopping:
                 self.executor.create_task(job, *arguments)
 
     def stop(self) -> None:
         """Stop to serve and wait for the callback that is running."""
         # an executor that is merely woken goes back to waiting for something to do
-        self.later(self._stopping.set)
+        self.later(self._end)
         with self._ending:
-            self._stopping.set()
-        if self._thread.is_alive():
-            self._thread.join(timeout=5.0)
+            self._stopping = True
+        self._thread.join(5.0)
         self.executor.shutdown(timeout_sec=1.0)
 
+    def _end(self) -> None:
+        self._stopping = True
+
     def _run(self) -> None:
-        while not self._stopping.is_set() and self.executor.context.ok():
+        while not self._stopping and self.executor.context.ok():
             try:
                 self.executor.spin_once()
             except (ExternalShutdownException, ShutdownException):
                 return
             except InvalidHandle:  # what was to be served is gone: a drive's node, after cleanup
-                self._stopping.wait(ERROR_PAUSE)
+                self._clock.wait(self._clock.now() + ERROR_PAUSE)
             except Exception as error:  # noqa: BLE001  outermost loop: no failure is silent
-                if self._stopping.is_set():
+                if self._stopping:
                     return
                 self._report(f'internal error in a callback: {type(error).__name__}: {error}')
-                self._stopping.wait(ERROR_PAUSE)
+                self._clock.wait(self._clock.now() + ERROR_PAUSE)

@@ -8,6 +8,7 @@ from typing import Any
 
 from rclpy.node import Node
 
+from drive_can_bridge.clock import Clock
 from drive_can_bridge.configuration.declare import identity_name
 from drive_can_bridge.core.configuration import (
     BridgeConfiguration, BusConfiguration, DriveConfiguration,
@@ -28,7 +29,7 @@ from drive_can_bridge.ros.log import Log
 from drive_can_bridge.ros.periodic_thread import PeriodicThread
 from drive_can_bridge.ros.service_thread import ServiceThread
 from drive_can_bridge.ros.stamps import Stamps
-from drive_can_bridge.transport.link import steady_now
+from drive_can_bridge.transport.end_point import EndPoint
 
 #: s that is waited for the first attempt to open the buses, to report what can never work
 FIRST_ATTEMPT_TIMEOUT = 3.0
@@ -42,6 +43,7 @@ class Fleet:
     :param control_thread: serves what stops drives.
     :param parameter_thread: serves their parameters.
     :param stamps: of all messages.
+    :param open_bus: opens a bus; None: python-can, by its configuration.
     :param announce: changes a read-only parameter of the bridge.
     :param dismiss: takes drives out of the graph; their exchanges are closed.
     :param fatal: takes the reason when the bridge cannot go on; from any thread.
@@ -51,7 +53,8 @@ class Fleet:
 
     def __init__(self, node: Node, log: Log, configuration: BridgeConfiguration,
                  spinner: ExecutorThread, control_thread: ServiceThread,
-                 parameter_thread: ServiceThread, stamps: Stamps, *,
+                 parameter_thread: ServiceThread, stamps: Stamps, clock: Clock, *,
+                 open_bus: Callable[[BusConfiguration], EndPoint] | None,
                  announce: Callable[[str, str], None],
                  dismiss: Callable[[Iterable[DriveNode]], None],
                  fatal: Callable[[str], None]) -> None:
@@ -60,6 +63,8 @@ class Fleet:
         self.drives: dict[str, DriveNode] = {}
         self.joints: Joints | None = None
         self._log = log
+        self._clock = clock
+        self._open_bus = open_bus
         self._fatal = fatal
         self._priority = ''
         #: what is wrong with buses, as long as they are opened for the first time
@@ -68,25 +73,26 @@ class Fleet:
             closing.callback(self.exchanges.clear)
             closing.callback(self._own().release)
             closing.callback(dismiss, self.drives.values())
-            self._flight = FlightWatch(node, log, list(configuration.buses.values()), spinner)
+            self._flight = FlightWatch(node, log, list(configuration.buses.values()), spinner,
+                                       clock)
             closing.callback(self._flight.close)
             for bus in configuration.buses.values():
                 self._build(bus, lambda drive, session, exchange: DriveNode(
                     node, drive, session, FAMILIES[drive.protocol], exchange, spinner, log,
                     control_thread, parameter_thread, stamps,
-                    partial(announce, identity_name(drive.name))))
+                    partial(announce, identity_name(drive.name)), clock))
             if any(drive.joint is not None for drive in configuration.drives.values()):
-                self.joints = Joints(node, log, configuration, self.drives, stamps)
+                self.joints = Joints(node, log, configuration, self.drives, stamps, clock)
                 closing.callback(self.joints.destroy)
             for exchange in self.exchanges.values():
                 closing.callback(exchange.close)
             self.diagnostics = Diagnostics(node, list(self.exchanges.values()),
                                            list(self.drives.values()), stamps,
-                                           self._flight.reported)
+                                           self._flight.reported, clock)
             closing.callback(self.diagnostics.destroy)
             self._reporting = PeriodicThread(
                 'diagnostics', configuration.diagnostics_period, self.diagnostics.publish,
-                lambda text: log.error(f'diagnostics: {text}'))
+                lambda text: log.error(f'diagnostics: {text}'), clock)
             closing.callback(self._reporting.stop)
             self._closing = closing.pop_all()
 
@@ -108,6 +114,7 @@ class Fleet:
         exchange = self.exchanges[bus.name] = BusExchange(
             bus, sessions,
             [[claim.route for claim in entries if claim.heard] for entries in claims], self,
+            self._clock, open_bus=self._open_bus,
             counted=[claim.route for entries in claims for claim in entries if not claim.heard],
             overheard=[FAMILIES[drive.protocol].overheard(drive) for drive in drives],
             prepare_thread=self._prepare_thread, note=self._flight.note_of(bus.name))
@@ -125,9 +132,9 @@ class Fleet:
         """
         for exchange in self.exchanges.values():
             exchange.open()
-        deadline = steady_now() + FIRST_ATTEMPT_TIMEOUT
+        deadline = self._clock.now() + FIRST_ATTEMPT_TIMEOUT
         for exchange in self.exchanges.values():
-            exchange.link.wait_first_attempt(max(0.0, deadline - steady_now()))
+            exchange.link.wait_first_attempt(max(0.0, deadline - self._clock.now()))
         if self._misconfigured:
             raise ConfigurationError(self._misconfigured)
         self._misconfigured = None
@@ -146,7 +153,7 @@ class Fleet:
 
     def stop(self) -> None:
         """Stop the drives safely, if they run."""
-        for bus, reason in stop_all(self.exchanges.values()).items():
+        for bus, reason in stop_all(self.exchanges.values(), self._clock).items():
             self._log.error(f'bus {bus}: the stop frames could not all be sent: {reason}')
 
     def close(self) -> None:

@@ -13,6 +13,7 @@ from rclpy.node import Node
 from rclpy.task import Future
 from std_srvs.srv import Trigger as TriggerService
 
+from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import Event, MappingDiffered, StationLost
@@ -22,7 +23,6 @@ from drive_can_bridge.ros.drive_node import DriveNode
 from drive_can_bridge.ros.executor_thread import ExecutorThread
 from drive_can_bridge.ros.log import Log
 from drive_can_bridge.trace.flight import FlightRecorder
-from drive_can_bridge.transport.link import steady_now
 
 NOT_RECORDING = 'nothing is recorded: set trace_seconds of a bus'
 #: of several reasons at once the most telling one names the trace
@@ -89,13 +89,14 @@ class FlightWatch:
     """
 
     def __init__(self, node: Node, log: Log, buses: Sequence[BusConfiguration],
-                 thread: ExecutorThread) -> None:
+                 thread: ExecutorThread, clock: Clock) -> None:
+        self._now = clock.now
         self._node = node
         self._log = log
         self._thread = thread
         wanted = any(bus.trace_seconds > 0.0 for bus in buses)  # else there may be no such place
         folder = Path(str(get_logging_directory())) / 'drive_can_bridge' if wanted else Path()
-        self._recorder = FlightRecorder(buses, folder, log.warning, log.error)
+        self._recorder = FlightRecorder(buses, folder, log.warning, log.error, clock)
         occasions = self._occasions = Occasions(self._recorder.trigger)
         #: what else is worth a trace: a bus that is gone, and a diagnostic status
         self.bus_lost, self.reported = occasions.bus_lost, occasions.reported
@@ -112,7 +113,7 @@ class FlightWatch:
         ring = self._recorder.ring(exchange.bus.name)
         if ring is not None:
             exchange.link.error_witness = lambda classes, data: ring.note_error(
-                classes, data, steady_now())
+                classes, data, self._now())
 
     def watch(self, drives: Sequence[DriveNode]) -> None:
         """Begin to look at the drives."""

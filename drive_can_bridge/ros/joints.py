@@ -13,6 +13,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
+from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.exchange.errand import Errand
@@ -23,7 +24,6 @@ from drive_can_bridge.ros.joint_states import JointStates
 from drive_can_bridge.ros.log import Log
 from drive_can_bridge.ros.polled_topics import PolledTopics, Warn
 from drive_can_bridge.ros.stamps import Stamps
-from drive_can_bridge.transport.clock import steady_now
 
 COMMANDS = '~/joint_commands'
 #: so many joints of others are told of
@@ -39,7 +39,8 @@ class Joints:
     """
 
     def __init__(self, node: Node, log: Log, configuration: BridgeConfiguration,
-                 drives: Mapping[str, DriveNode], stamps: Stamps) -> None:
+                 drives: Mapping[str, DriveNode], stamps: Stamps, clock: Clock) -> None:
+        self._now = clock.now
         speaker = log.speaker('')
         speaker.reset()
         warn = speaker.warn
@@ -58,7 +59,7 @@ class Joints:
                 taker = _Taker(joints, known, _nothing, _nothing)
             else:
                 taker = _Taker(joints, known, warn, log.info)
-            taken = PolledTopics(node, warn, taker.refuse)
+            taken = PolledTopics(node, clock, warn, taker.refuse)
             self._taken.append(taken)
             taken.subscribe(JointState, COMMANDS, taker, taker.take_old, JointReader())
             for drive in here:
@@ -73,7 +74,7 @@ class Joints:
     def start(self) -> None:
         """Begin to publish."""
         if self._errand is not None:
-            self._errand.begin(self._period, steady_now())
+            self._errand.begin(self._period, self._now())
 
     def destroy(self) -> None:
         """Take the topics out of the node. Nobody may take commands any more."""
@@ -82,7 +83,7 @@ class Joints:
         while self._taken:
             self._taken.pop().unsubscribe()
         if self._states is not None:
-            self._states.publish(steady_now())  # the last joints have gone
+            self._states.publish(self._now())  # the last joints have gone
             self._states.destroy()
             self._states = None
 

@@ -8,12 +8,10 @@ line puts it into a bounded queue and goes on; what does not fit is counted and 
 much drives and buses may say is limited before (:mod:`.log_limit`).
 """
 
-from collections.abc import Callable
-import queue
-import threading
-import time
+import math
 from typing import Any
 
+from drive_can_bridge.clock import Clock, Mailbox
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.process.taking import MOMENT, Taking
 from drive_can_bridge.ros.log_limit import Level, LogLimit, Speaker
@@ -30,18 +28,17 @@ class Log:
     Passes lines on to a logger of rclpy. From any thread; never waits.
 
     Whatever a line contains is printable when it arrives there.
-
-    :param clock: steady, in s.
     """
 
-    def __init__(self, logger: Any, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, logger: Any, clock: Clock) -> None:
         self._logger = logger
-        self._lines: queue.Queue[tuple[Level, str]] = queue.Queue(LINES_MAX)
-        self._limit = LogLimit(self._put, self._wake, clock)
+        self._now = clock.now
+        self._lines: Mailbox[tuple[Level, str]] = Mailbox(clock, LINES_MAX)
+        self._limit = LogLimit(self._put, self._wake, clock.now)
         self._dropped = 0
         self._closed = False
-        self._taking = Taking()
-        self._thread = threading.Thread(target=self._run, name='log', daemon=True)
+        self._taking = Taking(clock.now)
+        self._thread = clock.worker(self._run, 'log')
         self._thread.start()
 
     def speaker(self, name: str) -> Speaker:
@@ -70,44 +67,32 @@ class Log:
             return
         self._limit.sum_up(all_of_it=True)
         self._closed = True
-        ended = False
+        self._lines.put(_END, always=True)
         while self._thread.is_alive() and not self._taking.nobody:
-            if not ended:
-                try:
-                    self._lines.put(_END, timeout=MOMENT)
-                    ended = True
-                except queue.Full:
-                    continue
-            if self._thread is threading.current_thread():
-                return
             self._thread.join(MOMENT)
 
     def _put(self, level: Level, text: str) -> None:
         if self._closed:
             self._write(level, text)
             return
-        try:
-            self._lines.put_nowait((level, text))
-        except queue.Full:
+        if not self._lines.put((level, text)):
             self._dropped += 1
 
     def _wake(self) -> None:
-        try:
-            self._lines.put_nowait(_LOOK)
-        except queue.Full:
-            pass    # then the thread is awake
+        self._lines.put(_LOOK)      # full: then the thread is awake
 
     def _run(self) -> None:
         while True:
+            wait = self._limit.wait()
             try:
-                line = self._lines.get(timeout=self._limit.wait())
-            except queue.Empty:
+                line = self._lines.get(math.inf if wait is None else self._now() + wait)
+            except TimeoutError:
                 line = _LOOK
             if line is not _LOOK and line is not _END:
                 with self._taking:
                     self._write(*line)
             self._limit.sum_up()
-            if self._dropped and (self._lines.empty() or line is _END):
+            if self._dropped and (not self._lines or line is _END):
                 dropped, self._dropped = self._dropped, 0
                 self._write(Level.WARNING, f'{dropped} lines of the log left out: they came '
                                            f'faster than they could be written')

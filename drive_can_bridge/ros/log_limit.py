@@ -24,7 +24,6 @@ from dataclasses import dataclass
 from enum import Enum
 import math
 import threading
-import time
 
 #: times that a line is written at once before it is summed up
 FEW = 5
@@ -253,7 +252,7 @@ class LogLimit:
     """
 
     def __init__(self, emit: Callable[[Level, str], None], wake: Callable[[], None],
-                 clock: Callable[[], float] = time.monotonic) -> None:
+                 clock: Callable[[], float]) -> None:
         self.emit, self.wake, self.clock = emit, wake, clock
         self.lock = threading.RLock()
         #: nobody will sum up anything any more: everything is written

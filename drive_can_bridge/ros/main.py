@@ -106,14 +106,16 @@ def _main(watcher: SignalWatcher, arguments: list[str]) -> int:
 def _run(watcher: SignalWatcher, arguments: Sequence[str]) -> int:
     import rclpy
 
+    from drive_can_bridge.clock import SteadyClock
     from drive_can_bridge.ros.bridge_node import BridgeNode
     from drive_can_bridge.ros.executor_thread import ExecutorThread
     from drive_can_bridge.transport.failures import in_words
 
+    clock = SteadyClock()
     spinner = ExecutorThread('services', lambda text: bridge.log.error(text),
-                             rclpy.get_default_context())
+                             rclpy.get_default_context(), clock)
     try:
-        bridge = BridgeNode(spinner, watcher.fatal, files=_parameter_files(arguments))
+        bridge = BridgeNode(spinner, watcher.fatal, clock, files=_parameter_files(arguments))
     except Exception as error:  # noqa: BLE001  names and namespaces that rcl refuses
         print(f'drive_can_bridge: {in_words(error)}', file=sys.stderr)
         return 1

@@ -6,7 +6,7 @@ One thread at a time has the interpreter. One that never waits, because callers 
 are answered, makes the exchange late and stops wait, however high their priority is.
 """
 
-import time
+from drive_can_bridge.clock import Clock
 
 
 class Pace:
@@ -17,18 +17,19 @@ class Pace:
     :param in_hand: s that may be used at once, after a while of little work.
     """
 
-    def __init__(self, share: float, in_hand: float = 0.002) -> None:
+    def __init__(self, share: float, clock: Clock, in_hand: float = 0.002) -> None:
+        self._clock = clock
         self._share = share
         self._in_hand = in_hand
         self._left = in_hand
-        self._seen = time.monotonic()
-        self._used = time.thread_time()
+        self._seen = clock.now()
+        self._used = clock.used()
 
     def keep(self) -> None:
         """Pause, if it is time to. After each piece of work."""
-        now, used = time.monotonic(), time.thread_time()
+        now, used = self._clock.now(), self._clock.used()
         self._left = min(self._in_hand, self._left + self._share * (now - self._seen)) - (
             used - self._used)
         self._seen, self._used = now, used
         if self._left < 0.0:
-            time.sleep(-self._left / self._share)
+            self._clock.wait(now - self._left / self._share)

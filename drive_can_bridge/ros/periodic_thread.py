@@ -2,10 +2,8 @@
 """Something done again and again, without waking an executor."""
 
 from collections.abc import Callable
-import threading
 
-from drive_can_bridge.exchange.alarm import Alarm
-from drive_can_bridge.transport.clock import steady_now
+from drive_can_bridge.clock import Clock
 
 
 class PeriodicThread:
@@ -20,13 +18,14 @@ class PeriodicThread:
     """
 
     def __init__(self, name: str, period: float, action: Callable[[], None],
-                 failed: Callable[[str], None]) -> None:
+                 failed: Callable[[str], None], clock: Clock) -> None:
         self._period = period
+        self._now = clock.now
         self._action = action
         self._failed = failed
-        self._changed = Alarm()     # an Event costs more than many an action
+        self._changed = clock.alarm()   # an Event costs more than many an action
         self._ending = False
-        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+        self._thread = clock.worker(self._run, name)
 
     def start(self) -> None:
         """Begin."""
@@ -41,17 +40,16 @@ class PeriodicThread:
         """End, and wait for a call that is under way."""
         self._ending = True
         self._changed.ring()
-        if self._thread.is_alive() and self._thread is not threading.current_thread():
-            self._thread.join(timeout=5.0)
+        self._thread.join(5.0)
 
     def _run(self) -> None:
-        due = steady_now() + self._period
+        due = self._now() + self._period
         while not self._ending:
-            if self._changed.sleep(due - steady_now()):
-                due = steady_now() + self._period
+            if self._changed.wait(due):
+                due = self._now() + self._period
                 continue
             try:
                 self._action()
             except Exception as error:  # noqa: BLE001  outermost loop of a thread
                 self._failed(f'{type(error).__name__}: {error}')
-            due = max(due + self._period, steady_now())  # never twice to catch up
+            due = max(due + self._period, self._now())  # never twice to catch up

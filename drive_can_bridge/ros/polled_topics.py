@@ -22,6 +22,7 @@ from rclpy.node import Node
 from rclpy.qos import qos_policy_name_from_kind
 from rclpy.subscription import Subscription
 
+from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.ros.command_topic import CommandTopic
 from drive_can_bridge.ros.gone import GONE
@@ -74,7 +75,9 @@ class PolledTopics:
     :param refuse: the same of a command that is thrown away.
     """
 
-    def __init__(self, node: Node, warn: Warn, refuse: Callable[[str, str], None]) -> None:
+    def __init__(self, node: Node, clock: Clock, warn: Warn,
+                 refuse: Callable[[str, str], None]) -> None:
+        self._clock = clock
         self._node = node
         self._warn = warn
         self._refuse = refuse
@@ -118,7 +121,8 @@ class PolledTopics:
             self._refuse(f'unreadable {name}',
                          f'command on {name} cannot be read: {printable(reason)}')
         self._topics.append(CommandTopic(subscription, use=take, old=old, late=late,
-                                         unreadable=unreadable, read=read))
+                                         unreadable=unreadable, stamp=self._clock.stamp,
+                                         read=read))
 
     def take(self, now: float) -> None:
         """Hand over all that waits, oldest first."""

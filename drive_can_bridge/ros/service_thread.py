@@ -13,8 +13,6 @@ halfway, sending takes the middleware a tenth of a second (:mod:`.answers`).
 from collections.abc import Callable
 from contextlib import ExitStack
 from functools import partial
-import queue
-import threading
 from typing import Any
 
 from rclpy.context import Context
@@ -22,6 +20,7 @@ from rclpy.exceptions import InvalidHandle
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.service import Service
 
+from drive_can_bridge.clock import Clock, Mailbox, Worker
 from drive_can_bridge.ros.gone import GONE
 from drive_can_bridge.ros.pace import Pace
 
@@ -53,10 +52,11 @@ class ServiceThread:
     :param send: sends an answer.
     """
 
-    def __init__(self, name: str, context: Context, report: Callable[[str], None],
+    def __init__(self, name: str, context: Context, report: Callable[[str], None], clock: Clock,
                  prepare_thread: Callable[[], object] = lambda: None, *,
                  share: float = MODEST, send: Send = Service.send_response) -> None:
         self._name = name
+        self._clock = clock
         self._send_response = send
         self._share = share
         self._context = context
@@ -64,10 +64,10 @@ class ServiceThread:
         self._prepare_thread = prepare_thread
         self._served: dict[Service, tuple[Callback, Callable[[], None]]] = {}
         self._changed = False   # what is served
-        self._jobs: queue.SimpleQueue[Callable[[], None] | None] = queue.SimpleQueue()
+        self._jobs: Mailbox[Callable[[], None] | None] = Mailbox(clock)
         self._guard = rclpy_implementation.GuardCondition(context.handle)
-        self._ending = threading.Event()
-        self._threads: list[threading.Thread] = []
+        self._ending = False
+        self._threads: list[Worker] = []
 
     def serve(self, service: Service, callback: Callback,
               answered: Callable[[], None] = lambda: None) -> None:
@@ -79,9 +79,8 @@ class ServiceThread:
         self._served[service] = callback, answered
         if not self._threads:
             self._threads = [
-                threading.Thread(target=self._take_all, name=self._name, daemon=True),
-                threading.Thread(target=self._answer_all, name=f'{self._name}, answering',
-                                 daemon=True)]
+                self._clock.worker(self._take_all, self._name),
+                self._clock.worker(self._answer_all, f'{self._name}, answering')]
             for thread in self._threads:
                 thread.start()
         self._change()
@@ -98,11 +97,11 @@ class ServiceThread:
 
     def stop(self) -> None:
         """End, when the answers that there are have been sent."""
-        self._ending.set()
+        self._ending = True
         self._wake()
         self._jobs.put(None)
         for thread in self._threads:
-            thread.join(timeout=5.0)
+            thread.join(5.0)
         self._threads.clear()
         self._guard.destroy_when_not_in_use()
 
@@ -121,15 +120,15 @@ class ServiceThread:
 
     def _take_all(self) -> None:
         self._prepare_thread()
-        pace = Pace(self._share)
-        while not self._ending.is_set() and self._context.ok():
+        pace = Pace(self._share, self._clock)
+        while not self._ending and self._context.ok():
             try:
                 self._take_while_unchanged(pace)
             except Exception as error:  # noqa: BLE001  outermost loop: no failure is silent
-                if self._ending.is_set():
+                if self._ending:
                     return
                 self._report(f'internal error in a callback: {type(error).__name__}: {error}')
-                self._ending.wait(ERROR_PAUSE)
+                self._clock.wait(self._clock.now() + ERROR_PAUSE)
 
     def _take_while_unchanged(self, pace: Pace) -> None:
         """Take what comes until something else is to be served."""
@@ -147,7 +146,7 @@ class ServiceThread:
             held.enter_context(context_handle)
             waiting = rclpy_implementation.WaitSet(0, 1, 0, 0, len(present), 0, context_handle)
             handles = [service.handle for service in present.values()]
-            while not self._changed and not self._ending.is_set() and self._context.ok():
+            while not self._changed and not self._ending and self._context.ok():
                 waiting.clear_entities()
                 waiting.add_guard_condition(self._guard)
                 for handle in handles:
@@ -186,7 +185,7 @@ class ServiceThread:
             answered()
 
     def _answer_all(self) -> None:
-        pace = Pace(self._share)
+        pace = Pace(self._share, self._clock)
         while self._do_one_job():
             pace.keep()
 

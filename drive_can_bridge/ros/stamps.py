@@ -3,13 +3,12 @@
 
 from collections.abc import Callable
 import math
-import time
 from typing import Any
 
 from builtin_interfaces.msg import Time
-from rclpy.clock import Clock, ROSClock
+from rclpy.clock import Clock as RosClock, ROSClock
 
-from drive_can_bridge.transport.clock import steady_now
+from drive_can_bridge.clock import Clock
 
 #: s that two looks at clocks may be apart, and how often it is tried
 APART_MAX = 0.0001
@@ -31,11 +30,13 @@ class Stamps:
 
     A clock may say anything. A time that no message can hold makes stamps of 0, and is told once.
 
-    :param clock: returns that of the node.
+    :param ros: returns the clock of the node.
     :param warn: takes what is to be told.
     """
 
-    def __init__(self, clock: Callable[[], Clock], warn: Callable[[str], None]) -> None:
+    def __init__(self, ros: Callable[[], RosClock], warn: Callable[[str], None],
+                 clock: Clock) -> None:
+        self._ros = ros
         self._clock = clock
         self._warn = warn
         self._told = False
@@ -47,16 +48,16 @@ class Stamps:
         """Return the stamp of a moment of the steady clock. Simulated time only knows "now"."""
         if moment >= self._look_at:
             self._look_at = moment + LOOK_PERIOD
-            clock = self._clock()
+            clock = self._ros()
             self._simulated = isinstance(clock, ROSClock) and clock.ros_time_is_active
         if not self._simulated:
-            return self._stamp(_system_time(moment))
-        return self._stamp(self._clock().now().nanoseconds if self._published is None
+            return self._stamp(self._system_time(moment))
+        return self._stamp(self._ros().now().nanoseconds if self._published is None
                            else self._published)
 
     def now(self) -> Time:
         """Return the stamp of this moment as a message."""
-        seconds, nanoseconds = self.at(steady_now())
+        seconds, nanoseconds = self.at(self._clock.now())
         return Time(sec=seconds, nanosec=nanoseconds)
 
     def guarded(self, callback: Callable[[Any], None]) -> Callable[[Any], None]:
@@ -69,6 +70,15 @@ class Stamps:
             else:
                 self._published = nanoseconds
         return take
+
+    def _system_time(self, moment: float) -> int:
+        """Return what the system clock said at a moment of the steady clock, in ns."""
+        clock = self._clock
+        for _ in range(ATTEMPTS):
+            before, nanoseconds, now = clock.now(), clock.stamp(), clock.now()
+            if now - before < APART_MAX:    # else another thread had the interpreter in between
+                break
+        return nanoseconds - int((now - moment) * 1e9)
 
     def _stamp(self, nanoseconds: int) -> Stamp:
         if _representable(nanoseconds):
@@ -83,12 +93,3 @@ class Stamps:
 
 def _representable(nanoseconds: int) -> bool:
     return 0 <= nanoseconds < (SECONDS_MAX + 1) * NANOSECONDS
-
-
-def _system_time(moment: float) -> int:
-    """Return what the system clock said at a moment of the steady clock, in ns."""
-    for _ in range(ATTEMPTS):
-        before, nanoseconds, now = steady_now(), time.time_ns(), steady_now()
-        if now - before < APART_MAX:    # else another thread had the interpreter in between
-            break
-    return nanoseconds - int((now - moment) * 1e9)

@@ -8,15 +8,15 @@ asked, which would have a warning of its own.
 """
 
 from collections.abc import Callable
-from threading import RLock
 from typing import Any
 
 from rclpy.lifecycle import LifecycleNode
 
+from drive_can_bridge.clock import Lock
 from drive_can_bridge.core.text import printable
 
 
-def guard_transitions(node: LifecycleNode, warn: Callable[[str], None], lock: RLock,
+def guard_transitions(node: LifecycleNode, warn: Callable[[str], None], lock: Lock,
                       refusal: Callable[[], str]) -> None:
     """
     Guard the transition service of a node.

@@ -12,12 +12,13 @@ from functools import lru_cache
 import math
 import threading
 
+from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.simulation.drive import SimulatedDrive
 from drive_can_bridge.transport.end_point import EndPoint
-from drive_can_bridge.transport.link import Link, steady_now
+from drive_can_bridge.transport.link import Link
 
 #: s that an answer may wait for room in the adapter's queue
 _SEND_TIMEOUT = 0.05
@@ -43,8 +44,8 @@ class BusPlayer:
     :ivar frames_rejected: what arrived and was no frame.
     """
 
-    def __init__(self, bus: BusConfiguration, drives: Sequence[SimulatedDrive], *,
-                 open_bus: OpenBus, say: Say, complain: Say,
+    def __init__(self, bus: BusConfiguration, drives: Sequence[SimulatedDrive],
+                 clock: Clock, *, open_bus: OpenBus, say: Say, complain: Say,
                  show_frame: ShowFrame | None = None) -> None:
         self.bus = bus
         self.failure = ''
@@ -55,7 +56,8 @@ class BusPlayer:
         self._complain = complain
         self._show_frame = show_frame or (lambda *_: None)
         self._lock = threading.Lock()
-        self._alarm = threading.Event()
+        self._now = clock.now
+        self._alarm = clock.alarm()
         self._wake_at = 0.0
         self._closing = False
         self._opened = False            # ever
@@ -64,9 +66,8 @@ class BusPlayer:
         self._answer_lost = False       # ever
         self._addressees = lru_cache(_ROUTES_MAX)(self._find_addressees)
         # no filters: whoever looks on sees all frames
-        self._link = Link(bus, (), self, send_timeout=_SEND_TIMEOUT, opener=self._open)
-        self._thread = threading.Thread(
-            target=self._run, name=f'simulation {bus.name}', daemon=True)
+        self._link = Link(bus, (), self, clock, send_timeout=_SEND_TIMEOUT, opener=self._open)
+        self._thread = clock.worker(self._run, f'simulation {bus.name}')
 
     def start(self) -> None:
         """
@@ -85,23 +86,22 @@ class BusPlayer:
 
     def stop(self) -> None:
         self._closing = True
-        self._alarm.set()
-        if self._thread.is_alive():
-            self._thread.join()
+        self._alarm.ring()
+        self._thread.join()
         self._link.stop()
 
     @contextmanager
     def touch(self) -> Iterator[float]:
         """Hold the drives, and give the time; what comes of it is sent at once afterwards."""
         with self._lock:
-            yield steady_now()
-        self._alarm.set()
+            yield self._now()
+        self._alarm.ring()
 
     def _run(self) -> None:
         try:
             while not self._closing:
                 with self._lock:
-                    now = steady_now()
+                    now = self._now()
                     for drive in self._drives:
                         if drive.next_timer() <= now:
                             drive.handle_timer(now)
@@ -110,9 +110,7 @@ class BusPlayer:
                         (drive.next_timer() for drive in self._drives), default=math.inf)
                 for notice in notices:
                     self._say(notice)
-                self._alarm.wait(None if self._wake_at == math.inf else
-                                 max(self._wake_at - steady_now(), 0.0))
-                self._alarm.clear()
+                self._alarm.wait(self._wake_at)
         except Exception as error:  # noqa: BLE001  the outermost loop: end with a line of text
             self.link_failed(f'{type(error).__name__}: {error}')
 
@@ -150,13 +148,13 @@ class BusPlayer:
         self._show_frame(self.bus.name, frame, False)
         with self._lock:
             drives = self._addressees(frame.identifier, frame.extended)
-            now = steady_now()
+            now = self._now()
             for drive in drives:
                 drive.receive_frame(frame, now - age)
             notices = self._pump(drives)
             due = any(drive.next_timer() < self._wake_at for drive in drives)
         if due:
-            self._alarm.set()
+            self._alarm.ring()
         for notice in notices:
             self._say(notice)
 

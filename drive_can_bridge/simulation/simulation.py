@@ -18,6 +18,7 @@ from functools import partial
 import sys
 from typing import Any
 
+from drive_can_bridge.clock import Clock, SteadyClock
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.parameters import Value
 from drive_can_bridge.simulation.drive import EEPROM_TIME, SimulatedDrive
@@ -80,6 +81,7 @@ class Simulation:
     """
     All drives of a configuration, and a thread per bus.
 
+    :param clock: what everything waits by; None: that of this machine.
     :param open_bus: opens the end point of a bus; None: python-can, by the configuration.
     :param say: takes lines about the drives (faults, violations); None: they are dropped.
     :param complain: takes lines about the buses; None: standard error.
@@ -90,18 +92,21 @@ class Simulation:
     :raises ConfigurationError: a plant that a drive cannot do with.
     """
 
-    def __init__(self, configuration: BridgeConfiguration, *, open_bus: OpenBus | None = None,
+    def __init__(self, configuration: BridgeConfiguration, clock: Clock | None = None, *,
+                 open_bus: OpenBus | None = None,
                  say: Say | None = None, complain: Say | None = None,
                  show_frame: ShowFrame | None = None,
                  mechanics: Mapping[str, Mechanics] | None = None,
                  plants: Mapping[str, PlantFactory] | None = None) -> None:
         self.configuration = configuration
+        clock = clock or SteadyClock()
         drives = make_drives(configuration, eeprom_time=EEPROM_TIME - ARRIVAL_JITTER,
                              mechanics=mechanics, plants=plants)
         self._players = {
             bus.name: BusPlayer(
                 bus, [drive for drive in drives.values() if drive.configuration.bus == bus.name],
-                open_bus=open_bus or open_port, say=say or (lambda line: None),
+                clock, open_bus=open_bus or partial(open_port, clock=clock),
+                say=say or (lambda line: None),
                 complain=complain or partial(print, file=sys.stderr, flush=True),
                 show_frame=show_frame)
             for bus in configuration.buses.values()}

@@ -9,6 +9,7 @@ open here too, so that bridges may come and go.
 
 from array import array
 from collections import deque
+from collections.abc import Callable
 from contextlib import suppress
 import fcntl
 import os
@@ -16,7 +17,6 @@ from pathlib import Path
 import select
 import termios
 import threading
-import time
 import tty
 
 from drive_can_bridge.core.errors import BusUnavailable
@@ -39,13 +39,15 @@ class SlcanTerminal(EndPoint):
     """
     A bus end point on a pseudo-terminal. One thread may receive while others send.
 
+    :param now: the steady time.
     :param bitrate: of the bus, bit/s: a client that sets another hears nothing; None: any.
     :ivar path: the device that a client opens.
     :raises BusUnavailable: the system has no pseudo-terminal left.
     """
 
-    def __init__(self, bitrate: int | None = None) -> None:
+    def __init__(self, now: Callable[[], float], bitrate: int | None = None) -> None:
         super().__init__()
+        self._now = now
         try:
             self._master, self._slave = os.openpty()
         except OSError as error:
@@ -73,10 +75,10 @@ class SlcanTerminal(EndPoint):
 
         :raises BusUnavailable: closed.
         """
-        deadline = time.monotonic() + timeout
+        deadline = self._now() + timeout
         while not self._received:
             self._check_open()
-            left = max(deadline - time.monotonic(), 0.0)
+            left = max(deadline - self._now(), 0.0)
             waiting = bool(self._started or self._outgoing)
             readable, _, _ = select.select(
                 [self._master], [], [], min(left, _BACKLOG_PERIOD) if waiting else left)
@@ -100,7 +102,7 @@ class SlcanTerminal(EndPoint):
         with self._lock:
             if not self._adapter.connected:
                 return
-            now = time.monotonic()
+            now = self._now()
             self._outgoing.append((now, self._adapter.encode(frame, now)))
             self._flush()
 
@@ -152,12 +154,12 @@ class SlcanTerminal(EndPoint):
             self._outgoing.clear()
         replies = self._adapter.take_replies()
         if replies:
-            self._outgoing.append((time.monotonic(), replies))
+            self._outgoing.append((self._now(), replies))
             self._flush()
 
     def _flush(self) -> None:
         """Write as much as a client may want, without waiting."""
-        oldest = time.monotonic() - BACKLOG_AGE
+        oldest = self._now() - BACKLOG_AGE
         while self._outgoing and self._outgoing[0][0] < oldest:
             self._outgoing.popleft()
         try:

@@ -19,6 +19,7 @@ import re
 import threading
 import time
 
+from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.trace.candump import format_record
 from drive_can_bridge.trace.channels import labels
@@ -84,7 +85,9 @@ class FlightRecorder:
     """
 
     def __init__(self, buses: Iterable[BusConfiguration], default_folder: Path,
-                 say: Callable[[str], None], complain: Callable[[str], None]) -> None:
+                 say: Callable[[str], None], complain: Callable[[str], None],
+                 clock: Clock) -> None:
+        self._clock = clock
         self._say = say
         self._complain = complain
         buses = list(buses)
@@ -96,9 +99,10 @@ class FlightRecorder:
                            else default_folder)
             for bus in buses if bus.trace_seconds > 0.0}
         self._first: dict[str, list[Path]] = {name: [] for name in self._buses}
-        self._changed = threading.Condition()
+        self._lock = threading.Lock()
+        self._changed = clock.alarm()
         self._closing = False
-        self._thread = threading.Thread(target=self._run, name='flight recorder', daemon=True)
+        self._thread = clock.worker(self._run, 'flight recorder')
         if self._buses:
             self._thread.start()
 
@@ -122,8 +126,8 @@ class FlightRecorder:
         found = self._buses.get(bus)
         if found is None:
             return
-        with self._changed:
-            now, wanted = time.monotonic(), found.wanted
+        with self._lock:
+            now, wanted = self._clock.now(), found.wanted
             if wanted is None:
                 if now - found.failed >= SPACING:
                     found.failed = now
@@ -137,8 +141,8 @@ class FlightRecorder:
     def save(self, bus: str, reason: str, done: Done) -> None:
         """Write a trace because somebody asks for it; ``done`` is told the path, or why not."""
         found = self._buses[bus]
-        with self._changed:
-            now = time.monotonic()
+        with self._lock:
+            now = self._clock.now()
             wanted = found.wanted
             if wanted is None and now - found.last >= SPACING:
                 self._want(found, _Wanted(reason, _ASKED, now, now, [done]))
@@ -153,31 +157,31 @@ class FlightRecorder:
 
     def close(self) -> None:
         """Write what is still wanted, and end the thread."""
-        with self._changed:
+        with self._lock:
             self._closing = True
-            self._changed.notify()
-        if self._thread.is_alive():
-            self._thread.join(_END_TIMEOUT)
+        self._changed.ring()
+        self._thread.join(_END_TIMEOUT)
 
     def _want(self, bus: _Bus, wanted: _Wanted) -> None:
         bus.wanted = wanted
         bus.last = wanted.at
-        self._changed.notify()
+        self._changed.ring()
 
     # -- the thread -------------------------------------------------------------------------------
 
     def _run(self) -> None:
         while True:
-            with self._changed:
+            with self._lock:
                 due = self._due()
                 if due is None:
-                    waiting = [bus.wanted.at for bus in self._buses.values() if bus.wanted]
                     if self._closing:
                         return
-                    self._changed.wait(min(waiting) + AFTERMATH - time.monotonic()
-                                       if waiting else None)
-                    continue
-            self._write(*due)
+                    until = min((bus.wanted.at + AFTERMATH for bus in self._buses.values()
+                                 if bus.wanted), default=math.inf)
+            if due is None:
+                self._changed.wait(until)
+            else:
+                self._write(*due)
 
     def _due(self, *, asked: bool = True) -> tuple[_Bus, _Wanted] | None:
         """
@@ -185,7 +189,7 @@ class FlightRecorder:
 
         :param asked: what somebody asked for is among it.
         """
-        latest = math.inf if self._closing else time.monotonic() - AFTERMATH
+        latest = math.inf if self._closing else self._clock.now() - AFTERMATH
         due = [(bus, bus.wanted) for bus in self._buses.values()
                if bus.wanted is not None and bus.wanted.at <= latest
                and (asked or bus.wanted.rank > _ASKED)]
@@ -197,7 +201,7 @@ class FlightRecorder:
 
     def _write(self, bus: _Bus, wanted: _Wanted) -> None:
         name = bus.configuration.name
-        offset = time.time() - time.monotonic()
+        offset = 1e-9 * self._clock.stamp() - self._clock.now()
         stamp = time.strftime('%Y%m%dT%H%M%SZ', time.gmtime(wanted.since + offset))
         path = bus.folder / f'{name}_{stamp}_{_plain(wanted.reason)}.log'
         try:
@@ -238,7 +242,7 @@ class FlightRecorder:
                     file.writelines(lines)
                     count += len(lines)
                     if not self._closing:
-                        time.sleep(_PAUSE)
+                        self._clock.wait(self._clock.now() + _PAUSE)
                     if wanted.rank == _ASKED:
                         self._write_failures()
             if count:
@@ -253,7 +257,7 @@ class FlightRecorder:
     def _write_failures(self) -> None:
         """Write what is due of failures; what somebody asked for, and is being written, waits."""
         while True:
-            with self._changed:
+            with self._lock:
                 due = self._due(asked=False)
             if due is None:
                 return

@@ -17,13 +17,12 @@ counts as open only after its first read.
 """
 
 from collections.abc import Callable, Sequence
-import threading
 from typing import Protocol
 
+from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, TransportError
 from drive_can_bridge.core.frame import Frame, Route
-from drive_can_bridge.transport.clock import steady_now as steady_now
 from drive_can_bridge.transport.end_point import Counts, EndPoint
 from drive_can_bridge.transport.error_frames import ADVICE_ALONE, BUS_OFF, BusError
 from drive_can_bridge.transport.failures import in_words
@@ -76,12 +75,13 @@ class Link:
     :ivar taken: another process has the bus.
     """
 
-    def __init__(self, bus: BusConfiguration, routes: Sequence[Route], listener: LinkListener, *,
-                 send_timeout: float, stations: int = 0,
+    def __init__(self, bus: BusConfiguration, routes: Sequence[Route], listener: LinkListener,
+                 clock: Clock, *, send_timeout: float, stations: int = 0,
                  prepare_thread: Callable[[], object] = lambda: None,
                  opener: Callable[[], EndPoint] | None = None) -> None:
         self.bus = bus
-        self._open = opener or (lambda: open_port(bus, routes, stations=stations))
+        self._open = opener or (lambda: open_port(bus, clock, routes, stations=stations))
+        self._now = clock.now
         self.error_witness: Callable[[int, bytes], None] | None = None
         self.taken = False
         self._listener = listener
@@ -92,9 +92,9 @@ class Link:
         self._blocked: str | None = None
         self._no_room_since: float | None = None
         self._heard = False
-        self._closing = threading.Event()
-        self._first_attempt = threading.Event()
-        self._thread = threading.Thread(target=self._run, name=f'bus {bus.name}', daemon=True)
+        self._closing = self._tried = False
+        self._end, self._first_attempt = clock.alarm(), clock.alarm()
+        self._thread = clock.worker(self._run, f'bus {bus.name}')
         self.frames_sent = 0
         self.frames_received = 0
         self.send_failures = 0
@@ -112,13 +112,15 @@ class Link:
 
     def wait_first_attempt(self, timeout: float) -> bool:
         """Wait until the bus was tried once; False if that takes longer than ``timeout`` s."""
-        return self._first_attempt.wait(timeout)
+        if not self._tried:
+            self._first_attempt.wait(self._now() + timeout)
+        return self._tried
 
     def stop(self) -> None:
         """Close the bus and end the thread."""
-        self._closing.set()
-        if self._thread.is_alive() and self._thread is not threading.current_thread():
-            self._thread.join(timeout=5.0)
+        self._closing = True
+        self._end.ring()
+        self._thread.join(5.0)
 
     def send(self, frame: Frame) -> bool:
         """
@@ -149,7 +151,7 @@ class Link:
         return True
 
     def _no_room(self) -> None:
-        now = steady_now()
+        now = self._now()
         if self._no_room_since is None:
             self._no_room_since = now
         limit = max(BLOCKED_TIMEOUTS * self._send_timeout, BLOCKED_AFTER)
@@ -188,16 +190,20 @@ class Link:
         except BusMisconfigured as error:
             self._listener.bus_misconfigured(in_words(error))
         except Exception as error:  # noqa: BLE001  outermost loop of a thread: nothing is silent
-            self._first_attempt.set()
+            self._tell_tried()
             self._listener.link_failed(f'{type(error).__name__}: {in_words(error)}')
             self._read_on()
         finally:
             self._close_port()
-            self._first_attempt.set()
+            self._tell_tried()
+
+    def _tell_tried(self) -> None:
+        self._tried = True
+        self._first_attempt.ring()
 
     def _read_on(self) -> None:
         """Keep the port after a defect, until the drives were stopped: answers show that."""
-        while not self._closing.is_set():
+        while not self._closing:
             try:
                 port = self._port
                 frame = None if port is None else port.receive(RECEIVE_TIMEOUT)
@@ -206,12 +212,12 @@ class Link:
             except Exception:   # noqa: BLE001  more of what was told, or the bus is gone
                 frame = None
             if frame is None:
-                self._closing.wait(RECEIVE_TIMEOUT)
+                self._end.wait(self._now() + RECEIVE_TIMEOUT)
 
     def _keep_open(self) -> None:
         reported = ''
         opened = False
-        while not self._closing.is_set():
+        while not self._closing:
             try:
                 self._loss = NOT_READ_YET
                 self._port = port = self._open()
@@ -226,7 +232,7 @@ class Link:
                 opened = True
                 reported = ''
                 self._listener.bus_opened()
-                self._first_attempt.set()
+                self._tell_tried()
                 self._read(port, frame)
             except BusUnavailable as error:
                 self.taken = error.taken
@@ -236,15 +242,14 @@ class Link:
                 if reason != reported:
                     self._listener.bus_lost(reason)
                 reported = reason
-                self._first_attempt.set()
-            self._closing.wait(self.bus.reconnect_period)
+                self._tell_tried()
+            self._end.wait(self._now() + self.bus.reconnect_period)
 
     def _read(self, port: EndPoint, frame: Frame | None) -> None:
         receive = port.receive
         listener = self._listener.frame_received
-        closing = self._closing
         rejected = 0
-        while not closing.is_set():
+        while not self._closing:
             if self._loss is not None:
                 raise BusUnavailable(self._loss)
             if self._blocked is not None:
@@ -267,10 +272,10 @@ class Link:
         if port.has_room is None:
             raise BusUnavailable(reason)
         self._listener.bus_lost(reason)
-        look_at = steady_now() + self.bus.reconnect_period
-        while not self._closing.is_set():
+        look_at = self._now() + self.bus.reconnect_period
+        while not self._closing:
             port.receive(RECEIVE_TIMEOUT)
-            now = steady_now()
+            now = self._now()
             if now >= look_at:
                 if port.has_room:
                     break

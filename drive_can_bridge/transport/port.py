@@ -10,11 +10,11 @@ Whatever python-can's adapters throw becomes one of two errors here:
 from collections.abc import Callable, Sequence
 import inspect
 from pathlib import Path
-import time
 from typing import Any
 
 import can
 
+from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, TransportError
 from drive_can_bridge.core.frame import (
@@ -22,7 +22,6 @@ from drive_can_bridge.core.frame import (
 )
 from drive_can_bridge.transport.adapter_answers import AdapterAnswers
 from drive_can_bridge.transport.adapters import check_channel
-from drive_can_bridge.transport.clock import steady_now
 from drive_can_bridge.transport.device_lock import DeviceLock
 from drive_can_bridge.transport.end_point import Counts, EndPoint, REFUSED_FRAMES
 from drive_can_bridge.transport.error_frames import (
@@ -67,9 +66,10 @@ class Port(EndPoint):
     :ivar witness: sees every message that arrives, whatever it is; None: nobody does.
     """
 
-    def __init__(self, bus: can.BusABC, *, kernel_errors: bool = False,
+    def __init__(self, bus: can.BusABC, clock: Clock, *, kernel_errors: bool = False,
                  lock: DeviceLock | None = None) -> None:
         super().__init__()
+        self._now, self._stamp = clock.now, clock.stamp
         self._bus = bus
         self._lock = lock
         # what python-can documents for adapters to implement; the ``recv`` around it looks at the
@@ -84,7 +84,7 @@ class Port(EndPoint):
         self._socket = RawSocket.below(bus)
         self._lost = False
         self._malformed_in_row = 0
-        self._earliest = steady_now()   # the next frame cannot have come before
+        self._earliest = self._now()   # the next frame cannot have come before
         self.witness: Callable[[can.Message], None] | None = None
 
     def receive(self, timeout: float) -> Frame | None:
@@ -98,7 +98,7 @@ class Port(EndPoint):
             self._lost = True
             raise BusUnavailable(f'receive: {with_cause(error)}') from error
         if message is None:
-            self._earliest = steady_now()
+            self._earliest = self._now()
             self._limit_line()
             if self._answers is not None and self._answers.takes_nothing(self._earliest):
                 self._lost = True
@@ -122,8 +122,8 @@ class Port(EndPoint):
             self._malformed()
             return None
         self._malformed_in_row = 0
-        now = steady_now()
-        age = time.time() - message.timestamp
+        now = self._now()
+        age = 1e-9 * self._stamp() - message.timestamp
         self.age = age if 0.0 < age < max(_STAMP_AGE_MAX, now - self._earliest) else 0.0
         self._earliest = now - self.age     # they come in order
         return Frame(message.arbitration_id, data, message.is_extended_id)
@@ -233,7 +233,8 @@ class Port(EndPoint):
             raise BusUnavailable(f'{error.text}; {error.advice}')
 
 
-def open_port(bus: BusConfiguration, routes: Sequence[Route] = (), *, stations: int = 0) -> Port:
+def open_port(bus: BusConfiguration, clock: Clock, routes: Sequence[Route] = (), *,
+              stations: int = 0) -> Port:
     """
     Open a bus. May block for as long as its adapter does: never call it with a lock held.
 
@@ -254,7 +255,7 @@ def open_port(bus: BusConfiguration, routes: Sequence[Route] = (), *, stations: 
     except BusUnavailable as error:
         raise BusUnavailable(f'{where}: {error}', taken=error.taken) from None
     try:
-        port = _open(bus, routes, lock, where)
+        port = _open(bus, clock, routes, lock, where)
     except BaseException:
         if lock is not None:
             lock.release()
@@ -264,8 +265,8 @@ def open_port(bus: BusConfiguration, routes: Sequence[Route] = (), *, stations: 
     return port
 
 
-def _open(bus: BusConfiguration, routes: Sequence[Route], lock: DeviceLock | None,
-          where: str) -> Port:
+def _open(bus: BusConfiguration, clock: Clock, routes: Sequence[Route],
+          lock: DeviceLock | None, where: str) -> Port:
     options: dict[str, Any] = dict(bus.options)
     if bus.interface == 'slcan':
         options.setdefault('sleep_after_open', 0.0)
@@ -278,11 +279,11 @@ def _open(bus: BusConfiguration, routes: Sequence[Route], lock: DeviceLock | Non
         adapter = can.interface._get_class_for_interface(bus.interface)
         if _takes(adapter, 'bitrate'):
             options['bitrate'] = bus.bitrate
-        opened = (_open_serial(adapter, bus, lock, options)
+        opened = (_open_serial(adapter, bus, clock, lock, options)
                   if bus.interface in SERIAL_INTERFACES else
                   can.Bus(interface=bus.interface, channel=bus.channel, ignore_config=True,
                           **options))
-        port = Port(opened, kernel_errors=bus.interface in _KERNEL_ERRORS, lock=lock)
+        port = Port(opened, clock, kernel_errors=bus.interface in _KERNEL_ERRORS, lock=lock)
     except Exception as error:  # the one place where adapters may throw anything
         _abandon(error)
         text = f'{where}: {in_words(error)}'
@@ -300,11 +301,11 @@ def _open(bus: BusConfiguration, routes: Sequence[Route], lock: DeviceLock | Non
     return port
 
 
-def _open_serial(adapter: type[Any], bus: BusConfiguration, lock: DeviceLock | None,
-                 options: dict[str, Any]) -> can.BusABC:
+def _open_serial(adapter: type[Any], bus: BusConfiguration, clock: Clock,
+                 lock: DeviceLock | None, options: dict[str, Any]) -> can.BusABC:
     attribute = _PORTS[bus.interface]
     if attribute == _WATCHED:
-        adapter = watched(adapter, slcan=bus.interface == 'slcan')
+        adapter = watched(adapter, clock.now, slcan=bus.interface == 'slcan')
     if lock is not None:    # before the first byte
         adapter = announcing(adapter, attribute, lock.keep_out)
     opened: can.BusABC = adapter(bus.channel, **options)

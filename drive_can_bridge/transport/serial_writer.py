@@ -10,11 +10,9 @@ read. Both are replaced as soon as the port is there, because python-can's const
 from collections.abc import Callable
 import os
 import select
-import time
 from typing import Any
 
 from drive_can_bridge.transport.adapter_answers import AdapterAnswers
-from drive_can_bridge.transport.clock import steady_now
 
 #: s that each command to a serial adapter may take while it is opened
 OPEN_TIMEOUT = 0.5
@@ -26,20 +24,22 @@ class SerialWriter:
 
     Nothing old piles up: a terminal with more than 256 bytes waiting does not count as writable.
 
+    :param now: the steady time.
     :ivar timeout: s.
     """
 
-    def __init__(self, descriptor: int, timeout: float = 0.0) -> None:
+    def __init__(self, descriptor: int, now: Callable[[], float], timeout: float = 0.0) -> None:
         self._descriptor = descriptor
+        self._now = now
         self.timeout = timeout
 
     @classmethod
-    def take_over(cls, port: Any) -> 'SerialWriter | None':
+    def take_over(cls, port: Any, now: Callable[[], float]) -> 'SerialWriter | None':
         """Write for this port from now on; None: it is not one of a POSIX system."""
         descriptor = getattr(port, 'fd', None)
         if not isinstance(descriptor, int):
             return None
-        writer = cls(descriptor, OPEN_TIMEOUT)
+        writer = cls(descriptor, now, OPEN_TIMEOUT)
         port.write = writer.write
         port.flush = writer.flush
         return writer
@@ -51,9 +51,9 @@ class SerialWriter:
         :raises TimeoutError: there is no room for it.
         """
         rest = memoryview(data)
-        deadline = time.monotonic() + self.timeout
+        deadline = self._now() + self.timeout
         while rest:
-            left = max(deadline - time.monotonic(), 0.0)
+            left = max(deadline - self._now(), 0.0)
             if not select.select([], [self._descriptor], [], left)[1]:
                 raise TimeoutError('the adapter takes no more data')
             try:
@@ -73,6 +73,8 @@ class _WatchedPort:
     ``serialPortOrig`` is the attribute into which they put it.
     """
 
+    #: the steady time
+    drive_can_now: Callable[[], float]
     _serial_port: Any = None
     drive_can_writer: SerialWriter | None = None
 
@@ -83,7 +85,7 @@ class _WatchedPort:
     @serialPortOrig.setter
     def serialPortOrig(self, port: Any) -> None:  # noqa: N802  python-can's name
         self._serial_port = port
-        self.drive_can_writer = SerialWriter.take_over(port)
+        self.drive_can_writer = SerialWriter.take_over(port, self.drive_can_now)
         if self.drive_can_writer is not None:
             # what whoever had the adapter before has left may not even leave room for a command
             port.reset_output_buffer()
@@ -101,12 +103,12 @@ class _WatchedSlcan(_WatchedPort):
     def _read(self, timeout: float | None) -> str | None:
         line: str | None = super()._read(timeout)  # type: ignore[misc]
         if line:
-            self.drive_can_answers.take(line, steady_now())
+            self.drive_can_answers.take(line, self.drive_can_now())
         return line
 
 
-#: the class of an interface with the mix-in, by that class
-_WATCHED: dict[type, type] = {}
+#: the class of an interface with the mix-in, by that class and the clock
+_WATCHED: dict[tuple[type, Callable[[], float]], type] = {}
 
 
 def announcing(adapter: type[Any], attribute: str, opened: Callable[[], object]) -> type[Any]:
@@ -118,13 +120,15 @@ def announcing(adapter: type[Any], attribute: str, opened: Callable[[], object])
     return type(adapter.__name__, (adapter,), {'__setattr__': set_attribute})
 
 
-def watched(adapter: type[Any], *, slcan: bool) -> type[Any]:
+def watched(adapter: type[Any], now: Callable[[], float], *, slcan: bool) -> type[Any]:
     """
     Return a serial adapter's class, made so that opening it cannot hang.
 
+    :param now: the steady time.
     :param slcan: what it says to frames is listened to.
     """
-    if adapter not in _WATCHED:
+    if (adapter, now) not in _WATCHED:
         mix_in = _WatchedSlcan if slcan else _WatchedPort
-        _WATCHED[adapter] = type(adapter.__name__, (mix_in, adapter), {})
-    return _WATCHED[adapter]
+        _WATCHED[adapter, now] = type(adapter.__name__, (mix_in, adapter),
+                                      {'drive_can_now': staticmethod(now)})
+    return _WATCHED[adapter, now]

@@ -7,12 +7,10 @@ Nothing is ever sent.
 """
 
 from collections.abc import Callable
-import queue
-import threading
-import time
 
 import can
 
+from drive_can_bridge.clock import Clock, Mailbox
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusUnavailable
 from drive_can_bridge.core.record import Record
@@ -42,60 +40,64 @@ class Tap:
     :raises BusMisconfigured: it never can.
     """
 
-    def __init__(self, bus: BusConfiguration, label: str, records: 'queue.Queue[Record]',
-                 complain: Callable[[str], None]) -> None:
+    def __init__(self, bus: BusConfiguration, label: str, records: Mailbox[Record],
+                 complain: Callable[[str], None], clock: Clock) -> None:
         self.bus = bus
+        self._clock = clock
         self.label = label
         self.lost = 0
-        self.heard_until = time.time()
+        self.heard_until = self._today()
         self._heard = False
         self._records = records
         self._complain = complain
-        self._closing = threading.Event()
+        self._closing = False
+        self._end = clock.alarm()
         self._port: Port | None = self._open()
-        self._thread = threading.Thread(target=self._run, name=f'tap {bus.name}', daemon=True)
+        self._thread = clock.worker(self._run, f'tap {bus.name}')
         self._thread.start()
 
     def close(self) -> None:
         """Stop listening."""
-        self._closing.set()
-        self._thread.join(timeout=2.0)
+        self._closing = True
+        self._end.ring()
+        self._thread.join(2.0)
+
+    def _today(self) -> float:
+        return 1e-9 * self._clock.stamp()
 
     def _open(self) -> Port:
-        port = open_port(self.bus)
+        port = open_port(self.bus, self._clock)
         port.witness = self._take
         return port
 
     def _take(self, message: can.Message) -> None:
         self._heard = True
-        now = time.time()
+        now = self._today()
         record = record_of(message, self.label)
         if not abs(now - record.time) <= _STAMP_AGE_MAX:   # counted from power-up, or no stamp
             record = record._replace(time=now)
-        try:
-            self._records.put_nowait(record)
-        except queue.Full:
+        if not self._records.put(record):
             self.lost += 1
 
     def _run(self) -> None:
-        while not self._closing.is_set():
+        while not self._closing:
             try:
                 if self._port is None:
                     self._port = self._open()
                     self._complain(f'bus {self.bus.name}: open again')
-                while not self._closing.is_set():
+                while not self._closing:
                     self._listen(self._port)
             except BusUnavailable as error:
                 if self._port is not None:
                     self._complain(f'bus {self.bus.name}: {in_words(error)}; tried again every '
                                    f'{self.bus.reconnect_period:g} s')
                 self._close_port()
-                self.heard_until = time.time()  # nothing will be
-                self._closing.wait(self.bus.reconnect_period)
+                self.heard_until = self._today()  # nothing will be
+                self._end.wait(self._clock.now() + self.bus.reconnect_period)
         self._close_port()
 
     def _listen(self, port: Port) -> None:
-        began = time.time()
+        began = self._today()
         self._heard = False
         port.receive(_PATIENCE)
         if not self._heard:

@@ -2,8 +2,8 @@
 """The loop of the live view: look, draw, listen to the keyboard."""
 
 from collections.abc import Callable
-import time
 
+from drive_can_bridge.clock import Clock
 from drive_can_bridge.monitor.model import Model
 from drive_can_bridge.monitor.source import Source
 from drive_can_bridge.view.keys import Choice, Key
@@ -18,8 +18,8 @@ _FRAME_PERIOD_MAX = 1.0
 _LOOK_PERIOD = 0.1
 
 
-def show(source: Source, model: Model, setting: Setting, *, ended: Callable[[], bool],
-         quit_code: int, notice: Callable[[], str] = str) -> int:
+def show(source: Source, model: Model, setting: Setting, clock: Clock, *,
+         ended: Callable[[], bool], quit_code: int, notice: Callable[[], str] = str) -> int:
     """
     Draw until the end, or until the user has enough.
 
@@ -28,26 +28,26 @@ def show(source: Source, model: Model, setting: Setting, *, ended: Callable[[], 
     """
     choice, read = Choice(), None
     with Screen() as screen:
-        due = time.monotonic()
+        due = clock.now()
         while not (ended() or screen.gone):
-            begun, now = time.thread_time(), time.monotonic()
+            begun, now = clock.used(), clock.now()
             size = screen.size
             read = look(source, model, choice, read, size=size, now=now)
-            snapshot = model.look(now, time.time())
+            snapshot = model.look(now, 1e-9 * clock.stamp())
             drives = [drive.name for drive in snapshot.drives]
             choice = choice.among(drives)
             screen.draw(page(snapshot, choice, setting, notice=notice(), width=size[0],
                              height=size[1]))
-            cost = (time.thread_time() - begun) / _FRAME_SHARE
+            cost = (clock.used() - begun) / _FRAME_SHARE
             due = max(due, now) + min(max(FRAME_PERIOD, cost), _FRAME_PERIOD_MAX)
             while True:
-                left = max(0.0, due - time.monotonic())
+                left = max(0.0, due - clock.now())
                 for key in screen.wait(min(left, _LOOK_PERIOD)):
                     if key is Key.QUIT:
                         return quit_code
                     choice = choice.press(key, drives)
                     due = now  # whoever presses a key wants to see what it does
-                if ended() or screen.gone or time.monotonic() >= due:
+                if ended() or screen.gone or clock.now() >= due:
                     break
     return 0
 

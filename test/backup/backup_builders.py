@@ -7,6 +7,8 @@ from itertools import count
 import os
 from pathlib import Path
 
+from clocks import REAL
+
 from drive_can_bridge.client import open_drives
 from drive_can_bridge.client.drive import Drive
 from drive_can_bridge.configuration.load import configuration_from_file
@@ -37,7 +39,7 @@ class Shop:
         channel = f'backup_{os.getpid()}_{next(_CHANNELS)}'
         self.file.write_text(ALL_FAMILIES.read_text().replace(
             'channel: all_families', f'channel: {channel}'))
-        self.simulation = Simulation(configuration_from_file(self.file))
+        self.simulation = Simulation(configuration_from_file(self.file), REAL)
         self.drives = self.simulation.drives
 
     def change_by_hand(self, name: str) -> dict[str, float]:

@@ -11,6 +11,7 @@ from types import TracebackType
 from typing import Any
 
 import can
+from clocks import REAL
 from repeating import again_and_again
 from waiting import wait_for
 import yaml
@@ -68,7 +69,7 @@ class World:
         configuration = configuration_from_file(file)
         self.channel = str(configuration.buses['main'].channel)
         self.errors: list[str] = []
-        self._simulation = Simulation(configuration, complain=self.errors.append)
+        self._simulation = Simulation(configuration, REAL, complain=self.errors.append)
 
     @property
     def drives(self) -> dict[str, PlayedDrive]:

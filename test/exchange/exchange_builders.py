@@ -2,10 +2,10 @@
 """An exchange without a bus: a link that keeps what it is given, a clock that is set by hand."""
 
 from collections.abc import Sequence
-import time
 from typing import Any
 
 from builders import drive, frame
+from clocks import HandClock, REAL
 
 from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration
 from drive_can_bridge.core.events import Event, ProcessDataReceived
@@ -104,8 +104,8 @@ class Bench:
         self.bus_notes = BusNotes()
         self.exchange = BusExchange(
             BusConfiguration('main', 'virtual', 'x'), self.sessions, self.routes, self.bus_notes,
-            overheard=[FAMILIES[entry.protocol].overheard(entry) for entry in drives],
-            clock=time.monotonic if real_time else self.clock)
+            REAL if real_time else HandClock(self.clock),
+            overheard=[FAMILIES[entry.protocol].overheard(entry) for entry in drives])
         self.link = FakeLink()
         self.exchange.link = self.link  # type: ignore[assignment]
         self.notes = [DriveNotes(session) for session in self.sessions]

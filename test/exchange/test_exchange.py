@@ -7,6 +7,7 @@ import time
 from builders import (
     CONTROL, drive, GAIN, INT16, parameter, RAMP, read, SPEED, WORD, write,
 )
+from clocks import REAL
 from exchange_builders import all_routes, Bench, BusNotes
 import pytest
 from waiting import wait_for
@@ -99,10 +100,10 @@ def test_routes_become_filters_of_the_link(monkeypatch: pytest.MonkeyPatch) -> N
     bench = Bench()
     counted = Route(0x000, 0x7FF, False)
     made = BusExchange(BusConfiguration('main', 'virtual', 'x'), bench.sessions, bench.routes,
-                       BusNotes(), counted=[counted])
+                       BusNotes(), REAL, counted=[counted])
     opened: list[list[Route]] = []
     monkeypatch.setattr('drive_can_bridge.transport.link.open_port',
-                        lambda bus, routes, stations: opened.append(list(routes)))
+                        lambda bus, clock, routes, stations: opened.append(list(routes)))
     made.link._open()
     assert opened == [[*all_routes(bench), counted]]
     assert made.link._send_timeout == pytest.approx(0.01)  # half a cycle
@@ -375,10 +376,10 @@ def test_fault_of_one_stops_its_broadcast_group_at_once() -> None:
     outcome, = [event for event in bench.notes[0].events if isinstance(event, ControlCompleted)]
     assert outcome.success, outcome.message
     exchange._wake_at = exchange._pass()
-    while exchange._alarm.sleep(0.0):
+    while exchange._alarm.wait(0.0):
         pass
     bench.hears('005#380B0000', bench.now + 0.01)       # told unasked
-    assert exchange._alarm.sleep(0.0)
+    assert exchange._alarm.wait(0.0)
     assert [text for text in bench.at(bench.now + 0.001) if text.startswith('408')] == [
         '408#7E040000']
 
@@ -562,18 +563,18 @@ def test_whatever_is_due_sooner_wakes_the_timer() -> None:
     bench.hears(ANSWER, 10.001)
     exchange = bench.exchange
     exchange._wake_at = exchange._pass()
-    exchange._alarm.sleep(0.0)
+    exchange._alarm.wait(0.0)
     exchange.submit(bench.sessions[0], read(GAIN))
-    assert exchange._alarm.sleep(0.0)         # its time-out comes before the next pass
+    assert exchange._alarm.wait(0.0)         # its time-out comes before the next pass
 
     exchange._wake_at = 10.01
     bench.hears('10200281#0007000000000000', 10.003)
-    assert not exchange._alarm.sleep(0.0)     # nothing to wait for any more
+    assert not exchange._alarm.wait(0.0)     # nothing to wait for any more
     exchange._wake_at = 20.0
     bench.hears('7F1#00', 10.004)
-    assert not exchange._alarm.sleep(0.0)
+    assert not exchange._alarm.wait(0.0)
     bench.hears('102001E0#0000000000000000', 10.005)
-    assert exchange._alarm.sleep(0.0)         # the next cycle comes before that
+    assert exchange._alarm.wait(0.0)         # the next cycle comes before that
 
 
 def test_age_of_a_frame_does_not_shorten_the_pause_after_an_eeprom_write() -> None:

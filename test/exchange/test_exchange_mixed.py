@@ -12,6 +12,7 @@ import uuid
 
 from builders import drive, GAIN, read
 import can
+from clocks import REAL
 from exchange_builders import all_routes, Bench
 import pytest
 
@@ -158,7 +159,7 @@ def ports() -> Iterator[tuple[can.BusABC, Port]]:
     """Return a plain end point of a bus, and one with the filters of both drives."""
     channel = f'mixed_{uuid.uuid4()}'
     with can.Bus(interface='virtual', channel=channel, ignore_config=True) as other:
-        port = open_port(BusConfiguration('main', 'virtual', channel), all_routes(mixed()))
+        port = open_port(BusConfiguration('main', 'virtual', channel), REAL, all_routes(mixed()))
         yield other, port
         port.close()
 

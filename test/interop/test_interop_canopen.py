@@ -11,6 +11,7 @@ import itertools
 from typing import Any
 
 from builders import drive, read, text_of, write
+from clocks import REAL
 import pytest
 from waiting import wait_for
 
@@ -113,7 +114,7 @@ def ltmr(channel: str, states: list[int]) -> Iterator[PlayedDrive]:
     """Return a simulated LTMR on the bus, switched on after somebody listened."""
     configuration = BridgeConfiguration(
         buses={'main': bus_of(channel)}, drives={'pump': ltmr_configuration()})
-    with Simulation(configuration) as simulation:
+    with Simulation(configuration, REAL) as simulation:
         yield simulation.drives['pump']
     assert not simulation.failure
 
@@ -282,7 +283,7 @@ class Bridge:
         self.session: Session
         self.session, = make_sessions([configuration])
         routes = [claim.route for claim in FAMILIES['canopen_pkw'].claims(configuration)]
-        self.exchange = BusExchange(bus_of(channel), [self.session], [routes], self)
+        self.exchange = BusExchange(bus_of(channel), [self.session], [routes], self, REAL)
         self.exchange.attach(self.session, self)
         self.samples: list[tuple[int, ...]] = []
         self.events: list[Event] = []

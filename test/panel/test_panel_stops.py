@@ -8,6 +8,7 @@ import html
 import json
 from typing import Any
 
+from clocks import REAL
 from panel_builders import Site
 from panel_somebody import Somebody
 import pytest
@@ -117,7 +118,7 @@ def test_the_number_of_those_that_stand_comes_behind_those_that_do_not(
 
 def feed_of(operations: Asked) -> Any:
     from drive_can_bridge.panel.feed import Feed
-    return Feed(None, operations, Model())  # type: ignore[arg-type]
+    return Feed(None, operations, Model(), REAL)  # type: ignore[arg-type]
 
 
 def seen(name: str) -> DriveSnapshot:

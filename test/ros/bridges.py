@@ -14,11 +14,13 @@ from typing import Any
 
 import can
 from clients import patience, wait_until
+from clocks import REAL
 import rclpy
 from rclpy.context import Context
 from rclpy.signals import SignalHandlerOptions
 import yaml
 
+from drive_can_bridge.clock import Clock
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.ros.bridge_node import BridgeNode
 from drive_can_bridge.ros.executor_thread import ExecutorThread
@@ -66,12 +68,13 @@ class Bridge:
     :param autostart: configure and activate.
     :param key: to whom the parameter file is addressed.
     :param mechanics: what simulated motors carry, by drive.
+    :param clock: of the bridge.
     """
 
     def __init__(self, directory: Path, content: Any = None, *, arguments: tuple[str, ...] = (),
                  simulated: bool = True, autostart: bool = True,
                  key: str = '/**/drive_can_bridge',
-                 mechanics: dict[str, Mechanics] | None = None) -> None:
+                 mechanics: dict[str, Mechanics] | None = None, clock: Clock = REAL) -> None:
         number = next(_COUNTER)
         self.file = directory / f'bridge_{number}.yaml'
         if not isinstance(content, str):
@@ -91,13 +94,13 @@ class Bridge:
         self.context = Context()
         rclpy.init(args=['--ros-args', '--params-file', str(self.file), *arguments],
                    context=self.context, signal_handler_options=SignalHandlerOptions.NO)
-        self.spinner = ExecutorThread('services', self.errors.append, self.context)
-        self.node = BridgeNode(self.spinner, self.fatal.append, context=self.context)
+        self.spinner = ExecutorThread('services', self.errors.append, self.context, clock)
+        self.node = BridgeNode(self.spinner, self.fatal.append, clock, context=self.context)
 
     def begin(self) -> None:
         """Start the simulation and the bridge."""
         if self._simulated:
-            self.simulation = Simulation(configuration_from_file(self.file),
+            self.simulation = Simulation(configuration_from_file(self.file), REAL,
                                          complain=self.errors.append,
                                          mechanics=self._mechanics)
             self.simulation.start()

@@ -9,6 +9,7 @@ from typing import Any
 
 from bridges import Bridge, LIFT, parameters, StartBridge
 from clients import Client, ClientContext, LATCHED, wait_until
+from clocks import REAL
 import pytest
 from rclpy.qos import qos_profile_parameters
 from rclpy.service import Service
@@ -61,7 +62,7 @@ def _told() -> list[str]:
 
 @pytest.fixture(name='answers')
 def _answers(told: list[str]) -> Iterator[Answers]:
-    answers = Answers(lambda topic, text: told.append(text), told.append)
+    answers = Answers(lambda topic, text: told.append(text), told.append, REAL)
     yield answers
     answers.stop()
 
@@ -156,7 +157,7 @@ class Caller:
         self.service = client.node.create_service(
             Trigger, '~/asked', lambda *_: None, callback_group=PolledGroup(),
             qos_profile=qos_profile_parameters)
-        self.thread = ServiceThread('control', context.context, self.errors.append,
+        self.thread = ServiceThread('control', context.context, self.errors.append, REAL,
                                     send=answers.send)
         self.thread.serve(self.service, lambda _, answer: answer(
             Trigger.Response(success=True, message='an answer')))

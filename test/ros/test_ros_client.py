@@ -7,6 +7,7 @@ from typing import Any
 
 from bridges import Bridge, CONVEYOR, HASTY, LIFT, parameters, StartBridge
 from clients import Client, wait_until
+from clocks import REAL
 from lifecycle_msgs.srv import ChangeState
 import pytest
 from rcl_interfaces.msg import ParameterType, ParameterValue
@@ -255,7 +256,7 @@ def test_an_answer_that_is_lost_is_asked_for_again(
         client.node.create_service(
             kind, f'/forgetful/{name}', answers(name) if forgets else lambda _, given: given,
             qos_profile=qos_profile_parameters, callback_group=ReentrantCallbackGroup())
-    here = graph.Graph()
+    here = graph.Graph(REAL)
     try:
         here.call('/forgetful', 'list_parameters', ListParameters.Request())
         assert asked['list_parameters'] == 2

@@ -8,6 +8,7 @@ from typing import Any
 from bridges import Bridge, CONVEYOR, parameters, StartBridge
 from builtin_interfaces.msg import Time
 from clients import Client, Topic, wait_until
+from clocks import REAL
 from diagnostic_msgs.msg import DiagnosticArray
 import pytest
 from rcl_interfaces.msg import ParameterEvent
@@ -17,7 +18,6 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
 from drive_can_bridge.ros.stamps import Stamps
-from drive_can_bridge.transport.clock import steady_now
 
 REAL_TIME, REAL_TIME_NS = time.time, time.time_ns
 
@@ -58,7 +58,7 @@ def silent(_: str) -> None:
 
 def test_a_stamp_is_that_of_the_moment_not_of_the_look() -> None:
     before = time.time()
-    seconds, nanoseconds = Stamps(Clock, silent).at(steady_now() - 1000.0)
+    seconds, nanoseconds = Stamps(Clock, silent, REAL).at(REAL.now() - 1000.0)
     assert before - 1000.001 <= seconds + 1e-9 * nanoseconds <= time.time() - 999.999
 
 
@@ -89,9 +89,9 @@ def test_a_sample_has_one_stamp_when_the_clock_is_set_behind_it(
 def test_a_time_that_no_stamp_holds_is_0_and_told_once(monkeypatch: pytest.MonkeyPatch,
                                                        seconds: int) -> None:
     told: list[str] = []
-    stamps = Stamps(Clock, told.append)
+    stamps = Stamps(Clock, told.append, REAL)
     monkeypatch.setattr(time, 'time_ns', lambda: seconds * 10 ** 9)
-    moment = steady_now()
+    moment = REAL.now()
     assert [stamps.at(moment + step) for step in (0.0, -0.1, 1.0)] == [(0, 0)] * 3
     assert stamps.now() == Time()
     assert len(told) == 1 and 'system clock' in told[0]

@@ -5,6 +5,7 @@ from collections import deque
 import math
 from typing import Any
 
+from clocks import REAL
 import pytest
 from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
@@ -47,7 +48,8 @@ class Taken:
         self.unreadable: list[str] = []
         self.topic = CommandTopic(
             self.subscription, use=lambda message, _: self.used.append(message),  # type: ignore
-            old=self.old.append, late=self.late.append, unreadable=self.unreadable.append)
+            old=self.old.append, late=self.late.append, unreadable=self.unreadable.append,
+            stamp=REAL.stamp)
 
 
 @pytest.mark.parametrize('message', [

@@ -7,6 +7,7 @@ from typing import Any
 
 from bridges import Bridge, CONVEYOR, HASTY, parameters, Recorder, StartBridge
 from clients import Client, wait_until
+from clocks import HandClock, REAL
 import pytest
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
@@ -335,16 +336,14 @@ def test_incompatible_publishers_are_told_about(bridge: StartBridge, client: Cli
                        f'(RELIABILITY): nothing is received from it')
 
 
-def test_lost_time_wants_arming_again(bridge: StartBridge, client: Client,
-                                      monkeypatch: pytest.MonkeyPatch) -> None:
-    one = bridge(parameters(conveyor={**CONVEYOR, 'command_timeout': 0}))
+def test_lost_time_wants_arming_again(bridge: StartBridge, client: Client) -> None:
+    lost = [0.0]
+    one = bridge(parameters(conveyor={**CONVEYOR, 'command_timeout': 0}),
+                 clock=HandClock(lambda: REAL.now() + lost[0]))
     one.online()
-    exchange = one.node.exchanges['main']
     with one.record() as recorder:
         arm(client, recorder)
-        clock = exchange._clock
-        # as if the process had stood still for three seconds
-        monkeypatch.setattr(exchange, '_clock', lambda: clock() + 3.0)
+        lost[0] = 3.0       # as if the process had stood still for that long
         until_sent(recorder, 0, 0)
         one.online()
         recorder.clear()

@@ -7,6 +7,7 @@ import threading
 import time
 from typing import Any
 
+from clocks import REAL
 import pytest
 from rclpy.logging import get_logging_directory
 from waiting import wait_for
@@ -32,7 +33,7 @@ class Logger:
 
 def test_lines_in_order_and_printable() -> None:
     logger = Logger()
-    log = Log(logger)
+    log = Log(logger, REAL)
     log.info('first')
     log.warning('line\nfeed \x1b[2J')
     log.error('third')
@@ -47,7 +48,7 @@ def test_lines_in_order_and_printable() -> None:
 def test_nobody_waits_for_a_logger_that_does_not_come_back() -> None:
     logger = Logger()
     logger.open.clear()
-    log = Log(logger)
+    log = Log(logger, REAL)
     for number in range(LINES_MAX + 500):
         log.info(str(number))
     logger.open.set()
@@ -67,7 +68,7 @@ def test_the_last_words_are_written_however_long_that_takes() -> None:
             time.sleep(0.05)
             return super().__getattr__(level)
     logger = SlowLogger()
-    log = Log(logger)
+    log = Log(logger, REAL)
     for number in range(20):
         log.info(str(number))
     log.fatal('why it ends')
@@ -78,7 +79,7 @@ def test_the_last_words_are_written_however_long_that_takes() -> None:
 def test_the_end_does_not_wait_for_ever() -> None:
     logger = Logger()
     logger.open.clear()
-    log = Log(logger)
+    log = Log(logger, REAL)
     for number in range(LINES_MAX + 2):
         log.info(str(number))
     log.close()
@@ -88,7 +89,7 @@ def test_the_end_does_not_wait_for_ever() -> None:
 def test_its_thread_sums_up_what_repeats_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(log_limit, 'SUM_UP', 0.05)
     logger = Logger()
-    log = Log(logger)
+    log = Log(logger, REAL)
     for _ in range(500):
         log.speaker('lift').warning('fault')
         log.speaker('lift').info('fault gone')
@@ -101,7 +102,7 @@ def test_its_thread_sums_up_what_repeats_by_itself(monkeypatch: pytest.MonkeyPat
 
 def test_the_end_writes_what_is_held_behind_what_waits() -> None:
     logger = Logger()
-    log = Log(logger)
+    log = Log(logger, REAL)
     for _ in range(7):
         log.speaker('lift').info('online')
     log.close()

@@ -3,6 +3,8 @@
 
 import time
 
+from clocks import REAL
+
 from drive_can_bridge.ros.pace import Pace
 
 
@@ -15,7 +17,7 @@ def busy(seconds: float) -> None:
 
 def test_who_computes_without_end_gets_its_share() -> None:
     begun = time.monotonic()
-    pace = Pace(0.25, in_hand=0.002)
+    pace = Pace(0.25, REAL, in_hand=0.002)
     for _ in range(20):
         busy(0.002)
         pace.keep()

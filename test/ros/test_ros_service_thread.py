@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from clients import Client, ClientContext, wait_until
+from clocks import REAL
 import pytest
 from rclpy.qos import qos_profile_parameters
 from std_srvs.srv import Trigger
@@ -20,7 +21,7 @@ def _errors() -> list[str]:
 
 @pytest.fixture(name='thread')
 def _thread(_client_context: ClientContext, errors: list[str]) -> Iterator[ServiceThread]:
-    thread = ServiceThread('control', _client_context.context, errors.append)
+    thread = ServiceThread('control', _client_context.context, errors.append, REAL)
     yield thread
     thread.stop()
 

@@ -7,6 +7,7 @@ from typing import Any
 
 from bridges import CONVEYOR, HASTY, parameters, StartBridge
 from clients import Client, wait_until
+from clocks import REAL
 import pytest
 from rcl_interfaces.msg import ParameterEvent
 from rosgraph_msgs.msg import Clock
@@ -14,7 +15,6 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Int64
 
 from drive_can_bridge.core.events import StationLost
-from drive_can_bridge.transport.clock import steady_now
 
 PROFILE = """
 protocols: [datamodel_extended]
@@ -61,7 +61,7 @@ def test_a_lost_drive_leaves_no_sample_behind(bridge: StartBridge) -> None:
     """Else all joints in one message would show it once more in the instant it is found again."""
     drive = bridge(parameters(), simulated=False).node.drives['conveyor']
     with drive.exchange.lock:
-        drive.samples.publish((1, 2, 3), steady_now())
+        drive.samples.publish((1, 2, 3), REAL.now())
         assert drive.samples.last is not None
         drive.handle_event(StationLost('no answer'))
         assert drive.samples.last is None

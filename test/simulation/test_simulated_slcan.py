@@ -9,6 +9,7 @@ import time
 from typing import Any
 
 import can
+from clocks import REAL
 from hypothesis import given, strategies as st
 import pytest
 from simulation_builders import bridge, frame
@@ -136,7 +137,7 @@ def receive(terminal: SlcanTerminal, timeout: float = 10.0) -> Frame | None:
 
 @pytest.fixture
 def terminal() -> Any:
-    made = SlcanTerminal()
+    made = SlcanTerminal(REAL.now)
     yield made
     made.close()
 
@@ -144,7 +145,7 @@ def terminal() -> Any:
 class TestTerminal:
 
     def test_a_client_at_another_bit_rate_hears_nothing(self) -> None:
-        terminal = SlcanTerminal(500_000)
+        terminal = SlcanTerminal(REAL.now, 500_000)
         try:
             with client(terminal) as bus:
                 bus.send(can.Message(arbitration_id=0x3FFFF0, data=[1, 2, 3]))
@@ -275,7 +276,7 @@ class TestLink:
             self, terminal: SlcanTerminal, tmp_path: Path) -> None:
         link = tmp_path / 'main'
         terminal.link(link)
-        other = SlcanTerminal()
+        other = SlcanTerminal(REAL.now)
         other.link(link)
         terminal.close()
         assert os.readlink(link) == other.path
@@ -304,8 +305,8 @@ bus.shutdown()
 
 
 def test_client_in_another_process() -> None:
-    terminal = SlcanTerminal()
-    with Simulation(bridge(), open_bus=lambda bus: terminal) as simulation:
+    terminal = SlcanTerminal(REAL.now)
+    with Simulation(bridge(), REAL, open_bus=lambda bus: terminal) as simulation:
         for _ in range(2):
             done = subprocess.run([sys.executable, '-c', CLIENT, terminal.path], text=True,
                                   capture_output=True, timeout=60, check=False)

@@ -10,6 +10,7 @@ import time
 from typing import Any
 
 import can
+from clocks import REAL
 import pytest
 from simulation_builders import bridge, configuration, frame, INT16, parameter, RO
 from waiting import wait_for
@@ -78,7 +79,7 @@ class Scripted:
         self.complaints: list[str] = []
         self.shown: list[str] = []
         self.simulation = Simulation(
-            bridge(*drives), open_bus=self.open, say=self.said.append,
+            bridge(*drives), REAL, open_bus=self.open, say=self.said.append,
             complain=self.complaints.append, show_frame=self.show)
 
     def open(self, bus: BusConfiguration) -> ScriptedPort:
@@ -253,7 +254,7 @@ def test_any_profile_is_plain_memory_at_least(protocol: str) -> None:
 
 def test_virtual_bus() -> None:
     channel = 'test_simulation'
-    with Simulation(bridge(channel=channel)) as simulation, can.Bus(
+    with Simulation(bridge(channel=channel), REAL) as simulation, can.Bus(
             interface='virtual', channel=channel, ignore_config=True) as bus:
         bus.send(can.Message(arbitration_id=POLL.identifier, data=POLL.data))
         message = bus.recv(10.0)
@@ -330,7 +331,7 @@ class TestConsole:
 
     def test_terminal_of_others_is_left_alone(self, monkeypatch: pytest.MonkeyPatch) -> None:
         # reading from it would stop a process in the background
-        terminal = SlcanTerminal()
+        terminal = SlcanTerminal(REAL.now)
         with open(terminal.path, encoding='ascii') as stream:
             monkeypatch.setattr('sys.stdin', stream)
             assert LineReader().fileno is None

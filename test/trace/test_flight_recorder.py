@@ -9,6 +9,7 @@ import time
 import tracemalloc
 
 from builders import frame
+from clocks import REAL
 import pytest
 from waiting import wait_for
 
@@ -90,7 +91,8 @@ class Recording:
         self.complained: list[str] = []
         bus = BusConfiguration('main', 'virtual', 'x', **{  # type: ignore[arg-type]
             'trace_seconds': 10.0, **keys})
-        self.recorder = FlightRecorder([bus], folder, self.said.append, self.complained.append)
+        self.recorder = FlightRecorder([bus], folder, self.said.append, self.complained.append,
+                                       REAL)
         kept = self.recorder.ring('main')
         assert kept is not None
         self.ring: Ring = kept
@@ -214,7 +216,7 @@ def test_a_failure_does_not_wait_for_a_trace_that_somebody_asked_for(
     buses = [BusConfiguration(name, 'virtual', name, trace_seconds=10.0)
              for name in ('main', 'other')]
     told: list[str] = []
-    recorder = FlightRecorder(buses, tmp_path, told.append, told.append)
+    recorder = FlightRecorder(buses, tmp_path, told.append, told.append, REAL)
     try:
         for name, count in (('main', 200), ('other', 2)):
             kept = recorder.ring(name)

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from random import Random
 
+from clocks import REAL
 from foreign_devices import cannord, canopen, datamodel_extended, datamodel_standard, Device
 import pytest
 from test_trace_agrees import running
@@ -319,7 +320,7 @@ def test_simulated_drives_are_found_and_written(tmp_path: Path,
     drives = [(drive.protocol, drive.station) for drive in played.drives.values()
               if drive.protocol in SAFE]
     assert len(drives) == len(SAFE)
-    with Simulation(played):
+    with Simulation(played, REAL):
         assert drive_can('scan', '--interface', 'virtual', '--channel', 'all_families',
                          '--bitrate', 500_000, '--listen', 0.3, '-o', output) == 0
     lines = capsys.readouterr().out.splitlines()
@@ -344,7 +345,7 @@ def test_what_is_there_is_asked_for(tmp_path: Path, capsys: pytest.CaptureFixtur
                  500_000, '--listen', 0.1, '-o', output)
     monkeypatch.setattr('sys.stdin', open('/dev/null'))
     frames: list[Frame] = []
-    with Simulation(configuration_from_file(config_file('all_families.yaml')),
+    with Simulation(configuration_from_file(config_file('all_families.yaml')), REAL,
                     show_frame=lambda bus, frame, sent: sent or frames.append(frame)):
         for existing in (output, beside):
             existing.write_text('by hand')
@@ -429,7 +430,7 @@ def test_named_families_need_a_word(capsys: pytest.CaptureFixture[str],
 def test_named_families_are_not_asked_where_there_is_a_canopen_node(
         capsys: pytest.CaptureFixture[str]) -> None:
     frames: list[Frame] = []
-    with Simulation(configuration_from_file(config_file('all_families.yaml')),
+    with Simulation(configuration_from_file(config_file('all_families.yaml')), REAL,
                     show_frame=lambda bus, frame, sent: frames.append(frame)):
         drive_can('scan', '--interface', 'virtual', '--channel', 'all_families', '--bitrate',
                   500_000, '--listen', 0.3, '--protocols', 'cannord,datamodel_standard', '--yes')

@@ -14,6 +14,7 @@ from pathlib import Path
 import re
 import signal
 
+from clocks import REAL
 import pytest
 from running import Running
 from test_trace_agrees import running
@@ -70,7 +71,7 @@ class Place:
     def drives(self, *left_out: str) -> Iterator[Simulation]:
         """Play the drives."""
         self.heard.clear()
-        with Simulation(self.configuration(*left_out),
+        with Simulation(self.configuration(*left_out), REAL,
                         open_bus=(lambda _: self.terminal) if self.terminal else None,
                         show_frame=lambda _, frame, sent: sent or self.heard.append(frame),
                         ) as simulation:
@@ -87,7 +88,7 @@ def place(request: pytest.FixtureRequest) -> Iterator[Place]:
     if request.param == 'socketcan':
         yield Place('socketcan', VCAN, None, [])
         return
-    terminal = SlcanTerminal(BITRATE)
+    terminal = SlcanTerminal(REAL.now, BITRATE)
     yield Place('slcan', terminal.path, terminal, [])
     terminal.close()
 

@@ -9,13 +9,14 @@ listens to it; drives fall silent and come back. Afterwards the trace is read fr
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-import queue
 from statistics import median
 import time
 
+from clocks import REAL
 import pytest
 from waiting import wait_for
 
+from drive_can_bridge.clock import Mailbox
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.events import Event, RequestCompleted
@@ -56,16 +57,17 @@ class Bus:
         self.configuration = configuration
         bus, = configuration.buses.values()
         drives = list(configuration.drives.values())
-        self.records: queue.Queue[Record] = queue.Queue()
-        self.tap = Tap(bus, 'main', self.records, print)  # first: it sees requests before answers
-        self.simulation = Simulation(configuration)
+        self.records: Mailbox[Record] = Mailbox(REAL)
+        # first: it sees requests before answers
+        self.tap = Tap(bus, 'main', self.records, print, REAL)
+        self.simulation = Simulation(configuration, REAL)
         self.sessions = {drive.name: session for drive, session in zip(
             drives, make_sessions(drives))}
         self.listener = Listener()
         self.exchange = BusExchange(
             bus, list(self.sessions.values()),
             [[claim.route for claim in FAMILIES[drive.protocol].claims(drive)]
-             for drive in drives], self.listener)
+             for drive in drives], self.listener, REAL)
         for session in self.sessions.values():
             self.exchange.attach(session, self.listener)
 
@@ -121,7 +123,7 @@ def conversation() -> tuple[Bus, list[Record]]:
         wait_for(lambda: bus.listener.answers, 'an answer')
         bus.look()
     records = []
-    while not bus.records.empty():
+    while bus.records:
         records.append(bus.records.get())
     return bus, records
 

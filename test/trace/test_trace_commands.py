@@ -7,6 +7,7 @@ from pathlib import Path
 import threading
 import time
 
+from clocks import REAL
 import pytest
 from waiting import wait_for
 
@@ -259,7 +260,7 @@ class Talker:
     """Somebody on the bus of the parameter file."""
 
     def __init__(self, channel: str) -> None:
-        self._port = open_port(BusConfiguration('main', 'virtual', channel))
+        self._port = open_port(BusConfiguration('main', 'virtual', channel), REAL)
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run)
 

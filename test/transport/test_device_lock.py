@@ -9,6 +9,7 @@ import subprocess
 import sys
 import tty
 
+from clocks import REAL
 import pytest
 
 from drive_can_bridge.core.configuration import BusConfiguration
@@ -18,10 +19,11 @@ from drive_can_bridge.transport.port import open_port
 
 #: opens a port like anybody, tells, and keeps it until it is killed
 HOLDER = """
+from drive_can_bridge.clock import SteadyClock
 import sys
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.transport.port import open_port
-port = open_port(BusConfiguration('main', sys.argv[1], sys.argv[2], 125000))
+port = open_port(BusConfiguration('main', sys.argv[1], sys.argv[2], 125000), SteadyClock())
 print('open', flush=True)
 sys.stdin.read()
 """
@@ -85,21 +87,21 @@ def test_the_device_of_another_process_is_not_written_to(device: Device, interfa
     device.written()
     with pytest.raises(BusUnavailable, match=f'{device.path}: the serial port is used by process '
                                        f'{process.pid}; a drive has one master'):
-        open_port(bus(device.path, interface))
+        open_port(bus(device.path, interface), REAL)
     assert device.written() == b''
     process.kill()
     process.wait()
     process.stdin.close()
     process.stdout.close()
     # what a process held that was killed is free
-    open_port(bus(device.path, interface)).close()
+    open_port(bus(device.path, interface), REAL).close()
 
 
 def test_whoever_closes_it_lets_others_have_it(device: Device) -> None:
     for _ in range(2):
-        port = open_port(bus(device.path))
+        port = open_port(bus(device.path), REAL)
         with pytest.raises(BusUnavailable):
-            open_port(bus(device.path))
+            open_port(bus(device.path), REAL)
         port.close()
 
 
@@ -140,5 +142,5 @@ def test_what_is_no_terminal_is_left_to_the_adapter(channel: str) -> None:
 def test_a_channel_that_would_write_a_file_is_refused(tmp_path: object) -> None:
     path = f'{tmp_path}/precious'
     with pytest.raises(BusMisconfigured, match='is no serial port'):
-        open_port(bus(f'spy:///dev/null?file={path}'))
+        open_port(bus(f'spy:///dev/null?file={path}'), REAL)
     assert not os.path.exists(path)

@@ -9,6 +9,7 @@ import threading
 import time
 from typing import Any
 
+from clocks import REAL
 import pytest
 from waiting import wait_for
 
@@ -117,10 +118,11 @@ class Bench:
         self.stations: set[int] = set()
         self.listener = Listener()
         monkeypatch.setattr(link_module, 'open_port', self._open)
-        self.link = Link(BUS, [], self.listener, send_timeout=send_timeout, stations=3)
+        self.link = Link(BUS, [], self.listener, REAL, send_timeout=send_timeout, stations=3)
         self.link.start()
 
-    def _open(self, bus: BusConfiguration, routes: object, *, stations: int) -> FakePort:
+    def _open(self, bus: BusConfiguration, clock: object, routes: object, *,
+              stations: int) -> FakePort:
         self.attempts += 1
         self.stations.add(stations)
         if self.refusals:
@@ -456,7 +458,7 @@ def test_reconnections_leave_no_descriptors(monkeypatch: pytest.MonkeyPatch,
     # a device that cannot be opened, a hundred times over
     listener = Listener()
     bus = BusConfiguration('main', 'slcan', str(tmp_path / 'nothing'), reconnect_period=0.001)
-    link = Link(bus, [], listener, send_timeout=0.01)
+    link = Link(bus, [], listener, REAL, send_timeout=0.01)
     attempts = []
     real = link_module.open_port
     monkeypatch.setattr(link_module, 'open_port',

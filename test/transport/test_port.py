@@ -14,6 +14,7 @@ import tty
 from typing import Any
 
 import can
+from clocks import HandClock, REAL
 import pytest
 
 from drive_can_bridge.core.configuration import BusConfiguration
@@ -62,7 +63,7 @@ def error_frame(classes: int, data: str = '') -> can.Message:
 
 
 def test_frame(bus: FakeBus) -> None:
-    port = Port(bus)
+    port = Port(bus, REAL)
     bus.coming.append(can.Message(arbitration_id=0x103FFFF0, data=b'\x12\x34', timestamp=0.0))
     assert port.receive(0.02) == Frame(0x103FFFF0, b'\x12\x34', True)
     assert port.receive(0.02) is None
@@ -73,7 +74,7 @@ def test_frame(bus: FakeBus) -> None:
 
 def test_filters_of_adapters_that_have_none(bus: FakeBus) -> None:
     bus.set_filters([{'can_id': 0x123, 'can_mask': 0x7FF, 'extended': False}])
-    port = Port(bus)
+    port = Port(bus, REAL)
     bus.coming += [can.Message(arbitration_id=0x124, is_extended_id=False),
                    error_frame(0x020),
                    can.Message(arbitration_id=0x123, is_extended_id=False)]
@@ -96,7 +97,7 @@ def test_clock_that_is_set_while_waiting(bus: FakeBus, monkeypatch: pytest.Monke
         return clock[0]
     monkeypatch.setattr(time, 'time', jumping)
     monkeypatch.setattr('can.bus.time', jumping)
-    port = Port(bus)
+    port = Port(bus, REAL)
     assert port.receive(0.02) is None
     assert bus.waited == [0.02]
     bus.coming.append(can.Message(arbitration_id=1, timestamp=1e9))
@@ -108,8 +109,9 @@ def test_clock_that_is_set_while_waiting(bus: FakeBus, monkeypatch: pytest.Monke
     (1000.0 - 0.03, 0.03), (1000.0 + 5.0, 0.0), (1000.0 - 0.2, 0.0), (0.0, 0.0)],
     ids=['late', 'from the future', 'clock was set', 'adapter without a clock'])
 def test_age(bus: FakeBus, monkeypatch: pytest.MonkeyPatch, stamp: float, age: float) -> None:
-    monkeypatch.setattr(time, 'time', lambda: 1000.0)
-    port = Port(bus)
+    clock = HandClock(lambda: 50.0)
+    monkeypatch.setattr(clock, 'stamp', lambda: 1_000_000_000_000)
+    port = Port(bus, clock)
     bus.coming.append(can.Message(arbitration_id=1, timestamp=stamp))
     port.receive(0.0)
     assert port.age == pytest.approx(age)
@@ -117,9 +119,9 @@ def test_age(bus: FakeBus, monkeypatch: pytest.MonkeyPatch, stamp: float, age: f
 
 def test_age_of_frames_that_waited(bus: FakeBus, monkeypatch: pytest.MonkeyPatch) -> None:
     now = [50.0]
-    monkeypatch.setattr(time, 'time', lambda: 950.0 + now[0])
-    monkeypatch.setattr('drive_can_bridge.transport.port.steady_now', lambda: now[0])
-    port = Port(bus)
+    clock = HandClock(lambda: now[0])
+    monkeypatch.setattr(clock, 'stamp', lambda: round(1e9 * (950.0 + now[0])))
+    port = Port(bus, clock)
 
     def comes(stamped: float) -> float:
         bus.coming.append(can.Message(arbitration_id=1, timestamp=stamped))
@@ -140,7 +142,7 @@ def test_age_of_frames_that_waited(bus: FakeBus, monkeypatch: pytest.MonkeyPatch
 
 
 def test_error_frames_change_the_state(bus: FakeBus) -> None:
-    port = Port(bus, kernel_errors=True)
+    port = Port(bus, REAL, kernel_errors=True)
     bus.coming += [error_frame(0x004, '0008'), error_frame(0x004, '0020'), error_frame(0x020),
                    error_frame(0x002), error_frame(0x004, '0040')]
     states = []
@@ -155,7 +157,7 @@ def test_error_frames_change_the_state(bus: FakeBus) -> None:
 
 
 def test_bus_off_is_a_lost_bus(bus: FakeBus) -> None:
-    port = Port(bus, kernel_errors=True)
+    port = Port(bus, REAL, kernel_errors=True)
     bus.coming.append(error_frame(0x040))
     with pytest.raises(BusUnavailable, match='^bus-off; check cable, shield, termination and'):
         port.receive(0.0)
@@ -164,7 +166,7 @@ def test_bus_off_is_a_lost_bus(bus: FakeBus) -> None:
 
 def test_error_frames_of_other_adapters_are_counted_only(bus: FakeBus) -> None:
     # 040h would be bus-off with SocketCAN; elsewhere it is anything
-    port = Port(bus)
+    port = Port(bus, REAL)
     bus.coming.append(error_frame(0x040))
     assert port.receive(0.0) is None
     assert (port.error_frames, port.controller, port.bus_off_count) == (1, '', 0)
@@ -178,7 +180,7 @@ def test_error_frames_of_other_adapters_are_counted_only(bus: FakeBus) -> None:
     can.CanTimeoutError('no room'),
 ], ids=['python-can', 'socket', 'time-out'])
 def test_full_queue_is_no_lost_bus(bus: FakeBus, failure: Exception) -> None:
-    port = Port(bus)
+    port = Port(bus, REAL)
     bus.failure = failure
     with pytest.raises(TransportError) as caught:
         port.send(FRAME, 0.01)
@@ -190,7 +192,7 @@ def test_full_queue_is_no_lost_bus(bus: FakeBus, failure: Exception) -> None:
     OSError(errno.ENXIO, 'No such device or address'), RuntimeError('anything'),
 ], ids=['python-can', 'socket', 'anything'])
 def test_anything_else_is(bus: FakeBus, failure: Exception) -> None:
-    port = Port(bus)
+    port = Port(bus, REAL)
     bus.failure = failure
     with pytest.raises(BusUnavailable, match='^send: '):
         port.send(FRAME, 0.01)
@@ -213,7 +215,7 @@ class FakeSocket:
 
 
 def test_socket_without_room_gets_nothing(bus: FakeBus) -> None:
-    port = Port(bus)
+    port = Port(bus, REAL)
     assert port.has_room is None
     port._socket = socket = FakeSocket()  # type: ignore[assignment]
     assert port.has_room
@@ -294,7 +296,7 @@ def test_opening_an_adapter_that_takes_nothing_does_not_hang(
     try:
         terminal.fill()
         with pytest.raises(BusUnavailable, match='the adapter takes no more data'):
-            open_port(slcan(terminal.path))
+            open_port(slcan(terminal.path), REAL)
     finally:
         terminal.close()
 
@@ -303,7 +305,7 @@ def test_what_an_earlier_client_left_is_thrown_away() -> None:
     terminal = FullTerminal()
     try:
         terminal.fill()
-        port = open_port(slcan(terminal.path), [Route(0x103FFFF0, 0x1FFFFFFF, True)])
+        port = open_port(slcan(terminal.path), REAL, [Route(0x103FFFF0, 0x1FFFFFFF, True)])
         os.set_blocking(terminal.master, False)
         text = b''
         deadline = time.monotonic() + 10.0
@@ -327,7 +329,7 @@ class Adapter:
     def __init__(self) -> None:
         self.terminal = FullTerminal()
         os.set_blocking(self.terminal.master, False)
-        self.port = open_port(slcan(self.terminal.path))
+        self.port = open_port(slcan(self.terminal.path), REAL)
         while b'O' not in self.lines():
             pass
 
@@ -404,11 +406,11 @@ def test_adapter_that_refuses_some_is_not_lost(adapter: Adapter) -> None:
 
 def test_absent_adapter(tmp_path: Path) -> None:
     with pytest.raises(BusUnavailable, match='No such file or directory'):
-        open_port(slcan(str(tmp_path / 'nothing')))
+        open_port(slcan(str(tmp_path / 'nothing')), REAL)
 
 
 def test_what_is_no_data_frame_is_counted(bus: FakeBus) -> None:
-    port = Port(bus)
+    port = Port(bus, REAL)
     bus.coming += [can.Message(arbitration_id=0x003FFFF0, is_remote_frame=True, dlc=8),
                    can.Message(arbitration_id=0x003FFFF0, is_fd=True, data=bytes(8))]
     assert [port.receive(0.0), port.receive(0.0)] == [None, None]
@@ -417,7 +419,7 @@ def test_what_is_no_data_frame_is_counted(bus: FakeBus) -> None:
 
 
 def test_only_malformed_frames_in_a_row_lose_the_bus(bus: FakeBus) -> None:
-    port = Port(bus)
+    port = Port(bus, REAL)
     bad = can.Message(arbitration_id=0x800, is_extended_id=False)
     good = can.Message(arbitration_id=0x003FFFF0, data=bytes(8))
     few = [bad] * (port_module._MALFORMED_MAX - 1)

@@ -10,27 +10,15 @@ import pytest
 
 PACKAGE = Path(__file__).resolve().parents[2] / 'drive_can_bridge'
 
-#: Who may look at the system clock, and how often: for stamps and for what people read.
+#: Who may look at the system clock, or write down a day, and how often.
 ALLOWED = {
-    # the age of a frame, believed below a tenth of a second only
-    'transport/port.py': 1,
-    # how old a command is, where the middleware does not say when it came
-    'ros/command_topic.py': 1,
-    # stamps of messages
-    'ros/stamps.py': 1,
-    # entries of traces: when frames came, and until when all of them have
-    'trace/flight.py': 3,
-    'transport/tap.py': 4,
-    # no look at the clock: a day and a time in a trace, as text
+    # everybody else asks this one
+    'clock.py': 1,
+    # no look at the clock: a day and a time as text
     'trace/candump.py': 1,
-    # times shown to people
+    'trace/flight.py': 2,
     'cli/backup.py': 1,
-    'cli/read.py': 1,
-    'panel/feed.py': 2,
     'panel/log_page.py': 2,
-    'cli/monitor.py': 2,
-    'cli/simulate.py': 2,
-    'view/live.py': 1,
     'view/parts.py': 2,
 }
 SYSTEM_CLOCK = {'time', 'time_ns', 'localtime', 'gmtime', 'strftime', 'ctime', 'asctime',
@@ -59,8 +47,8 @@ def test_who_looks_at_the_system_clock() -> None:
 
 OFFSET = """
 import time
-from drive_can_bridge.transport.clock import steady_now
-print(steady_now() - time.monotonic())
+from drive_can_bridge.clock import SteadyClock
+print(SteadyClock().now() - time.monotonic())
 """
 
 
@@ -77,3 +65,22 @@ def test_suspend_counts() -> None:
     plain = subprocess.run([sys.executable, '-c', OFFSET], capture_output=True, text=True,
                            check=True, timeout=60)
     assert float(done.stdout) - float(plain.stdout) == pytest.approx(5000.0, abs=1.0)
+
+
+#: who may wait by himself, or ask for a time that nobody injects: processes, descriptors, signals
+OWN_WAYS = {'clock.py', 'process/locks.py', 'process/scheduling.py', 'process/signals.py',
+            'process/standard_outputs.py', 'process/taking.py', 'ros/demo/commander.py',
+            'view/screen.py'}
+WAYS = {'monotonic', 'monotonic_ns', 'perf_counter', 'sleep', 'thread_time', 'process_time',
+        'clock_gettime', 'Thread', 'Event', 'Condition', 'Timer', 'Semaphore', 'SimpleQueue',
+        'Queue'}
+
+
+def test_everybody_else_is_handed_a_clock() -> None:
+    found = set()
+    for path in PACKAGE.rglob('*.py'):
+        for node in ast.walk(ast.parse(path.read_text(encoding='utf-8'))):
+            if isinstance(node, ast.Attribute) and node.attr in WAYS and isinstance(
+                    node.value, ast.Name) and node.value.id in ('time', 'threading', 'queue'):
+                found.add(path.relative_to(PACKAGE).as_posix())
+    assert found == OWN_WAYS

@@ -4,12 +4,13 @@
 from collections.abc import Callable
 import queue
 import time
-from types import SimpleNamespace
 
 import can
+from clocks import REAL
 import pytest
 from waiting import wait_for
 
+from drive_can_bridge.clock import Mailbox, SteadyClock
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusUnavailable
 from drive_can_bridge.core.record import Record
@@ -20,15 +21,16 @@ from drive_can_bridge.transport.tap import Tap
 @pytest.mark.parametrize(('late', 'believed'), [(0.0, True), (2.5, True), (3600.0, False)])
 def test_a_stamp_is_believed_although_it_was_read_late(
         late: float, believed: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, 'time', SimpleNamespace(time=lambda: time.time() + late))
-    records: queue.Queue[Record] = queue.Queue()
+    clock = SteadyClock()
+    monkeypatch.setattr(clock, 'stamp', lambda: time.time_ns() + round(1e9 * late))
+    records: Mailbox[Record] = Mailbox(REAL)
     channel = f'tap {late}'
-    tap = Tap(BusConfiguration('main', 'virtual', channel), 'main', records, print)
+    tap = Tap(BusConfiguration('main', 'virtual', channel), 'main', records, print, clock)
     try:
         with can.Bus(channel, interface='virtual') as bus:
             sent_at = time.time()
             bus.send(can.Message(arbitration_id=0x123, is_extended_id=False, data=b'\x01'))
-            record = records.get(timeout=10.0)
+            record = records.get(REAL.now() + 30.0)
     finally:
         tap.close()
     assert (abs(record.time - sent_at) < 0.5 * late + 0.5) is believed
@@ -57,10 +59,10 @@ class HeldPort:
 def test_until_when_everything_was_heard(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nobody may call an answer missing that waits in the socket of a busy machine."""
     port = HeldPort()
-    monkeypatch.setattr(module, 'open_port', lambda bus: port)
-    records: queue.Queue[Record] = queue.Queue()
+    monkeypatch.setattr(module, 'open_port', lambda bus, clock: port)
+    records: Mailbox[Record] = Mailbox(REAL)
     tap = Tap(BusConfiguration('main', 'virtual', 'held', reconnect_period=0.01), 'main', records,
-              lambda text: None)
+              lambda text: None, REAL)
     try:
         port.steps.put(None)
         wait_for(port.steps.empty, 'the tap')
@@ -69,7 +71,7 @@ def test_until_when_everything_was_heard(monkeypatch: pytest.MonkeyPatch) -> Non
         for message in (can.Message(arbitration_id=0x123, data=b'\x01'),
                         can.Message(is_error_frame=True, dlc=8, data=bytes(8))):
             port.steps.put([message])
-            records.get(timeout=10.0)
+            records.get(REAL.now() + 30.0)
         assert tap.heard_until <= held
         port.steps.put(None)
         port.steps.put(None)

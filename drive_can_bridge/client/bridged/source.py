@@ -10,6 +10,7 @@ from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters
 from drive_can_bridge.client.bridged.descriptors import parameter_of, role_of
 from drive_can_bridge.client.bridged.drive import BridgedDrive
 from drive_can_bridge.client.drive import DriveFacts, Drives
+from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.errors import NoBridge
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.profile import RestoreStep, RestoreTable
@@ -33,8 +34,8 @@ class BridgeSource:
     :raises NoBridge: there is none, or it does not answer.
     """
 
-    def __init__(self, namespace: str | None) -> None:
-        self._graph = Graph()
+    def __init__(self, namespace: str | None, clock: Clock) -> None:
+        self._graph = Graph(clock)
         try:
             found = find_bridge(
                 self._graph,

@@ -8,12 +8,12 @@ comes through.
 
 from collections.abc import Callable
 import math
-import time
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.qos import QoSProfile
 
+from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.ros.client.calls import NodeCalls
 from drive_can_bridge.ros.client.guest import Guest
@@ -36,7 +36,8 @@ class Graph:
     :raises DriveCanError: ROS does not start.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
         self.guest = Guest('client')
         self._calls: dict[float, NodeCalls] = {}
         self._heard: set[str] = set()
@@ -53,14 +54,15 @@ class Graph:
 
         :param done: is asked again and again with the time, and may look at what has arrived.
         """
-        deadline = time.monotonic() + timeout
+        deadline = self._clock.now() + timeout
         while True:
-            now = time.monotonic()
+            now = self._clock.now()
             if done(now):
                 return True
             if now >= deadline:
                 return False
-            time.sleep(min(LOOK_PERIOD, deadline - now))
+            now = self._clock.now()     # looking took its time
+            self._clock.wait(min(now + LOOK_PERIOD, deadline))
 
     def call(self, node: str, service: str, request: Any, timeout: float = _CALL_TIMEOUT) -> Any:
         """
@@ -73,7 +75,7 @@ class Graph:
         if timeout not in self._calls:
             self._calls[timeout] = NodeCalls(self.guest, timeout)
         calls, answers = self._calls[timeout], list[Any]()
-        calls.ask(node, service, request, answers.append, time.monotonic())
+        calls.ask(node, service, request, answers.append, self._clock.now())
 
         def look(now: float) -> bool:
             calls.look(now)
@@ -108,7 +110,7 @@ class Graph:
 
     def _take_statuses(self, message: DiagnosticArray) -> None:
         for status in message.status:
-            self._statuses[status.name] = time.monotonic(), {
+            self._statuses[status.name] = self._clock.now(), {
                 pair.key: pair.value for pair in status.values}
 
     def _check(self) -> None:

@@ -10,6 +10,7 @@ from builders import drive, frame, read
 from cannord_session_builders import (
     ACTUAL, CURRENT, FREQUENCY, inverter, OFFSET, PARAMETERS, SETPOINTS, VALUES,
 )
+from clocks import HandClock
 import pytest
 
 from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration
@@ -860,7 +861,7 @@ def test_silent_member_is_offline_by_its_own_timer() -> None:
     exchange = BusExchange(
         BusConfiguration('main', 'virtual', 'x'), sessions,
         [[claim.route for claim in FAMILIES['cannord'].claims(entry)] for entry in drives],
-        Ears(), clock=lambda: now)  # type: ignore[arg-type]
+        Ears(), HandClock(lambda: now))  # type: ignore[arg-type]
     cable = exchange.link = Cable()  # type: ignore[assignment]
     for session, each in zip(sessions, ears):
         exchange.attach(session, each)  # type: ignore[arg-type]

@@ -1,0 +1,219 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The one place that asks for the time, waits, and begins threads.
+
+Everybody else is handed a :class:`Clock`, and made with it. The executables make a
+:class:`SteadyClock`; a test has one that jumps from one time that somebody waits for to the next,
+and runs one thread at a time.
+"""
+
+from collections import deque
+from collections.abc import Callable
+from functools import partial
+import math
+import threading
+import time
+from typing import Generic, Protocol, TypeVar
+
+#: CLOCK_MONOTONIC stands still while the machine is suspended; the drives do not
+_CLOCK = getattr(time, 'CLOCK_BOOTTIME', time.CLOCK_MONOTONIC)
+
+Item = TypeVar('Item')
+
+
+class Alarm(Protocol):
+    """Wakes one sleeper. A ring while nobody sleeps is kept for the next; several count once."""
+
+    def wait(self, until: float = math.inf) -> bool:
+        """Sleep until then, or until somebody rings; tell whether somebody did."""
+
+    def ring(self) -> None:
+        """Wake the sleeper, or the next one at once. From any thread."""
+
+
+class Worker(Protocol):
+    """A thread of this program."""
+
+    def start(self) -> None:
+        """Begin."""
+
+    def is_alive(self) -> bool:
+        """Tell whether it has begun, and not ended."""
+
+    def join(self, timeout: float = math.inf) -> None:
+        """Wait until it has ended, for so many s; not at all if it is this one, or never began."""
+
+
+class Lock(Protocol):
+    """Of one thread at a time, which may take it again. For what waits while it has it."""
+
+    def acquire(self, timeout: float = math.inf) -> bool:
+        """Take it; False: not in so many s."""
+
+    def release(self) -> None:
+        """Give it back, as often as it was taken."""
+
+    def __enter__(self) -> object: ...
+
+    def __exit__(self, *_: object) -> None: ...
+
+
+class Clock(Protocol):
+    """The time, and everything that waits for it."""
+
+    @property
+    def now(self) -> Callable[[], float]:
+        """The steady time in s, which nobody can set, and for which suspend counts."""
+
+    def stamp(self) -> int:
+        """Return the time of the day, in ns since 1970: for stamps, and for what people read."""
+
+    def used(self) -> float:
+        """Return the s of a processor that this thread has used."""
+
+    def alarm(self) -> Alarm:
+        """Return what a thread waits by, for a time or for somebody."""
+
+    def lock(self) -> Lock:
+        """Return what keeps others out, even while one waits."""
+
+    def worker(self, run: Callable[[], object], name: str) -> Worker:
+        """Return a thread that can be started; the process does not wait for it."""
+
+    def wait(self, until: float) -> None:
+        """Sleep until then."""
+
+
+class Bell:
+    """
+    An alarm for half of what ``threading.Event`` costs.
+
+    That makes a new lock for every wait and takes three of them; that is more CPU time than the
+    exchange needs to send a frame. Here it is one lock, which is free while the alarm rings.
+    """
+
+    def __init__(self, now: Callable[[], float]) -> None:
+        self._now = now
+        self._silence = threading.Lock()
+        self._silence.acquire()
+
+    def wait(self, until: float = math.inf) -> bool:
+        """Sleep until then, or until somebody rings; tell whether somebody did."""
+        timeout = until - self._now()
+        if timeout > threading.TIMEOUT_MAX:
+            return self._silence.acquire()
+        return self._silence.acquire(timeout=timeout if timeout > 0.0 else 0.0)
+
+    def ring(self) -> None:
+        """Wake the sleeper, or the next one at once. From any thread."""
+        try:
+            self._silence.release()
+        except RuntimeError:  # it rings already
+            pass
+
+
+class SystemThread(threading.Thread):
+    """A thread that may be joined whatever became of it."""
+
+    def join(self, timeout: float | None = None) -> None:
+        """Wait for its end."""
+        if self.is_alive() and self is not threading.current_thread():
+            super().join(None if timeout == math.inf else timeout)
+
+
+class SystemLock:
+    """A re-entrant lock."""
+
+    def __init__(self) -> None:
+        self._lock = threading.RLock()
+
+    def acquire(self, timeout: float = math.inf) -> bool:
+        """Take it; False: not in so many s."""
+        return self._lock.acquire(timeout=-1 if timeout == math.inf else timeout)
+
+    def release(self) -> None:
+        """Give it back."""
+        self._lock.release()
+
+    def __enter__(self) -> 'SystemLock':
+        self._lock.acquire()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._lock.release()
+
+
+class SteadyClock:
+    """
+    The clock of this machine, and its threads.
+
+    :ivar now: read several times for each frame, hence no function of ours around it.
+    """
+
+    def __init__(self) -> None:
+        self.now: Callable[[], float] = partial(time.clock_gettime, _CLOCK)
+
+    def stamp(self) -> int:
+        """Return the time of the day, in ns since 1970."""
+        return time.time_ns()
+
+    def used(self) -> float:
+        """Return the s of a processor that this thread has used."""
+        return time.thread_time()
+
+    def alarm(self) -> Bell:
+        """Return what a thread waits by."""
+        return Bell(self.now)
+
+    def lock(self) -> SystemLock:
+        """Return what keeps others out."""
+        return SystemLock()
+
+    def worker(self, run: Callable[[], object], name: str) -> SystemThread:
+        """Return a thread that can be started."""
+        return SystemThread(target=run, name=name, daemon=True)
+
+    def wait(self, until: float) -> None:
+        """Sleep until then."""
+        time.sleep(max(0.0, until - self.now()))
+
+
+class Mailbox(Generic[Item]):
+    """
+    What one thread gets and any thread puts, in order.
+
+    :param limit: so many may wait.
+    """
+
+    def __init__(self, clock: Clock, limit: float = math.inf) -> None:
+        self._now = clock.now
+        self._items: deque[Item] = deque()
+        self._limit = limit
+        self._alarm = clock.alarm()
+
+    def put(self, item: Item, *, always: bool = False) -> bool:
+        """
+        Put something, without waiting; False: too much waits already.
+
+        :param always: however much waits.
+        """
+        if len(self._items) >= self._limit and not always:
+            return False
+        self._items.append(item)
+        self._alarm.ring()
+        return True
+
+    def get(self, until: float = math.inf) -> Item:
+        """
+        Wait for what comes next, and return it.
+
+        :raises TimeoutError: nothing came until then.
+        """
+        while not self._items:
+            if not self._alarm.wait(until) and not self._items:
+                raise TimeoutError
+        return self._items.popleft()
+
+    def __len__(self) -> int:
+        """Return how many wait."""
+        return len(self._items)

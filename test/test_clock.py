@@ -1,0 +1,112 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""The clock of this machine: its alarms, threads, locks and mailboxes."""
+
+import threading
+
+import pytest
+
+from drive_can_bridge.clock import Mailbox, SteadyClock
+
+CLOCK = SteadyClock()
+
+
+def test_ring_before_the_sleep_is_kept() -> None:
+    alarm = CLOCK.alarm()
+    alarm.ring()
+    assert alarm.wait(CLOCK.now() + 3600.0), 'somebody rang'
+    assert not alarm.wait(0.0)
+
+
+def test_several_rings_count_once() -> None:
+    alarm = CLOCK.alarm()
+    for _ in range(3):
+        alarm.ring()
+    assert alarm.wait(CLOCK.now() + 3600.0)
+    assert not alarm.wait(0.0), 'nothing is left: this one ends by its time'
+
+
+def test_sleep_ends_by_itself_even_when_its_time_is_over() -> None:
+    alarm = CLOCK.alarm()
+    assert not alarm.wait(-1.0)
+    assert not alarm.wait(CLOCK.now() + 0.001)
+    assert not alarm.wait(0.0)
+
+
+def test_ring_wakes_the_sleeper() -> None:
+    alarm = CLOCK.alarm()
+    sleeper = CLOCK.worker(lambda: alarm.wait(), 'sleeper')
+    sleeper.start()
+    alarm.ring()
+    sleeper.join(30.0)
+    assert not sleeper.is_alive()
+
+
+def test_rings_of_many_threads() -> None:
+    alarm = CLOCK.alarm()
+    threads = [threading.Thread(target=lambda: [alarm.ring() for _ in range(2000)])
+               for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    while any(thread.is_alive() for thread in threads):
+        alarm.wait(CLOCK.now() + 0.001)
+    for thread in threads:
+        thread.join()
+    alarm.wait(0.0)
+    alarm.ring()
+    assert alarm.wait(0.0)
+
+
+def test_a_thread_may_be_joined_whatever_became_of_it() -> None:
+    done: list[str] = []
+
+    def run() -> None:
+        worker.join(3600.0)     # itself
+        done.append('ran')
+    worker = CLOCK.worker(run, 'worker')
+    worker.join()               # has not begun
+    assert not worker.is_alive()
+    worker.start()
+    worker.join()
+    worker.join()               # has ended
+    assert done == ['ran'] and not worker.is_alive()
+
+
+def test_a_lock_is_taken_again_by_its_own_thread_only() -> None:
+    lock = CLOCK.lock()
+    found: list[bool] = []
+    with lock:
+        assert lock.acquire(0.0)
+        lock.release()
+        other = CLOCK.worker(lambda: found.append(lock.acquire(0.001)), 'other')
+        other.start()
+        other.join()
+    assert found == [False]
+    assert lock.acquire()
+    lock.release()
+
+
+def test_mailbox() -> None:
+    box: Mailbox[int] = Mailbox(CLOCK, 2)
+    assert [box.put(each) for each in (1, 2, 3)] == [True, True, False]
+    box.put(4, always=True)
+    assert len(box) == 3
+    assert [box.get(), box.get(0.0), box.get()] == [1, 2, 4]
+    with pytest.raises(TimeoutError):
+        box.get(CLOCK.now() + 0.001)
+
+
+def test_a_mailbox_wakes_who_waits() -> None:
+    box: Mailbox[int] = Mailbox(CLOCK)
+    found: list[int] = []
+    worker = CLOCK.worker(lambda: found.append(box.get()), 'worker')
+    worker.start()
+    box.put(5)
+    worker.join(30.0)
+    assert found == [5]
+
+
+def test_waiting_for_a_time_that_is_over() -> None:
+    before = CLOCK.now()
+    CLOCK.wait(before - 1.0)
+    CLOCK.wait(before + 0.001)
+    assert CLOCK.now() >= before + 0.001
