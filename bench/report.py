@@ -160,6 +160,17 @@ def stop_figures(found: dict[str, Any]) -> list[Figure]:
     return figures
 
 
+def hand_figures(found: dict[str, Any]) -> list[Figure]:
+    """Commands that a person types, beside clients that call one service."""
+    names = {'stop': '`drive_can stop`, Enter to the first stop frame',
+             'stop done': '`drive_can stop`, Enter to its end',
+             'read': '`drive_can read` of one value', 'write': '`drive_can write` of one value'}
+    return [Figure(text, f'{median(found[name]["ours"]):.2f} s',
+                   f'bare client {median(found[name]["bare"]):.2f} s',
+                   median(found[name]['ours']) / median(found[name]['bare']), 1.3)
+            for name, text in names.items()]
+
+
 def backup_figures(found: dict[str, Any]) -> list[Figure]:
     """How long a backup takes, and what a bridge misses while one is made through it."""
     runs = sorted(found['backups'], key=lambda each: each['elapsed'] / each['spent'])
@@ -278,7 +289,7 @@ FIGURES: dict[str, Callable[[Any], list[Figure]]] = {
     'ordinary': lambda found: exchange_figures(found, 'all of it at ordinary priority', 1.5),
     'diy': diy_figures, 'sweep': sweep_figures, 'buses': buses_figures,
     'latency': latency_figures, 'service': service_figures,
-    'flood': flood_figures, 'stop': stop_figures, 'monitor': monitor_figures,
+    'flood': flood_figures, 'stop': stop_figures, 'hand': hand_figures, 'monitor': monitor_figures,
     'alone': alone_figures, 'panel': panel_figures, 'backup': backup_figures,
     'drives': drives_figures, 'decode': decode_figures,
     'flight': flight_figures, 'joints': joints_figures, 'start': start_figures,

@@ -35,6 +35,7 @@ class Pace:
 
     calls: int = 300
     stops: int = 200
+    commands: int = 9
     rounds: int = 40
     turns: int = 4
     backups: int = 5
@@ -42,7 +43,7 @@ class Pace:
 
 
 #: each scenario for a second or two, to see that it runs
-SMOKE = Pace(calls=5, stops=4, rounds=2, turns=1, backups=1, sweep=(1, 2))
+SMOKE = Pace(calls=5, stops=4, commands=1, rounds=2, turns=1, backups=1, sweep=(1, 2))
 
 
 def plan(options: argparse.Namespace) -> dict[str, Callable[[], Any]]:
@@ -68,6 +69,8 @@ def plan(options: argparse.Namespace) -> dict[str, Callable[[], Any]]:
             Load(drives, period, subscribed=False, commands=20.0), duration),
         'stop': lambda: scenarios.stop(
             Load(8, 0.01, subscribed=False, control=True, stuck=True), pace.stops, 10000.0, 64),
+        'hand': lambda: scenarios.by_hand(
+            Load(8, 0.01, subscribed=False, control=True), pace.commands),
         'backup': lambda: scenarios.backup(
             Load(8, 0.01, subscribed=False, settings=119), pace.backups),
         'drives': lambda: {number: scenarios.exchange(

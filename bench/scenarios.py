@@ -8,6 +8,7 @@ All return plain numbers: times in s, CPU time in s, memory in MB; lists are sam
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager, ExitStack, nullcontext
 from dataclasses import dataclass, replace
+import math
 import os
 from pathlib import Path
 import statistics
@@ -393,6 +394,35 @@ def stop(load: Load, calls: int, commands: float, under_way: int) -> dict[str, A
                                       default=float('inf')) for called in answer['called']],
                     'failures': answer['failures'], 'sleeper': sleeper.ask('errors')}
             found['calls'] = caller.ask('calm')
+    return found
+
+
+def by_hand(load: Load, rounds: int) -> dict[str, Any]:
+    """Measure commands that a person types, from Enter, beside a client that calls one service."""
+    ours, bare = [sys.executable, '-m', 'drive_can_bridge.cli.start'], [
+        sys.executable, str(HERE / 'bare_client.py')]
+    found: dict[str, Any] = {name: {'ours': [], 'bare': []} for name in (
+        'stop', 'stop done', 'read', 'write')}
+    with ExitStack() as stack:
+        bus = Bus(stack, load)
+        with bridge_under(load, bus), child('stopper.py') as stopper:
+            for number in range(rounds):
+                value = str(1.0 + number / 100)
+                for who, words in (('ours', [
+                        [*ours, 'stop'], [*ours, 'read', 'drive0', 'ramp_time'],
+                        [*ours, 'write', 'drive0', f'ramp_time={value}']]),
+                        ('bare', [[*bare, 'stop'], [*bare, 'read'], [*bare, 'write', value]])):
+                    if not stopper.ask('enable'):
+                        raise SystemExit('the drive was not enabled')
+                    bus.drives.ask('clear')
+                    for name, command in zip(('stop', 'read', 'write'), words):
+                        begun = time.monotonic()
+                        subprocess.run(command, stdout=subprocess.DEVNULL, check=False)
+                        elapsed = time.monotonic() - begun
+                        if name == 'stop':
+                            found['stop done'][who].append(elapsed)
+                            elapsed = min(bus.drives.ask('stops'), default=math.inf) - begun
+                        found[name][who].append(elapsed)
     return found
 
 

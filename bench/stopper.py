@@ -3,7 +3,7 @@
 A process that stops a drive again and again.
 
 ``stop N`` enables the first drive and calls ``~/quick_stop``, every other time ``~/enable`` false,
-N times in all, and returns when each call was made.
+N times in all, and returns when each call was made. ``enable`` enables it.
 """
 
 import random
@@ -52,6 +52,13 @@ class Stopper:
                 failures.append('no answer' if answer is None else answer.message)
         return {'called': called, 'failures': failures}
 
+    def enable(self) -> bool:
+        """Enable the first drive; return whether it is."""
+        if not self._enable.wait_for_service(DISCOVERY_TIMEOUT):
+            raise SystemExit('no service')
+        answer = self._call(self._enable, SetBool.Request(data=True))
+        return answer is not None and answer.success
+
     @staticmethod
     def _call(client: Any, request: Any) -> Any:
         future = client.call_async(request)
@@ -68,7 +75,7 @@ def main() -> None:
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     threading.Thread(target=executor.spin, daemon=True).start()
-    serve({'stop': stopper.stop})
+    serve({'stop': stopper.stop, 'enable': stopper.enable})
 
 
 if __name__ == '__main__':

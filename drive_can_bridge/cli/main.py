@@ -33,6 +33,10 @@ SUBCOMMANDS = {
     'demo': 'run a bridge, simulated drives and the live view of them',
     'monitor': 'show all bridges and their drives, live',
     'panel': 'show all bridges and their drives in a browser',
+    'stop': 'stop drives; without a name all drives of every bridge, at once',
+    'enable': 'enable drives',
+    'disable': 'disable drives',
+    'reset': 'reset the faults of drives',
     'security': 'write who may talk to a bridge',
     'profile': 'list, show, check and import parameter tables',
     'scan': 'find the drives on a bus',
@@ -45,6 +49,8 @@ SUBCOMMANDS = {
     'record': 'write everything on the buses of a parameter file to a trace',
     'decode': 'say what the frames of a trace, or of a bus, mean',
 }
+#: the module of a subcommand, where it is not called so itself
+MODULES = dict.fromkeys(('stop', 'enable', 'disable', 'reset'), 'control')
 #: what runs until a signal comes: that is no failure
 ENDLESS = ('simulate', 'demo', 'record', 'monitor', 'panel')
 #: options that make a subcommand one of these
@@ -140,7 +146,7 @@ def understood(arguments: list[str]) -> tuple[Any, argparse.Namespace]:
                for name, help_line in SUBCOMMANDS.items()}
     module: Any = None
     if wanted in parsers:
-        module = importlib.import_module(f'{__package__}.{wanted}')
+        module = importlib.import_module(f'{__package__}.{MODULES.get(wanted, wanted)}')
         module.define(parsers[wanted])
     complete(parser)
     args, rest = parser.parse_known_args(arguments)

@@ -22,8 +22,8 @@ import socket
 import time
 
 #: all names begin with this
-_PREFIX = 'drive_can_bridge'
-_SOCKETS = Path('/proc/net/unix')
+PREFIX = 'drive_can_bridge'
+SOCKETS = Path('/proc/net/unix')
 #: characters of a holder's name that have room in that of a socket
 _WHO_MAX = 40
 #: s until whoever has just taken a lock has also said who it is
@@ -73,7 +73,7 @@ class HostLock:
     def _bind(self, name: str) -> None:
         made = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         self._sockets.append(made)
-        made.bind(f'\0{_PREFIX}/{name}')
+        made.bind(f'\0{PREFIX}/{name}')
 
     def release(self) -> None:
         """Let others have it. Idempotent."""
@@ -112,10 +112,10 @@ def holder(key: str) -> Held | None:
 def _holder(digest: str) -> Held:
     """Find out who has a lock."""
     deadline = time.monotonic() + _PATIENCE
-    wanted = re.compile(rf'@{_PREFIX}/who/{digest}/(\d+)/(\w*)$', re.MULTILINE)
+    wanted = re.compile(rf'@{PREFIX}/who/{digest}/(\d+)/(\w*)$', re.MULTILINE)
     while True:
         try:
-            found = wanted.search(_SOCKETS.read_text(encoding='utf-8', errors='replace'))
+            found = wanted.search(SOCKETS.read_text(encoding='utf-8', errors='replace'))
         except OSError:
             found = None
         if found is not None:

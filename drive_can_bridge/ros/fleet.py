@@ -16,8 +16,9 @@ from drive_can_bridge.core.configuration import (
 from drive_can_bridge.core.errors import ConfigurationError
 from drive_can_bridge.core.words import counted
 from drive_can_bridge.exchange.exchange import BusExchange
-from drive_can_bridge.exchange.one_master import BRIDGE, InUse, Ownership
+from drive_can_bridge.exchange.one_master import InUse, Ownership
 from drive_can_bridge.exchange.stop import stop_all
+from drive_can_bridge.process.presence import BRIDGE, Presence
 from drive_can_bridge.process.scheduling import raise_priority
 from drive_can_bridge.protocols.families import FAMILIES, make_sessions
 from drive_can_bridge.ros.diagnostics import Diagnostics
@@ -72,6 +73,8 @@ class Fleet:
         with ExitStack() as closing:    # the last first
             closing.callback(self.exchanges.clear)
             closing.callback(self._own().release)
+            closing.callback(Presence(node.context.get_domain_id(),
+                                      node.get_fully_qualified_name()).withdraw)
             closing.callback(dismiss, self.drives.values())
             self._flight = FlightWatch(node, log, list(configuration.buses.values()), spinner,
                                        clock)

@@ -9,7 +9,8 @@ from builders import drive
 import pytest
 
 from drive_can_bridge.core.configuration import BusConfiguration
-from drive_can_bridge.exchange.one_master import BRIDGE, InUse, Ownership
+from drive_can_bridge.exchange.one_master import InUse, Ownership
+from drive_can_bridge.process.presence import BRIDGE
 
 ADVICE = 'leave --params-file away to go through it'
 CAN = BusConfiguration('main', 'socketcan', f'nowhere{os.getpid()}')

@@ -1,23 +1,20 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The way to drives through a running bridge: the same answers as directly."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from bridges import Bridge, CONVEYOR, HASTY, LIFT, parameters, StartBridge
 from clients import Client, wait_until
 from clocks import REAL
+from graph_builders import answer, hang, offer
 from lifecycle_msgs.srv import ChangeState
 import pytest
-from rcl_interfaces.msg import ParameterType, ParameterValue
-from rcl_interfaces.srv import (
-    GetParameters, GetParameterTypes, ListParameters, SetParameters,
-)
+from rcl_interfaces.srv import GetParameterTypes, ListParameters, SetParameters
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.qos import qos_profile_parameters
 from rclpy.task import Future
-from std_srvs.srv import Trigger
 
 from drive_can_bridge.client import find_source, open_drives
 from drive_can_bridge.client.drive import Drive, Enabled
@@ -145,36 +142,6 @@ def test_several_bridges_and_none(bridge: StartBridge, tmp_path: Path) -> None:
     with open_drives(namespace='b') as drives:
         assert list(drives) == ['conveyor']
         assert drives['conveyor'].facts.through == '/b/other'
-
-
-def offer(client: Client, name: str, service: str, kind: Any, answer: Any = None) -> None:
-    """Offer a service of somebody who may be a bridge."""
-    client.node.create_service(kind, f'{name}/{service}', answer or (lambda _, response: response),
-                               qos_profile=qos_profile_parameters)
-
-
-def hang(client: Client, name: str) -> None:
-    """Be a bridge that is in the graph, and answers nothing."""
-    offer(client, name, 'change_state', ChangeState)
-    offer(client, name, 'save_trace', Trigger)
-
-
-def answer(client: Client, name: str, others: Sequence[str] = (), drives: str = 'conveyor',
-           greet: Any = None) -> Callable[[], None]:
-    """Answer as a bridge does; return what begins to tell of its drives."""
-    def tell_drives(_: Any, response: Any) -> Any:
-        response.result.names = [f'drives.{each}.profile_sha256' for each in drives.split()]
-        return response
-
-    def tell_others(request: Any, response: Any) -> Any:
-        assert list(request.names) == ['bridges']
-        response.values = [ParameterValue(type=ParameterType.PARAMETER_STRING_ARRAY,
-                                          string_array_value=sorted([name, *others]))]
-        return response
-    hang(client, name)
-    offer(client, name, 'get_parameter_types', GetParameterTypes, greet)
-    offer(client, name, 'get_parameters', GetParameters, tell_others)
-    return lambda: offer(client, name, 'list_parameters', ListParameters, tell_drives)
 
 
 def test_services_that_are_found_one_by_one(client: Client) -> None:

@@ -105,6 +105,11 @@ class Service:
         """Somebody waits for an answer."""
         return bool(self._waiting or self._unsent)
 
+    @property
+    def unsent(self) -> bool:
+        """Something waits until somebody offers it."""
+        return bool(self._unsent)
+
     def send(self, request: Any, done: Done, now: float,
              patience: float = OFFER_TIMEOUT) -> None:
         """

@@ -10,7 +10,6 @@ from collections.abc import Callable
 import math
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.qos import QoSProfile
 
 from drive_can_bridge.clock import Clock
@@ -33,16 +32,21 @@ class Graph:
     """
     This process in the ROS graph.
 
+    :param guest: what it is there; None: a new one.
     :raises DriveCanError: ROS does not start.
     """
 
-    def __init__(self, clock: Clock) -> None:
+    def __init__(self, clock: Clock, guest: Guest | None = None) -> None:
         self._clock = clock
-        self.guest = Guest('client')
+        self.guest = guest or Guest('client')
         self._calls: dict[float, NodeCalls] = {}
         self._heard: set[str] = set()
         self._diagnostics: Inbox | None = None
         self._statuses: dict[str, tuple[float, dict[str, str]]] = {}
+
+    def now(self) -> float:
+        """Return the time."""
+        return self._clock.now()
 
     def close(self) -> None:
         """Leave the graph. Idempotent."""
@@ -99,6 +103,7 @@ class Graph:
         """
         self._check()
         if self._diagnostics is None:
+            from diagnostic_msgs.msg import DiagnosticArray
             self._diagnostics = Inbox(self.guest, DiagnosticArray, '/diagnostics',
                                       QoSProfile(depth=50), self._take_statuses)
         inbox = self._diagnostics
@@ -108,7 +113,7 @@ class Graph:
             return name in self._statuses and now - self._statuses[name][0] <= age
         return self._statuses[name][1] if self.wait(look, age + patience) else {}
 
-    def _take_statuses(self, message: DiagnosticArray) -> None:
+    def _take_statuses(self, message: Any) -> None:
         for status in message.status:
             self._statuses[status.name] = self._clock.now(), {
                 pair.key: pair.value for pair in status.values}

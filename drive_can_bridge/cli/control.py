@@ -1,0 +1,147 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+``drive_can stop``, ``enable``, ``disable``, ``reset``: drives told by hand, through their bridges.
+
+``stop`` is what a hand types in a fright, so nothing is imported here that it can do without.
+"""
+
+from argparse import ArgumentParser, Namespace
+from collections.abc import Sequence
+from typing import Any
+
+from drive_can_bridge.cli.command import complain, FAILED, say, what_is_missing, WrongUsage
+from drive_can_bridge.core.errors import DriveCanError, WhichBridge
+from drive_can_bridge.process.presence import bridges, Present, short
+
+STOP = 'stop'
+_WORDS = {
+    STOP: ('[DRIVE]', '*', 'stop drives; without a name all drives of every bridge, at once',
+           'Calls ~/quick_stop of each drive, and asks nothing. Exit code 0: all have stopped. '
+           '1: the lines at the top say who may still be running.'),
+    'enable': ('DRIVE', '+', 'enable drives', 'Calls ~/enable. Nothing moves: setpoints stay '
+                                              'neutral until they are armed.'),
+    'disable': ('DRIVE', '+', 'disable drives', 'Calls ~/enable with false.'),
+    'reset': ('DRIVE', '+', 'reset the faults of drives', 'Calls ~/reset_fault.'),
+}
+#: in a pattern, not in a name
+_WILD = frozenset('*?[')
+
+
+def define(parser: ArgumentParser) -> None:
+    """Define the words and options of one of the subcommands."""
+    command = parser.prog.rpartition(' ')[2]
+    metavar, nargs, what, how = _WORDS[command]
+    patterns = command in (STOP, 'disable')
+    parser.allow_abbrev = False
+    parser.description = f'{what[0].upper()}{what[1:]}. {how}'
+    words = parser.add_argument('words', metavar=metavar, nargs=nargs, help=(
+        'a drive, by its name or its full name in the ROS graph (/cell/lift)'
+        + ('; patterns too' if patterns else '')))
+    words.completer = _complete     # type: ignore[attr-defined]  # for argcomplete
+    parser.add_argument('--namespace', metavar='NS', type=_namespace,
+                        help='only the bridge in this namespace')
+    parser.add_argument('--json', action='store_true', help='a JSON document a line')
+    parser.add_argument('--yes', action='store_true', help='accepted; nothing is asked')
+    parser.add_argument('-p', '--params-file', metavar='FILE', help='refused: these go through '
+                                                                    'the running bridge only')
+
+
+def _namespace(text: str) -> str:
+    from drive_can_bridge.cli.arguments import namespace
+    return namespace(text)
+
+
+def _complete(prefix: str, parsed_args: Namespace, **more: object) -> list[str]:
+    from drive_can_bridge.cli.completion import complete_drives
+    return complete_drives(prefix, parsed_args, **more)
+
+
+def run(args: Namespace) -> int:
+    """
+    Tell drives, and show their answers.
+
+    :return: 0 all did it, 1 not all.
+    :raises WrongUsage: what was typed cannot be obeyed.
+    :raises DriveCanError: no bridge, no ROS.
+    """
+    _check(args)
+    try:
+        from drive_can_bridge.ros.client.guest import Guest
+        guest = Guest('client')     # is being discovered while the rest is imported
+        from drive_can_bridge.ros.client import control
+        from drive_can_bridge.ros.client.graph import Graph
+    except ImportError as error:
+        raise DriveCanError(what_is_missing(f'drive_can {args.subcommand}', error)) from error
+    graph = Graph(args.clock, guest)
+    try:
+        if args.subcommand == STOP:
+            return _stop(args, graph)
+        try:
+            return _show(args, control.give(graph, args.subcommand, args.namespace, args.words))
+        except (control.UnknownDrive, WhichBridge) as error:
+            raise WrongUsage(str(error)) from None
+    finally:
+        graph.close()
+
+
+def _check(args: Namespace) -> None:
+    """
+    See whether the command line alone shows that something is wrong.
+
+    :raises WrongUsage: it does.
+    """
+    if args.params_file is not None:
+        raise WrongUsage('goes through the running bridge: leave --params-file away')
+    if args.subcommand in ('enable', 'reset'):
+        for word in args.words:
+            if _WILD & set(word):
+                raise WrongUsage(f'{word!r}: takes full names, no patterns')
+
+
+def _stop(args: Namespace, graph: Any) -> int:
+    from drive_can_bridge.ros.client.control import Answer, Stop
+    domain = graph.guest.context.get_domain_id()
+    present = [each for each in bridges() if _concerns(each, args.namespace, args.words)]
+    stop = Stop(graph, args.namespace, args.words, [
+        each.name for each in present if each.domain == domain and '~' not in each.name])
+    try:
+        graph.wait(stop.look, float('inf'))
+    except KeyboardInterrupt:
+        complain('interrupted; this is known:')
+        _show(args, stop.answers())
+        raise
+    known = {short(name) for name in stop.seen}
+    unseen = [Answer(each.name, False, _of_host(each, domain), bridge=True) for each in present
+              if each.domain != domain or each.name not in known]
+    return _show(args, [*unseen, *stop.answers()])
+
+
+def _concerns(present: Present, namespace: str | None, words: Sequence[str]) -> bool:
+    """Tell whether a bridge of this host may have one of the drives that are meant."""
+    place = present.name.rpartition('/')[0]
+    if namespace is not None:
+        return place == namespace
+    return not words or any(not word.startswith('/') or word.rpartition('/')[0] == place
+                            for word in words)
+
+
+def _of_host(present: Present, domain: int) -> str:
+    where = f'process {present.process}'
+    if present.domain not in (None, domain):
+        where += f', ROS domain {present.domain}'
+    return (f'this bridge of this host ({where}) does not answer here: its drives may still be '
+            'running')
+
+
+def _show(args: Namespace, answers: Sequence[Any]) -> int:
+    """Print what became of it, failures first; return the exit code."""
+    for answer in sorted(answers, key=lambda each: each.ok):
+        name = answer.name.lstrip('/')
+        if args.json:
+            from drive_can_bridge.cli.tables import print_json
+            print_json({'bridge' if answer.bridge else 'drive': name, 'ok': answer.ok,
+                        'message': answer.text})
+        else:
+            verdict = '' if answer.ok or args.subcommand != STOP else 'NOT STOPPED'
+            say(': '.join(filter(None, (name, verdict, answer.text))))
+    return 0 if answers and all(answer.ok for answer in answers) else FAILED

@@ -1,0 +1,194 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""``drive_can stop``, ``enable``, ``disable``, ``reset``: told by hand, through bridges."""
+
+from collections.abc import Callable
+import json
+import os
+from typing import Any
+
+from bridges import LIFT, parameters, StartBridge
+from clients import Client, LATCHED, wait_until
+from graph_builders import answer, hang, offer
+import pytest
+from std_msgs.msg import Bool
+from std_srvs.srv import Trigger
+
+from drive_can_bridge.cli import control
+from drive_can_bridge.cli.main import main
+from drive_can_bridge.process.presence import bridges, Presence
+from drive_can_bridge.ros.client import guest
+
+HOIST = {**LIFT, 'station': 3}
+Run = Callable[..., tuple[int, list[str], str]]
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
+    """Run a command; return exit code, lines, and standard error."""
+    # others may use this host meanwhile
+    monkeypatch.setattr(control, 'bridges', lambda: [
+        each for each in bridges() if each.process == os.getpid()])
+
+    def started(*words: str) -> tuple[int, list[str], str]:
+        capsys.readouterr()
+        code = main(words)
+        told = capsys.readouterr()
+        return code, told.out.splitlines(), told.err
+    return started
+
+
+@pytest.fixture
+def nowhere(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have nobody look for a bridge."""
+    def look(*_: Any) -> None:
+        raise AssertionError('looked for a bridge')
+    monkeypatch.setattr(guest.Guest, '__init__', look)
+
+
+def states(bridge: Any, *names: str) -> list[str]:
+    """Return whether drives run: 'online' where they are enabled, armed or not."""
+    return [{'not armed': 'online'}.get(state, state) for state in (
+        bridge.node.drives[name].session.state.value for name in names)]
+
+
+def test_stop_stops_every_drive_of_every_bridge(bridge: StartBridge, run: Run) -> None:
+    one = bridge(parameters(lift=LIFT, hoist=HOIST), arguments=('-r', '__ns:=/a'))
+    two = bridge(parameters(lift=LIFT), arguments=('-r', '__ns:=/b'))
+    for each in (one, two):
+        each.online()
+    assert run('enable', '/a/lift', '/a/hoist', '/b/lift')[0] == 0
+    assert states(one, 'lift', 'hoist') == states(two, 'lift') * 2 == ['online'] * 2
+    code, lines, errors = run('stop')
+    assert (code, errors) == (0, '')
+    assert sorted(line.partition(':')[0] for line in lines) == ['a/hoist', 'a/lift', 'b/lift']
+    assert {*states(one, 'lift', 'hoist'), *states(two, 'lift')} == {'disabled'}
+
+
+def test_names_patterns_and_namespaces(bridge: StartBridge, run: Run) -> None:
+    one = bridge(parameters(lift=LIFT, hoist=HOIST), arguments=('-r', '__ns:=/a'))
+    two = bridge(parameters(lift=LIFT), arguments=('-r', '__ns:=/b'))
+    for each in (one, two):
+        each.online()
+
+    def run_all() -> None:
+        assert run('enable', '/a/lift', '/a/hoist', '/b/lift')[0] == 0
+    run_all()
+    code, lines, _ = run('stop', 'hoist', 'crane')
+    assert code == 1    # and what exists is stopped
+    assert lines[0].startswith('crane: NOT STOPPED: no such drive; there are: a/')
+    assert lines[1].startswith('a/hoist: ')
+    assert states(one, 'lift', 'hoist') == ['online', 'disabled']
+    assert run('stop', '--namespace', 'b', '--yes')[0] == 0
+    assert (states(one, 'lift'), states(two, 'lift')) == (['online'], ['disabled'])
+    run_all()
+    assert run('stop', '/a/*')[0] == 0
+    assert (states(one, 'lift', 'hoist'), states(two, 'lift')) == (['disabled'] * 2, ['online'])
+    run_all()
+    assert run('stop', 'l*')[0] == 0
+    assert (states(one, 'lift', 'hoist'), states(two, 'lift')) == (
+        ['disabled', 'online'], ['disabled'])
+    # which lift?
+    for command in ('enable', 'disable', 'reset'):
+        code, lines, errors = run(command, 'lift')
+        assert (code, lines) == (2, [])
+        assert '/a/drive_can_bridge, /b/drive_can_bridge' in errors
+    code, _, errors = run('enable', '--namespace', 'a', 'crane')
+    assert (code, "no drive 'crane'; there are: a/lift, a/hoist" in errors) == (2, True)
+    run_all()
+    assert run('disable', '--namespace', 'a', '*')[0] == 0
+    assert (states(one, 'lift', 'hoist'), states(two, 'lift')) == (['disabled'] * 2, ['online'])
+
+
+def test_one_that_hangs_is_named_first_and_the_others_are_stopped(
+        bridge: StartBridge, client: Client, run: Run) -> None:
+    one = bridge(parameters(lift=LIFT))
+    one.online()
+    assert run('enable', 'lift')[0] == 0
+    hang(client, '/b/bridge')
+    code, lines, errors = run('stop')
+    assert (code, errors, len(lines)) == (1, '', 2)
+    assert lines[0].startswith('b/bridge: NOT STOPPED: ')
+    assert lines[1].startswith('lift: ')
+    assert states(one, 'lift') == ['disabled']
+
+
+def test_one_that_another_one_sees_is_named(
+        client: Client, run: Run) -> None:
+    answer(client, '/a/bridge', others=['/b/bridge'], drives='')()
+    code, lines, _ = run('stop')
+    assert code == 1
+    assert [line.partition(':')[0] for line in lines] == ['b/bridge']
+
+
+def test_one_that_holds_drives_of_this_host_is_named(
+        bridge: StartBridge, run: Run) -> None:
+    one = bridge(parameters(lift=LIFT))
+    one.online()
+    domain = one.context.get_domain_id()
+    here, elsewhere = Presence(domain, '/b/bridge'), Presence(domain + 1, '/drive_can_bridge')
+    try:
+        code, lines, _ = run('stop', '--json')
+        documents = [json.loads(line) for line in lines]
+        assert code == 1
+        assert [(each.get('bridge'), each.get('drive'), each['ok']) for each in documents] == [
+            ('drive_can_bridge', None, False), ('b/bridge', None, False), (None, 'lift', True)]
+        assert f'domain {domain + 1}' in documents[0]['message']
+        assert run('stop', '/lift')[0] == 1     # that of the other domain may be called so, too
+        assert run('stop', '--namespace', 'a')[0] == 1
+    finally:
+        here.withdraw()
+        elsewhere.withdraw()
+    assert run('stop') == (0, ['lift: ready'], '')
+
+
+def drive(client: Client, name: str, message: str = 'stopped', online: bool = True) -> None:
+    """Be a drive that can be stopped."""
+    def stop(_: Any, response: Any) -> Any:
+        response.success, response.message = True, message
+        return response
+    offer(client, name, 'quick_stop', Trigger, stop)
+    client.node.create_publisher(Bool, f'{name}/online', LATCHED).publish(Bool(data=online))
+
+
+def test_a_drive_that_is_not_online_is_a_failure(
+        client: Client, run: Run) -> None:
+    answer(client, '/bridge', drives='gone lift mute')()
+    drive(client, '/lift')
+    drive(client, '/gone', 'nothing is commanded', online=False)
+    code, lines, _ = run('stop')
+    assert code == 1
+    assert lines == [
+        'gone: NOT STOPPED: nothing is commanded; not online: may still be running',
+        'mute: NOT STOPPED: nobody offers its ~/quick_stop: may still be running',
+        'lift: stopped']
+
+
+def test_no_bridge_at_all(run: Run) -> None:
+    code, lines, errors = run('stop', '--namespace', 'nobody')
+    assert (code, len(lines), errors) == (1, 1, '')
+    assert 'no configured bridge is running in namespace /nobody' in lines[0]
+    code, lines, errors = run('enable', '--namespace', 'nobody', 'lift')
+    assert (code, lines) == (1, [])
+    assert 'no configured bridge is running in namespace /nobody' in errors
+
+
+@pytest.mark.usefixtures('nowhere')
+@pytest.mark.parametrize('words', [
+    ('stop', '--params-file', 'robot.yaml'), ('stop', '-p', 'robot.yaml'), ('enable',),
+    ('reset',), ('disable',), ('enable', 'l*'), ('reset', 'l?ft'), ('enable', '[ab]'),
+    ('stop', '--namespace', 'a b'), ('stop', '--unknown')])
+def test_wrong_usage_is_told_before_anybody_is_looked_for(words: tuple[str, ...]) -> None:
+    try:
+        code = main(words)
+    except SystemExit as ended:
+        code = int(ended.code or 0)
+    assert code == 2
+
+
+def test_a_fault_is_reset(bridge: StartBridge, run: Run) -> None:
+    one = bridge(parameters(lift=LIFT))
+    one.online()
+    one.played['lift'].fault('trip')
+    wait_until(lambda: states(one, 'lift') == ['fault'])
+    code, lines, _ = run('reset', 'lift')
+    assert (code, states(one, 'lift')) == (0, ['disabled']), lines
