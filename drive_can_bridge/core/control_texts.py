@@ -49,7 +49,7 @@ def stuck_text(reports: StatusReports, table: ControlTable, wording: Wording | N
     """
     if pulsed and reports.answered:
         return sentences.fault_present(timeout, reports.text)
-    remarks: list[str] = []
+    remarks: list[Sentence] = []
     if not sent:
         remarks.append(sentences.word_not_acknowledged(word) if acknowledged else
                        sentences.word_not_sent(word))

@@ -138,8 +138,8 @@ def sent_unacknowledged() -> str:
 
 
 @sentence
-def refused_by_drive(code: str) -> str:
-    return f'refused by the drive: {code}'
+def refused_by_drive(number: int, text: str) -> str:
+    return f'refused by the drive: {text}'
 
 
 @sentence
@@ -290,6 +290,12 @@ def group_is_led(leader: str, service: str) -> str:
 
 
 @sentence
+def position_not_told(name: str, measured: str, known: bool) -> str:
+    return f'{name} does not have the value of {measured} yet' + (
+        '' if known else ', which is not known or which it cannot carry')
+
+
+@sentence
 def would_jump(why: str) -> str:
     return f'it would jump: {why}'
 
@@ -315,9 +321,24 @@ def fault_present(timeout: float, status: str) -> str:
 
 
 @sentence
-def stuck(timeout: float, state: str, status: str, remarks: Sequence[str] = ()) -> str:
+def stuck(timeout: float, state: str, status: str, remarks: Sequence[Sentence] = ()) -> str:
     return '; '.join((f'no confirmation in {timeout:g} s: stuck in state {state} ({status})',
                       *remarks))
+
+
+@sentence
+def voltage_disabled() -> str:
+    return 'voltage is disabled: look at the digital inputs with that function'
+
+
+@sentence
+def quick_stop_active() -> str:
+    return 'a quick stop is active: look at the digital inputs with that function'
+
+
+@sentence
+def bus_not_in_control() -> str:
+    return 'the bus is not in control: look at P509 and P510'
 
 
 @sentence
@@ -774,8 +795,8 @@ def process_data_not_received() -> str:
 
 
 @sentence
-def no_such_element(code: str, number: int, elements: int) -> str:
-    return f'refused by the drive: {code}; P{number} has {_counted(elements, "element")}'
+def no_such_element(number: int, text: str, parameter: int, elements: int) -> str:
+    return f'refused by the drive: {text}; P{parameter} has {_counted(elements, "element")}'
 
 
 @sentence

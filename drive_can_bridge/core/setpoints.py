@@ -17,7 +17,9 @@ import math
 from drive_can_bridge.core.holding import HeldSetpoint, Limit, make_setpoint, Setpoint
 from drive_can_bridge.core.last_sent import LastSent
 from drive_can_bridge.core.parameters import Parameter, Value
-from drive_can_bridge.core.sentences import NOTHING, Sentence, would_jump
+from drive_can_bridge.core.sentences import (
+    NOTHING, position_not_told, Sentence, together, would_jump,
+)
 
 
 class CommandOutcome(Enum):
@@ -178,11 +180,10 @@ class Setpoints:
     @property
     def untold_text(self) -> Sentence:
         """Why an axis cannot be driven yet: the drive does not have its position; '' if it has."""
-        texts = [
-            f'{setpoint.parameter.name} does not have the value of {setpoint.measured.name} yet'
-            + ('' if setpoint.known else ', which is not known or which it cannot carry')
-            for setpoint in self.untold]
-        return would_jump('; '.join(texts)) if texts else NOTHING
+        why = together(
+            position_not_told(setpoint.parameter.name, setpoint.measured.name, setpoint.known)
+            for setpoint in self.untold)
+        return would_jump(why) if why else NOTHING
 
     def reset(self) -> None:
         """Begin anew: nothing was ever measured, and limits are neutral."""

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from drive_can_bridge.core.profile import ControlTable, StatusPattern
+from drive_can_bridge.core.sentences import Sentence
 
 
 @dataclass(slots=True)
@@ -30,7 +31,7 @@ class Wording:
     """
 
     state: Callable[[int], str]
-    hint: Callable[[int], str]
+    hint: Callable[[int], Sentence]
 
 
 class StatusReports:

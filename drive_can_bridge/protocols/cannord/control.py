@@ -20,7 +20,9 @@ from collections.abc import Callable, Sequence
 
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.profile import ControlTable, StatusPattern
-from drive_can_bridge.core.sentences import NOTHING, Sentence
+from drive_can_bridge.core.sentences import (
+    bus_not_in_control, NOTHING, quick_stop_active, Sentence, voltage_disabled,
+)
 from drive_can_bridge.core.status_reports import Wording
 from drive_can_bridge.protocols.cannord.states import (
     ACKNOWLEDGE, is_faulted, parameter_set_bits, QUICK_STOP, READY, RUN, state_of, STATUS_WORD,
@@ -60,14 +62,14 @@ def make_control(*, parameter_set: int, timeout: float,
                           wording=Wording(lambda status: state_of(status).value, hint))
 
 
-def hint(status: int) -> str:
+def hint(status: int) -> Sentence:
     """Say what a status word tells about why an inverter does not go on; '' for nothing."""
     if is_faulted(status):
-        return ''
+        return NOTHING
     if not status & _VOLTAGE_ENABLED:
-        return 'voltage is disabled: look at the digital inputs with that function'
+        return voltage_disabled()
     if not status & _NO_QUICK_STOP:
-        return 'a quick stop is active: look at the digital inputs with that function'
+        return quick_stop_active()
     if not status & _BUS_CONTROL:
-        return 'the bus is not in control: look at P509 and P510'
-    return ''
+        return bus_not_in_control()
+    return NOTHING

@@ -141,8 +141,9 @@ def _refusal(parameter: Parameter, response: ParameterFrame) -> Generator[Ask, R
         reply = yield Ask(Task.READ_ELEMENTS, parameter.number or 0)
         answer = reply.response
         if answer is not None and answer.identifier == Response.ELEMENTS:
-            return Failure(sentences.no_such_element(text, parameter.number or 0, answer.word))
-    return Failure(sentences.refused_by_drive(text))
+            return Failure(sentences.no_such_element(
+                response.word, text, parameter.number or 0, answer.word))
+    return Failure(sentences.refused_by_drive(response.word, text))
 
 
 def _width_text(parameter: Parameter, *, double: bool) -> Sentence:

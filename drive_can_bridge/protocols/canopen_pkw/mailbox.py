@@ -102,7 +102,7 @@ class Refused(NamedTuple):
     @property
     def text(self) -> Sentence:
         """The refusal in words."""
-        return sentences.refused_by_drive(refusals.describe(self.code))
+        return sentences.refused_by_drive(self.code, refusals.describe(self.code))
 
 
 class Silence(NamedTuple):
