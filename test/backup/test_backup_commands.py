@@ -481,4 +481,4 @@ class TestCompare:
         found = {each['parameter']: each for each in said.documents}
         assert 'ramp_time' not in found
         assert found['torque_limit'] == {
-            'parameter': 'torque_limit', 'unit': '%', 'a': None, 'b': 0.0}
+            'parameter': 'torque_limit', 'unit': '%', 'a': None, 'b': 100.0}

@@ -3,6 +3,7 @@
 
 from builders import CONTROL, SPEED, STATUS
 import pytest
+from saying import says
 
 from drive_can_bridge.core.command_gate import CommandGate
 from drive_can_bridge.core.control import ControlAction, ControlRequest
@@ -86,7 +87,7 @@ def test_what_the_machine_notes_is_a_warning_unless_the_bridge_stops(active: boo
     stand.active = active
     stand.gate.withdraw('bridge inactive', 2.0)
     assert stand.report.take() == [Noted(
-        'enable withdrawn: bridge inactive; only ~/enable starts the drive again',
+        says('enable_withdrawn', whom='the drive'),
         warning=active)]
 
 

@@ -8,6 +8,7 @@ import math
 from hypothesis import settings, strategies as st
 from hypothesis.stateful import initialize, invariant, rule, RuleBasedStateMachine
 import pytest
+from saying import says
 
 from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.core.control_machine import ControlMachine
@@ -100,7 +101,7 @@ def test_what_is_reached_already_needs_no_word() -> None:
     cycle(control, FAULT, 0.5)
     control.request(ControlRequest(RESET_FAULT), 0.6)
     assert outcomes(control) == [
-        (RESET_FAULT, False, 'no fault reset: the profile has no reset_fault word')]
+        (RESET_FAULT, False, says('no_reset_word'))]
 
 
 def test_a_quick_stop_without_a_word_ends_an_enable_that_waits() -> None:
@@ -112,7 +113,7 @@ def test_a_quick_stop_without_a_word_ends_an_enable_that_waits() -> None:
     assert control.pending
     control.request(ControlRequest(QUICK_STOP), 0.3)
     assert outcomes(control) == [
-        (ENABLE, False, 'replaced by quick_stop'), (QUICK_STOP, True, 'not ready')]
+        (ENABLE, False, says('replaced', action='quick_stop')), (QUICK_STOP, True, 'not ready')]
     for step in range(5):
         assert cycle(control, READY, 0.4 + 0.1 * step) == OFF
     assert control.word == OFF
@@ -169,8 +170,9 @@ def test_running_on_under_disable_is_told_once() -> None:
     for step in range(21, 40):
         cycle(control, ENABLED, 1.0 + 0.1 * step + 0.01)
         assert control.disregard == (
-            'still enabled (status word 0003h) although its control word is disable (0000h): '
-            'stop it by other means, or set a control_timeout longer than its ramp')
+            says(
+                'disregards', action='disable', state='enabled', status='status word 0003h',
+                word=0))
     assert control.take_notes() == [control.disregard]
     cycle(control, READY, 6.0)
     assert control.disregard == ''
@@ -422,7 +424,7 @@ def test_enable_of_an_enabled_drive_waits_while_its_status_is_missing() -> None:
     control.request(ControlRequest(ENABLE), 2.01)
     cycle(control, READY, 2.02)
     assert outcomes(control) == [
-        (ENABLE, False, 'no longer enabled, by itself (status word 0001h)')]
+        (ENABLE, False, says('dropped_out', status='status word 0001h'))]
     assert control.word == OFF
 
 
@@ -440,7 +442,7 @@ def test_enabled_under_the_disable_word_is_outdated_and_not_taken_for_success() 
 def test_enable_is_refused_while_faulted() -> None:
     control = faulted()
     control.request(ControlRequest(ENABLE), 1.0)
-    assert outcomes(control) == [(ENABLE, False, 'fault: reset it first')]
+    assert outcomes(control) == [(ENABLE, False, says('reset_first'))]
     assert (control.word, control.pending) == (OFF, False)
 
 
@@ -529,8 +531,8 @@ def test_fault_while_enabling_ends_it(before: tuple[tuple[int, float], ...]) -> 
         cycle(control, raw, now)
     control.status_received(FAULT, 0.03)
     assert outcomes(control) == [
-        (ENABLE, False, 'fault while enabling (status word 0008h): reset it first')]
-    assert control.take_notes() == ['fault (status word 0008h)']
+        (ENABLE, False, says('fault_while_enabling', status='status word 0008h'))]
+    assert control.take_notes() == [says('fault_came', ran=False, status='status word 0008h')]
     assert (control.word, control.fault, control.pending) == (OFF, True, False)
 
 
@@ -539,7 +541,7 @@ def test_fault_while_enabled_puts_the_word_back() -> None:
     cycle(control, FAULT | ENABLED, 1.0)
     assert (control.word, control.state, control.fault) == (OFF, 'fault', True)
     assert control.take_notes() == [
-        'fault (status word 000Bh); only ~/enable starts the drive again']
+        says('fault_came', ran=True, status='status word 000Bh')]
     cycle(control, READY, 1.02)
     cycle(control, ENABLED, 1.04)
     assert control.word == OFF
@@ -550,14 +552,14 @@ def test_fault_is_noted_once_when_it_comes_and_once_when_it_goes() -> None:
     control = machine()
     for now, raw in enumerate((READY, FAULT, FAULT, None, FAULT | READY)):
         cycle(control, raw, float(now))
-    assert control.take_notes() == ['fault (status word 0008h)']
+    assert control.take_notes() == [says('fault_came', ran=False, status='status word 0008h')]
     assert control.state == 'fault'
     cycle(control, READY, 10.0)
     cycle(control, READY, 11.0)
-    assert control.take_notes() == ['fault gone (status word 0001h)']
+    assert control.take_notes() == [says('fault_gone', status='status word 0001h')]
     assert not control.fault
     cycle(control, FAULT, 12.0)
-    assert control.take_notes() == ['fault (status word 0008h)']
+    assert control.take_notes() == [says('fault_came', ran=False, status='status word 0008h')]
 
 
 def test_drive_that_drops_out_is_not_started_again() -> None:
@@ -565,7 +567,7 @@ def test_drive_that_drops_out_is_not_started_again() -> None:
     cycle(control, READY, 1.0)
     assert (control.word, control.pending) == (OFF, False)
     assert control.take_notes() == [
-        'no longer enabled, by itself (status word 0001h); only ~/enable starts the drive again']
+        says('dropped_out_for_good', status='status word 0001h')]
     cycle(control, ENABLED, 1.02)
     assert control.word == OFF
     assert control.take_notes() == []
@@ -622,8 +624,9 @@ def test_disable_that_is_not_confirmed_fails_and_stays() -> None:
     cycle(control, ENABLED, 1.02)
     control.handle_timer(3.0)
     assert outcomes(control) == [(
-        DISABLE, False, 'no confirmation in 2 s: stuck in state enabled (status word 0003h); '
-        'it does not follow control word 0000h')]
+        DISABLE, False, says(
+            'stuck', remarks=[says('word_not_followed', word=0)], state='enabled',
+            status='status word 0003h', timeout=2.0))]
     assert control.word == OFF
 
 
@@ -645,7 +648,8 @@ def test_disable_wins_over_enable(steps: tuple[tuple[int, float], ...]) -> None:
     control.request(ControlRequest(DISABLE), 0.1)
     assert control.word == OFF
     cycle(control, READY, 0.12)
-    assert outcomes(control) == [(ENABLE, False, 'replaced by disable'), (DISABLE, True, 'ready')]
+    assert outcomes(control) == [(ENABLE, False, says(
+        'replaced', action='disable')), (DISABLE, True, 'ready')]
     cycle(control, READY, 0.14)
     assert control.word == OFF
 
@@ -655,7 +659,7 @@ def test_disable_wins_over_a_quick_stop() -> None:
     control.request(ControlRequest(QUICK_STOP), 1.0)
     control.request(ControlRequest(DISABLE), 1.01)
     assert control.word == OFF
-    assert outcomes(control) == [(QUICK_STOP, False, 'replaced by disable')]
+    assert outcomes(control) == [(QUICK_STOP, False, says('replaced', action='disable'))]
 
 
 def test_disable_wins_over_a_fault_reset() -> None:
@@ -666,7 +670,7 @@ def test_disable_wins_over_a_fault_reset() -> None:
     assert control.word == OFF
     cycle(control, FAULT, 0.04)
     assert outcomes(control) == [
-        (RESET_FAULT, False, 'replaced by disable'), (DISABLE, True, 'fault')]
+        (RESET_FAULT, False, says('replaced', action='disable')), (DISABLE, True, 'fault')]
 
 
 # -- quick stop -----------------------------------------------------------------------------------
@@ -702,7 +706,7 @@ def test_quick_stop_of_a_drive_that_is_about_to_run_brakes(sent: bool) -> None:
         cycle(control, READY, 0.02)
     control.request(ControlRequest(QUICK_STOP), 0.03)
     assert control.word == STOP
-    assert outcomes(control) == [(ENABLE, False, 'replaced by quick_stop')]
+    assert outcomes(control) == [(ENABLE, False, says('replaced', action='quick_stop'))]
 
 
 def test_quick_stop_before_the_enable_word_needs_no_braking() -> None:
@@ -711,7 +715,7 @@ def test_quick_stop_before_the_enable_word_needs_no_braking() -> None:
     control.request(ControlRequest(ENABLE), 0.01)
     control.request(ControlRequest(QUICK_STOP), 0.02)
     assert outcomes(control) == [
-        (ENABLE, False, 'replaced by quick_stop'), (QUICK_STOP, True, 'not ready')]
+        (ENABLE, False, says('replaced', action='quick_stop')), (QUICK_STOP, True, 'not ready')]
     assert control.word == OFF
 
 
@@ -720,7 +724,7 @@ def test_quick_stop_of_a_drive_that_still_runs_under_disable_brakes() -> None:
     control.request(ControlRequest(DISABLE), 1.0)
     control.request(ControlRequest(QUICK_STOP), 1.01)
     assert control.word == STOP
-    assert outcomes(control) == [(DISABLE, False, 'replaced by quick_stop')]
+    assert outcomes(control) == [(DISABLE, False, says('replaced', action='quick_stop'))]
     control.request(ControlRequest(DISABLE), 1.02)
     cycle(control, ENABLED, 1.03)
     control.request(ControlRequest(QUICK_STOP), 1.04)
@@ -741,8 +745,9 @@ def test_quick_stop_that_is_not_confirmed_fails_and_disables() -> None:
     cycle(control, ENABLED, 1.02)
     control.handle_timer(3.0)
     assert outcomes(control) == [(
-        QUICK_STOP, False, 'no confirmation in 2 s: stuck in state enabled (status word 0003h); '
-        'it does not follow control word 0002h; now disable')]
+        QUICK_STOP, False, says(
+            'stuck', remarks=[says('word_not_followed', word=2), says('now_disable')],
+            state='enabled', status='status word 0003h', timeout=2.0))]
     assert (control.word, control.pending) == (OFF, False)
 
 
@@ -756,8 +761,9 @@ def braking() -> ControlMachine:
     cycle(control, BRAKES, 1.02)
     control.handle_timer(3.0)
     assert outcomes(control) == [(
-        QUICK_STOP, False, 'no confirmation in 2 s: stuck in state enabled (status word 0043h); '
-        'it does not follow control word 0002h; the word stays')]
+        QUICK_STOP, False, says(
+            'stuck', remarks=[says('word_not_followed', word=2), says('word_stays')],
+            state='enabled', status='status word 0043h', timeout=2.0))]
     return control
 
 
@@ -819,7 +825,7 @@ def test_quick_stop_ends_a_fault_reset() -> None:
     assert control.word == OFF
     cycle(control, FAULT, 0.04)
     assert outcomes(control) == [
-        (RESET_FAULT, False, 'replaced by quick_stop'), (QUICK_STOP, True, 'fault')]
+        (RESET_FAULT, False, says('replaced', action='quick_stop')), (QUICK_STOP, True, 'fault')]
 
 
 def test_quick_stop_of_a_faulted_drive_that_still_runs_is_a_disable() -> None:
@@ -835,8 +841,7 @@ def test_quick_stop_without_a_word_is_refused_and_disturbs_nothing() -> None:
     control = enabled(replace(FULL, quick_stop=None))
     control.request(ControlRequest(QUICK_STOP), 1.0)
     assert outcomes(control) == [(
-        QUICK_STOP, False, 'no quick stop: the profile has no quick_stop word; '
-        '~/enable false disables the drive')]
+        QUICK_STOP, False, says('no_quick_stop_word'))]
     assert (control.word, control.pending) == (RUN, False)
 
 
@@ -857,7 +862,7 @@ def test_quick_stop_without_a_status_is_answered_when_sent_and_keeps_braking() -
     assert outcomes(control) == [(QUICK_STOP, True, message)]
     control.request(ControlRequest(ENABLE), 1.6)
     assert outcomes(control) == [
-        (ENABLE, False, 'quick_stop under way: try enable again when it has ended')]
+        (ENABLE, False, says('stop_under_way', action='enable', stop='quick_stop'))]
     control.handle_timer(3.0)
     assert (control.word, control.pending) == (OFF, False)
     assert control.take_completed() == []
@@ -918,7 +923,7 @@ def test_fault_reset_with_nothing_to_reset_does_not_disturb_a_stop() -> None:
     cycle(control, FAULT | ENABLED, 1.02)
     control.request(ControlRequest(RESET_FAULT), 1.03)
     assert outcomes(control) == [(
-        RESET_FAULT, False, 'quick_stop under way: try reset_fault again when it has ended')]
+        RESET_FAULT, False, says('stop_under_way', action='reset_fault', stop='quick_stop'))]
 
 
 # -- fault reset ----------------------------------------------------------------------------------
@@ -933,7 +938,7 @@ def test_reset_pulses_then_disables_and_waits_for_the_status() -> None:
     assert control.take_completed() == []
     cycle(control, READY, 0.14)
     assert outcomes(control) == [(RESET_FAULT, True, 'ready')]
-    assert control.take_notes() == ['fault gone (status word 0001h)']
+    assert control.take_notes() == [says('fault_gone', status='status word 0001h')]
     assert (control.word, control.pending) == (OFF, False)
     control.request(ControlRequest(ENABLE), 0.15)
     assert control.word == RUN
@@ -978,7 +983,7 @@ def test_reset_that_does_not_help_fails_and_disables() -> None:
     assert [cycle(control, FAULT, 0.1 * n) for n in range(1, 5)] == [RESET] * 3 + [OFF]
     control.handle_timer(2.0)
     assert outcomes(control) == [
-        (RESET_FAULT, False, 'fault still present after 2 s (status word 0008h)')]
+        (RESET_FAULT, False, says('fault_present', status='status word 0008h', timeout=2.0))]
     assert (control.word, control.fault, control.pending) == (OFF, True, False)
 
 
@@ -987,8 +992,9 @@ def test_reset_that_could_not_be_sent_says_so() -> None:
     control.request(ControlRequest(RESET_FAULT), 0.0)
     control.handle_timer(2.0)
     assert outcomes(control) == [(
-        RESET_FAULT, False, 'no confirmation in 2 s: stuck in state fault (status word 0008h); '
-        'control word 0080h could not be sent')]
+        RESET_FAULT, False, says(
+            'stuck', remarks=[says('word_not_sent', word=128)], state='fault',
+            status='status word 0008h', timeout=2.0))]
 
 
 def test_word_that_was_not_acknowledged_says_so() -> None:
@@ -1034,7 +1040,7 @@ def test_reset_without_a_word_is_refused() -> None:
     control = faulted(replace(FULL, reset_fault=None))
     control.request(ControlRequest(RESET_FAULT), 0.01)
     assert outcomes(control) == [
-        (RESET_FAULT, False, 'no fault reset: the profile has no reset_fault word')]
+        (RESET_FAULT, False, says('no_reset_word'))]
     assert (control.word, control.pending) == (OFF, False)
 
 
@@ -1067,7 +1073,7 @@ def test_reset_replaces_an_enable() -> None:
     assert control.word == OFF
     cycle(control, READY, 0.04)
     assert outcomes(control) == [
-        (ENABLE, False, 'replaced by reset_fault'), (RESET_FAULT, True, 'ready')]
+        (ENABLE, False, says('replaced', action='reset_fault')), (RESET_FAULT, True, 'ready')]
     cycle(control, READY, 0.06)
     assert control.word == OFF
 
@@ -1076,7 +1082,7 @@ def test_enable_is_refused_during_a_reset_and_does_not_disturb_it() -> None:
     control = faulted()
     control.request(ControlRequest(RESET_FAULT), 0.01)
     control.request(ControlRequest(ENABLE), 0.02)
-    assert outcomes(control) == [(ENABLE, False, 'fault: reset it first')]
+    assert outcomes(control) == [(ENABLE, False, says('reset_first'))]
     assert (control.word, control.pending) == (RESET, True)
 
 
@@ -1087,7 +1093,7 @@ def test_enable_replaces_a_reset_where_no_fault_is_known() -> None:
     assert control.word == RESET
     control.request(ControlRequest(ENABLE), 0.01)
     assert control.word == OFF
-    assert outcomes(control) == [(RESET_FAULT, False, 'replaced by enable')]
+    assert outcomes(control) == [(RESET_FAULT, False, says('replaced', action='enable'))]
     cycle(control, READY, 0.02)
     assert control.word == RUN
 
@@ -1099,7 +1105,7 @@ def test_withdraw_puts_an_enabled_drive_back() -> None:
     control.withdraw('drive offline', 1.0)
     assert (control.word, control.word_due, control.state) == (OFF, True, 'unknown')
     assert control.take_notes() == [
-        'enable withdrawn: drive offline; only ~/enable starts the drive again']
+        says('enable_withdrawn', reason='drive offline', whom='the drive')]
     assert control.take_completed() == []
     cycle(control, READY, 1.02)
     cycle(control, ENABLED, 1.04)
@@ -1126,11 +1132,11 @@ def test_withdraw_fails_a_reset_and_remembers_the_fault() -> None:
     assert outcomes(control) == [(RESET_FAULT, False, 'drive offline')]
     assert (control.word, control.fault) == (OFF, True)
     control.request(ControlRequest(ENABLE), 2.0)
-    assert outcomes(control) == [(ENABLE, False, 'fault: reset it first')]
+    assert outcomes(control) == [(ENABLE, False, says('reset_first'))]
     cycle(control, FAULT, 3.0)
     assert control.take_notes() == []
     cycle(control, READY, 4.0)
-    assert control.take_notes() == ['fault gone (status word 0001h)']
+    assert control.take_notes() == [says('fault_gone', status='status word 0001h')]
 
 
 def test_withdraw_forgets_that_there_was_no_fault() -> None:

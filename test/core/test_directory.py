@@ -8,6 +8,7 @@ from builders import (
     TABLE, WO,
 )
 import pytest
+from saying import says
 
 from drive_can_bridge.core.directory import ParameterDirectory
 from drive_can_bridge.core.errors import ValueRefused
@@ -59,9 +60,10 @@ def test_two_listed_parameters_with_one_number(
 
 def test_unknown_names_get_a_hint() -> None:
     names = directory()
-    assert names.unknown('ramp_tme') == 'unknown parameter ramp_tme, did you mean ramp_time?'
-    assert names.unknown('zzz') == 'unknown parameter zzz'
-    assert names.unknown('') == "unknown parameter ''"
+    assert names.unknown('ramp_tme') == says(
+        'unknown_parameter', name='ramp_tme', nearest='ramp_time')
+    assert names.unknown('zzz') == says('unknown_parameter', name='zzz', nearest=None)
+    assert names.unknown('') == says('unknown_parameter', name="''", nearest=None)
 
 
 @pytest.mark.parametrize('entry, value, raw', [

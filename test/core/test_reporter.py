@@ -2,6 +2,7 @@
 """What a session has to tell."""
 
 from builders import SPEED
+from saying import says
 
 from drive_can_bridge.core.events import (
     FrameRejected, Noted, SetpointsExpired, StationFound, StationLost,
@@ -29,7 +30,7 @@ def test_of_a_danger() -> None:
     report = Reporter(DriveStatistics(), '')
     report.warn('no answer', may_run=True)
     assert report.take() == [
-        Noted('no answer: it may still be running', warning=True, danger=True)]
+        Noted(says('may_still_be_running', why='no answer'), warning=True, danger=True)]
 
 
 def test_what_was_taken_stays_as_it_was() -> None:

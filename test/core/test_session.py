@@ -6,6 +6,7 @@ from typing import Any
 
 from builders import CONTROL, drive, GAIN, parameter, read, SPEED, STATUS, WORD
 import pytest
+from saying import says
 
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
 from drive_can_bridge.core.control_machine import ControlMachine
@@ -92,7 +93,7 @@ def test_loss_of_the_bus() -> None:
     made.done.clear()
     made.bus_down(4.0, 'unplugged')
     assert made.done == ['cancel', 'lost: bus down: unplugged', 'idle: bus down: unplugged']
-    assert made.take_events() == [StationLost('bus down: unplugged')]
+    assert made.take_events() == [StationLost(says('bus_is_down', reason='unplugged'))]
     assert made.take_frames() == []
     made.users.submit(read(GAIN), 5.0)
     assert [event.outcomes for event in made.take_events()] == [(Failure('bus down'),)]
@@ -158,7 +159,7 @@ def test_states() -> None:
 def test_control_word_that_no_control_uses_is_a_setpoint() -> None:
     plain = session(request=(WORD, SPEED))
     assert [item.parameter for item in plain.setpoints.items] == [WORD, SPEED]
-    assert plain.users.write_refusal(WORD) == 'sent cyclically: publish ~/command/control_word'
+    assert plain.users.write_refusal(WORD) == says('sent_cyclically', name='control_word')
     controlled = session(request=(WORD, SPEED), control=CONTROL)
     assert controlled.users.write_refusal(WORD) == 'use ~/enable'
     assert session(control=CONTROL).users.write_refusal(WORD) == 'use ~/enable'
@@ -200,7 +201,7 @@ def test_control_requests_need_a_drive() -> None:
     without = session()
     without.users.submit(request, 1.0)
     assert without.take_events() == [
-        ControlCompleted(request, False, 'the profile has no control section')]
+        ControlCompleted(request, False, says('no_control_section'))]
 
 
 class Acting:
@@ -314,7 +315,7 @@ def test_a_stall_begins_anew_but_lets_a_stop_go_on() -> None:
     made.online = True
     made.time_lost(5.0)
     assert made.log == ['channel lost time', 'begin']
-    assert made.take_events() == [StationLost('the bridge stood still')]
+    assert made.take_events() == [StationLost(says('bridge_stood_still'))]
     made.deactivate(6.0)
     made.log.clear()
     made.time_lost(8.0)

@@ -10,6 +10,7 @@ from builders import (
 from clocks import REAL
 from exchange_builders import all_routes, Bench, BusNotes
 import pytest
+from saying import says
 from waiting import wait_for
 
 from drive_can_bridge.core.configuration import BusConfiguration
@@ -202,7 +203,7 @@ def test_lost_time_is_noticed_by_the_timer() -> None:
     assert bench.notes[0].discarded == 2  # at activation, and now
     assert bench.notes[0].commands == []
     assert sent == ['00300321#0000000000000000']    # it was told to run, so it is stopped
-    assert bench.notes[0].events[-1] == StationLost('the bridge stood still')
+    assert bench.notes[0].events[-1] == StationLost(says('bridge_stood_still'))
     assert not bench.sessions[0].online
 
 
@@ -294,7 +295,8 @@ def test_stop_frames_that_the_bus_refuses_are_no_stop() -> None:
     assert bench.exchange.deactivate() is False
     assert bench.sessions[0].stopped
     assert bench.notes[0].events[-2:] == [
-        Noted('could not be told to stop: it may still be running', warning=True, danger=True),
+        Noted(says(
+            'may_still_be_running', why=says('stop_not_possible')), warning=True, danger=True),
         StationLost('deactivated')]
 
 
@@ -432,7 +434,7 @@ def test_control_request_that_is_not_taken() -> None:
     request = ControlRequest(ControlAction.ENABLE)
     bench.exchange.submit(bench.sessions[0], request)
     assert bench.notes[0].events == [
-        ControlCompleted(request, False, 'the profile has no control section')]
+        ControlCompleted(request, False, says('no_control_section'))]
 
 
 def test_reconfigure() -> None:
@@ -449,7 +451,7 @@ def test_bus_that_is_lost_and_comes_back() -> None:
     bench.online()
     bench.exchange.bus_lost('unplugged')
     assert (bench.exchange.bus_state, bench.exchange.bus_reason) == ('down', 'unplugged')
-    assert bench.notes[0].events[-1] == StationLost('bus down: unplugged')
+    assert bench.notes[0].events[-1] == StationLost(says('bus_is_down', reason='unplugged'))
     assert bench.at(10.1) == []
     bench.exchange.bus_opened()
     assert bench.link.take() == [ASK_MAP_1]

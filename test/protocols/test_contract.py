@@ -17,6 +17,7 @@ from builders import (
 )
 from literal_drives import ExtendedDrive, PkwNode, StandardDrive
 import pytest
+from saying import says
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction
@@ -359,7 +360,7 @@ def test_bus_down_is_silence_at_once(partner: Partner) -> None:
     assert partner.talk.bus_down(partner.now) == []
     partner.live(3.0)
     assert partner.take() == []
-    assert partner.talk.session.offline_advice == 'bus down: unplugged'
+    assert partner.talk.session.offline_advice == says('bus_is_down', reason='unplugged')
     assert partner.talk.session.stopped
 
 
@@ -405,7 +406,7 @@ def test_end_while_the_bus_is_lost_is_told(partner: Partner) -> None:
     partner.talk.events()
     partner.deliver(partner.talk.deactivate(partner.now))
     assert partner.talk.session.stopped
-    assert warnings(partner) == ['could not be told to stop: it may still be running']
+    assert warnings(partner) == [says('may_still_be_running', why=says('stop_not_possible'))]
 
 
 def test_a_stop_that_the_drive_did_not_hear_is_told(partner: Partner) -> None:
@@ -474,7 +475,7 @@ def test_acknowledged_or_not_a_refused_write_is_not_sent(make: type[Partner]) ->
     partner.talk.refusing = refusing
     partner.writes((GAIN, 7))
     partner.live(0.5)
-    assert partner.talk.outcomes() == [['not sent: the bus takes no frames']]
+    assert partner.talk.outcomes() == [[says('not_sent')]]
     assert partner.registers[GAIN.number] == 0
 
 
@@ -678,7 +679,7 @@ def test_requests_end_with_the_bus_or_with_activity(partner: Partner) -> None:
 
 def test_what_users_may_not_write(partner: Partner) -> None:
     refusal = partner.talk.session.users.write_refusal
-    assert refusal(partner.own(SPEED)) == 'sent cyclically: publish ~/command/speed_setpoint'
+    assert refusal(partner.own(SPEED)) == says('sent_cyclically', name='speed_setpoint')
     assert [refusal(partner.own(parameter)) for parameter in (GAIN, RAMP, ORDER, LIMIT)] == [
         ''] * 4
 

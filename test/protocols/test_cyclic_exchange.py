@@ -5,6 +5,7 @@ import math
 
 from builders import CONTROL, drive, SPEED, WORD
 import pytest
+from saying import says
 
 from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.core.control_machine import ControlMachine
@@ -120,7 +121,8 @@ def test_once_a_period_as_long_as_it_answers() -> None:
         assert talk.at(10.0 + 0.02 * number) == ['0000']
     reason = 'no answer for 3 cycles'
     assert talk.session.take_events() == [StationLost(reason)]
-    assert talk.session.offline_advice == 'no answer: look at the plug'
+    assert talk.session.offline_advice == says(
+        'silent', look_at='look at the plug', what='no answer')
     assert talk.at(10.1) == ['0000'], 'which is how it is found again'
     talk.answer(10.101)
     assert talk.session.take_events() == [StationFound()]
@@ -132,7 +134,7 @@ def test_what_nobody_waits_for() -> None:
     talk.answer(10.001)
     talk.session.take_events()
     talk.answer(10.002)
-    assert talk.session.take_events() == [FrameRejected('answer that nobody asked for')]
+    assert talk.session.take_events() == [FrameRejected(says('unasked', what='answer'))]
     talk.at(10.02)
     talk.at(10.04)
     talk.answer(10.041)

@@ -11,6 +11,7 @@ from typing import Any
 from builders import (
     CONTROL, Conversation, drive, INT16, parameter, RAM, RO, SPEED, STATUS, TABLE, WORD,
 )
+from saying import says
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import Noted
@@ -129,7 +130,7 @@ def test_standard_stop_of_the_rest_is_none_of_an_axis_that_may_be_anywhere() -> 
     assert talk.hears('7F1#0000ADDEADDEADDE', 12.002) == []
     talk.bus_down(12.003)
     assert [event.text for event in talk.events(Noted) if event.warning] == [
-        'the bus was lost before it could be told to stop: it may still be running']
+        says('may_still_be_running', why=says('bus_lost_before_stop'))]
 
 
 # -- cannord: 002 and 003, words low byte first ---------------------------------------------------

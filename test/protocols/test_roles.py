@@ -8,6 +8,7 @@ from builders import (
     ACTUAL, CONTROL, drive, EEPROM, GAIN, INT32, parameter, RAM, RO, SPEED, TABLE, WORD,
 )
 import pytest
+from saying import says
 from test_contract import PARTNERS
 
 from drive_can_bridge.core.directory import ParameterDirectory
@@ -84,7 +85,7 @@ def test_a_word_inside_one_of_ours() -> None:
                                 response=(ACTUAL,))])
     for name in ('position', 'position_low', 'p60', 'p61'):
         assert one.users.write_refusal(raw(one, name)) == (
-            'sent cyclically: publish ~/command/position'), name
+            says('sent_cyclically', name='position')), name
 
 
 def test_a_register_and_its_object() -> None:
@@ -116,7 +117,7 @@ def test_maps(family: str) -> None:
         assert one.users.write_refusal(raw(one, name)) == ''
         one.active = True
         assert one.users.write_refusal(raw(one, name)) == (
-            'mapping parameter: not written while the bridge is active')
+            says('mapping_parameter'))
         one.active = False
     assert one.roles.role(raw(one, 'p121')) is one.roles.role(raw(one, 'p130')) is None
 
@@ -125,6 +126,6 @@ def test_process_data_without_a_number() -> None:
     frequency = parameter('frequency', None, storage=None)
     one, = make_sessions([drive('cannord', table=(*TABLE, frequency), request=(frequency,),
                                 response=(ACTUAL,))])
-    assert one.users.write_refusal(frequency) == 'sent cyclically: publish ~/command/frequency'
+    assert one.users.write_refusal(frequency) == says('sent_cyclically', name='frequency')
     assert one.roles.role(frequency) is Role.CYCLIC
     assert one.roles.role(WORD) is one.roles.role(GAIN) is None

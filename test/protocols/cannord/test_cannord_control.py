@@ -4,6 +4,7 @@
 from builders import Conversation
 from cannord_session_builders import enabled, exchange, FAULT, online, READY, RUNNING, TICK
 import pytest
+from saying import says
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.drive_state import DriveState
@@ -66,8 +67,9 @@ def test_enable_sticks_and_says_where_and_why() -> None:
     assert talk.control_outcomes() == []
     talk.until(12.004)
     assert talk.control_outcomes() == [(
-        'enable', False, 'no confirmation in 2 s: stuck in state switch-on disabled (status word '
-        '0D50h); a quick stop is active: look at the digital inputs with that function')]
+        'enable', False, says(
+            'stuck', remarks=[says('quick_stop_active')], state='switch-on disabled',
+            status='status word 0D50h', timeout=2.0))]
 
 
 @pytest.mark.parametrize(('status', 'what'), [
@@ -120,10 +122,10 @@ def test_a_fault_told_unasked_disables_with_the_next_frame() -> None:
     talk.hears(FAULT, 10.065)
     assert talk.session.state is DriveState.FAULT
     assert talk.events(Noted) == [
-        Noted('fault (status word 0B38h); only ~/enable starts the drive again', warning=True)]
+        Noted(says('fault_came', ran=True, status='status word 0B38h'), warning=True)]
     assert words(talk, 10.08, FAULT) == ['7E04']
     talk.asks(ENABLE, 10.09)
-    assert talk.control_outcomes() == [('enable', False, 'fault: reset it first')]
+    assert talk.control_outcomes() == [('enable', False, says('reset_first'))]
 
 
 def test_a_fault_ends_an_enable() -> None:
@@ -131,7 +133,7 @@ def test_a_fault_ends_an_enable() -> None:
     talk.asks(ENABLE, 10.003)
     assert words(talk, 10.02, READY, FAULT, FAULT) == ['7F04', '7F04', '7E04']
     assert talk.control_outcomes() == [
-        ('enable', False, 'fault while enabling (status word 0B38h): reset it first')]
+        ('enable', False, says('fault_while_enabling', status='status word 0B38h'))]
 
 
 def test_reset_is_a_rising_edge() -> None:
@@ -150,7 +152,7 @@ def test_reset_while_the_cause_is_there() -> None:
     assert words(talk, 10.02, FAULT, FAULT, FAULT, FAULT) == ['FE04', 'FE04', 'FE04', '7E04']
     assert talk.until(10.104)[0][1] == '002#7E040000'
     assert talk.control_outcomes() == [
-        ('reset_fault', False, 'fault still present after 0.1 s (status word 0B38h)')]
+        ('reset_fault', False, says('fault_present', status='status word 0B38h', timeout=0.1))]
     assert words(talk, 10.12, FAULT) == ['7E04']
     talk.asks(RESET_FAULT, 10.13)      # with an edge of its own
     assert words(talk, 10.14, FAULT, DISABLED, DISABLED, DISABLED) == [

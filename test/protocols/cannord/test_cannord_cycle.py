@@ -10,6 +10,7 @@ from cannord_session_builders import (
     online, READY, READY_FRAME, RUNNING, SECOND, SETPOINTS, started, THIRD, VALUES,
 )
 import pytest
+from saying import says
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.drive_state import DriveState
@@ -23,7 +24,7 @@ from drive_can_bridge.core.setpoints import CommandOutcome
 def test_first_exchange() -> None:
     talk = started()
     assert talk.at(10.0) == [READY_FRAME]
-    assert talk.session.offline_advice == 'being looked for'
+    assert talk.session.offline_advice == says('looked_for')
     assert talk.session.state is DriveState.OFFLINE
     assert talk.hears(READY, 10.002) == []
     assert talk.events() == [StationFound(), ProcessDataReceived((0x0B31, 0), 10.002)]
@@ -213,7 +214,7 @@ def test_extra_values_that_belong_to_nothing() -> None:
     talk = five()
     talk.hears('003#0100020000', 10.01)
     assert talk.events(FrameRejected) == [
-        FrameRejected('additional process data that nobody asked for')]
+        FrameRejected(says('unasked', what='additional process data'))]
     talk.until(10.021)
     talk.hears('003#0100020000', 10.022)     # the main answer was lost
     assert talk.samples() == []
@@ -237,7 +238,7 @@ def test_short_answer_publishes_what_arrived() -> None:
     talk.until(10.021)
     talk.hears('003#310B0020', 10.022)
     assert talk.events() == [
-        FrameRejected('process data with 1 values, 3 needed'),
+        FrameRejected(says('short_process_data', found=1, needed=3)),
         ProcessDataReceived((0x0B31, 8192), 10.022)]
     assert talk.session.statistics.exchanges == 2
     assert talk.session.statistics.rejected == 1
@@ -273,7 +274,7 @@ def test_malformed_answers(size: int) -> None:
 def test_unasked_and_doubled_answers() -> None:
     talk = online()
     talk.hears(READY, 10.003)
-    assert talk.events() == [FrameRejected('process data that nobody asked for')]
+    assert talk.events() == [FrameRejected(says('unasked', what='process data'))]
     assert talk.session.statistics.exchanges == 1
 
 
@@ -282,8 +283,8 @@ def test_foreign_master() -> None:
     talk.hears('002#7F040040', 10.003)
     talk.hears('202#6610000000000000', 10.003)
     assert talk.events() == [
-        ForeignMasterSeen('another master sends to station 1: 002#7F040040'),
-        ForeignMasterSeen('another master sends to station 1: 202#6610000000000000')]
+        ForeignMasterSeen(says('other_master', frame='002#7F040040', station=1)),
+        ForeignMasterSeen(says('other_master', frame='202#6610000000000000', station=1))]
 
 
 @pytest.mark.parametrize(('options', 'obeyed', 'others'), [
@@ -312,7 +313,7 @@ def test_a_fault_told_unasked_is_a_sample_at_once() -> None:
     talk = online()
     talk.hears('003#380B0010', 10.011)
     assert talk.events() == [
-        Noted('fault (status word 0B38h)', warning=True),
+        Noted(says('fault_came', ran=False, status='status word 0B38h'), warning=True),
         ProcessDataReceived((0x0B38, 0x1000), 10.011)]
     assert talk.session.state is DriveState.FAULT
     statistics = talk.session.statistics
@@ -368,7 +369,7 @@ def test_silence_is_offline_and_cycling_goes_on() -> None:
     assert talk.events(StationLost) == []
     assert talk.until(10.101) == [(10.1, '002#7E040000')]
     lost, = talk.events(StationLost)
-    assert lost.reason == 'no answer to process data for 3 cycles'
+    assert lost.reason == says('silent_for_cycles', cycles=3, what='no answer to process data')
     assert 'P509' in talk.session.offline_advice
     assert talk.session.statistics.missed == 3
     assert talk.commands(0, 0.0, 10.11) is CommandOutcome.NOT_ARMED
@@ -437,7 +438,7 @@ def test_stop() -> None:
     talk.hears(READY, 10.102)    # the answer to the last frame
     assert talk.events() == []
     talk.hears(READY, 10.11)
-    assert talk.events() == [FrameRejected('process data that nobody asked for')]
+    assert talk.events() == [FrameRejected(says('unasked', what='process data'))]
 
 
 def test_stop_with_a_long_period_is_quicker() -> None:
@@ -472,7 +473,7 @@ def test_lost_time() -> None:
     talk = commanded(50.0)
     assert exchange(talk, 10.04, RUNNING) == '002#7F040040'
     talk.time_lost(15.0)
-    assert talk.events(StationLost) == [StationLost('the bridge stood still')]
+    assert talk.events(StationLost) == [StationLost(says('bridge_stood_still'))]
     assert talk.until(15.001) == [(15.0, READY_FRAME)]
     talk.hears(READY, 15.002)
     assert talk.session.state is DriveState.DISABLED
@@ -483,6 +484,6 @@ def test_bus_down_is_silence() -> None:
     talk.until(10.021)
     assert talk.bus_down(10.021) == []
     assert talk.session.next_timer() == math.inf
-    assert talk.session.offline_advice == 'bus down: unplugged'
+    assert talk.session.offline_advice == says('bus_is_down', reason='unplugged')
     assert talk.bus_up(12.0) == []
     assert talk.until(12.001) == [(12.0, READY_FRAME)]

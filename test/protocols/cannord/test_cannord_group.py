@@ -12,6 +12,7 @@ from cannord_session_builders import (
 )
 from clocks import HandClock
 import pytest
+from saying import says
 
 from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
@@ -239,7 +240,8 @@ def test_each_counts_its_own_answers() -> None:
     assert hoist.online
     bus.live(0.05)       # asked at 10.2: missed 20 ms later
     assert bus.events(StationLost) == [
-        ('hoist', StationLost('no answer to process data for 3 cycles'))]
+        ('hoist', StationLost(says(
+            'silent_for_cycles', cycles=3, what='no answer to process data')))]
     assert [session.statistics.missed for session in bus.sessions] == [0, 3, 0]
     assert [session.state for session in bus.sessions] == [
         DriveState.DISABLED, DriveState.OFFLINE, DriveState.DISABLED]
@@ -274,7 +276,7 @@ def test_the_leader_commands_all() -> None:
     assert sorted(text for _, text in bus.live(0.06)) == [
         '002#7F040020', '004#7F040020', '006#7F040020', *['400#7F040020'] * 3]
     assert bus.session('hoist').users.write_refusal(FREQUENCY) == (
-        'sent cyclically by the broadcast group: publish lift/command/frequency_setpoint')
+        says('sent_by_group', leader='lift', name='frequency_setpoint'))
     assert bus.session('hoist').users.write_refusal(OFFSET) == ''
 
 
@@ -347,7 +349,7 @@ def test_only_answers_since_the_last_word_count() -> None:
     bus.asks(ENABLE)
     assert words(bus.live(0.02)) == ['7F04']
     bus.asks(DISABLE)
-    assert bus.outcomes() == [('enable', False, 'replaced by disable')]
+    assert bus.outcomes() == [('enable', False, says('replaced', action='disable'))]
     assert words(bus.live(0.04)) == ['7E04'] * 2      # two of three have answered that
     assert bus.outcomes() == []
     bus.live(0.02)
@@ -387,7 +389,7 @@ def test_a_fault_of_one_stops_all(station: int) -> None:
     samples = bus.events(ProcessDataReceived)
     assert samples[0] == (NAMES[station - 1], ProcessDataReceived((0x0B38, 0), samples[0][1][1]))
     bus.asks(ENABLE)
-    assert bus.outcomes() == [('enable', False, 'fault: reset it first')]
+    assert bus.outcomes() == [('enable', False, says('reset_first'))]
 
 
 def test_reset_waits_for_all_and_ends_with_the_last() -> None:
@@ -452,7 +454,9 @@ def test_a_fault_leaves_with_the_member_that_has_it() -> None:
     assert not bus.session('hoist').online
     assert bus.session('lift').state is DriveState.DISABLED
     assert [event.text for name, event in bus.events(Noted) if name == 'lift'] == [
-        'fault (status words: lift 0B31h, hoist 0B38h, turn 0B31h)'], 'nobody said it is gone'
+        says(
+            'fault_came', ran=False,
+            status='status words: lift 0B31h, hoist 0B38h, turn 0B31h')], 'nobody said it is gone'
     bus.asks(RESET_FAULT)
     assert [success for _, success, _ in bus.outcomes()] == [True]
 
@@ -463,8 +467,8 @@ def test_a_fault_that_stays_is_not_laid_to_the_inputs_of_another_member() -> Non
     bus.live(0.06)
     bus.asks(RESET_FAULT)
     bus.live(0.42)
-    assert bus.outcomes() == [('reset_fault', False, 'fault still present after 0.4 s (status '
-                               'words: lift 0B50h, hoist 0B38h, turn 0B31h)')]
+    assert bus.outcomes() == [('reset_fault', False, says(
+        'fault_present', status='status words: lift 0B50h, hoist 0B38h, turn 0B31h', timeout=0.4))]
 
 
 def test_quick_stop_of_all() -> None:
@@ -507,7 +511,7 @@ def test_a_member_that_is_lost_stops_all(station: int) -> None:
         bus.asks(QUICK_STOP)
         bus.live(0.1)
         assert bus.outcomes() == [
-            ('quick_stop', False, 'lift offline: it may still be running')]
+            ('quick_stop', False, says('members_may_run', names=['lift']))]
 
 
 @pytest.mark.parametrize('action', [DISABLE, QUICK_STOP])
@@ -521,7 +525,7 @@ def test_a_member_that_ran_and_is_lost_has_not_confirmed_a_stop(action: ControlA
     bus.asks(action)
     bus.live(0.1)
     (_, success, message), = bus.outcomes()
-    assert (success, message) == (False, 'turn offline: it may still be running')
+    assert (success, message) == (False, says('members_may_run', names=['turn']))
     bus.answers[3] = READY
     bus.live(0.2)
     bus.asks(action)
@@ -582,7 +586,7 @@ def test_member_that_falls_silent_together_with_the_stop(
     bus.live(1.0)
     assert all(session.stopped for session in bus.sessions)
     assert worries(bus) == [
-        (name, 'told to stop, but it does not answer: it may still be running')]
+        (name, says('may_still_be_running', why=says('stop_not_answered')))]
 
 
 def test_a_late_answer_of_one_member_does_not_end_the_wait_for_another() -> None:
@@ -638,8 +642,7 @@ def test_the_end_of_the_bridge_is_the_reason_whoever_is_told_first(order: tuple[
     bus.live(1.0)
     noted = bus.events(Noted)
     # as a drive alone says it, and for whoever reads the log: nothing is wrong
-    assert noted == [('lift', Noted('enable withdrawn: bridge inactive; only ~/enable starts the '
-                                    'drive again'))]
+    assert noted == [('lift', Noted(says('enable_withdrawn', whom='the drive')))]
 
 
 @pytest.mark.parametrize(('action', 'word'), [(DISABLE, '7E04'), (QUICK_STOP, '7A04')])
@@ -683,8 +686,8 @@ def test_stop_of_a_member_while_the_bridge_ends() -> None:
 def test_members_name_their_leader() -> None:
     bus = three()
     texts = [bus.session('hoist').users.control_refusal(action) for action in ControlAction]
-    assert texts == ['lift leads the broadcast group: call ~/enable of lift', '', '',
-                     'lift leads the broadcast group: call ~/reset_fault of lift']
+    assert texts == [says('group_is_led', leader='lift', service='enable'), '', '',
+                     says('group_is_led', leader='lift', service='reset_fault')]
     control = bus.session('hoist').control
     assert control is not None
     assert control.state == 'ready to switch on'
@@ -772,7 +775,7 @@ def test_stop_frames_of_a_group_that_the_bus_refuses() -> None:
         session.give_up(bus.now)
     bus.pump()
     assert all(session.stopped for session in bus.sessions)
-    assert worries(bus) == [(name, 'could not be told to stop: it may still be running')
+    assert worries(bus) == [(name, says('may_still_be_running', why=says('stop_not_possible')))
                             for name in NAMES]
 
 
@@ -802,7 +805,7 @@ def test_enable_that_only_one_of_them_got_is_owed_a_stop() -> None:
         session.bus_down(bus.now, 'unplugged')
     bus.pump()
     assert worries(bus) == [
-        ('lift', 'the bus was lost before it could be told to stop: it may still be running')]
+        ('lift', says('may_still_be_running', why=says('bus_lost_before_stop')))]
 
 
 def test_stall_reopened_bus_and_signal() -> None:

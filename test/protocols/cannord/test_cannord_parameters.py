@@ -9,6 +9,7 @@ from cannord_session_builders import (
     inverter, MONITORING, OFFSET, online, PARAMETERS, POSITION, SETPOINTS, VALUES,
 )
 import pytest
+from saying import says
 
 from drive_can_bridge.core.directory import ParameterDirectory
 from drive_can_bridge.core.errors import ValueRefused
@@ -87,18 +88,20 @@ def test_one_refusal_takes_no_other_along() -> None:
     assert asked(online(), read(ACCELERATION, OFFSET),
                  ('6610000000000000', '6670000000000000'),
                  ('9B11000000000000', '9B11000000000500')) == [
-        'refused by the drive: error 0: invalid parameter number', 5]
+        says('refused_by_drive', number=0, text='error 0: invalid parameter number'), 5]
 
 
 def test_a_wrong_element_tells_how_many_there_are() -> None:
     assert asked(online(), read(POSITION),
                  ('6562150000000000', '6572150000000300'),
                  ('6592000000000000', '6562000000000500')) == [
-        'refused by the drive: error 3: wrong sub-index; P613 has 5 elements']
+        says(
+            'no_such_element', elements=5, number=3, parameter=613,
+            text='error 3: wrong sub-index')]
     assert asked(online(), read(POSITION),
                  ('6562150000000000', '6572150000000300'),
                  ('6592000000000000', '6572000000000400')) == [
-        'refused by the drive: error 3: wrong sub-index']
+        says('refused_by_drive', number=3, text='error 3: wrong sub-index')]
 
 
 @pytest.mark.parametrize(('parameter', 'task', 'response', 'text'), [
@@ -152,7 +155,7 @@ def test_layout_variants() -> None:
                  ('662000000F270000', '661000000F270000')) == ['written']
     assert asked(talk, read(POSITION), ('6562150000000000', '65521500A0860100')) == [100000]
     assert asked(talk, read(ACCELERATION), ('6610000000000000', '6670000002000000')) == [
-        'refused by the drive: error 2: limit exceeded']
+        says('refused_by_drive', number=2, text='error 2: limit exceeded')]
     talk = online(index_byte='high')
     assert asked(talk, write((ACCELERATION_2, 100)),
                  ('66C0000100006400', '6640000100006400')) == ['written']
@@ -163,14 +166,14 @@ def test_write_refused() -> None:
     assert asked(online(), write((ACCELERATION, 9999), (FLAG, 1)),
                  ('6620000000000F27', '6670000000000200'),
                  ('78E0000000000100', '7810000000000100')) == [
-        'refused by the drive: error 2: limit exceeded', 'written']
+        says('refused_by_drive', number=2, text='error 2: limit exceeded'), 'written']
 
 
 def test_a_lost_acknowledgement_is_a_failure_and_nothing_is_repeated() -> None:
     talk = online()
     assert talk.submits(write((ACCELERATION, 9999)), 10.003) == ['202#6620000000000F27']
     assert [text for _, text in talk.until(10.2) if text.startswith('202')] == []
-    assert talk.outcomes() == [['no answer; drive offline']]
+    assert talk.outcomes() == [[says('no_answer_offline')]]
 
 
 def test_no_answer_to_a_write_while_online() -> None:
@@ -179,7 +182,7 @@ def test_no_answer_to_a_write_while_online() -> None:
     for place in range(1, 6):
         exchange(talk, 10.0 + 0.02 * place)
     talk.until(10.11)
-    assert talk.outcomes() == [['no answer in 0.1 s, 1 attempt']]
+    assert talk.outcomes() == [[says('no_answer', attempts=1, timeout=0.1)]]
 
 
 def test_both_halves_of_a_double_word_are_acknowledged() -> None:
@@ -205,7 +208,7 @@ def test_an_acknowledgement_with_another_value_is_none() -> None:
     for place in range(1, 6):
         exchange(talk, 10.0 + 0.02 * place)
     talk.until(10.11)
-    assert talk.outcomes() == [['read back 1 instead of 99.99']]
+    assert talk.outcomes() == [[says('read_back_differs', found='1', wanted='99.99')]]
 
 
 def test_another_value_is_forgotten_with_its_write() -> None:
@@ -216,7 +219,7 @@ def test_another_value_is_forgotten_with_its_write() -> None:
     for place in range(1, 6):
         exchange(talk, 10.0 + 0.02 * place)
     talk.until(10.11)
-    assert talk.outcomes() == [['written', 'no answer in 0.1 s, 1 attempt']]
+    assert talk.outcomes() == [['written', says('no_answer', attempts=1, timeout=0.1)]]
 
 
 def test_only_one_fits_a_frame() -> None:
@@ -254,7 +257,7 @@ def test_no_answer_after_all_attempts() -> None:
         (10.018, '202#9B11000000000000')]
     exchange(talk, 10.02)
     talk.until(10.03)
-    assert talk.outcomes() == [['no answer in 0.005 s, 2 attempts'] * 2]
+    assert talk.outcomes() == [[says('no_answer', attempts=2, timeout=0.005)] * 2]
 
 
 @pytest.mark.parametrize('late', [
@@ -278,7 +281,7 @@ def test_what_does_not_belong_to_the_task_is_discarded(late: str) -> None:
 def test_a_refusal_may_leave_the_sub_index_away() -> None:
     assert asked(online(), write((ACCELERATION_2, 100)),
                  ('66C0010000006400', '6670000000000200')) == [
-        'refused by the drive: error 2: limit exceeded']
+        says('refused_by_drive', number=2, text='error 2: limit exceeded')]
 
 
 @pytest.mark.parametrize('size', [0, 4, 7])
@@ -306,8 +309,8 @@ def test_an_absent_drive_ends_a_request_with_its_first_name() -> None:
     sent = [text for _, text in talk.until(11.0) if text.startswith('202')]
     assert sent == ['202#9B11000000000000'] * 2
     assert talk.outcomes() == [[
-        'no answer; drive offline', 'exists in process data only, and none with it was received',
-        'no answer; drive offline', 'no answer; drive offline']]
+        says('no_answer_offline'), says('process_data_not_received'),
+        says('no_answer_offline'), says('no_answer_offline')]]
 
 
 def test_an_absent_drive_is_sent_one_write_only() -> None:
@@ -316,7 +319,7 @@ def test_an_absent_drive_is_sent_one_write_only() -> None:
     talk.submits(write((OFFSET, 1), (ACTUAL, 2), (FLAG, 1)), 10.2)
     assert [text for _, text in talk.until(11.0) if text.startswith('202')] == []
     assert talk.outcomes() == [[
-        'no answer; drive offline', 'exists in process data only', 'no answer; drive offline']]
+        says('no_answer_offline'), 'exists in process data only', says('no_answer_offline')]]
 
 
 def test_time_out_may_change() -> None:
@@ -324,7 +327,7 @@ def test_time_out_may_change() -> None:
     talk.session.reconfigure(parameter_timeout=0.005)
     talk.submits(write((FLAG, 1)), 10.003)
     talk.until(10.009)
-    assert talk.outcomes() == [['no answer in 0.005 s, 1 attempt']]
+    assert talk.outcomes() == [[says('no_answer', attempts=1, timeout=0.005)]]
 
 
 # -- what exists in process data only -------------------------------------------------------------
@@ -335,13 +338,13 @@ def test_process_data_are_read_without_a_frame() -> None:
     assert talk.submits(read(ACTUAL), 10.003) == []
     assert talk.outcomes() == [[8192]]
     assert talk.submits(read(FREQUENCY), 10.003) == []
-    assert talk.outcomes() == [['exists in process data only, and none with it was received']]
+    assert talk.outcomes() == [[says('process_data_not_received')]]
 
 
 def test_process_data_are_not_written() -> None:
     talk = online(request=SETPOINTS[:1], response=VALUES[:1])
     refusal = talk.session.users.write_refusal
-    assert refusal(FREQUENCY) == 'sent cyclically: publish ~/command/frequency_setpoint'
+    assert refusal(FREQUENCY) == says('sent_cyclically', name='frequency_setpoint')
     assert refusal(SETPOINTS[1]) == 'exists in process data only'
     assert refusal(ACCELERATION) == ''
     talk.submits(write((SETPOINTS[1], 5), (ACTUAL, 5)), 10.003)
@@ -401,12 +404,12 @@ def test_raw_writes_that_do_not_fit_or_are_refused() -> None:
     talk = online()
     assert asked(talk, write(user_value('p310', 65536)),
                  ('3611000000000000', '3611000000000000')) == [
-        '65536 is not representable in 16 bits: -32768 to 65535']
+        says('not_in_bits', bits=16, high=65535, low=-32768, value=65536)]
     assert asked(talk, write(user_value('p310', -32769)),
                  ('3611000000000000', '3611000000000000')) == [
-        '-32769 is not representable in 16 bits: -32768 to 65535']
+        says('not_in_bits', bits=16, high=65535, low=-32768, value=-32769)]
     assert asked(talk, write(user_value('p310', 1)), ('3611000000000000', '3671000000000000')) == [
-        'refused by the drive: error 0: invalid parameter number']
+        says('refused_by_drive', number=0, text='error 0: invalid parameter number')]
     with pytest.raises(ValueRefused, match='4294967296 is not representable in 32 bits'):
         user_value('p310', 1 << 32)
 
@@ -472,8 +475,9 @@ def test_telegram_time_out_in_words() -> None:
     talk, _ = monitored(period=0.1)
     talk.hears('203#0112000000000200', 10.005)
     assert talk.session.warning == (
-        'telegram time-out 0.2 s (telegram_timeout, P513) is too tight for a period of 0.1 s: set '
-        'it to 0.3 s or more, or shorten the period')
+        says(
+            'timeout_too_tight', address='P513', least=pytest.approx(0.3),
+            name='telegram_timeout', period=0.1, timeout=0.2))
     talk.until(11.0)
     assert not talk.session.online
     assert talk.session.warning == ''
@@ -504,8 +508,9 @@ def test_telegram_time_out_that_cannot_be_read() -> None:
     talk, _ = monitored()
     talk.hears('203#0172000000000000', 10.005)
     assert talk.events(Noted) == [Noted(
-        'telegram time-out (P513) unknown: refused by the drive: error 0: invalid parameter '
-        'number')]
+        says(
+            'timeout_unknown', address='P513', reason=says('refused_by_drive', number=0,
+            text='error 0: invalid parameter number')))]
     assert talk.session.warning == ''
     assert talk.outcomes() == []
 

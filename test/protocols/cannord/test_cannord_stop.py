@@ -10,6 +10,7 @@ from cannord_session_builders import (
     READY, READY_FRAME, RUNNING, SETPOINTS, TICK, VALUES,
 )
 import pytest
+from saying import says
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.drive_state import DriveState
@@ -76,7 +77,7 @@ def test_signal_right_after_a_stall_to_a_drive_that_does_not_answer() -> None:
     assert talk.deactivate(15.0) == []
     assert [text for _, text in talk.until(16.0)] == [READY_FRAME] * 3
     assert talk.session.stopped
-    assert warnings(talk) == ['told to stop, but it does not answer: it may still be running']
+    assert warnings(talk) == [says('may_still_be_running', why=says('stop_not_answered'))]
 
 
 def test_signal_that_comes_before_anybody_noticed_the_stall() -> None:
@@ -90,7 +91,7 @@ def test_signal_right_after_the_bus_came_back() -> None:
     talk = running()
     assert talk.bus_down(10.05) == []
     assert warnings(talk) == [
-        'the bus was lost before it could be told to stop: it may still be running']
+        says('may_still_be_running', why=says('bus_lost_before_stop'))]
     assert talk.bus_up(12.0) == []
     assert talk.deactivate(12.0) == []
     assert exchange(talk, 12.0) == READY_FRAME
@@ -104,7 +105,7 @@ def test_bus_that_is_lost_during_the_stop() -> None:
     talk.bus_down(10.055)
     assert talk.session.stopped
     assert warnings(talk) == [
-        'the bus was lost before it could be told to stop: it may still be running']
+        says('may_still_be_running', why=says('bus_lost_before_stop'))]
 
 
 def test_end_while_the_bus_is_lost() -> None:
@@ -113,7 +114,7 @@ def test_end_while_the_bus_is_lost() -> None:
     talk.events()
     assert talk.deactivate(11.0) == []
     assert talk.session.stopped
-    assert warnings(talk) == ['could not be told to stop: it may still be running']
+    assert warnings(talk) == [says('may_still_be_running', why=says('stop_not_possible'))]
 
 
 def test_end_while_a_drive_that_ran_is_lost() -> None:
@@ -167,7 +168,7 @@ def test_drive_that_falls_silent_together_with_the_stop() -> None:
     talk.deactivate(10.05)
     assert talk.until(10.25) == [(10.06, READY_FRAME), (10.08, READY_FRAME), (10.1, READY_FRAME)]
     assert talk.session.stopped
-    assert warnings(talk) == ['told to stop, but it does not answer: it may still be running']
+    assert warnings(talk) == [says('may_still_be_running', why=says('stop_not_answered'))]
 
 
 def test_drive_that_answers_the_last_cycle_of_a_stop() -> None:
@@ -197,7 +198,7 @@ def test_bus_that_is_lost_while_the_last_answer_is_waited_for() -> None:
     assert talk.session.stopped
     assert talk.until(11.0) == []
     assert warnings(talk) == [
-        'the bus was lost before it could be told to stop: it may still be running']
+        says('may_still_be_running', why=says('bus_lost_before_stop'))]
 
 
 def test_bus_that_takes_no_stop_frame_at_all() -> None:
@@ -210,7 +211,7 @@ def test_bus_that_takes_no_stop_frame_at_all() -> None:
     assert talk.sent() == []
     assert talk.session.stopped
     assert talk.session.next_timer() == math.inf
-    assert warnings(talk) == ['could not be told to stop: it may still be running']
+    assert warnings(talk) == [says('may_still_be_running', why=says('stop_not_possible'))]
 
 
 def test_one_stop_frame_that_left_is_a_word() -> None:
@@ -244,7 +245,7 @@ def test_additional_frame_that_is_refused_is_half_a_stop() -> None:
         (round(10.06 + 0.02 * place, 6), '002#7E04000000000000') for place in range(13)]
     assert not talk.session.stopped
     talk.session.give_up(10.31)
-    assert warnings(talk) == ['could not be told to stop: it may still be running']
+    assert warnings(talk) == [says('may_still_be_running', why=says('stop_not_possible'))]
 
 
 def test_refused_enable_is_no_enable() -> None:
@@ -285,7 +286,7 @@ def test_refused_write_was_not_sent() -> None:
     talk = online()
     talk.refusing = lambda text: text.startswith('202')
     assert talk.submits(write((OFFSET, 7)), 10.003) == []
-    assert talk.outcomes() == [['not sent: the bus takes no frames']]
+    assert talk.outcomes() == [[says('not_sent')]]
     talk.refusing = lambda text: False
     assert talk.submits(write((OFFSET, 8)), 10.004) == ['202#9BE1000000000800']
     talk.hears('203#9B11000000000800', 10.005)
@@ -448,7 +449,7 @@ def test_inverter_that_falls_silent_while_it_runs_is_warned_about_once() -> None
     assert not talk.session.online
     assert warnings(talk) == [], 'it may have heard those that are not neutral'
     assert {text for _, text in talk.until(10.18 + TICK)} == {READY_FRAME}
-    assert warnings(talk) == ['told to stop, but it does not answer: it may still be running']
+    assert warnings(talk) == [says('may_still_be_running', why=says('stop_not_answered'))]
     talk.until(20.0)
     assert warnings(talk) == []
     talk.hears(READY, 20.001)

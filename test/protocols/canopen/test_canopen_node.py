@@ -5,6 +5,7 @@ import math
 from typing import Any
 
 import pytest
+from saying import says
 
 from drive_can_bridge.protocols.canopen.network import Emergency, NmtState
 from drive_can_bridge.protocols.canopen.node import Change, Node
@@ -107,7 +108,7 @@ def test_boot_up_of_a_node_with_heartbeats_waits_for_operational() -> None:
     hears(watched, OPERATIONAL, 10.1)
     assert hears(watched, BOOT_UP, 20.0) == (Change.RESTARTED, ['000#0105'])
     assert watched.free_at == pytest.approx(21.0)
-    assert watched.refusal(20.5) == 'node is pre-operational'
+    assert watched.refusal(20.5) == says('node_state', state='pre-operational')
     assert hears(watched, OPERATIONAL, 20.1) == (Change.OPERATIONAL, [])
     assert watched.free_at == 20.1
 
@@ -117,7 +118,7 @@ def test_slow_heartbeats_are_believed_for_three_intervals() -> None:
     for now in (20.0, 25.0):
         hears(watched, PRE_OPERATIONAL, now)
     assert watched.free_at == pytest.approx(40.0)
-    assert watched.refusal(39.9) == 'node is pre-operational'
+    assert watched.refusal(39.9) == says('node_state', state='pre-operational')
     assert watched.refusal(40.1) == '', 'heartbeats ceased: nothing is known any more'
 
 
@@ -179,11 +180,11 @@ def test_no_heartbeat_was_due_while_nobody_listened() -> None:
 def test_emergencies_last_until_they_are_over() -> None:
     watched = node()
     assert watched.receive_emergency(OVERLOAD) == (
-        'emergency 2310h (current, output side), error register 02h')
+        says('emergency', text='2310h (current, output side), error register 02h'))
     assert watched.emergency == OVERLOAD
     assert watched.receive_emergency(OVERLOAD) == '', 'nothing new'
     assert watched.receive_emergency(Emergency(0)) == (
-        'emergency over: the node reports no error any more')
+        says('emergency_over'))
     assert watched.emergency is None
     assert watched.receive_emergency(Emergency(0)) == ''
 

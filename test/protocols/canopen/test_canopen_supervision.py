@@ -5,6 +5,7 @@ import math
 
 from builders import drive, frame
 import pytest
+from saying import says
 
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.events import Noted
@@ -85,7 +86,8 @@ def test_a_node_that_stays_closed_moves_what_may_begin() -> None:
     closed = ('closed', 'node is pre-operational', False)
     assert exchange.hears('705#7F', 10.2) == [START, closed, ('free', 11.2, True)]
     assert exchange.hears('705#7F', 10.25) == [('free', 11.25, True)], 'the same, for longer'
-    assert exchange.supervision.refusal(11.24) == 'drive offline: node is pre-operational'
+    assert exchange.supervision.refusal(11.24) == says(
+        'drive_offline_because', reason=says('node_state', state='pre-operational'))
     assert exchange.supervision.refusal(11.25) == ''
 
 
@@ -93,9 +95,9 @@ def test_a_restart_is_told_and_the_node_started_first() -> None:
     exchange = begun()
     exchange.online = True
     assert exchange.hears('705#00', 12.0) == [
-        START, ('closed', 'the device restarted', True), ('free', 12.05, False)]
-    assert exchange.report.take() == [Noted('boot-up: the device has started')]
-    assert exchange.report.advice == 'the device restarted: waiting for it to answer'
+        START, ('closed', says('device_restarted'), True), ('free', 12.05, False)]
+    assert exchange.report.take() == [Noted(says('booted'))]
+    assert exchange.report.advice == says('restarted_waiting')
 
 
 def test_heartbeats_that_cease() -> None:
@@ -105,7 +107,7 @@ def test_heartbeats_that_cease() -> None:
     exchange.hears('705#05', 10.1)
     assert exchange.supervision.next_timer() == pytest.approx(10.6)
     assert exchange.at(10.59) == []
-    assert exchange.at(10.61) == [('silent', 'no heartbeat for 0.5 s')]
+    assert exchange.at(10.61) == [('silent', says('no_heartbeat', timeout=0.5))]
     assert exchange.at(10.7) == []
 
 
@@ -170,7 +172,7 @@ def test_emergency_and_its_end() -> None:
     assert node.ailing == ''
     assert exchange.report.take() == [
         Noted(f'emergency {text}', warning=True),
-        Noted('emergency over: the node reports no error any more')]
+        Noted(says('emergency_over'))]
 
 
 def test_state_and_missing_heartbeat() -> None:

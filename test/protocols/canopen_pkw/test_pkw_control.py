@@ -10,6 +10,7 @@ from pkw_builders import (
     RUNS_1, START, started, STILL_0, TABLE, TRIPPED_0, WORD,
 )
 import pytest
+from saying import says
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.drive_state import DriveState
@@ -66,7 +67,8 @@ def test_reset_of_a_trip() -> None:
     talk.until(10.0901)
     talk.hears(TRIPPED_0, 10.091)
     assert talk.session.state is DriveState.FAULT
-    assert talk.events(Noted) == [Noted('fault (status word 0044h)', warning=True)]
+    assert talk.events(Noted) == [Noted(says(
+        'fault_came', ran=False, status='status word 0044h'), warning=True)]
     assert talk.asks(ControlAction.RESET_FAULT, 10.095) == ['505#C00200AA08000000']
     assert talk.hears('485#C00200AA00000000', 10.096) == [DISABLE_0], 'one acknowledged write'
     assert talk.hears(DISABLED_0, 10.097) == []
@@ -121,7 +123,7 @@ def test_enabling_while_tripped_is_refused() -> None:
     talk.until(10.0901)
     talk.hears(TRIPPED_0, 10.091)
     assert talk.asks(ControlAction.ENABLE, 10.095) == []
-    assert talk.control_outcomes() == [('enable', False, 'fault: reset it first')]
+    assert talk.control_outcomes() == [('enable', False, says('reset_first'))]
 
 
 def test_offline_drive_is_not_enabled() -> None:
@@ -331,7 +333,7 @@ def test_restart_puts_the_word_back() -> None:
     talk = running()
     assert talk.hears('705#00', 10.1) == [START, DISABLE_0], 'it was told to run'
     lost, = talk.events(StationLost)
-    assert lost.reason == 'the device restarted'
+    assert lost.reason == says('device_restarted')
     assert talk.hears(DISABLED_0, 10.11) == []
     assert talk.until(10.151) == [(10.15, READ_1)]
     assert talk.hears(ANSWER_1, 10.153) == [DISABLE_0]
@@ -354,7 +356,7 @@ def test_enabling_stuck_on_the_way_fails_when_the_device_restarts() -> None:
     talk = ready()
     talk.asks(ControlAction.ENABLE, 10.075)
     talk.hears('705#00', 10.08)
-    assert talk.control_outcomes() == [('enable', False, 'the device restarted')]
+    assert talk.control_outcomes() == [('enable', False, says('device_restarted'))]
 
 
 # -- the word among the cyclic requests -----------------------------------------------------------

@@ -7,6 +7,7 @@ from pkw_builders import (
     PRE_OPERATIONAL, READ_0, READ_1, SPEED, START, started, STATUS, STOPPED, TRIPPED_1,
 )
 import pytest
+from saying import says
 
 from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import Noted, ProcessDataReceived, StationFound, StationLost
@@ -30,7 +31,7 @@ def test_boot_up_before_the_first_round() -> None:
     assert talk.until(10.0999) == []
     assert talk.until(10.1499) == [(10.1, START)]
     assert talk.until(10.1501) == [(10.15, IDLE)]
-    assert talk.events() == [Noted('boot-up: the device has started')]
+    assert talk.events() == [Noted(says('booted'))]
 
 
 def test_nothing_but_nmt_before_the_node_is_operational() -> None:
@@ -42,7 +43,7 @@ def test_nothing_but_nmt_before_the_node_is_operational() -> None:
         sent += [text for _, text in talk.until(now)]
         sent += talk.hears(PRE_OPERATIONAL, now)
     assert set(sent) == {START}
-    assert talk.session.offline_advice == 'node is pre-operational'
+    assert talk.session.offline_advice == says('node_state', state='pre-operational')
     assert talk.session.facts()['nmt_state'] == 'pre-operational'
     assert talk.hears(OPERATIONAL, 12.0) == []
     assert talk.at(12.0) == [IDLE]
@@ -143,14 +144,13 @@ def test_lost_heartbeat_stays_the_advice_while_nothing_is_answered() -> None:
     talk.hears(ANSWER_0, 10.071)
     talk.until(10.2)
     assert talk.session.statistics.missed > 1
-    assert talk.session.offline_advice == 'no heartbeat for 0.025 s'
+    assert talk.session.offline_advice == says('no_heartbeat', timeout=0.025)
 
 
 def test_lost_heartbeat_makes_it_offline_until_it_is_back() -> None:
     talk = online(heartbeat_timeout=0.1)
     assert talk.session.warning == (
-        "no heartbeat although heartbeat_timeout is set: configure the device's heartbeat "
-        'producer (1017h)')
+        says('heartbeat_missing'))
     talk.hears(OPERATIONAL, 10.06)
     assert talk.session.warning == ''
     talk.until(10.0701)
@@ -166,8 +166,8 @@ def test_lost_heartbeat_makes_it_offline_until_it_is_back() -> None:
     talk.hears(ANSWER_0, 10.151)
     talk.events()
     assert [text for _, text in talk.until(10.161)] == []
-    assert talk.events() == [StationLost('no heartbeat for 0.1 s')]
-    assert talk.session.offline_advice == 'no heartbeat for 0.1 s'
+    assert talk.events() == [StationLost(says('no_heartbeat', timeout=0.1))]
+    assert talk.session.offline_advice == says('no_heartbeat', timeout=0.1)
     # its answers alone do not bring it back
     assert [text for _, text in talk.until(10.1701)] == [READ_1]
     talk.hears(ANSWER_1, 10.171)
@@ -196,7 +196,7 @@ def test_emergency_is_shown_until_it_is_over() -> None:
     talk.hears(TRIP, 10.061)
     assert talk.events() == [], 'told once'
     talk.hears('085#0000000000000000', 10.062)
-    assert talk.events() == [Noted('emergency over: the node reports no error any more')]
+    assert talk.events() == [Noted(says('emergency_over'))]
     assert talk.session.facts()['emergency'] == 'none'
     assert talk.session.warning == ''
 

@@ -10,6 +10,7 @@ from pkw_builders import (
     READ_0, READ_1, START, started, STATUS, STATUS_2,
 )
 import pytest
+from saying import says
 
 from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import (
@@ -21,7 +22,7 @@ READ_SINGLE_0 = '505#C701002500000000'
 
 def test_the_way_to_the_first_sample() -> None:
     talk = started()
-    assert talk.session.offline_advice == 'being looked for'
+    assert talk.session.offline_advice == says('looked_for')
     assert talk.until(10.049) == []
     assert talk.until(10.05) == [(10.05, IDLE)]
     assert talk.hears(IDLE_ANSWER, 10.051) == [READ_1]
@@ -148,7 +149,7 @@ def test_late_response_is_counted_and_not_believed() -> None:
     assert talk.session.statistics.rejected == 1
     rejected, = talk.events()
     assert rejected == FrameRejected(
-        'PKW response that nobody asked for: function 26h, register 455')
+        says('unasked_pkw', message='function 26h, register 455'))
     assert talk.hears(IDLE_ANSWER, 10.181) == [READ_1]
     talk.hears(ANSWER_1, 10.182)
     assert talk.samples() == [(0x41, 0)]
@@ -159,7 +160,7 @@ def test_three_missed_rounds_make_it_offline_and_one_good_one_online() -> None:
     sent = talk.until(10.6)
     assert [text for _, text in sent] == [READ_0, IDLE, READ_1, IDLE, READ_0, IDLE]
     lost, = talk.events(StationLost)
-    assert lost == StationLost('no complete round of reads for 3 periods')
+    assert lost == StationLost(says('no_round', periods=3))
     assert talk.session.offline_advice == lost.reason
     assert talk.session.statistics.missed == 3
     assert talk.session.state is DriveState.OFFLINE
@@ -274,7 +275,7 @@ def test_what_was_missed_before_a_restart_counts_no_more() -> None:
     assert talk.hears('705#00', 10.107) == [START]
     talk.until(10.22)
     assert talk.session.statistics.missed == 3
-    assert talk.session.offline_advice == 'the device restarted: waiting for it to answer'
+    assert talk.session.offline_advice == says('restarted_waiting')
     talk.until(10.26)
     assert talk.session.statistics.missed == 4
     assert talk.session.offline_advice.startswith('no complete round of reads: drive silent')
@@ -290,10 +291,14 @@ def test_refused_poll_is_an_answer_but_shown() -> None:
     assert talk.session.statistics.missed == 0
     assert talk.session.statistics.exchanges == 0
     assert talk.session.warning == (
-        'poll of thermal_level refused by the drive: 06020000h (no such register or object): '
-        'correct cyclic_response or the profile')
+        says(
+            'poll_refused', what=says('write_refused', reason=says('refused_by_drive',
+            number=0x06020000, text='06020000h (no such register or object)'),
+            what='thermal_level')))
     assert talk.events() == [
-        Noted('read thermal_level: refused by the drive: 06020000h (no such register or object)',
+        Noted(says(
+            'read_refused', names='thermal_level', reason=says('refused_by_drive',
+            number=0x06020000, text='06020000h (no such register or object)')),
               warning=True),
         StationFound()]
     # told once; gone when it is answered
@@ -369,7 +374,7 @@ def test_another_master_is_noticed() -> None:
     talk = online()
     assert talk.hears('505#C002002A01000000', 10.06) == []
     event, = talk.events()
-    assert event.text == 'another master sends PKW requests to node 5: 505#C002002A01000000'
+    assert event.text == says('other_master_asks_node', frame='505#C002002A01000000', node=5)
 
 
 def test_nothing_is_planned_before_activation() -> None:

@@ -11,6 +11,7 @@ from pkw_builders import (
     started, STATUS, STILL_0, STILL_1, STOPPED, TORQUE,
 )
 import pytest
+from saying import says
 
 from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import Noted, SetpointsExpired, StationLost
@@ -204,10 +205,14 @@ def test_refused_setpoint_is_shown_until_one_is_taken() -> None:
     assert talk.at(10.07) == [SPEED_1]
     assert answered(talk, talk.hears('485#C60200CE30000906', 10.071), 10.071) == []
     assert talk.session.warning == (
-        'write of speed refused by the drive: 06090030h (value out of range): correct '
-        'cyclic_request, the command or the profile')
+        says(
+            'setpoint_not_taken', what=says('write_refused', reason=says('refused_by_drive',
+            number=0x06090030, text='06090030h (value out of range)'), what='speed')))
     assert talk.events(Noted) == [Noted(
-        'write of speed refused by the drive: 06090030h (value out of range)', warning=True)]
+        says(
+            'write_failed', what=says('write_refused', what='speed', reason=says(
+                'refused_by_drive', number=0x06090030, text='06090030h (value out of range)'))),
+        warning=True)]
     assert talk.session.online
     assert cycle(talk, 10.09) == [], 'not repeated before the refresh'
     talk.commands(0, 5.0, 10.1)
@@ -289,8 +294,10 @@ def test_stop_is_tried_three_times() -> None:
     assert [round(now - 10.115, 3) for now, _ in sent] == [0.0, 0.5, 1.0, 1.5, 2.0, 2.5]
     assert talk.session.stopped
     assert talk.events(Noted) == [WITHDRAWN, Noted(
-        'told to stop, but control_register_1 0000h not acknowledged in 3 attempts; speed not '
-        'acknowledged in 3 attempts: it may still be running', warning=True, danger=True)]
+        says(
+            'may_still_be_running', why=says('stop_failed', what=[says('write_not_acknowledged',
+            attempts=3, what='control_register_1 0000h'), says('write_not_acknowledged',
+            attempts=3, what='speed')])), warning=True, danger=True)]
 
 
 def test_stop_of_many_setpoints_has_its_limit() -> None:
@@ -388,7 +395,7 @@ def test_lost_time_means_neutral() -> None:
     talk = armed(command_timeout=0.0)
     cycle(talk, 10.07)
     assert talk.time_lost(15.0) == [START, STILL_1]
-    assert talk.events(StationLost) == [StationLost('the bridge stood still')]
+    assert talk.events(StationLost) == [StationLost(says('bridge_stood_still'))]
     assert talk.hears('485#C60200AA00000000', 15.001) == []
     assert answered(talk, talk.at(15.05), 15.05) == ['C60200000000']
     assert talk.session.state is DriveState.NOT_ARMED

@@ -13,6 +13,7 @@ from pkw_builders import (
     STOPPED, TABLE, WORD,
 )
 import pytest
+from saying import says
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.drive_state import DriveState
@@ -40,7 +41,9 @@ def test_the_end_of_a_drive_that_never_ran_and_does_not_answer_is_told() -> None
     assert talk.until(14.0) == [(10.56, DISABLE_0), (11.06, DISABLE_1)]
     assert talk.session.stopped
     assert [note.text for note in talk.events(Noted)] == [
-        'told to stop, but control_register_1 0000h not acknowledged in 3 attempts']
+        says(
+            'stop_failed', what=[says('write_not_acknowledged', attempts=3,
+            what='control_register_1 0000h')])]
 
 
 def test_what_was_not_answered_may_run_all_the_same() -> None:
@@ -121,8 +124,7 @@ def test_slow_device_after_the_bus_came_back() -> None:
     assert len(stops) == 3
     talk.hears(DISABLED_1 if stops[-1][1] == DISABLE_1 else DISABLED_0, stops[-1][0] + 0.3)
     talk.until(12.5)
-    assert worries(talk) == ['the bus was lost before it could be told to stop: '
-                             'it may still be running']
+    assert worries(talk) == [says('may_still_be_running', why=says('bus_lost_before_stop'))]
 
 
 def test_end_while_the_bus_is_lost() -> None:
@@ -323,7 +325,7 @@ def test_refused_write_was_not_sent_and_leaves_the_mailbox_in_step() -> None:
     talk = online()
     refuse(talk)
     assert talk.submits(write((FLC, 90)), 10.055) == []
-    assert talk.outcomes() == [['not sent: the bus takes no frames']]
+    assert talk.outcomes() == [[says('not_sent')]]
     accept(talk)
     assert talk.submits(write((FLC, 91)), 10.056) == ['505#8C02002A5B000000']
     talk.hears('485#8C02002A00000000', 10.057)
@@ -596,7 +598,7 @@ def test_boot_up_frames_in_a_flood(runs: bool) -> None:
     stops = [when for when, text in sent if text in (DISABLE_0, DISABLE_1)]
     assert len(stops) == (3 if runs else 0), 'three attempts, and not three for each frame'
     notes = [note.text for note in talk.events(Noted) if note.text.startswith('boot-up')]
-    assert notes == ['boot-up: the device has started'] * 1000
+    assert notes == [says('booted')] * 1000
     assert talk.session.facts()['nmt_state'] == 'pre-operational'
 
 
@@ -617,7 +619,7 @@ def test_emergencies_in_a_flood() -> None:
             'manufacturer 0A 00 00 00 00')
     assert talk.events(Noted) == [
         Noted(text, warning=True),
-        Noted('emergency over: the node reports no error any more')] * 500
+        Noted(says('emergency_over'))] * 500
     end = 11.1
     while (due := talk.session.next_timer()) < end:
         for text in talk.at(due):

@@ -5,6 +5,7 @@ from typing import Any
 
 from builders import Conversation
 from pkw_builders import CONTROL, driven, echo, online, READ_0, SPEED, SPEED_1
+from saying import says
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import Noted
@@ -62,8 +63,11 @@ def test_drive_that_refuses_neutral_is_not_enabled() -> None:
     assert '0100' not in words(sent)
     (action, success, message), = talk.control_outcomes()
     assert (action, success) == ('enable', False)
-    assert message == ('control word 0001h not sent: write of speed refused by the drive: '
-                       '08000022h (data cannot be stored in the present state of the device)')
+    assert message == (says(
+        'word_refused', reason=says('word_held_back', what=says('write_refused',
+        reason=says('refused_by_drive', number=0x08000022,
+        text='08000022h (data cannot be stored in the present state of the device)'),
+        what='speed')), word=1))
 
 
 def test_drive_that_refused_neutral_once_can_be_enabled_and_disabled() -> None:
@@ -85,8 +89,10 @@ def test_drive_that_does_not_answer_to_neutral_is_not_enabled() -> None:
     sent = enabling(talk, 13.0)
     assert '0100' not in words(sent)
     assert talk.control_outcomes() == [
-        ('enable', False, 'control word 0001h not sent: write of speed: no answer')]
-    assert notes(talk) == ['write of speed: no answer']
+        ('enable', False, says(
+            'word_refused', reason=says('word_held_back', what=says('write_unanswered',
+            what='speed')), word=1))]
+    assert notes(talk) == [says('write_failed', what=says('write_unanswered', what='speed'))]
     assert 'write of speed: no answer' in talk.session.warning
 
 

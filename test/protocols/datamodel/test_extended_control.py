@@ -11,6 +11,7 @@ from extended_builders import (
     ANSWER, ASK_REQUEST_MAP, checked, exchange, NEUTRAL, online, TICK, ZEROS,
 )
 import pytest
+from saying import says
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.drive_state import DriveState
@@ -140,7 +141,7 @@ def test_fault_ends_it() -> None:
     exchange(talk, 10.06, FAULT)
     assert talk.session.state is DriveState.FAULT
     assert [note.text for note in talk.events(Noted)] == [
-        'fault (status word 0008h); only ~/enable starts the drive again']
+        says('fault_came', ran=True, status='status word 0008h')]
     assert exchange(talk, 10.08, READY) == NEUTRAL
     assert exchange(talk, 10.1, READY) == NEUTRAL
 
@@ -178,7 +179,7 @@ def test_drive_whose_status_is_missing_for_long_is_not_driven_on() -> None:
     talk.events()
     assert cut(talk, 10.12) == cut(talk, 10.14) == cut(talk, 10.16) == runs
     assert [note.text for note in talk.events(Noted)] == [
-        'enable withdrawn: 3 answers without a status word; only ~/enable starts the drive again']
+        says('enable_withdrawn', reason=says('status_missing', answers=3), whom='the drive')]
     assert talk.session.state is DriveState.DISABLED
     assert talk.commands(0, 100.0, 10.162) is CommandOutcome.DISABLED
     assert cut(talk, 10.18) == NEUTRAL
@@ -228,7 +229,7 @@ def test_time_out_of_a_request() -> None:
 def test_refusals() -> None:
     plain = online()
     assert plain.session.users.control_refusal(ControlAction.ENABLE) == (
-        'the profile has no control section')
+        says('no_control_section'))
     assert plain.control_outcomes() == []
     talk = Conversation(drive(control=CONTROL))
     assert talk.session.users.control_refusal(ControlAction.ENABLE) == 'bridge inactive'
@@ -318,7 +319,9 @@ def test_disable_that_gets_lost_when_a_drive_comes_back_is_written_again() -> No
             'it by other means, or set a control_timeout longer than its ramp')
     assert talk.session.control.disregard == text
     assert [note.text for note in talk.events(Noted)] == [
-        'told to stop, but control_word (P52): no answer: it may still be running', text]
+        says(
+            'may_still_be_running', why=says('stop_failed', what=[says('write_unanswered',
+            what='control_word (P52)')])), text]
     assert cycles(talk, 201, 400, READY) == []
     assert talk.session.control.disregard == ''
 
@@ -412,7 +415,8 @@ def test_loss_writes_disable() -> None:
     # disable at once when it is lost, and read back
     assert [text for _, text in found if text != ASK_WORD] == (
         [NEUTRAL] * 3 + [DISABLE, NEUTRAL, DISABLE, NEUTRAL])
-    assert talk.events(StationLost) == [StationLost('no cyclic response for 3 cycles')]
+    assert talk.events(StationLost) == [StationLost(says(
+        'silent_for_cycles', cycles=3, what='no cyclic response'))]
 
 
 @pytest.mark.parametrize('mapping', ['assume', 'verify'])
@@ -558,7 +562,7 @@ def test_drive_whose_status_is_not_read_any_more_is_not_driven_on() -> None:
     assert sent.count(ASK_STATUS) == 3
     assert DISABLE in sent + [text for _, text in talk.until(talk.now + 0.01)]
     assert [note.text for note in talk.events(Noted)] == [
-        'enable withdrawn: 3 answers without a status word; only ~/enable starts the drive again']
+        says('enable_withdrawn', reason=says('status_missing', answers=3), whom='the drive')]
 
 
 def test_fault_is_seen_in_a_read_status() -> None:

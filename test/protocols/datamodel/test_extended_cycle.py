@@ -11,6 +11,7 @@ from extended_builders import (
     REQUEST_MAP, RESPONSE_MAP, TICK, ZEROS,
 )
 import pytest
+from saying import says
 
 from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import (
@@ -91,7 +92,7 @@ def test_second_answer_in_a_cycle_is_rejected() -> None:
     talk.hears(ANSWER, 10.021)
     talk.hears('103FFFF0#0BAD0BAD0BAD0000', 10.022)
     assert talk.events() == [ProcessDataReceived((1000, 250, 1), 10.021),
-                             FrameRejected('cyclic response that nobody asked for')]
+                             FrameRejected(says('unasked', what='cyclic response'))]
     assert talk.session.statistics.rejected == 1
     assert talk.session.statistics.exchanges == 2
 
@@ -123,7 +124,7 @@ def test_unasked_answer_before_the_first_cycle() -> None:
     talk.bus_up(9.0)
     talk.activate(10.0)
     talk.hears(ANSWER, 10.0005)
-    assert talk.events() == [FrameRejected('cyclic response that nobody asked for')]
+    assert talk.events() == [FrameRejected(says('unasked', what='cyclic response'))]
     assert not talk.session.online
 
 
@@ -297,9 +298,11 @@ def test_offline_at_the_limit_three_neutral_cycles_then_silence() -> None:
     assert talk.session.statistics.missed == 2
 
     assert talk.until(10.08 + TICK) == [(10.08, NEUTRAL)]
-    assert talk.events() == [StationLost('no cyclic response for 3 cycles')]
+    assert talk.events() == [StationLost(says(
+        'silent_for_cycles', cycles=3, what='no cyclic response'))]
     assert not talk.session.online
-    assert talk.session.offline_advice == 'no cyclic response for 3 cycles'
+    assert talk.session.offline_advice == says(
+        'silent_for_cycles', cycles=3, what='no cyclic response')
 
     assert talk.until(10.1421) == [
         (10.1, NEUTRAL), (10.12, NEUTRAL),
@@ -309,8 +312,11 @@ def test_offline_at_the_limit_three_neutral_cycles_then_silence() -> None:
     assert talk.events() == []
     assert talk.until(10.45)[-1][1] == ASK_REQUEST_MAP
     assert talk.events() == [Noted(
-        'told to stop, but speed_setpoint (P50): no answer; torque_limit (P51): no answer: '
-        'it may still be running', warning=True, danger=True)]
+        says(
+            'may_still_be_running', why=says('stop_failed', what=[
+                says('write_unanswered', what='speed_setpoint (P50)'),
+                says('write_unanswered', what='torque_limit (P51)')])),
+        warning=True, danger=True)]
     assert {text for _, text in talk.until(20.0)} == {ASK_REQUEST_MAP}
     assert talk.events() == [], 'once'
 
@@ -379,7 +385,7 @@ def test_drive_that_answers_reads_but_no_cycles() -> None:
     # never closer together than a period, here and elsewhere
     assert talk.until(10.07) == [(10.063, NEUTRAL)]
     assert talk.session.offline_advice == (
-        'no cyclic response: drive silent or response identifier taken')
+        says('cycles_unanswered'))
     assert talk.events(StationFound, StationLost) == []
 
 
@@ -398,8 +404,8 @@ def test_first_cycle_keeps_its_distance_to_the_last_one() -> None:
 def test_bus_down_is_silence_and_offline() -> None:
     talk = online()
     assert talk.bus_down(10.01) == []
-    assert talk.events() == [StationLost('bus down: unplugged')]
-    assert talk.session.offline_advice == 'bus down: unplugged'
+    assert talk.events() == [StationLost(says('bus_is_down', reason='unplugged'))]
+    assert talk.session.offline_advice == says('bus_is_down', reason='unplugged')
     assert talk.session.next_timer() == math.inf
     assert talk.at(20.0) == []
     assert talk.session.stopped
@@ -417,7 +423,7 @@ def test_frames_that_were_not_fetched_die_with_the_bus() -> None:
 def test_bus_that_comes_up_twice_makes_the_drive_offline_once() -> None:
     talk = online()
     assert talk.bus_up(10.01) == [ASK_REQUEST_MAP]
-    assert talk.events() == [StationLost('the drive is being reconnected')]
+    assert talk.events() == [StationLost(says('reconnected'))]
     assert not talk.session.online
 
 
@@ -430,7 +436,7 @@ def test_lost_time_starts_over() -> None:
     assert talk.time_lost(15.0) == ['00300321#0000000000000000']
     assert talk.until(15.0021) == [
         (15.001, '00300331#0000000000000000'), (15.002, '00200321#0000000000000000')]
-    assert talk.events() == [StationLost('the bridge stood still')]
+    assert talk.events() == [StationLost(says('bridge_stood_still'))]
     assert talk.hears('10200321#0000000000000000', 15.003) == ['00200331#0000000000000000']
     assert talk.hears('10200331#0000000000000000', 15.004) == [ASK_REQUEST_MAP]
     checked(talk, 15.004)

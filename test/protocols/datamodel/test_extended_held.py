@@ -12,6 +12,7 @@ from builders import (
     ACTUAL, CONTROL, Conversation, drive, INT16, parameter, RAM, RO, STATUS, TABLE, WORD,
 )
 import pytest
+from saying import says
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.errors import ValueRefused
@@ -92,8 +93,9 @@ def test_axis_whose_position_is_missing_may_be_anywhere() -> None:
     talk = standing()
     assert short(talk, 2, 1) == request(0, 70)
     refusal = talk.session.users.control_refusal(ControlAction.ENABLE)
-    assert refusal == ('it would jump: position_setpoint does not have the value of '
-                       'actual_position yet, which is not known or which it cannot carry')
+    assert refusal == (says(
+        'would_jump', why=says('position_not_told', known=False, measured='actual_position',
+        name='position_setpoint')))
     # moved by hand meanwhile
     assert cycle(talk, 3, 1, 90) == request(0, 70), 'beside disable'
     assert talk.session.users.control_refusal(ControlAction.ENABLE).startswith(
@@ -125,8 +127,9 @@ def test_no_cycle_without_a_position() -> None:
     assert talk.hears(MAPS[1], 10.361) == []    # the read is in quarantine
     assert talk.until(10.5)[0][1] == ASK_POSITION
     assert talk.session.offline_advice == (
-        'it would jump: position_setpoint does not have the value of actual_position yet, which '
-        'is not known or which it cannot carry')
+        says(
+            'would_jump', why=says('position_not_told', known=False, measured='actual_position',
+            name='position_setpoint')))
 
 
 def test_limits_do_not_bound_where_the_axis_is() -> None:
@@ -312,13 +315,13 @@ def test_without_control_a_lost_drive_is_sent_nothing(mapping: str) -> None:
     cyclic = [text for _, text in talk.until(10.4) if text.startswith('003FFFF0')]
     assert cyclic == ['003FFFF0#005A000000000000'] * 3
     assert [event.text for event in talk.events(Noted) if event.warning] == [
-        'where its axis is, nobody knows, so that it is told nothing: it may still be running']
+        says('may_still_be_running', why=says('position_unknown'))]
     assert not [text for _, text in talk.until(15.0) if not text.endswith(ZEROS)]   # reads only
     talk.deactivate(15.0)
     assert talk.sent() == []
     assert talk.session.stopped
     assert [event.text for event in talk.events(Noted) if event.warning] == [
-        'could not be told to stop: it may still be running']
+        says('may_still_be_running', why=says('stop_not_possible'))]
 
 
 def test_stall_reads_it_anew_and_believes_no_older_answer() -> None:
@@ -344,12 +347,15 @@ def test_enable_waits_for_the_position() -> None:
     talk.hears('103FFFF0#00010000', 10.081)     # too short for the position
     assert talk.session.online
     assert talk.session.users.control_refusal(ControlAction.ENABLE) == (
-        'it would jump: position_setpoint does not have the value of actual_position yet, which '
-        'is not known or which it cannot carry')
+        says(
+            'would_jump', why=says('position_not_told', known=False, measured='actual_position',
+            name='position_setpoint')))
     assert talk.until(10.1 + 1e-6)[-1][1] == request(0, 70)
     talk.hears('103FFFF0#0001000000210000', 10.102)
     assert talk.session.users.control_refusal(ControlAction.ENABLE) == (
-        'it would jump: position_setpoint does not have the value of actual_position yet')
+        says(
+            'would_jump', why=says('position_not_told', known=True, measured='actual_position',
+            name='position_setpoint')))
     assert talk.until(10.12 + 1e-6)[-1][1] == request(0, 33)
     talk.hears('103FFFF0#0001000000210000', 10.122)
     assert talk.asks(ControlAction.ENABLE, 10.123) == []
@@ -426,4 +432,4 @@ def test_axis_that_ran_and_does_not_say_where_it_is_is_disabled_by_number() -> N
     assert sent.count(disable) == 1
     assert not any(text.startswith('003FFFF0') for text in sent)
     assert [note.text for note in talk.events(Noted)] == [
-        'told to stop once more, which it has confirmed']
+        says('stopped_again')]

@@ -9,6 +9,7 @@ from extended_builders import (
     RESPONSE_MAP, TICK, ZEROS,
 )
 import pytest
+from saying import says
 
 from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import (
@@ -150,12 +151,12 @@ def test_parameter_services_work_while_maps_differ() -> None:
     # nobody answers: the drive is there, so it is not called offline
     talk.submits(read(GAIN), 10.2)
     talk.until(10.6)
-    assert talk.outcomes() == [['no answer in 0.1 s, 3 attempts']]
+    assert talk.outcomes() == [[says('no_answer', attempts=3, timeout=0.1)]]
 
 
 def test_silent_drive_is_looked_for_again_and_again() -> None:
     talk = asked()
-    assert talk.session.offline_advice == 'being looked for'
+    assert talk.session.offline_advice == says('looked_for')
     assert talk.until(10.35) == [(10.1, ASK_REQUEST_MAP), (10.2, ASK_REQUEST_MAP),
                                  (10.3, ASK_REQUEST_MAP)]
     assert talk.session.offline_advice.startswith('no answer to mapping read')
@@ -240,7 +241,7 @@ def test_answer_to_the_cycle_before_a_lost_map_is_no_surprise() -> None:
     talk.hears(ANSWER, 11.7)
     assert talk.events() == []
     talk.hears(ANSWER, 11.8)
-    assert talk.events() == [FrameRejected('cyclic response that nobody asked for')]
+    assert talk.events() == [FrameRejected(says('unasked', what='cyclic response'))]
     assert talk.session.statistics.rejected == 1
 
 
@@ -314,8 +315,10 @@ def test_assume_goes_on_cycling_after_a_loss() -> None:
                                  (10.06, '003FFFF0#00C8000000000000')]
     assert talk.session.online
     assert talk.until(10.1) == [(10.08, NEUTRAL), (10.1, NEUTRAL)]
-    assert talk.events() == [StationLost('no cyclic response for 3 cycles')]
-    assert talk.session.offline_advice == 'no cyclic response for 3 cycles'
+    assert talk.events() == [StationLost(says(
+        'silent_for_cycles', cycles=3, what='no cyclic response'))]
+    assert talk.session.offline_advice == says(
+        'silent_for_cycles', cycles=3, what='no cyclic response')
     talk.hears(ANSWER, 10.102)
     assert talk.session.online
     assert exchange(talk, 10.12) == NEUTRAL
@@ -391,7 +394,7 @@ def test_configure_in_the_safe_order() -> None:
             assert keeper.trace[place + 1].endswith(f' {number}?')
     assert keeper.registers == dict(zip(range(122, 130), (50, 51, 0, 0, 209, 0, 0, 0)))
     assert talk.events(MappingWritten, MappingDiffered) == [
-        MappingWritten('request map [50, 51], response map [209]')]
+        MappingWritten(says('maps_written', request=(50, 51), response=(209,)))]
 
 
 def test_configure_leaves_right_maps_alone() -> None:
@@ -485,7 +488,7 @@ def test_drive_that_falls_silent_in_a_rewrite() -> None:
     assert keeper.live(talk, 10.5) == []
     assert keeper.registers[122] == 0  # every request word is ignored: that is safe
     assert talk.events(MappingDiffered) == [
-        MappingDiffered('could not be rewritten: no answer for map parameter 122')]
+        MappingDiffered(says('maps_not_written', why=says('no_answer_for_map', number=122)))]
 
 
 def test_maps_that_cannot_be_read_are_not_written() -> None:

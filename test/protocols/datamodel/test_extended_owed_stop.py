@@ -17,6 +17,7 @@ from extended_builders import (
     REQUEST_MAP, RESPONSE_MAP, TICK,
 )
 import pytest
+from saying import says
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.drive_state import DriveState
@@ -405,7 +406,7 @@ def test_drive_that_falls_silent_together_with_the_stop(mapping: str) -> None:
     sent = talk.until(10.3)
     assert [text for _, text in sent] == [NEUTRAL] * 3
     assert talk.session.stopped
-    assert warnings(talk) == ['told to stop, but it does not answer: it may still be running']
+    assert warnings(talk) == [says('may_still_be_running', why=says('stop_not_answered'))]
 
 
 @pytest.mark.parametrize('mapping', ['verify', 'assume'])
@@ -437,7 +438,7 @@ def test_second_end_while_the_last_answer_is_waited_for() -> None:
     talk.deactivate(10.13)
     assert [text for _, text in talk.until(11.0)] == [NEUTRAL] * 3
     assert talk.session.stopped
-    assert warnings(talk) == ['told to stop, but it does not answer: it may still be running']
+    assert warnings(talk) == [says('may_still_be_running', why=says('stop_not_answered'))]
 
 
 def test_stop_of_a_lost_drive_counts_frames_that_were_taken() -> None:
@@ -480,7 +481,7 @@ def test_unacknowledged_write_that_was_refused_was_not_sent() -> None:
     talk = online(verify_writes=False)
     talk.refusing = lambda text: text.startswith('00300281')
     talk.submits(write((GAIN, 7)), 10.003)
-    assert talk.outcomes() == [['not sent: the bus takes no frames']]
+    assert talk.outcomes() == [[says('not_sent')]]
 
 
 def test_many_writes_that_are_refused_end_with_the_first() -> None:
@@ -493,7 +494,7 @@ def test_many_writes_that_are_refused_end_with_the_first() -> None:
     talk.refusing = refusing
     others = [parameter(f'g{number}', number, storage=GAIN.storage) for number in range(300, 320)]
     talk.submits(write(*((other, 1) for other in others)), 10.003)
-    assert talk.outcomes() == [['not sent: the bus takes no frames'] * 20]
+    assert talk.outcomes() == [[says('not_sent')] * 20]
     assert len(refused) == 1
 
 

@@ -7,6 +7,7 @@ from builders import (
 )
 from extended_builders import ANSWER, ASK_REQUEST_MAP, NEUTRAL, online, TICK, ZEROS
 import pytest
+from saying import says
 
 from drive_can_bridge.core.events import FrameRejected, RequestCompleted
 
@@ -56,7 +57,7 @@ def test_shared_frame_falls_apart_when_nobody_answers() -> None:
     assert talk.until(10.4 + TICK) == [(10.2, ASK_BOTH), (10.3, ASK_BOTH), (10.4, ASK_GAIN)]
     assert talk.hears('10200281#0007000000000000', 10.41) == [ASK_DAMPING]
     assert talk.until(10.8) == [(10.51, ASK_DAMPING), (10.61, ASK_DAMPING)]
-    assert talk.outcomes() == [[7, 'no answer in 0.1 s, 3 attempts']]
+    assert talk.outcomes() == [[7, says('no_answer', attempts=3, timeout=0.1)]]
     assert talk.session.statistics.requests_ok == 1
     assert talk.session.statistics.requests_failed == 1
 
@@ -92,7 +93,7 @@ def test_timeout_that_is_changed_while_running() -> None:
     talk.session.reconfigure(parameter_timeout=0.3)
     talk.submits(read(GAIN), 10.1)
     talk.until(10.4 + TICK)
-    assert talk.outcomes() == [['no answer in 0.3 s, 1 attempt']]
+    assert talk.outcomes() == [[says('no_answer', attempts=1, timeout=0.3)]]
 
 
 def test_offline_drive_is_asked_once_and_the_rest_fails_at_once() -> None:
@@ -102,7 +103,7 @@ def test_offline_drive_is_asked_once_and_the_rest_fails_at_once() -> None:
     talk.at(10.0)
     assert talk.submits(read(GAIN, RAMP, ACTUAL), 16.0) == [ASK_RAMP]
     assert talk.until(16.2) == []
-    assert talk.outcomes() == [['no answer; drive offline'] * 3]
+    assert talk.outcomes() == [[says('no_answer_offline')] * 3]
 
 
 def test_offline_drive_that_answers_anyway() -> None:
@@ -113,7 +114,7 @@ def test_offline_drive_that_answers_anyway() -> None:
     talk.submits(read(GAIN, RAMP), 16.0)
     assert talk.hears('102001E1#0005000000000000', 16.001) == [ASK_GAIN]
     talk.until(16.2)
-    assert talk.outcomes() == [['no answer; drive offline', 5]]
+    assert talk.outcomes() == [[says('no_answer_offline'), 5]]
 
 
 def test_requests_in_a_row() -> None:
@@ -171,7 +172,8 @@ def test_read_back_of_something_else() -> None:
     talk.until(10.13)
     talk.hears('10200321#FF6B000000000000', 10.14)
     assert talk.outcomes() == [
-        ['read back 6 instead of 7', 'read back -14.9 instead of -15']]
+        [says('read_back_differs', found='6', wanted='7'),
+         says('read_back_differs', found='-14.9', wanted='-15')]]
 
 
 def test_bool_is_read_back_as_a_bool() -> None:
@@ -189,7 +191,7 @@ def test_write_that_is_not_read_back() -> None:
     talk = quiet()
     talk.submits(write((GAIN, 7)), 10.1)
     assert [text for _, text in talk.until(10.5)] == [ASK_GAIN] * 3      # written once
-    assert talk.outcomes() == [['no answer in 0.1 s, 3 attempts']]
+    assert talk.outcomes() == [[says('no_answer', attempts=3, timeout=0.1)]]
 
 
 def test_write_to_an_offline_drive() -> None:
@@ -199,7 +201,7 @@ def test_write_to_an_offline_drive() -> None:
     talk.at(10.0)
     assert talk.submits(write((GAIN, 7), (DAMPING, 8)), 16.0) == ['00300281#0007000000000000']
     assert [text for _, text in talk.until(16.2)] == [ASK_GAIN]
-    assert talk.outcomes() == [['no answer; drive offline'] * 2]
+    assert talk.outcomes() == [[says('no_answer_offline')] * 2]
 
 
 def test_writes_without_verification() -> None:
@@ -230,7 +232,7 @@ def test_parameter_65535_is_refused() -> None:
     talk.until(10.11)
     talk.hears('10200281#0007000000000000', 10.12)
     assert talk.outcomes() == [[
-        'parameter 65535 is never written: its number marks cyclic frames', 'written']]
+        says('never_written', number=65535), 'written']]
     assert talk.submits(read(last), 10.2) == [f'002FFFF1#{ZEROS}']
     talk.hears('102FFFF1#0009000000000000', 10.201)
     assert talk.outcomes() == [[9]]
@@ -250,7 +252,7 @@ def test_eeprom_that_does_not_answer_is_not_written() -> None:
     talk = quiet()
     talk.submits(write((RAMP, 5)), 10.1)
     assert [text for _, text in talk.until(10.5)] == [ASK_RAMP, ASK_RAMP]
-    assert talk.outcomes() == [['no answer in 0.1 s, 3 attempts']]
+    assert talk.outcomes() == [[says('no_answer', attempts=3, timeout=0.1)]]
 
 
 @pytest.mark.parametrize('gap', [0.02, 0.05])
@@ -307,14 +309,14 @@ def test_together_in_one_frame() -> None:
         '00300282#0007000800000000']
     assert talk.until(10.11) == [(10.101, ASK_BOTH)]
     talk.hears('10200282#0007000900000000', 10.12)
-    assert talk.outcomes() == [['read back 9 instead of 8', 'written']]
+    assert talk.outcomes() == [[says('read_back_differs', found='9', wanted='8'), 'written']]
 
 
 def test_together_without_an_answer() -> None:
     talk = quiet(parameter_retries=0)
     talk.submits(write((GAIN, 7), (DAMPING, 8), atomic=True), 10.1)
     talk.until(10.3)
-    assert talk.outcomes() == [['no answer in 0.1 s, 1 attempt'] * 2]
+    assert talk.outcomes() == [[says('no_answer', attempts=1, timeout=0.1)] * 2]
 
 
 def test_together_unverified() -> None:
@@ -417,14 +419,14 @@ def test_every_request_is_answered_by_itself() -> None:
 def test_what_may_not_be_written() -> None:
     talk = online(control=CONTROL)
     refusal = talk.session.users.write_refusal
-    assert refusal(SPEED) == 'sent cyclically: publish ~/command/speed_setpoint'
-    assert refusal(LIMIT) == 'sent cyclically: publish ~/command/torque_limit'
+    assert refusal(SPEED) == says('sent_cyclically', name='speed_setpoint')
+    assert refusal(LIMIT) == says('sent_cyclically', name='torque_limit')
     assert refusal(WORD) == 'use ~/enable'
     assert refusal(GAIN) == ''
     for number, refused in ((121, False), (122, True), (125, True), (126, True), (129, True),
                             (130, False)):
         text = refusal(parameter(f'p{number}', number, listed=False))
-        assert text == ('mapping parameter: not written while the bridge is active' if refused
+        assert text == (says('mapping_parameter') if refused
                         else '')
     talk.deactivate(10.01)
     talk.until(10.2)
@@ -467,4 +469,4 @@ def test_cycles_do_not_wait_for_acyclic_answers() -> None:
         times += [when for when, text in talk.until(now + TICK) if text == NEUTRAL]
         talk.hears(ANSWER, now + 0.002)
     assert times == pytest.approx([10.0 + 0.02 * cycle for cycle in range(1, 30)])
-    assert talk.outcomes() == [['no answer in 0.1 s, 3 attempts']]
+    assert talk.outcomes() == [[says('no_answer', attempts=3, timeout=0.1)]]

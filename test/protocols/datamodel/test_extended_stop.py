@@ -11,6 +11,7 @@ from extended_builders import (
     ANSWER, ASK_REQUEST_MAP, checked, cycling, exchange, NEUTRAL, online, TICK,
 )
 import pytest
+from saying import says
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import FrameRejected, MappingDiffered, Noted, StationLost
@@ -208,7 +209,7 @@ def test_confirmed_disable_stops_no_setpoint_of_the_cycle() -> None:
     talk.session.give_up(11.4)
     assert talk.sent() == []
     assert [event.text for event in talk.events(Noted) if event.warning] == [
-        'could not be told to stop: it may still be running']
+        says('may_still_be_running', why=says('stop_not_possible'))]
 
 
 def test_disable_goes_with_the_cycles() -> None:

@@ -5,6 +5,7 @@ from builders import Conversation
 from extended_builders import (
     ASK_REQUEST_MAP, ASK_RESPONSE_MAP, exchange, NEUTRAL, online, REQUEST_MAP, RESPONSE_MAP,
 )
+from saying import says
 
 from drive_can_bridge.core.events import Noted
 
@@ -37,7 +38,7 @@ def test_a_drive_that_answers_one_map_only_is_told_to_stop_by_number() -> None:
     assert NEUTRAL not in sent
     assert not (talk.session.told.owed or talk.session.told.ran)
     assert [note.text for note in talk.events(Noted)] == [
-        'told to stop once more, which it has confirmed']
+        says('stopped_again')]
 
 
 def test_one_that_is_back_right_after_the_stop_it_has_not_heard_is_told_at_once() -> None:

@@ -8,6 +8,7 @@ from builders import (
     RAMP, read, RO, SPEED, STATUS, TABLE, WORD, write,
 )
 import pytest
+from saying import says
 from standard_builders import (
     ANSWER, ASK, LIMIT_ZERO, online, polling, round_of, SPEED_ZERO,
 )
@@ -54,7 +55,7 @@ def test_answer_that_finds_a_drive_does_not_show_that_a_stop_arrived() -> None:
     assert talk.session.online
     talk.bus_down(12.0221)
     assert [note.text for note in talk.events(Noted) if note.warning] == [
-        'the bus was lost before it could be told to stop: it may still be running']
+        says('may_still_be_running', why=says('bus_lost_before_stop'))]
 
 
 def test_a_round_cut_short_by_the_end_does_not_keep_the_next_from_beginning() -> None:
@@ -139,7 +140,7 @@ def test_three_failed_rounds_are_the_end_of_online() -> None:
     assert talk.session.online
     talk.until(10.6)
     assert talk.events(StationLost) == [
-        StationLost('no complete round of reads for 3 periods')]
+        StationLost(says('no_round', periods=3))]
     assert talk.session.statistics.missed == 3
 
 
@@ -432,7 +433,7 @@ def test_a_read_is_repeated_after_the_quarantine_only() -> None:
             if text == ASK:
                 talk.hears(ANSWER, when + 0.001)
         now += 0.0005
-    assert done == [['no answer in 0.1 s, 2 attempts']]
+    assert done == [[says('no_answer', attempts=2, timeout=0.1)]]
     again, = [when for when, text in sent if text == '3F1#0328000100000000']
     assert again >= 10.205
 
@@ -441,7 +442,7 @@ def test_one_parameter_is_all_that_fits_a_frame() -> None:
     talk = online()
     assert talk.submits(write((GAIN, 1), (DAMPING, 2), atomic=True), 10.005) == []
     assert talk.outcomes() == [[
-        'cannot be written in one frame, nothing was written: one parameter fits'] * 2]
+        says('not_in_one_frame', fits='one parameter fits')] * 2]
     assert talk.submits(write((GAIN, 1), atomic=True), 10.005) == ['3F1#0628000100000000']
 
 
@@ -490,7 +491,7 @@ def test_users_get_one_step_a_round_however_long_it_is() -> None:
 def test_mapping_parameters_are_left_alone_here_too() -> None:
     talk = online()
     assert talk.session.users.write_refusal(parameter('map', 124)) == (
-        'mapping parameter: not written while the bridge is active')
+        says('mapping_parameter'))
     assert talk.session.users.write_refusal(ORDER) == ''
 
 
@@ -609,7 +610,7 @@ def test_unacknowledged_write_that_the_bus_refused_was_not_sent() -> None:
     talk.refusing = lambda text: text.startswith('3F1#0628')
     talk.submits(write((GAIN, 7), (DAMPING, 8)), 10.005)
     talk.until(10.01)
-    assert talk.outcomes() == [['not sent: the bus takes no frames'] * 2]
+    assert talk.outcomes() == [[says('not_sent')] * 2]
 
 
 def test_a_drive_that_never_answered_gets_nothing_at_the_stop() -> None:
@@ -642,8 +643,7 @@ def test_a_parameter_that_nobody_has_is_named() -> None:
         assert '3F1#032C010100000000' in sent
     assert talk.session.state is DriveState.OFFLINE
     assert talk.session.offline_advice == (
-        'no answer to the read of heat (P300), though others are answered: does this drive have '
-        'it')
+        says('one_read_unanswered', names='heat (P300)'))
 
 
 # -- control --------------------------------------------------------------------------------------
