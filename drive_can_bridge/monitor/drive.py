@@ -7,7 +7,9 @@ import math
 from drive_can_bridge.core.parameters import Value, ValueKind
 from drive_can_bridge.monitor.history import History, Rate
 from drive_can_bridge.monitor.reports import Level, Report
-from drive_can_bridge.monitor.snapshot import DriveSnapshot, Place, Reading, Shown, Times
+from drive_can_bridge.monitor.snapshot import (
+    DriveSnapshot, Place, Reading, Shown, Times, UNKNOWN,
+)
 from drive_can_bridge.monitor.values import ParameterInfo
 
 OFFLINE, ONLINE = 'offline', 'online'
@@ -156,13 +158,12 @@ class DriveRecord:
             parameters=tuple(self.parameters.values()),
             readings={name: Reading(text, now - at)
                       for name, (text, at) in self._readings.items()},
-            told_again=self._told_again)
+            told_again=self._told_again, silent=bool(silent))
 
     def _judge(self, report: Report, now: float, silent: float) -> tuple[str, Level, str, bool]:
         """Return state, level, advice, and whether it is online."""
         if silent:
-            return (OFFLINE, Level.ERROR, f'offline: its bridge {report.bridge} has been silent '
-                    f'for {silent:.0f} s: is it still running?', False)
+            return UNKNOWN, Level.STALE, 'may still be running: its bridge is silent', False
         told_online = report.state not in _SILENT_STATES
         # diagnostics come once a second, this topic at once
         if self._online is not None and self._online_at > self._reported_at:

@@ -73,6 +73,7 @@ class DriveSnapshot:
     :param label: as short as it may be among the others.
     :param state: in one or two words, as the bridge says it.
     :param online: it exchanges process data.
+    :param silent: its bridge says nothing any more: how it is nobody knows.
     :param advice: in words, and what to do.
     :param control: state of its control word; '' without control.
     :param bits: parameter -> bit -> set.
@@ -110,6 +111,7 @@ class DriveSnapshot:
     parameters: tuple[ParameterInfo, ...] = ()
     readings: Mapping[str, Reading] = field(default_factory=dict)
     told_again: int = 0
+    silent: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,9 +24,6 @@ class Source(Protocol):
     def watch(self, wanted: bool) -> None:
         """Ask for samples, or for none: nobody looks at them."""
 
-    def read(self, drive: str, names: list[str]) -> None:
-        """Read parameters of a drive over its bus. The last wish counts."""
-
     @property
     def busy(self) -> bool:
         """Wait for an answer to something: polling soon is worth it."""

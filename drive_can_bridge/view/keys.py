@@ -11,7 +11,6 @@ class Page(Enum):
 
     DRIVES = 'drives'
     DRIVE = 'drive'
-    PARAMETERS = 'parameters'
     LOG = 'log'
     HELP = 'help'
 
@@ -25,10 +24,8 @@ class Key(Enum):
     PREVIOUS_PAGE = 'previous page'
     OPEN = 'open'
     BACK = 'back'
-    PARAMETERS = 'parameters'
     LOG = 'log'
     HELP = 'help'
-    READ = 'read'
     QUIT = 'quit'
 
 
@@ -39,19 +36,17 @@ _SEQUENCES = {
     '\x1b[6~': Key.NEXT_PAGE, ' ': Key.NEXT_PAGE, '\x1b[5~': Key.PREVIOUS_PAGE,
     'b': Key.PREVIOUS_PAGE, '\r': Key.OPEN, '\n': Key.OPEN, '\x1b[C': Key.OPEN,
     '\x1bOC': Key.OPEN, '\x1b': Key.BACK, '\x7f': Key.BACK, '\x08': Key.BACK,
-    '\x1b[D': Key.BACK, '\x1bOD': Key.BACK, 'p': Key.PARAMETERS, 'l': Key.LOG, '?': Key.HELP,
-    'h': Key.HELP, 'r': Key.READ, 'q': Key.QUIT, 'Q': Key.QUIT,
+    '\x1b[D': Key.BACK, '\x1bOD': Key.BACK, 'l': Key.LOG, '?': Key.HELP,
+    'h': Key.HELP, 'q': Key.QUIT, 'Q': Key.QUIT,
 }
 _LONGEST = max(map(len, _SEQUENCES))
 
 #: the last line: what may be pressed here
 HINTS: dict[Page, tuple[tuple[str, str], ...]] = {
-    Page.DRIVES: (('↑↓', 'drive'), ('⏎', 'in detail'), ('p', 'parameters'), ('l', 'log'),
+    Page.DRIVES: (('↑↓', 'drive'), ('⏎', 'in detail'), ('l', 'log'),
                   ('?', 'help'), ('q', 'quit')),
-    Page.DRIVE: (('↑↓', 'drive'), ('p', 'parameters'), ('l', 'log'), ('esc', 'back'),
+    Page.DRIVE: (('↑↓', 'drive'), ('l', 'log'), ('esc', 'back'),
                  ('?', 'help'), ('q', 'quit')),
-    Page.PARAMETERS: (('space', 'next'), ('b', 'previous'), ('r', 'read again'), ('↑↓', 'drive'),
-                      ('esc', 'back'), ('q', 'quit')),
     Page.LOG: (('space', 'older'), ('b', 'newer'), ('esc', 'back'), ('?', 'help'), ('q', 'quit')),
     Page.HELP: (('↑↓', 'drive'), ('esc', 'back'), ('q', 'quit')),
 }
@@ -87,13 +82,11 @@ class Choice:
 
     :param drive: full name of the drive that is marked, or shown; None before there is any.
     :param screen: number of the screen of a long page, from 0.
-    :param wish: counts how often reading anew was asked for.
     """
 
     page: Page = Page.DRIVES
     drive: str | None = None
     screen: int = 0
-    wish: int = 0
 
     def among(self, drives: Sequence[str]) -> 'Choice':
         """Return the same for these drives: one that has gone cannot be chosen."""
@@ -113,14 +106,10 @@ class Choice:
             return replace(self, screen=self.screen + 1)
         if key is Key.PREVIOUS_PAGE:
             return replace(self, screen=max(0, self.screen - 1))
-        if key is Key.READ:
-            return replace(self, wish=self.wish + 1)
         if key is Key.BACK:
-            back = Page.DRIVE if self.page is Page.PARAMETERS else Page.DRIVES
-            return replace(self, page=back, screen=0)
+            return replace(self, page=Page.DRIVES, screen=0)
         page = _PAGES.get(key)
         return self if page is None else replace(self, page=page, screen=0)
 
 
-_PAGES = {Key.OPEN: Page.DRIVE, Key.PARAMETERS: Page.PARAMETERS, Key.LOG: Page.LOG,
-          Key.HELP: Page.HELP}
+_PAGES = {Key.OPEN: Page.DRIVE, Key.LOG: Page.LOG, Key.HELP: Page.HELP}

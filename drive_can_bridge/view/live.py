@@ -6,8 +6,9 @@ from collections.abc import Callable
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.monitor.model import Model
 from drive_can_bridge.monitor.source import Source
+from drive_can_bridge.monitor.summary import in_order
 from drive_can_bridge.view.keys import Choice, Key
-from drive_can_bridge.view.page import closely, page, Setting, to_read, Wish
+from drive_can_bridge.view.page import closely, page, Setting
 from drive_can_bridge.view.screen import Screen
 
 #: s between two pages; longer where drawing one takes more than its share of a processor
@@ -26,15 +27,17 @@ def show(source: Source, model: Model, setting: Setting, clock: Clock, *,
     :param notice: returns what is to be said instead of the keys; '' for nothing.
     :return: 0, or ``quit_code`` after the key that quits.
     """
-    choice, read = Choice(), None
+    choice = Choice()
     with Screen() as screen:
         due = clock.now()
         while not (ended() or screen.gone):
             begun, now = clock.used(), clock.now()
             size = screen.size
-            read = look(source, model, choice, read, size=size, now=now)
+            drive = closely(choice)
+            source.focus(*([] if drive is None else [drive]))
+            source.poll(now)
             snapshot = model.look(now, 1e-9 * clock.stamp())
-            drives = [drive.name for drive in snapshot.drives]
+            drives = [drive.name for drive in in_order(snapshot.drives)]
             choice = choice.among(drives)
             screen.draw(page(snapshot, choice, setting, notice=notice(), width=size[0],
                              height=size[1]))
@@ -50,21 +53,3 @@ def show(source: Source, model: Model, setting: Setting, clock: Clock, *,
                 if ended() or screen.gone or clock.now() >= due:
                     break
     return 0
-
-
-def look(source: Source, model: Model, choice: Choice, read: Wish | None, *,
-         size: tuple[int, int], now: float) -> Wish | None:
-    """
-    Bring the model up to date, for what was chosen.
-
-    :param read: what was read last, and need not be read again.
-    :return: what was read last now.
-    """
-    drive = closely(choice)
-    source.focus(*([] if drive is None else [drive]))
-    source.poll(now)
-    wanted = to_read(model.look(now, 0.0), choice, width=size[0], height=size[1])
-    if wanted is None or wanted == read:
-        return read
-    source.read(wanted.drive, list(wanted.names))
-    return wanted

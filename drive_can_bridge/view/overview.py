@@ -12,22 +12,20 @@ import math
 from rich.table import Table
 from rich.text import Text
 
-from drive_can_bridge.core.words import counted
 from drive_can_bridge.monitor.reports import Level
 from drive_can_bridge.monitor.snapshot import (
     BusSnapshot, DriveSnapshot, Shown, Snapshot, UNKNOWN,
 )
+from drive_can_bridge.monitor.summary import counts_in_words, in_order, troubles
 from drive_can_bridge.view.parts import (
     DIM, GAP, LEVEL_STYLES, Lines, milliseconds, NO_VALUE, plain_table, spark, state, times,
-    ValueColumns, wrapped,
+    TONE_STYLES, ValueColumns, wrapped,
 )
 
 #: longest state that a drive has
 _STATE = 2 + len('mapping differs')
 _TREND_MIN, _TREND_MAX = 8, 30
 _EXCHANGE_WIDTH = 28
-#: drives with the same trouble that are named
-_NAMED = 4
 _LOAD_WIDTH = 12
 #: %, above which a bus is never OK
 LOAD_WARNING = 70.0
@@ -42,16 +40,17 @@ def drives_table(drives: Sequence[DriveSnapshot], marked: str | None, *, width: 
 
     :param height: at most.
     """
-    full, count = _FullTable(drives, width), counted(len(drives), 'drive', 'drives')
+    drives = in_order(drives)
+    full, told = _FullTable(drives, width), counts_in_words(drives)
     if full.fits(height):
-        return full.table(drives, marked), full.height, count
+        return full.table(drives, marked), full.height, told
     shown = max(1, height - 1)
     if len(drives) <= shown:
-        return _line_table(drives, drives, marked, width), len(drives) + 1, count
+        return _line_table(drives, drives, marked, width), len(drives) + 1, told
     place = next((number for number, drive in enumerate(drives) if drive.name == marked), 0)
     first = min(max(0, place - shown // 2), len(drives) - shown)
     return (_line_table(drives, drives[first:first + shown], marked, width), shown + 1,
-            f'drives {first + 1} to {first + shown} of {len(drives)}')
+            f'{first + 1} to {first + shown} of {told}')
 
 
 def _mark(drive: DriveSnapshot, marked: str | None) -> Text:
@@ -181,23 +180,20 @@ def principal(items: Sequence[Shown]) -> Shown | None:
     return next((item for wish in wishes for item in items if wish(item)), None)
 
 
-def advice_lines(snapshot: Snapshot, width: int) -> Lines:
-    """Say what is not well, and what to do; those with the same trouble together."""
-    troubles: dict[tuple[Level, str], list[str]] = {}
-    for bus in snapshot.buses:
-        if bus.level is not Level.OK and bus.state != UNKNOWN:
-            troubles.setdefault((bus.level, bus.message), []).append(f'bus {bus.label}')
-    for drive in snapshot.drives:
-        if drive.level is not Level.OK:
-            troubles.setdefault((drive.level, drive.advice), []).append(drive.label)
+def advice_lines(snapshot: Snapshot, width: int, *, brief: bool = False) -> Lines:
+    """
+    Say what is not well, and what to do.
+
+    :param brief: in a line for each trouble.
+    """
     lines: Lines = []
-    for (level, message), names in troubles.items():
-        who = ', '.join(names[:_NAMED])
-        if len(names) > _NAMED:
-            who += f' and {len(names) - _NAMED} more'
-        text = wrapped(f'{who}: {message}', width - 2)
-        text[0].stylize(LEVEL_STYLES[level], 0, len(who))
-        lines += [Text('! ' if place == 0 else '  ', style=LEVEL_STYLES[level]).append_text(line)
+    for trouble in troubles(snapshot):
+        style = TONE_STYLES[trouble.tone]
+        text = wrapped(f'{trouble.who}{trouble.text}', width - 2)
+        if brief and len(text) > 1:
+            text = [Text(f'{trouble.who}{trouble.text}'[:width - 3] + '…')]
+        text[0].stylize(style, 0, len(trouble.who))
+        lines += [Text('! ' if place == 0 else '  ', style=style).append_text(line)
                   for place, line in enumerate(text)]
     return lines
 

@@ -17,10 +17,13 @@ from rich.text import Text
 from drive_can_bridge.core.words import counted
 from drive_can_bridge.monitor.hints import hints
 from drive_can_bridge.monitor.snapshot import DriveSnapshot, Snapshot
+from drive_can_bridge.monitor.summary import in_order, silence, Tone
 from drive_can_bridge.view import detail
 from drive_can_bridge.view.keys import Choice, HINTS, Page
 from drive_can_bridge.view.overview import advice_lines, bus_lines, drives_table
-from drive_can_bridge.view.parts import clock, DIM, Lines, log_lines, section, wrapped
+from drive_can_bridge.view.parts import (
+    clock, DIM, flow, Lines, log_lines, section, TONE_STYLES, wrapped,
+)
 
 #: from here on there is room for frames
 _BOXED = (100, 30)
@@ -69,6 +72,11 @@ class _Frame:
         self.parts.append(Layout(body, size=1))
         self.left -= 1
 
+    def lines(self, body: Lines) -> None:
+        """Add lines without a title."""
+        for line in body[:self.left]:
+            self.bare(line)
+
     def add(self, title: str, body: Sequence[RenderableType], lines: int) -> None:
         """Add a section whose body has so many lines, if only a part of it fits."""
         lines = min(lines, self.left - self.overhead)
@@ -91,9 +99,11 @@ def page(snapshot: Snapshot, choice: Choice, setting: Setting, *, width: int, he
 
     :param notice: to be said in the last line, instead of the keys.
     """
-    choice = choice.among([drive.name for drive in snapshot.drives])
+    choice = choice.among([drive.name for drive in in_order(snapshot.drives)])
     frame = _Frame(width, height - 1)
     frame.bare(_header(snapshot, setting, width))
+    for text in silence(snapshot, clock):
+        frame.lines(wrapped(text, width, 'bold white on red'))
     drive = snapshot.drive(choice.drive or '')
     if choice.page is Page.HELP:
         _help(frame, drive, setting)
@@ -103,8 +113,6 @@ def page(snapshot: Snapshot, choice: Choice, setting: Setting, *, width: int, he
         _nobody(frame, snapshot, setting)
     elif choice.page is Page.DRIVE:
         _drive(frame, snapshot, drive)
-    elif choice.page is Page.PARAMETERS:
-        _parameters(frame, drive, choice)
     else:
         _drives(frame, snapshot, choice)
     if frame.left > 0:
@@ -116,35 +124,9 @@ def page(snapshot: Snapshot, choice: Choice, setting: Setting, *, width: int, he
     return root
 
 
-@dataclass(frozen=True, slots=True)
-class Wish:
-    """
-    Parameters that the page shows, and that have to be read for it.
-
-    :param wish: counts how often the user asked for it anew.
-    :param told_again: counts how often the drive told of its parameters anew.
-    """
-
-    drive: str
-    names: tuple[str, ...]
-    wish: int
-    told_again: int
-
-
-def to_read(snapshot: Snapshot, choice: Choice, *, width: int, height: int) -> Wish | None:
-    """Return what a page has to be told; the same answer: it was told already."""
-    drive = snapshot.drive(choice.drive or '')
-    if choice.page is not Page.PARAMETERS or drive is None or not drive.parameters:
-        return None
-    rows = height - 2 - _Frame(width, height).overhead - 1
-    names = tuple(info.name for info in detail.on_screen(drive, choice.screen, rows)
-                  if info.readable)
-    return Wish(drive.name, names, choice.wish, drive.told_again) if names else None
-
-
 def closely(choice: Choice) -> str | None:
     """Return the drive that is looked at closely, if one is."""
-    return choice.drive if choice.page in (Page.DRIVE, Page.PARAMETERS) else None
+    return choice.drive if choice.page is Page.DRIVE else None
 
 
 def _header(snapshot: Snapshot, setting: Setting, width: int) -> Text:
@@ -196,16 +178,20 @@ def _nobody(frame: _Frame, snapshot: Snapshot, setting: Setting) -> None:
 def _drives(frame: _Frame, snapshot: Snapshot, choice: Choice) -> None:
     advice = advice_lines(snapshot, frame.inner)
     buses = min(len(snapshot.buses), 4)
-    below = (buses + frame.overhead + _LOG_MIN + frame.overhead
-             + (min(len(advice), 6) + frame.overhead if advice else 0))
+    room = frame.left - buses - 2 * frame.overhead
+    height = room - _LOG_MIN - frame.overhead - (
+        min(len(advice), 6) + frame.overhead if advice else 0)
+    if height <= len(snapshot.drives):      # then without the log, and what to do in short
+        advice = advice_lines(snapshot, frame.inner, brief=True)
+        height = room - (min(len(advice), 4) + frame.overhead if advice else 0)
     # on the smallest terminals the drives take what they need
-    height = max(frame.left - below - frame.overhead, min(6, frame.left - frame.overhead))
-    table, lines, title = drives_table(snapshot.drives, choice.drive, width=frame.inner,
-                                       height=height)
+    table, lines, title = drives_table(
+        snapshot.drives, choice.drive, width=frame.inner,
+        height=max(height, min(6, frame.left - frame.overhead)))
     frame.add(title, [table], lines)
     if advice:
         room = frame.left - frame.overhead - min(buses, frame.left) - frame.overhead
-        shown = _cut(advice, max(2, room - _LOG_MIN))
+        shown = _cut(advice, max(4, room - _LOG_MIN))
         frame.add('what to do', shown, len(shown))
     _rest(frame, snapshot)
 
@@ -249,20 +235,6 @@ def _drive(frame: _Frame, snapshot: Snapshot, drive: DriveSnapshot) -> None:
     frame.fill('log of this drive', lambda lines: log_lines(told, frame.inner, lines))
 
 
-def _parameters(frame: _Frame, drive: DriveSnapshot, choice: Choice) -> None:
-    rows = frame.left - frame.overhead - 1
-    shown = detail.on_screen(drive, choice.screen, rows)
-    number, count = choice.screen % detail.screens(drive, rows) + 1, len(drive.parameters)
-    if not shown:
-        frame.add(f'parameters of {drive.label}',
-                  [Text('not told yet: the drive has not answered list_parameters')], 1)
-        return
-    table = detail.parameter_table(drive, shown, frame.inner)
-    frame.add(f'{count} parameters of {drive.label}, screen {number} of '
-              f'{detail.screens(drive, rows)}: as the drive holds them',
-              [table], rows + 1)
-
-
 def _log(frame: _Frame, snapshot: Snapshot, choice: Choice) -> None:
     def body(lines: int) -> Lines:
         everything = log_lines(snapshot.log, frame.inner, len(snapshot.log) * 8 + lines)
@@ -273,6 +245,9 @@ def _log(frame: _Frame, snapshot: Snapshot, choice: Choice) -> None:
 
 
 def _help(frame: _Frame, drive: DriveSnapshot | None, setting: Setting) -> None:
+    legend = flow([Text('● ', style=TONE_STYLES[tone]).append(tone.value, style='not bold')
+                   for tone in Tone], frame.inner, 3)
+    frame.add('colours', legend, len(legend))
     told: Lines = []
     for command, meaning in hints(drive, setting.environment):
         told.append(Text(f'# {meaning}', style=DIM))
@@ -280,7 +255,6 @@ def _help(frame: _Frame, drive: DriveSnapshot | None, setting: Setting) -> None:
     frame.add('from another terminal', told, len(told))
     meanings = [
         ('↑ ↓ j k', 'mark another drive'), ('⏎ →', 'the marked drive in detail'),
-        ('p', 'its parameters; they are read over the bus screen by screen, r reads again'),
         ('l', 'the log'), ('space b', 'further, and back'), ('esc ←', 'back'), ('q', 'quit')]
     keys = [Text(f'{key:10}', style='bold').append(meaning, style='not bold')
             for key, meaning in meanings]

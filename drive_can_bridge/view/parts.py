@@ -20,13 +20,14 @@ from rich.text import Text
 from drive_can_bridge.monitor.history import columns
 from drive_can_bridge.monitor.reports import Level
 from drive_can_bridge.monitor.snapshot import DriveSnapshot, LogLine, Points, Shown, Times
+from drive_can_bridge.monitor.summary import Tone, tone_of
 
 DIM = 'bright_black'
 NUMBER = 'bold cyan'
 LEVEL_STYLES = {Level.OK: 'bold green', Level.WARN: 'bold yellow', Level.ERROR: 'bold red',
-                Level.STALE: 'bold magenta'}
-#: states that tell more than their level
-_STATE_STYLES = {'fault': 'bold white on red', 'disabled': 'bold blue'}
+                Level.STALE: 'bold red'}
+TONE_STYLES = {Tone.OK: 'bold green', Tone.OFF: 'bold', Tone.WARN: 'bold yellow',
+               Tone.ERROR: 'bold red', Tone.UNKNOWN: DIM}
 _LOG_STYLES = {'WARN': 'bold yellow', 'ERROR': 'bold red', 'FATAL': 'bold white on red'}
 #: bits that are no good news, whatever the drive
 _ALARMS = {'fault': 'bold red', 'alarm': 'bold red', 'trip': 'bold red', 'warning': 'bold yellow'}
@@ -52,7 +53,7 @@ def section(title: str, body: Sequence[RenderableType], *, boxed: bool) -> Rende
 
 def state(drive: DriveSnapshot) -> Text:
     """Return the state in a word, with a lamp."""
-    style = _STATE_STYLES.get(drive.state, LEVEL_STYLES[drive.level])
+    style = TONE_STYLES[tone_of(drive)]
     return Text().append('● ' if drive.online else '○ ', style=style).append(
         drive.state or 'unknown', style=style)
 

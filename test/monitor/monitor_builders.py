@@ -128,6 +128,28 @@ def many_drives(count: int = 40) -> Model:
     return model
 
 
+def fifteen_drives() -> Model:
+    """Make a bridge with two dead drives, one that was never seen, four unarmed, and others."""
+    lost = 'silent since 12:33:{:02}, was online before: check its power and its cable'
+    states = {'axis_3': ('fault', 2, 'fault 7 overcurrent: remove its cause, then reset it'),
+              'axis_8': ('offline', 2, lost.format(8)), 'axis_13': ('offline', 2, lost.format(13)),
+              'axis_14': ('offline', 3, SILENT)}
+    for number in (1, 4, 6, 7):
+        states[f'axis_{number}'] = ('not armed', 1, 'not armed: publish 0 to '
+                                    f'/axis_{number}/command/speed_setpoint')
+    for number in (2, 5):
+        states[f'axis_{number}'] = ('disabled', 0, f'disabled: call ~/enable (drive_can enable '
+                                                   f'axis_{number})')
+    model = model_of([bus_status(), *(
+        drive_status(name, level=level, state=state, message=message)
+        for name, (state, level, message) in (
+            (f'axis_{number}', states.get(f'axis_{number}', ('online', 0, 'online')))
+            for number in range(15)))])
+    for number in range(15):
+        feed(model, f'/axis_{number}')
+    return model
+
+
 def seen(model: Model) -> Snapshot:
     """Look at the time of the golden pages."""
     return model.look(NOW, AT)

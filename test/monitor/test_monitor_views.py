@@ -7,7 +7,7 @@ from views import golden_file, plain, shown, SIZES, VIEWS
 
 from drive_can_bridge.monitor.model import Model
 from drive_can_bridge.view.keys import Choice, HINTS, Key, keys_in, Page
-from drive_can_bridge.view.page import closely, to_read
+from drive_can_bridge.view.page import closely
 
 
 @pytest.mark.parametrize(('width', 'height'), SIZES)
@@ -75,7 +75,7 @@ def test_colours_are_left_out_where_they_are_not_wanted(monkeypatch: pytest.Monk
     ('q', [Key.QUIT]), ('\x1b[A\x1b[B', [Key.UP, Key.DOWN]), ('\x1bOBjk', [
         Key.DOWN, Key.DOWN, Key.UP]), ('\r', [Key.OPEN]), ('\x1b', [Key.BACK]),
     ('\x1b[6~ b', [Key.NEXT_PAGE, Key.NEXT_PAGE, Key.PREVIOUS_PAGE]), ('x\x00ü', []),
-    ('\x1b[1;5Cq', [Key.QUIT]), ('\x1b[200~p', [Key.PARAMETERS]), ('\x1b\x1b', [
+    ('\x1b[1;5Cq', [Key.QUIT]), ('\x1b[200~l', [Key.LOG]), ('\x1b\x1b', [
         Key.BACK, Key.BACK]), ('', [])])
 def test_keys_are_found_in_what_is_typed(typed: str, keys: list[Key]) -> None:
     assert keys_in(typed) == keys
@@ -87,33 +87,12 @@ def test_keys_change_what_is_chosen() -> None:
     assert choice.drive == '/a'
     choice = choice.press(Key.UP, drives)
     assert choice.drive == '/c'
-    choice = choice.press(Key.OPEN, drives).press(Key.PARAMETERS, drives)
-    assert (choice.page, closely(choice)) == (Page.PARAMETERS, '/c')
-    choice = choice.press(Key.NEXT_PAGE, drives).press(Key.READ, drives)
-    assert (choice.screen, choice.wish) == (1, 1)
-    choice = choice.press(Key.BACK, drives)
-    assert (choice.page, choice.screen) == (Page.DRIVE, 0)
+    choice = choice.press(Key.OPEN, drives)
+    assert (choice.page, closely(choice)) == (Page.DRIVE, '/c')
+    choice = choice.press(Key.LOG, drives).press(Key.NEXT_PAGE, drives)
+    assert (choice.page, choice.screen, closely(choice)) == (Page.LOG, 1, None)
     choice = choice.press(Key.BACK, drives)
     assert (choice.page, closely(choice)) == (Page.DRIVES, None)
     assert choice.among(['/a']).drive == '/a'
     assert choice.among([]).drive is None
     assert Choice().press(Key.PREVIOUS_PAGE, drives) == Choice()
-
-
-def test_parameters_are_read_for_the_screen_that_is_shown_and_for_no_other() -> None:
-    snapshot = seen(three_drives())
-    choice = Choice(Page.PARAMETERS, '/conveyor')
-    everything = to_read(snapshot, choice, width=80, height=24)
-    assert everything is not None
-    # what is write-only is never asked for
-    assert everything.names == ('speed_setpoint', 'torque_limit', 'actual_speed', 'motor_current',
-                                'status_word', 'ramp_time')
-    first = to_read(snapshot, choice, width=80, height=8)
-    assert first is not None
-    assert first.names == everything.names[:4]
-    again = to_read(snapshot, choice.press(Key.READ, []), width=80, height=8)
-    assert again is not None
-    assert again.names == first.names
-    assert again != first
-    assert to_read(snapshot, Choice(Page.DRIVE, '/conveyor'), width=80, height=24) is None
-    assert to_read(snapshot, Choice(Page.PARAMETERS, '/nobody'), width=80, height=24) is None

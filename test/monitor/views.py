@@ -11,7 +11,7 @@ from pathlib import Path
 import sys
 import time
 
-from monitor_builders import many_drives, seen, three_drives
+from monitor_builders import fifteen_drives, many_drives, seen, three_drives
 from rich.console import Console
 
 from drive_can_bridge.monitor.model import Model
@@ -28,7 +28,7 @@ VIEWS: dict[str, tuple[Snapshot, Choice]] = {
     'drives': (seen(three_drives()), Choice(drive='/lift')),
     'many': (seen(many_drives()), Choice(drive='/axis_30')),
     'drive': (seen(three_drives()), Choice(Page.DRIVE, '/conveyor')),
-    'parameters': (seen(three_drives()), Choice(Page.PARAMETERS, '/conveyor')),
+    'fifteen': (seen(fifteen_drives()), Choice()),
     'log': (seen(three_drives()), Choice(Page.LOG)),
     'help': (seen(three_drives()), Choice(Page.HELP, '/lift')),
     'nobody': (seen(Model()), Choice()),

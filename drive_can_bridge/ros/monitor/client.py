@@ -91,15 +91,6 @@ class MonitorClient:
         """Ask for samples, or for none: nobody looks at them."""
         self._watched = wanted
 
-    def read(self, drive: str, names: list[str]) -> None:
-        """Read parameters of a drive over its bus. The last wish counts."""
-        def take(response: GetParameters.Response | None) -> None:
-            found = [] if response is None else response.values
-            answers = [drive_value(value) for value in found]
-            answers += [None] * (len(names) - len(answers))
-            self._model.read(drive, zip(names, answers), self._now)
-        self._ask(drive, 'get_parameters', GetParameters.Request(names=names), take)
-
     def poll(self, now: float) -> None:
         """Take what has arrived, and ask for what is missing."""
         self._now = now

@@ -1,0 +1,124 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Many drives at a glance: colours with one legend for all views, the worst first, and advice."""
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from enum import Enum
+import re
+
+from drive_can_bridge.core.words import counted
+from drive_can_bridge.monitor.reports import Level
+from drive_can_bridge.monitor.snapshot import DriveSnapshot, Snapshot, UNKNOWN
+
+#: drives that one page shows in the order of their configuration, and in full; more are sorted
+FEW = 6
+#: drives with the same trouble that are named
+_NAMED = 4
+_OTHER = '…'
+_TIME = re.compile(r'\b\d+:\d\d:\d\d\b|\b\d+(?:\.\d+)? s\b')
+
+
+class Tone(Enum):
+    """What colour a drive has; the worst first."""
+
+    ERROR = 'fault, offline or not seen'
+    UNKNOWN = 'its bridge is silent'
+    WARN = 'not armed, or a warning'
+    OFF = 'disabled'
+    OK = 'enabled and armed'
+
+
+_RANKS = {tone: rank for rank, tone in enumerate(Tone)}
+_OF_LEVEL = {Level.WARN: Tone.WARN, Level.ERROR: Tone.ERROR, Level.STALE: Tone.ERROR}
+
+
+def tone_of(drive: DriveSnapshot) -> Tone:
+    """Return the colour of a drive."""
+    if drive.silent:
+        return Tone.UNKNOWN
+    return _OF_LEVEL.get(drive.level, Tone.OK if drive.state == 'online' else Tone.OFF)
+
+
+def in_order(drives: Sequence[DriveSnapshot]) -> tuple[DriveSnapshot, ...]:
+    """Return drives as they are shown: the worst first where they are many."""
+    if len(drives) <= FEW:
+        return tuple(drives)
+    return tuple(sorted(drives, key=lambda drive: _RANKS[tone_of(drive)]))
+
+
+def counts(drives: Iterable[DriveSnapshot]) -> list[tuple[Tone, str, int]]:
+    """Count drives by state; the worst first."""
+    found = Counter((tone_of(drive), drive.state or UNKNOWN) for drive in drives)
+    return [(tone, state, count) for (tone, state), count in sorted(
+        found.items(), key=lambda each: (_RANKS[each[0][0]], each[0][1]))]
+
+
+def counts_in_words(drives: Sequence[DriveSnapshot]) -> str:
+    """Write ``15 drives: 2 offline, 4 not armed, 9 online``."""
+    states = Counter[str]()
+    for _, state, count in counts(drives):
+        states[state] += count
+    told = ', '.join(f'{count} {state}' for state, count in states.items())
+    return counted(len(drives), 'drive', 'drives') + (f': {told}' if told else '')
+
+
+@dataclass(frozen=True, slots=True)
+class Trouble:
+    """
+    What is not well, and what to do.
+
+    :param who: a bus, a drive, or how many of them; begins the text.
+    """
+
+    tone: Tone
+    who: str
+    text: str
+
+
+def troubles(snapshot: Snapshot) -> list[Trouble]:
+    """
+    Say what is not well: the worst first, drives with the same trouble together.
+
+    A silent bridge has a banner of its own (:func:`silence`).
+    """
+    found = [Trouble(_OF_LEVEL[bus.level], f'bus {bus.label}', f': {bus.message}')
+             for bus in snapshot.buses if bus.level is not Level.OK and bus.state != UNKNOWN]
+    alike: dict[tuple[Tone, str], list[DriveSnapshot]] = {}
+    for drive in snapshot.drives:
+        if drive.level is not Level.OK and not drive.silent:
+            key = tone_of(drive), _TIME.sub(_OTHER, _of_anybody(drive))
+            alike.setdefault(key, []).append(drive)
+    for (tone, text), drives in alike.items():
+        if len(drives) == 1:
+            found.append(Trouble(tone, drives[0].label, f': {drives[0].advice}'))
+        else:
+            texts = {_of_anybody(drive) for drive in drives}
+            text = text if len(texts) > 1 else texts.pop()
+            names = ', '.join(drive.label for drive in drives[:_NAMED])
+            more = f' and {len(drives) - _NAMED} more' if len(drives) > _NAMED else ''
+            found.append(Trouble(tone, f'{len(drives)} drives', f' {text} ({names}{more})'))
+    return sorted(found, key=lambda trouble: _RANKS[trouble.tone])
+
+
+def _of_anybody(drive: DriveSnapshot) -> str:
+    """Return the advice for a drive without its name."""
+    text = drive.advice.replace(f'{drive.name}/', f'/{_OTHER}/')
+    own = re.escape(drive.name.rpartition('/')[2])
+    return re.sub(rf'(?<![\w/.]){own}(?![\w.])', _OTHER, text)
+
+
+def silence(snapshot: Snapshot, clock: Callable[[float], str]) -> list[str]:
+    """
+    Say which bridges are silent, and what that means: a line for each.
+
+    :param clock: writes a time of day.
+    """
+    lines = []
+    for bridge in snapshot.bridges:
+        if bridge.silent:
+            name = f'{bridge.name} ' if len(snapshot.bridges) > 1 else ''
+            since = clock(snapshot.at - bridge.silent)
+            lines.append(f'bridge {name}silent since {since}: its drives may still be running; '
+                         'stop buttons have no effect')
+    return lines
