@@ -87,7 +87,7 @@ class Session(ABC):
     :ivar ever_online: it did so at least once since activation.
     :ivar defect: what went wrong in the program, in words, while the drive is left alone for that.
     :ivar serving: it only cares for parameter requests; ``online``: the last one was answered.
-    :ivar how_to_enable: what to do about a drive that is disabled.
+    :ivar enabled_by: name of the drive whose ``~/enable`` enables it: its own, but in a group.
     :ivar partners: sessions on this bus whose timers and events any call of this one may change.
     :ivar phase: s, when in each period of the steady clock this drive has its turn among those
         that share its bus; None: whenever it is ready.
@@ -121,7 +121,7 @@ class Session(ABC):
         self.stage = Stage.IDLE
         self.active = self.serving = self.bus_available = self.online = self.ever_online = False
         self.defect = NOTHING
-        self.how_to_enable = 'call ~/enable'
+        self.enabled_by = drive.name
         self.partners: Sequence[Session] = ()
         self.phase: float | None = None
         self._parts: Sequence[Part] = ()

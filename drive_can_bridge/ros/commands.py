@@ -23,6 +23,7 @@ from drive_can_bridge.core.parameters import Value, ValueKind
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.setpoints import CommandOutcome
 from drive_can_bridge.core.words import value_text
+from drive_can_bridge.ros.advice import how_to_enable
 from drive_can_bridge.ros.joint_reader import JointMessage, JointReader, QUANTITIES
 from drive_can_bridge.ros.polled_topics import PolledTopics, Warn
 from drive_can_bridge.ros.values import TOPIC_TYPES
@@ -49,6 +50,7 @@ class CommandIntake:
 
     def __init__(self, node: Node, drive: DriveConfiguration, session: Session,
                  clock: Clock, warn: Warn, inform: Callable[[str], None]) -> None:
+        self._node = node
         self._session = session
         self._warn = warn
         self._inform = inform
@@ -110,7 +112,7 @@ class CommandIntake:
         if outcome is CommandOutcome.DISABLED and session.active:
             name = session.setpoints.items[index].parameter.name
             self._warn('disabled', f'command {name} has no effect: disabled, '
-                       f'{session.how_to_enable}', once=True)
+                       f'{how_to_enable(session, self._node)}', once=True)
         if outcome is CommandOutcome.NOT_ARMED and session.setpoints.enabled:
             parameter = session.setpoints.items[index].parameter
             neutral = value_text(

@@ -17,6 +17,7 @@ from drive_can_bridge.core.statistics import Statistic
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.core.words import value_text
 from drive_can_bridge.exchange.exchange import BusExchange
+from drive_can_bridge.ros.advice import how_to_enable, how_to_reset
 from drive_can_bridge.ros.drive_node import DriveNode
 from drive_can_bridge.ros.quality import publisher
 from drive_can_bridge.ros.stamps import Stamps
@@ -171,7 +172,7 @@ class DriveReporter:
                 return DiagnosticStatus.STALE, f'not seen since start: {what}'
             return DiagnosticStatus.ERROR, f'offline: {what}'
         if state is DriveState.FAULT:
-            told = ['fault: remove its cause, then call ~/reset_fault and ~/enable',
+            told = [f'fault: remove its cause, then {how_to_reset(session, drive.node)}',
                     *self._warnings(rejected)]
             return DiagnosticStatus.ERROR, '; '.join(told)
         told = self._warnings(rejected)
@@ -181,13 +182,13 @@ class DriveReporter:
         if obeyed is not None and obeyed.stopping and obeyed.unconfirmed:
             told.append(f'told to stop, and still {obeyed.state}')
         if state is DriveState.DISABLED:
-            advice = f'disabled: {session.how_to_enable}'
+            disabled = f'disabled: {how_to_enable(session, drive.node)}'
             if now - session.setpoints.ignored_at < COMMANDS_RECENT:
-                told.append(f'{advice}; commands arrive, and change nothing')
+                told.append(f'{disabled}; commands arrive, and change nothing')
             elif not told:
-                return DiagnosticStatus.OK, advice
+                return DiagnosticStatus.OK, disabled
             else:
-                told.append(advice)
+                told.append(disabled)
         if state is DriveState.NOT_ARMED:
             told.append(self._how_to_arm())
         if told:

@@ -224,7 +224,8 @@ def test_diagnostics(start: Start, client: Client, facts: Facts) -> None:
     status = client.diagnostics(STATUS, lambda drive: drive['state'] == 'disabled'
                                 and drive['level'] == 'OK')
     assert set(status) == DRIVE_KEYS | facts.diagnostics | {'level', 'message'}
-    assert (status['level'], status['message']) == ('OK', 'disabled: call ~/enable')
+    assert (status['level'], status['message']) == (
+        'OK', 'disabled: call ~/enable (drive_can enable conveyor)')
     client.listen()
     command(client, speed_setpoint=0.0)
     client.wait_logged('disabled, call ~/enable', WARN)

@@ -184,9 +184,9 @@ class Group:
         return sentences.sent_by_group(parameter.name, self._lead.name)
 
     @property
-    def how_to_enable(self) -> str:
-        """Say what to do about an inverter that is led and disabled."""
-        return f'call ~/enable of {self._lead.name}, which leads the broadcast group'
+    def leads(self) -> str:
+        """Name of the inverter that takes the commands for all."""
+        return self._lead.name
 
     def fact(self, member: CannordSession) -> str:
         """Say who leads whom."""

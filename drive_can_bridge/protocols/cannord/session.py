@@ -79,7 +79,7 @@ class CannordSession(Session):
                         cyclic_refusal=publish_it if led_by is None else led_by.cyclic_refusal),
             leader=None if group is None else group.control)
         if led_by is not None:
-            self.how_to_enable = led_by.how_to_enable
+            self.enabled_by = led_by.leads
         self._extended: bool = options.extended_identifiers
         self.request_identifier, self._response_identifier, self._task_identifier, \
             self._task_response_identifier = (

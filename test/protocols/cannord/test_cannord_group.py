@@ -176,9 +176,8 @@ def test_the_lowest_station_leads_whatever_the_order() -> None:
     bus.live(0.07)
     assert bus.session('lift').facts() == {'broadcast': 'leads hoist, turn'}
     assert bus.session('turn').facts() == {'broadcast': 'led by lift'}
-    assert bus.session('lift').how_to_enable == 'call ~/enable'
-    assert bus.session('turn').how_to_enable == (
-        'call ~/enable of lift, which leads the broadcast group')
+    assert bus.session('lift').enabled_by == 'lift'
+    assert bus.session('turn').enabled_by == 'lift'
 
 
 def test_groups_of_32_are_apart_and_others_are_alone() -> None:
