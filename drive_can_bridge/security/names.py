@@ -9,7 +9,7 @@ from drive_can_bridge.protocols.families import FAMILIES
 #: how parameters are read and written: ``~/get_parameters`` ...
 READING = ('describe_parameters', 'get_parameter_types', 'get_parameters', 'list_parameters')
 WRITING = ('set_parameters', 'set_parameters_atomically')
-CONTROL = ('enable', 'reset_fault', 'quick_stop')
+CONTROL = ('enable', 'reset_fault')
 #: a managed node says how it is, and is told
 STATES = ('get_available_states', 'get_available_transitions', 'get_state',
           'get_transition_graph')
@@ -65,4 +65,4 @@ def drive_names(drive: DriveConfiguration) -> NodeNames:
         taken.append('joint_command')
     return NodeNames(
         drive.name, shown=tuple(shown), taken=tuple(taken), asked=READING,
-        obeyed=(*WRITING, *(CONTROL if session.control is not None else ())))
+        obeyed=(*WRITING, 'quick_stop', *(CONTROL if session.control is not None else ())))

@@ -243,7 +243,7 @@ def test_outputs_that_are_closed(tmp_path: Path) -> None:
     for file, code in ((write(tmp_path), 0), (tmp_path / 'absent.yaml', 1)):
         for closed in ('>&-', '2>&-', '>&- 2>&-'):
             done = subprocess.run(
-                f'exec {sys.executable} -m drive_can_bridge.cli.main validate {file} {closed}',
+                f'exec {sys.executable} -m drive_can_bridge.cli.start validate {file} {closed}',
                 shell=True, stdin=subprocess.DEVNULL, capture_output=True, text=True,
                 env=ENVIRONMENT, timeout=60, check=False)
             assert done.returncode == code
@@ -270,7 +270,7 @@ def test_terminals_that_lack_characters(encoding: str, subcommand: str) -> None:
 ])
 def test_never_a_traceback(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
                            error: BaseException, line: str) -> None:
-    def fail(_: object) -> int:
+    def fail(*_: object) -> int:
         raise error
 
     monkeypatch.setattr(front_end, '_run', fail)
@@ -280,7 +280,7 @@ def test_never_a_traceback(monkeypatch: pytest.MonkeyPatch, capsys: pytest.Captu
 
 def test_interrupted(monkeypatch: pytest.MonkeyPatch,
                      capsys: pytest.CaptureFixture[str]) -> None:
-    def stop(_: object) -> int:
+    def stop(*_: object) -> int:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(front_end, '_run', stop)
