@@ -52,6 +52,10 @@ class RemoteProtocolError(DriveCanError):
     """A received frame breaks the protocol."""
 
 
+class Unasked(DriveCanError):
+    """A received frame is in order, but answers nothing that was asked just now."""
+
+
 class ValueRefused(DriveCanError, ValueError):
     """A value has the wrong type, is out of range, or cannot be represented."""
 

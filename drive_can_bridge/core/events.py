@@ -80,6 +80,13 @@ class FrameRejected:
 
 
 @dataclass(frozen=True)
+class AnswerLate:
+    """Answers come after the time of their question; ``seconds``: by how much the last one did."""
+
+    seconds: float
+
+
+@dataclass(frozen=True)
 class ForeignMasterSeen:
     """Somebody else sends requests to this drive."""
 
@@ -102,4 +109,4 @@ class Noted:
 
 Event = Union[ProcessDataReceived, StationFound, StationLost, DriveFailed, MappingDiffered,
               MappingWritten, SetpointsExpired, RequestCompleted, ControlCompleted, FrameRejected,
-              ForeignMasterSeen, Noted]
+              AnswerLate, ForeignMasterSeen, Noted]

@@ -6,13 +6,17 @@ It is the counterpart of the outbox: frames go to the drive, this goes to people
 """
 
 from collections.abc import Iterable
+import math
 
 from drive_can_bridge.core.events import (
-    Event, FrameRejected, Noted, SetpointsExpired, StationFound, StationLost,
+    AnswerLate, Event, FrameRejected, Noted, SetpointsExpired, StationFound, StationLost,
 )
 from drive_can_bridge.core.holding import Setpoint
 from drive_can_bridge.core.sentences import may_still_be_running, NOTHING, Sentence
 from drive_can_bridge.core.statistics import DriveStatistics
+
+#: s between two answers that are told to be late
+TELL_LATE = 10.0
 
 
 class Reporter:
@@ -24,12 +28,13 @@ class Reporter:
     :ivar advice: while the drive is not online: what is missing, and what to look at; '' else.
     """
 
-    __slots__ = ('_statistics', 'advice', 'events')
+    __slots__ = ('_statistics', '_tell_late_at', 'advice', 'events')
 
     def __init__(self, statistics: DriveStatistics, advice: Sentence) -> None:
         self.events: list[Event] = []
         self.advice = advice
         self._statistics = statistics
+        self._tell_late_at = -math.inf
 
     def take(self) -> list[Event]:
         """Return what happened since the last call."""
@@ -55,6 +60,22 @@ class Reporter:
         """Count and tell a frame of the drive that is malformed or unasked."""
         self._statistics.rejected += 1
         self.events.append(FrameRejected(text))
+
+    def unasked(self, text: Sentence, late: float | None, now: float) -> None:
+        """
+        Count and tell an answer that nobody waits for: rejected, or late.
+
+        :param late: by how many s it came too late; 0: it is not wanted any more; None: it
+            answers nothing that was asked.
+        """
+        if late is None:
+            self.reject(text)
+        elif late > 0.0:
+            self._statistics.late += 1
+            self._statistics.late_by = late
+            if now >= self._tell_late_at:   # once in a while
+                self._tell_late_at = now + TELL_LATE
+                self.events.append(AnswerLate(late))
 
     def found(self) -> None:
         """Tell that the drive exchanges process data."""

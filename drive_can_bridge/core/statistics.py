@@ -68,6 +68,8 @@ class DriveStatistics:
     :ivar exchanges: complete request/response exchanges.
     :ivar missed: responses that did not come in time.
     :ivar rejected: frames on the drive's own response identifiers that are malformed or unasked.
+    :ivar late: answers to a question whose time was over.
+    :ivar late_by: how many s the last of them came after it.
     :ivar short: responses with fewer than 8 bytes that still held what was needed.
     :ivar commands_refused: setpoint commands with a value that cannot be sent.
     :ivar latency: from request to response.
@@ -77,6 +79,8 @@ class DriveStatistics:
     exchanges: int = 0
     missed: int = 0
     rejected: int = 0
+    late: int = 0
+    late_by: float = 0.0
     short: int = 0
     commands_refused: int = 0
     requests_ok: int = 0

@@ -35,6 +35,10 @@ from drive_can_bridge.protocols.quarantine import Quarantine
 
 #: s that a stop waits for the answer under way, where a device has one request at a time
 STOP_PATIENCE = 0.05
+#: s, beyond those that a courier expects it, after which an answer counts as nobody's
+LATE_MAX = 0.5
+#: so many questions that were given up are remembered
+LATE_COUNT = 16
 
 Done = Callable[[Any], None]
 
@@ -121,9 +125,28 @@ class Channel(Generic[StepT, ReplyT]):
         self._hurried = False  # and it has to make room
         self._deadline = math.inf  # of the exchange under way, as it was at first
         self._quarantine = Quarantine()
+        #: what was given up without an answer, and when
+        self._given_up: deque[tuple[float, StepT]] = deque(maxlen=LATE_COUNT)
         self._held_until = -math.inf
         self._awake = False  # something may be waiting or under way
         self._advancing = False
+
+    # -- answers that come too late ---------------------------------------------------------------
+
+    def late(self, received_at: float,
+             answers: Callable[[StepT], bool] = lambda step: True) -> float | None:
+        """
+        Take an answer that nobody waits for.
+
+        :param answers: tells whether it may be that to a step.
+        :return: how many s ago the step was given up that it answers; None: there is none.
+        """
+        horizon = received_at - LATE_MAX - self._courier.silence
+        for place, (at, step) in enumerate(self._given_up):
+            if at >= horizon and answers(step):
+                del self._given_up[place]
+                return max(0.0, received_at - at)
+        return None
 
     # -- queueing ---------------------------------------------------------------------------------
 
@@ -356,6 +379,8 @@ class Channel(Generic[StepT, ReplyT]):
         if step is None:
             return
         silent = courier.unanswered(step, reply)
+        if silent:
+            self._given_up.append((self.now, step))
         # what answers a repetition may be the answer to the attempt before
         if silent or queue.repeated and not courier.anonymous:
             key = courier.key(step)

@@ -9,13 +9,16 @@ here stands what every such session has to see to:
   and after ``missed_limit`` of those in a row the drive is lost.
 * *What has left.* What the bus did not take counts for nothing: a cycle has been sent when all its
   frames have left.
-* *The end.* The last cycles before silence are counted; where a drive that ran has answered none
-  of those that stop it, the answer to the last one is waited for a moment.
+* *The end.* The last cycles before silence are counted. Where a drive that ran has not shown that
+  it heard one of those that stop it, an answer is waited for a moment, and then it gets more of
+  them, until one is answered. What it answers to cycles of before shows nothing
+  (:mod:`.exchange_book`).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from functools import partial
 import math
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.frame import Frame
@@ -25,6 +28,8 @@ from drive_can_bridge.protocols.exchange_book import ExchangeBook
 
 #: cyclic frames with neutral setpoints that are sent before a drive is left alone
 STOP_CYCLES = 3
+#: more of them for one that ran and has not shown that it heard one
+MORE_CYCLES = 3
 #: s that an answer to the cycles of a stop is waited for, where none has come
 LAST_ANSWER = 0.1
 #: s between a cycle and one that is brought forward because commands are too old
@@ -52,14 +57,18 @@ class CyclicExchange(Generic[TelegramT]):
         answered or waited for; None: that ends the stop.
     :param settled: called when an exchange ends, answered or not.
     :param left: called when a cycle has left.
+    :param audience: the exchanges of those whom a whole cycle tells; None: this one.
+    :param in_turn: not each cycle asks this drive: whoever asks it settles the one before.
     :param unheard: tells whether somebody who ran may not have heard the stop; None: the drive
         has answered none of its cycles.
-    :param heeded: an answer shows that what the drive was told last has arrived.
+    :param heeded: an answer to a cycle shows that what the drive was told by it has arrived.
     :ivar book: counts the cycles, and the answers.
     :ivar timer: when the next cycle is due.
     :ivar word: the control word of the last cycle.
     :ivar cycles_left: still to be sent before silence; -1: no end is planned.
     :ivar again: this cycle follows one of which the bus has not taken everything.
+    :ivar insisting: the last cycles are more than a drive gets that answers.
+    :ivar runs: the last cycle holds anything but neutral and ``disable``.
     """
 
     def __init__(self, session: Session, encode: Callable[[list[int]], TelegramT],
@@ -68,12 +77,14 @@ class CyclicExchange(Generic[TelegramT]):
                  ended: Callable[[float], None] | None = None,
                  settled: Callable[[], None] | None = None,
                  left: Callable[[], None] | None = None,
+                 in_turn: bool = False,
+                 audience: 'Callable[[], Iterable[CyclicExchange[Any]]] | None' = None,
                  unheard: Callable[[], bool] | None = None, heeded: bool = True) -> None:
         self.book = ExchangeBook(session.configuration, session.statistics)
         self.timer = self.book.timer
         self.word: int | None = None
         self.cycles_left = -1
-        self.again = False
+        self.again = self.insisting = self.runs = False
         self._session = session
         self._encode, self._send = encode, send
         self._slot = slot
@@ -82,12 +93,13 @@ class CyclicExchange(Generic[TelegramT]):
         self._ended = ended or self._end_stop
         self._settled = settled
         self._told = left
+        self._in_turn = in_turn
+        self._audience = audience or (lambda: (self,))
         self._unheard = unheard or self._unanswered
         self._heeded = heeded
         self._answer_due = math.inf
         self._telegram: TelegramT | None = None
         self._raws: list[int] | None = None     # in it, until it has left
-        self._runs = False                      # it holds anything but neutral and disable
         self._frames_out = 0                    # of which nobody has said what became of them
         self._whole = True                      # the bus has taken all others of this cycle
         self._stopping = False                  # the last cycles are those of a stop
@@ -111,10 +123,10 @@ class CyclicExchange(Generic[TelegramT]):
                 # a drive has that long for its answer
                 self.timer.no_later(max(now, self.timer.began_at + EXPIRY_SPACING))
             return
-        if self._waiting:
-            self._end(now)
+        if self._waiting and not self._insist(now):
             return
-        self.settle(now)
+        if not self._in_turn or now >= self._answer_due:
+            self.settle(now)
         if self.timer.due == math.inf:  # what was missed has ended the cycles
             return
         session = self._session
@@ -166,26 +178,33 @@ class CyclicExchange(Generic[TelegramT]):
 
     # -- sending ----------------------------------------------------------------------------------
 
-    def put(self, frame: Frame) -> None:
-        """Hand out a frame of the cycle that has begun."""
+    def put(self, frame: Frame, *to: 'CyclicExchange[Any]') -> None:
+        """
+        Hand out a frame of the cycle that has begun.
+
+        :param to: whose drives it may start, where that is not only this one.
+        """
         self._frames_out += 1
-        self._session.outbox.put(frame, self._left)
+        self._session.outbox.put(frame, partial(self._left, to) if to else self._alone_left)
+
+    def _alone_left(self, sent: bool, now: float) -> None:
+        self._left((self,), sent, now)
 
     def _make(self) -> TelegramT:
         session = self._session
         raws = [setpoint.raw for setpoint in session.setpoints.items]
-        self._runs = not session.setpoints.at_rest
+        self.runs = not session.setpoints.at_rest
         control = session.control
         if control is not None:
             self.word = control.word
             if self._slot is not None:
                 raws.insert(self._slot, self.word)
-                self._runs = self._runs or not control.at_rest
+                self.runs = self.runs or not control.at_rest
         session.setpoints.changed = False
         self._raws = raws
         return self._encode(raws)
 
-    def _left(self, sent: bool, now: float) -> None:
+    def _left(self, to: 'Iterable[CyclicExchange[Any]]', sent: bool, now: float) -> None:
         """
         Take note of a frame.
 
@@ -196,12 +215,14 @@ class CyclicExchange(Generic[TelegramT]):
         self._frames_out -= 1
         if not sent:
             self._whole = False
-        elif self._runs:
-            session.told.note_unacknowledged(CYCLE, runs=True)
+        elif self.runs:
+            for each in to:
+                each._session.told.note_unacknowledged(CYCLE, runs=True)
         if self._frames_out or not self._whole:
             return
-        if not self._runs:
-            session.told.note(CYCLE, runs=False)
+        if not self.runs:
+            for each in self._audience():
+                each._session.told.note(CYCLE, runs=False)
         if self._raws is not None:      # the first time that it left
             session.sent.take(self._raws)
             self._raws = None
@@ -222,27 +243,53 @@ class CyclicExchange(Generic[TelegramT]):
 
     # -- answers ----------------------------------------------------------------------------------
 
-    def expect_answer(self, now: float, until: float = math.inf) -> None:
+    def expect_answer(self, now: float, until: float = math.inf, *,
+                      runs: bool | None = None) -> None:
         """
         Take note that the drive was sent a cycle.
 
         :param until: when the answer counts as missed; infinity: with the next cycle.
+        :param runs: it holds anything but neutral and ``disable``; None: as the cycle of this
+            exchange does.
         """
-        self.book.awaiting = True
-        self.book.began_at = now
+        self.book.asked(now, runs=self.runs if runs is None else runs)
         self._answer_due = until
 
-    def expects(self, what: str) -> bool:
+    def expects(self, what: str, now: float, received_at: float) -> bool:
         """Tell whether an answer belongs to the last cycle; others are late, or rejected."""
-        book = self.book
-        if not book.awaiting and not book.take_stale():
-            self._session.report.reject(sentences.unasked(what))
-        return book.awaiting
+        if self.wanted:
+            return True
+        late = self.book.late(received_at)
+        if late is not None or not self.book.take_stale():
+            self._session.report.unasked(sentences.unasked(what), late, now)
+        self._heed()
+        return False
 
     def answered(self, received_at: float) -> None:
         """Take note of the answer to the last cycle."""
-        self.book.answered(received_at)
-        if self._heeded and self._session.told.ran:
+        book = self.book
+        missed = not book.awaiting
+        book.answered(received_at)
+        book.heard(received_at)
+        if missed:
+            self._session.report.unasked(NOTHING, book.overdue, received_at)
+        self._heed()
+
+    @property
+    def wanted(self) -> bool:
+        """
+        An answer would belong to the last cycle.
+
+        Of a stop, all do that may still come; of drives that are asked in turn, also one that is
+        missed, as long as the next has not been asked for.
+        """
+        book = self.book
+        return book.awaiting or book.outstanding and (
+            self._in_turn or self._session.stage is Stage.STOPPING)
+
+    def _heed(self) -> None:
+        """Take note that the drive has shown to have heard what it was told last, if it has."""
+        if self._heeded and self._session.told.ran and self.book.stop_shown:
             self._session.told.answered()
 
     def settle(self, now: float) -> None:
@@ -277,7 +324,7 @@ class CyclicExchange(Generic[TelegramT]):
     @property
     def longest_stop(self) -> float:
         """How many s the last cycles before silence take at most."""
-        return STOP_CYCLES * self.timer.stop_spacing + LAST_ANSWER
+        return (STOP_CYCLES + MORE_CYCLES) * self.timer.stop_spacing + 2 * LAST_ANSWER
 
     def stop_soon(self, now: float) -> None:
         """Let the last cycles before silence follow soon."""
@@ -288,6 +335,7 @@ class CyclicExchange(Generic[TelegramT]):
         else:   # those of a stop before this one have left, what goes by writes is under way
             self.run_out(soon)
         self._stopping = True
+        self.book.doubt()       # one of these is to be answered
         self.timer.hurry(now)
 
     def run_out(self, first: float) -> None:
@@ -297,7 +345,7 @@ class CyclicExchange(Generic[TelegramT]):
 
     def _plan(self, cycles_left: int) -> None:
         self.cycles_left = cycles_left
-        self._stopping = self._waiting = False
+        self._stopping = self._waiting = self.insisting = False
 
     def _last_left(self, now: float) -> None:
         """Come to an end, at once or when somebody has answered."""
@@ -307,13 +355,26 @@ class CyclicExchange(Generic[TelegramT]):
         else:
             self._ended(now)
 
+    def _insist(self, now: float) -> bool:
+        """Begin with more cycles for who has not shown to have heard one; False: that is all."""
+        if self.insisting or not self._unheard():
+            self._end(now)
+            return False
+        self._waiting, self.insisting = False, True
+        self.cycles_left = MORE_CYCLES
+        if self._session.configuration.period <= LAST_ANSWER:   # late answers have come by now
+            for each in self._audience():
+                each.book.forget_asked()
+        return True
+
     def wait_out(self, now: float) -> None:
         """Come to the end of a stop that only waits for an answer, if that came."""
-        if self._waiting and not self._unheard():
+        if (self._waiting or self.insisting) and not self._unheard():
             self._end(now)
 
     def _end(self, now: float) -> None:
-        self._waiting = False
+        self._waiting = self.insisting = False
+        self.cycles_left = 0
         self._ended(now)
 
     def _end_stop(self, now: float) -> None:
@@ -321,8 +382,8 @@ class CyclicExchange(Generic[TelegramT]):
         self._session.stop_left()
 
     def _unanswered(self) -> bool:
-        """Tell whether a drive that ran has answered none of the last cycles but one."""
-        return self._session.told.ran and self.book.missed_in_row >= STOP_CYCLES - 1
+        """Tell whether a drive that ran has not shown to have heard one of the last cycles."""
+        return self._session.told.ran and not self.book.stop_shown
 
     def doubt_the_end(self) -> None:
         """Take note of a drive that ran, and has answered none of its last cycles."""

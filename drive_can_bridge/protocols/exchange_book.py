@@ -2,15 +2,35 @@
 """
 How regularly a drive is asked, and whether it answers; for cycles and rounds alike.
 
-An answer belongs to the last exchange; where it may come later than that, it is *stale*, and no
-surprise.
+Answers come in the order of the cycles. One that comes while a cycle waits for it is the answer of
+that exchange, as far as samples are concerned. What it *shows* is another thing: it may be the
+answer to a cycle before, which is merely late. So it shows that the oldest cycle was heard of
+which no answer has been seen; and one that comes while nothing waits is late where there is such a
+cycle, and nobody's where there is none.
 """
 
+from collections import deque
 import math
+from typing import NamedTuple
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.statistics import DriveStatistics
 from drive_can_bridge.protocols.cycle_timer import CycleTimer
+
+#: s, and periods, after which nobody believes that an answer will come
+HORIZON, HORIZON_PERIODS = 0.5, 2.0
+
+
+class Asked(NamedTuple):
+    """
+    A cycle that waits for its answer, or may still get one.
+
+    :ivar at: when it was sent.
+    :ivar neutral: how often a running cycle was sent before; -1: it is one itself.
+    """
+
+    at: float
+    neutral: int
 
 
 class ExchangeBook:
@@ -21,11 +41,14 @@ class ExchangeBook:
     :ivar began_at: when the last one began.
     :ivar missed_in_row: how many went unanswered since the last answer.
     :ivar awaiting: the answer to a cycle has not come yet.
-    :ivar stale: so many answers too many may be on their way.
+    :ivar overdue: how late the last answer was, in s.
+    :ivar stale: so many frames beside answers to cycles may be on their way.
+    :ivar stop_shown: what was answered last was neutral, and so were all cycles since.
     """
 
     __slots__ = (
-        '_limit', '_statistics', 'awaiting', 'began_at', 'missed_in_row', 'stale', 'timer')
+        '_asked', '_horizon', '_limit', '_period', '_runs', '_statistics', 'awaiting', 'began_at',
+        'missed_in_row', 'overdue', 'stale', 'stop_shown', 'timer')
 
     def __init__(self, drive: DriveConfiguration, statistics: DriveStatistics) -> None:
         self.timer = CycleTimer(drive.period)
@@ -33,6 +56,12 @@ class ExchangeBook:
         self.missed_in_row = 0
         self.awaiting = False
         self.stale = 0
+        self.stop_shown = False
+        self._asked: deque[Asked] = deque()
+        self._period = drive.period
+        self._horizon = max(HORIZON, HORIZON_PERIODS * drive.period)
+        self._runs = 0
+        self.overdue = 0.0
         self._limit = drive.missed_limit
         self._statistics = statistics
 
@@ -47,6 +76,64 @@ class ExchangeBook:
         if error == error:  # not NaN
             self._statistics.period_error.add(error)
 
+    # -- cycles -----------------------------------------------------------------------------------
+
+    def asked(self, now: float, *, runs: bool) -> None:
+        """
+        Take note that the drive was sent a cycle that it answers.
+
+        :param runs: it holds anything but neutral and ``disable``.
+        """
+        self.awaiting = True
+        self.began_at = now
+        if runs:
+            self.doubt()
+        self._forget_older(now)
+        self._asked.append(Asked(now, -1 if runs else self._runs))
+
+    def doubt(self) -> None:
+        """Take note that no cycle up to now shows that the drive was told to stop."""
+        self._runs += 1
+        self.stop_shown = False
+
+    def heard(self, received_at: float) -> None:
+        """Take note of an answer: to the oldest cycle that may still get one."""
+        if self._asked:
+            at, neutral = self._asked.popleft()
+            self.stop_shown = self.stop_shown or neutral == self._runs
+            self.overdue = max(0.0, received_at - at - self._period)
+
+    def late(self, received_at: float) -> float | None:
+        """
+        Take an answer that nobody waits for.
+
+        :return: by how many s answers are late: this one, or that before it, which was taken for
+            that to a later cycle; 0: it is in time, but not wanted any more; None: no cycle is
+            left that it could answer.
+        """
+        self._forget_older(received_at)
+        if not self._asked:
+            return None
+        before = self.overdue
+        self.heard(received_at)
+        return max(before, self.overdue)
+
+    @property
+    def outstanding(self) -> bool:
+        """Some cycles may still be answered."""
+        return bool(self._asked)
+
+    def forget_asked(self) -> None:
+        """Take note that no answer to any cycle up to now is on its way."""
+        self._asked.clear()
+
+    def _forget_older(self, now: float) -> None:
+        asked = self._asked
+        while len(asked) > 1 and now - asked[0][0] > self._horizon:     # the last: as late as ever
+            asked.popleft()
+
+    # -- answers ----------------------------------------------------------------------------------
+
     def answered(self, received_at: float) -> None:
         """Take note of the answer that completes an exchange."""
         self.awaiting = False
@@ -59,18 +146,16 @@ class ExchangeBook:
     def missed(self) -> bool:
         """Take note of an exchange that nobody answered; tell whether those were too many."""
         self.awaiting = False
-        self.stale = 1  # one answer too many is on its way, if this one is only late
         self._statistics.missed += 1
         self.missed_in_row += 1
         return self.missed_in_row >= self._limit
 
     def expect_nothing(self) -> None:
         """Expect no answer any more; one that is on its way is no surprise, though."""
-        self.stale = int(self.awaiting)
         self.awaiting = False
 
     def take_stale(self) -> bool:
-        """Take an answer that nobody waits for; tell whether it is merely late."""
+        """Take a frame beside the answers that nobody waits for; tell whether it may come."""
         if not self.stale:
             return False
         self.stale -= 1

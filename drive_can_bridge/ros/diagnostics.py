@@ -18,7 +18,7 @@ from drive_can_bridge.core.text import printable
 from drive_can_bridge.core.words import value_text
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.ros.advice import how_to_enable, how_to_reset
-from drive_can_bridge.ros.drive_node import DriveNode
+from drive_can_bridge.ros.drive_node import DriveNode, late_text
 from drive_can_bridge.ros.quality import publisher
 from drive_can_bridge.ros.stamps import Stamps
 from drive_can_bridge.transport.end_point import Counts, REFUSED_FRAMES
@@ -109,7 +109,7 @@ class DriveReporter:
 
     def __init__(self, drive: DriveNode) -> None:
         self._drive = drive
-        self._rejected = 0
+        self._rejected = self._late = 0
         self._latencies = 0, 0.0        # how many, and their sum
         self._requests = 0
         self.inactive = 'bridge inactive: activate it'
@@ -141,6 +141,7 @@ class DriveReporter:
             'command_age_s': f'{command_age:.3f}',
             'commands_refused': str(statistics.commands_refused),
             'frames_rejected': str(statistics.rejected),
+            'late_answers': str(statistics.late),
             'parameter_requests_ok': str(statistics.requests_ok),
             'parameter_requests_failed': str(
                 statistics.requests_failed + drive.requests_refused),
@@ -209,7 +210,10 @@ class DriveReporter:
             drive.foreign_text = ''
         if rejected:
             told.append(f'{rejected} frames rejected, the last: {drive.rejected_text}; check for '
-                        f'a second station with the same number, or answers that come too late')
+                        f'a second station with the same number')
+        late, self._late = session.statistics.late - self._late, session.statistics.late
+        if late:
+            told.append(late_text(session.statistics.late_by))
         return told
 
     def _slowness(self) -> str:

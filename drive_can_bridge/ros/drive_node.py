@@ -19,8 +19,9 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlCompleted, ControlRequest
 from drive_can_bridge.core.directory import ParameterDirectory
 from drive_can_bridge.core.events import (
-    DriveFailed, Event, ForeignMasterSeen, FrameRejected, MappingDiffered, MappingWritten, Noted,
-    ProcessDataReceived, RequestCompleted, SetpointsExpired, StationFound, StationLost,
+    AnswerLate, DriveFailed, Event, ForeignMasterSeen, FrameRejected, MappingDiffered,
+    MappingWritten, Noted, ProcessDataReceived, RequestCompleted, SetpointsExpired, StationFound,
+    StationLost,
 )
 from drive_can_bridge.core.requests import (
     Failure, ReadRequest, Request,
@@ -252,6 +253,8 @@ class DriveNode(DriveListener):
         elif isinstance(event, FrameRejected):
             self.rejected_text = event.text
             self.warn('rejected', f'frame rejected: {event.text}')
+        elif isinstance(event, AnswerLate):
+            self._log.warning(late_text(event.seconds))
         elif isinstance(event, ForeignMasterSeen):
             self.foreign_text = event.text
             self.warn('foreign master', event.text)
@@ -296,3 +299,10 @@ class DriveNode(DriveListener):
         self.requests_refused += uncounted
         self.session.statistics.last_request_error = text
         self.warn(f'parameter {text}', text)
+
+
+def late_text(seconds: float) -> str:
+    """Say how late an answer came, and what that means."""
+    late = 1e3 * seconds
+    return (f'answer {late:.{int(late < 1.0)}f} ms after its period: the computer or the drive is '
+            f'too slow')

@@ -251,9 +251,9 @@ def test_deactivate_waits_for_the_neutral_cycles() -> None:
     bench.at(10.02)
     bench.step = 0.001  # the timer thread is not there: whoever waits does its work
     assert bench.exchange.deactivate() is True
-    assert bench.link.take() == [NEUTRAL] * 3
+    assert bench.link.take() == [NEUTRAL] * 6   # nobody answers
     assert bench.sessions[0].stopped
-    assert bench.now < 10.3
+    assert bench.now < 10.4
     assert not bench.exchange.active
 
 
@@ -326,7 +326,7 @@ def test_a_process_that_stands_still_during_a_stop_ends_it_all_the_same(
         bench.now += stalls.pop(0) if stalls else 0.0
     monkeypatch.setattr(time, 'sleep', sleep)
     assert bench.exchange.deactivate() is True
-    assert bench.link.take() == [NEUTRAL] * 3
+    assert bench.link.take() == [NEUTRAL] * 6   # nobody answers
     assert not stalls
 
 

@@ -9,7 +9,7 @@ from saying import says
 
 from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.core.control_machine import ControlMachine
-from drive_can_bridge.core.events import FrameRejected, StationFound, StationLost
+from drive_can_bridge.core.events import AnswerLate, FrameRejected, StationFound, StationLost
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.request_desk import RequestServer
 from drive_can_bridge.core.session import Session, Stage
@@ -78,7 +78,7 @@ class Plain(Session):
         self.exchange.expect_answer(now)
 
     def receive_frame(self, frame: Frame, now: float, age: float = 0.0) -> None:
-        if not self.exchange.expects('answer'):
+        if not self.exchange.expects('answer', now, now - age):
             return
         self.exchange.answered(now - age)
         if not self.online and self.stage is Stage.RUNNING:
@@ -139,7 +139,7 @@ def test_what_nobody_waits_for() -> None:
     talk.at(10.04)
     talk.answer(10.041)
     talk.answer(10.042)
-    assert talk.session.take_events() == [], 'one of them was late'
+    assert talk.session.take_events() == [AnswerLate(pytest.approx(0.001))], 'one of them was late'
 
 
 def test_what_stops_a_drive_is_brought_forward() -> None:
@@ -180,7 +180,7 @@ def test_nothing_is_left_of_an_exchange_that_was_stopped() -> None:
     talk.at(10.0)
     talk.exchange.settle(10.02)
     talk.exchange.settle(10.02)
-    talk.exchange.expect_answer(10.03, until=10.05)
+    talk.exchange.expect_answer(10.03)
     talk.exchange.stop_soon(10.03)
     assert talk.exchange.book.missed_in_row == 1
     talk.exchange.stop()
@@ -188,7 +188,7 @@ def test_nothing_is_left_of_an_exchange_that_was_stopped() -> None:
     assert talk.exchange.cycles_left == -1
     assert talk.exchange.book.missed_in_row == 0
     talk.answer(10.04)
-    assert talk.session.take_events() == [], 'it was on its way'
+    assert talk.session.take_events() == [AnswerLate(pytest.approx(0.02))], 'it was on its way'
 
 
 @pytest.mark.parametrize('answered', [True, False])
@@ -210,8 +210,11 @@ def test_the_answer_to_the_last_cycle_is_waited_for_where_the_drive_ran(answered
     if answered:
         talk.answer(10.15)
         assert talk.session.stopped
-    else:
-        talk.at(10.2)
+    else:   # three more, and then no more
+        for now in (10.2, 10.22, 10.24):
+            assert talk.at(now) == ['0000']
+        assert talk.session.next_timer() == pytest.approx(10.34)
+        assert talk.at(10.34) == []
         assert talk.session.stopped
     told = [event for event in talk.session.take_events() if 'does not answer' in str(event)]
     assert bool(told) is not answered

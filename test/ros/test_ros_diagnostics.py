@@ -13,7 +13,9 @@ import pytest
 from std_msgs.msg import Float64
 
 from drive_can_bridge.core.errors import BusUnavailable
+from drive_can_bridge.core.sentences import NOTHING
 from drive_can_bridge.ros.diagnostics import BusReporter, DriveReporter
+from drive_can_bridge.ros.drive_node import late_text
 from drive_can_bridge.transport import link
 from drive_can_bridge.transport.end_point import Counts
 
@@ -24,8 +26,8 @@ BUS_KEYS = {
 DRIVE_KEYS = {
     'state', 'exchanges', 'missed_exchanges', 'latency_mean_ms', 'latency_p99_ms',
     'latency_max_ms', 'period_error_mean_ms', 'period_error_p99_ms', 'period_error_max_ms',
-    'command_age_s', 'commands_refused', 'frames_rejected', 'parameter_requests_ok',
-    'parameter_requests_failed', 'last_parameter_error', 'short_frames'}
+    'command_age_s', 'commands_refused', 'frames_rejected', 'late_answers',
+    'parameter_requests_ok', 'parameter_requests_failed', 'last_parameter_error', 'short_frames'}
 
 
 def test_names_and_keys(bridge: StartBridge, client: Client) -> None:
@@ -192,6 +194,24 @@ def test_strangers_are_counted_and_told(bridge: StartBridge, client: Client) -> 
         recorder.send(0x10200000 | 99 << 4 | 1, bytes(3))
     assert status['parameter_requests_failed'] == '0'
     client.diagnostics(DRIVE, lambda drive: int(drive['frames_rejected']) >= 4)
+
+
+@pytest.mark.parametrize(('seconds', 'words'), [
+    (0.004, '4 ms'), (0.0003, '0.3 ms'), (0.1234, '123 ms')])
+def test_a_late_answer_in_words(seconds: float, words: str) -> None:
+    assert late_text(seconds) == (
+        f'answer {words} after its period: the computer or the drive is too slow')
+
+
+def test_late_answers_are_no_second_station(bridge: StartBridge, client: Client) -> None:
+    one = bridge()
+    one.online()
+    drive, = one.node.drives.values()
+    with drive.exchange.lock:
+        drive.session.report.unasked(NOTHING, 0.004, math.inf)
+    client.wait_logged('conveyor: answer 4 ms after its period')
+    status = client.diagnostics(DRIVE, lambda drive: int(drive['late_answers']) >= 1)
+    assert int(status['frames_rejected']) == 0
 
 
 def test_a_bus_that_is_not_there_yet(bridge: StartBridge, client: Client,

@@ -17,7 +17,7 @@ from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from drive_can_bridge.core.errors import RemoteProtocolError
+from drive_can_bridge.core.errors import RemoteProtocolError, Unasked
 from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.retry import RetryPolicy
 from drive_can_bridge.protocols.cannord.parameter_frame import (
@@ -87,11 +87,11 @@ class TaskCourier(Courier[Ask, Reply]):
     def receive(self, answer: bytes, now: float) -> Reply:
         response, task = self._layout.decode(answer), self.step
         if task is None:
-            raise RemoteProtocolError('parameter response that nobody asked for')
+            raise Unasked('parameter response that nobody asked for')
         if not _belongs(response, task):
-            raise RemoteProtocolError(f'parameter response {response.identifier} for '
-                                      f'P{response.number}.{response.index} does not belong to '
-                                      f'task {task.task} for P{task.number}.{task.index}')
+            raise Unasked(f'parameter response {response.identifier} for '
+                          f'P{response.number}.{response.index} does not belong to '
+                          f'task {task.task} for P{task.number}.{task.index}')
         if task.task in WRITES and response.identifier != Response.REFUSED and not _echoes(
                 response, task):
             self.silent = Reply(None, response)
@@ -99,6 +99,10 @@ class TaskCourier(Courier[Ask, Reply]):
                                       'another value')
         self.finish()
         return Reply(response)
+
+    def answers(self, answer: bytes, step: Ask) -> bool:
+        """Tell whether a response may be that to a task that was given up."""
+        return _belongs(self._layout.decode(answer), step)
 
     def attempts(self, step: Ask) -> int:
         return 1 if step.task in WRITES else self.retry.attempts

@@ -28,7 +28,7 @@ from drive_can_bridge.protocols.cannord.broadcast import broadcast_identifier
 from drive_can_bridge.protocols.cannord.control import make_control
 from drive_can_bridge.protocols.cannord.process_data import values_needed
 from drive_can_bridge.protocols.cannord.session import CannordSession
-from drive_can_bridge.protocols.cyclic_exchange import CYCLE, STOP_CYCLES
+from drive_can_bridge.protocols.cyclic_exchange import STOP_CYCLES
 
 
 def make_group(drives: Sequence[DriveConfiguration]) -> list[CannordSession]:
@@ -80,27 +80,28 @@ class Group:
 
     def send(self, payloads: list[bytes], now: float) -> None:
         """Send a cycle: to all, and to one or some of them alone."""
-        leader, count = self.leader, len(self.members)
+        leader, members = self.leader, self.members
+        exchange, count = leader.exchange, len(members)
         stopping = leader.stage is Stage.STOPPING
-        if stopping and leader.exchange.again:  # nobody of a stop is left out for that
+        if stopping and exchange.again:     # nobody of a stop is left out for that
             self._turn = self._turn_begun
         self._turn_begun = self._turn
-        leader.send(self.broadcast, payloads)
-        # a stop reaches also those that do not listen to broadcasts
-        for _ in range(math.ceil(count / STOP_CYCLES) if stopping else 1):
-            member = self.members[self._turn % count]
-            self._turn = (self._turn + 1) % count
-            leader.send(member.request_identifier, payloads)
+        leader.send(self.broadcast, payloads, *(member.exchange for member in members))
+        if exchange.insisting:
+            alone = [member for member in members if member.told.ran]
+        else:   # a stop reaches also those that do not listen to broadcasts
+            turns = math.ceil(count / STOP_CYCLES) if stopping else 1
+            alone = [members[(self._turn + place) % count] for place in range(turns)]
+            self._turn = (self._turn + turns) % count
+        for member in alone:
+            leader.send(member.request_identifier, payloads, member.exchange)
             member.exchange.settle(now)
-            member.expect_answer(now, now + leader.configuration.period)
+            member.expect_answer(now, now + leader.configuration.period, runs=exchange.runs)
 
     def cycle_left(self) -> None:
         """Take note that a cycle has left: it told everybody the same."""
-        leader = self.leader
-        runs = leader.told.runs(CYCLE)
         for member in self.members[1:]:
-            member.sent.raws = leader.sent.raws
-            member.told.note_unacknowledged(CYCLE, runs=runs)
+            member.sent.raws = self.leader.sent.raws
 
     # -- the end of a stop ------------------------------------------------------------------------
 

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction
-from drive_can_bridge.core.errors import RemoteProtocolError
+from drive_can_bridge.core.errors import RemoteProtocolError, Unasked
 from drive_can_bridge.core.events import Event, ForeignMasterSeen
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.process_image import ProcessImage
@@ -90,10 +90,11 @@ class CannordSession(Session):
         self._length = main_length(min(places, MAIN_VALUES))
         self._extra = places > MAIN_VALUES
         self._samples = Samples(self)
-        self._channel = TaskChannel(TaskCourier(
+        self._courier = TaskCourier(
             ParameterLayout(options.value_order, options.index_byte),
             lambda payload, left: self.outbox.put(
-                Frame(self._task_identifier, payload, self._extended), left), self.retry))
+                Frame(self._task_identifier, payload, self._extended), left), self.retry)
+        self._channel = TaskChannel(self._courier)
         access = procedures.TaskAccess(
             self._channel, self.retry, last_value=self._samples.last,
             persist=options.persist_writes,
@@ -112,7 +113,9 @@ class CannordSession(Session):
                    'to CAN',
             settled=self._samples.settle if self._extra else None,
             ended=None if group is None else group.stop_left,
-            left=None if group is None else group.cycle_left,
+            left=None if group is None else group.cycle_left, in_turn=group is not None,
+            audience=None if group is None else lambda: [
+                member.exchange for member in group.members],
             unheard=None if group is None else group.unheard)
         self.look_after(self.exchange, channel=self._channel)
 
@@ -171,25 +174,32 @@ class CannordSession(Session):
     def _send_cycle(self, payloads: list[bytes], now: float) -> None:
         if self._group is None:
             self.send(self.request_identifier, payloads)
-            self.expect_answer(now)
+            self.expect_answer(now, runs=self.exchange.runs)
         else:
             self._group.send(payloads, now)
 
-    def send(self, addressed: int, payloads: list[bytes]) -> None:
-        """Hand out main frame and additional frame of a cycle to one identifier."""
-        for payload in payloads:
-            self.exchange.put(Frame(addressed, payload, self._extended))
+    def send(self, addressed: int, payloads: list[bytes],
+             *to: CyclicExchange[list[bytes]]) -> None:
+        """
+        Hand out main frame and additional frame of a cycle to one identifier.
 
-    def expect_answer(self, now: float, until: float = math.inf) -> None:
+        :param to: the exchanges of the inverters that obey it, where that is not only this one.
+        """
+        for payload in payloads:
+            self.exchange.put(Frame(addressed, payload, self._extended), *to)
+
+    def expect_answer(self, now: float, until: float = math.inf, *, runs: bool) -> None:
         """
         Take note that the inverter was sent its process frames.
 
         :param until: when the answer counts as missed; infinity: with the next cycle.
+        :param runs: they hold anything but neutral and ``disable``.
         """
+        self.exchange.expect_answer(now, until, runs=runs)
         if self.stage is Stage.IDLE:
-            self.exchange.book.stale = 1 + self._extra
+            self.exchange.book.expect_nothing()
+            self.exchange.book.stale = self._extra
             return
-        self.exchange.expect_answer(now, until)
         self._samples.awaiting = self._extra
 
     # -- process data, receiving ------------------------------------------------------------------
@@ -216,6 +226,9 @@ class CannordSession(Session):
                     sentences.other_master_broadcasts(self.configuration.station, str(frame))))
             else:
                 self.report.reject(sentences.not_of_this_drive(str(frame)))
+        except Unasked as error:
+            self.report.unasked(sentences.malformed(str(error)), self._channel.late(
+                now - age, partial(self._courier.answers, data)), now)
         except RemoteProtocolError as error:
             self.report.reject(sentences.malformed(str(error)))
 
@@ -223,13 +236,13 @@ class CannordSession(Session):
         """Take status word and actual values. The fast path of the reader."""
         word, values = decode_main(data, swap=self._swap)
         book = self.exchange.book
-        asked = book.awaiting
+        asked = self.exchange.wanted
         if asked:
             self.exchange.answered(received_at)
         elif not (is_faulted(word) and self.online):
             # a fault while offline is told again by the first exchange
-            if not book.take_stale() and not is_faulted(word):
-                self.report.reject(sentences.unasked('process data'))
+            if not is_faulted(word):
+                self.exchange.expects('process data', now, received_at)
             return
         if not self.online and self.stage is Stage.RUNNING:
             self.be_online()

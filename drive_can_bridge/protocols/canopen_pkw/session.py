@@ -193,7 +193,8 @@ class PkwSession(Session):
                 self._exchange.received_at = now - age
                 message = pkw.decode(data, self._layout)
                 if not self._channel.receive(message, now):
-                    self.report.reject(sentences.unasked_pkw(str(message)))
+                    self.report.unasked(sentences.unasked_pkw(str(message)),
+                                        self._channel.late(now - age), now)
             elif self._supervision.receive(identifier, data, now):
                 self._end_futile_stop(now)
                 self._writers.again.heard(now, hurry=True)

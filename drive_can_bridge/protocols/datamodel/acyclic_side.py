@@ -6,11 +6,12 @@ Requests of users, a control or status word without a slot in cyclic telegrams, 
 """
 
 from collections.abc import Callable, Generator, Sequence
+from functools import partial
 import math
 from typing import Union
 
 from drive_can_bridge.core import sentences
-from drive_can_bridge.core.errors import RemoteProtocolError
+from drive_can_bridge.core.errors import RemoteProtocolError, Unasked
 from drive_can_bridge.core.events import ForeignMasterSeen
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter, Storage
@@ -106,12 +107,25 @@ class AcyclicSide:
         session, self.shows_up = self._session, True
         try:
             words = self._decode(frame, self.courier.outstanding)
+        except Unasked as error:
+            late = self.channel.late(now, partial(self._answers, frame))
+            session.report.unasked(sentences.malformed(str(error)), late, now)
+            return
         except RemoteProtocolError as error:
             session.report.reject(sentences.malformed(str(error)))
             return
         if len(frame.data) != PAYLOAD:
             session.statistics.short += 1
         self.channel.receive(words, now)
+
+    def _answers(self, frame: Frame, step: Step) -> bool:
+        if not isinstance(step, Read):
+            return False
+        try:
+            self._decode(frame, step)
+        except (RemoteProtocolError, Unasked):
+            return False
+        return True
 
     def foreign_master(self, frame: Frame) -> None:
         """Take note of a request that is not ours."""

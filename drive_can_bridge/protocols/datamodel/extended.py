@@ -29,7 +29,7 @@ from dataclasses import dataclass
 import struct
 from typing import Union
 
-from drive_can_bridge.core.errors import LocalProtocolError, RemoteProtocolError
+from drive_can_bridge.core.errors import LocalProtocolError, RemoteProtocolError, Unasked
 from drive_can_bridge.core.frame import Frame
 
 DIR = 0x10000000
@@ -208,14 +208,15 @@ def decode_answer(frame: Frame, station: int, question: tuple[int, int] | None, 
 
     :param question: number and count that were asked for; None: nothing was.
     :return: the words.
-    :raises RemoteProtocolError: anything else, malformed, or of another station.
+    :raises RemoteProtocolError: malformed, or of another station.
+    :raises Unasked: anything else.
     """
     telegram = decode(frame, strict=strict)
     if station_of(frame.identifier) != station:
         raise RemoteProtocolError(f'{frame}: not from station {station}')
     if not isinstance(telegram, ReadResponse) or (
             (telegram.number, len(telegram.words)) != question):
-        raise RemoteProtocolError(f'{frame}: nobody asked for it')
+        raise Unasked(f'{frame}: nobody asked for it')
     return telegram.words
 
 

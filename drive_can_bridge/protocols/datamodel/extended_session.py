@@ -216,7 +216,7 @@ class ExtendedSession(Session):
 
     def _start_cycling(self, now: float) -> None:
         self._phase = Phase.CYCLIC
-        self._exchange.book.stale = 0
+        self._exchange.book.forget_asked()
         self._exchange.start(now, in_turn=True)
         self.report.advice = sentences.cycles_unanswered()
 
@@ -278,7 +278,8 @@ class ExtendedSession(Session):
 
     def _receive_cyclic(self, data: bytes, now: float, received_at: float) -> None:
         """Take a cyclic response. The fast path of the reader."""
-        if not self._exchange.expects('cyclic response'):
+        if not self._exchange.expects('cyclic response', now, received_at):
+            self._exchange.wait_out(now)
             return
         raws, wrong = self._codec.decode_response(data)
         if wrong:

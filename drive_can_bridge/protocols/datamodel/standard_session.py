@@ -198,10 +198,10 @@ class StandardSession(Session):
         # it may have come before the question
         if courier.outstanding is None or now - age < courier.asked_at:
             self._channel.disturbed(now)
-            if self._expected:
-                self._expected = False
-            else:
-                self.report.reject(sentences.nobody_asked(str(frame)))
+            late = self._channel.late(now - age)
+            if late is not None or not self._expected:
+                self.report.unasked(sentences.nobody_asked(str(frame)), late, now)
+            self._expected = False
             return
         self._exchange.received_at = now - age
         self._side.receive(frame, now)

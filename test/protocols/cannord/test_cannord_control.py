@@ -217,7 +217,7 @@ def test_parameter_set_is_in_every_word() -> None:
 def test_stop_disables() -> None:
     talk = running()
     talk.deactivate(10.07)
-    assert [text for _, text in talk.until(11.0)] == ['002#7E040000'] * 3
+    assert [text for _, text in talk.until(11.0)] == ['002#7E040000'] * 6    # nobody answers
 
 
 def test_refused_while_offline_or_inactive() -> None:

@@ -598,7 +598,7 @@ def test_a_late_answer_of_one_member_does_not_end_the_wait_for_another() -> None
     last = int(alone[-1][:3], 16)
     bus.hears(f'{last + 1:03X}#{READY}')
     assert not bus.sessions[0].stopped
-    bus.live(0.2)
+    bus.live(0.4)
     assert all(session.stopped for session in bus.sessions)
     assert [name for name, _ in worries(bus)] == [
         name for station, name in enumerate(NAMES, 1) if station != last // 2]

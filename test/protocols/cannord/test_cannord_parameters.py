@@ -245,6 +245,9 @@ def test_reads_are_repeated() -> None:
     talk.hears('203#6610000000006700', 10.03)
     assert talk.outcomes() == [[103]]
     talk.hears('203#6610000000006700', 10.031)     # the answer to an earlier attempt
+    assert (talk.session.statistics.late, talk.session.statistics.rejected) == (1, 0)
+    for at in (10.032, 10.033):     # two attempts were given up
+        talk.hears('203#6610000000006700', at)
     assert talk.events(FrameRejected) == [
         FrameRejected('parameter response that nobody asked for')]
 

@@ -75,7 +75,7 @@ def test_signal_right_after_a_stall_to_a_drive_that_does_not_answer() -> None:
     talk = running()
     assert talk.time_lost(15.0) == []
     assert talk.deactivate(15.0) == []
-    assert [text for _, text in talk.until(16.0)] == [READY_FRAME] * 3
+    assert [text for _, text in talk.until(16.0)] == [READY_FRAME] * 6
     assert talk.session.stopped
     assert warnings(talk) == [says('may_still_be_running', why=says('stop_not_answered'))]
 
@@ -84,7 +84,8 @@ def test_signal_that_comes_before_anybody_noticed_the_stall() -> None:
     talk = running()
     assert talk.deactivate(15.0) == []
     assert talk.at(15.0) == [READY_FRAME]
-    assert talk.until(16.0) == [(15.02, READY_FRAME), (15.04, READY_FRAME)]
+    # nobody answers: three more
+    assert talk.until(16.0) == [(at, READY_FRAME) for at in (15.02, 15.04, 15.14, 15.16, 15.18)]
 
 
 def test_signal_right_after_the_bus_came_back() -> None:
@@ -166,7 +167,8 @@ def test_drive_that_falls_silent_together_with_the_stop() -> None:
     """It may have been disconnected in the meantime, and run on by itself."""
     talk = running()
     talk.deactivate(10.05)
-    assert talk.until(10.25) == [(10.06, READY_FRAME), (10.08, READY_FRAME), (10.1, READY_FRAME)]
+    assert talk.until(10.35) == [
+        (at, READY_FRAME) for at in (10.06, 10.08, 10.1, 10.2, 10.22, 10.24)]
     assert talk.session.stopped
     assert warnings(talk) == [says('may_still_be_running', why=says('stop_not_answered'))]
 
@@ -328,7 +330,7 @@ def test_a_stop_brings_its_cycle_forward(action: ControlAction, frame: str, aske
 def test_so_does_a_signal(asked: float, left: float) -> None:
     talk = slow()
     assert talk.deactivate(asked) == []
-    assert talk.until(11.0) == [
+    assert talk.until(left + 0.25) == [
         (left, READY_FRAME), (round(left + 0.1, 6), READY_FRAME),
         (round(left + 0.2, 6), READY_FRAME)]
 

@@ -14,7 +14,7 @@ from saying import says
 
 from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import (
-    FrameRejected, Noted, ProcessDataReceived, StationFound, StationLost,
+    AnswerLate, FrameRejected, Noted, ProcessDataReceived, StationFound, StationLost,
 )
 
 READ_SINGLE_0 = '505#C701002500000000'
@@ -146,10 +146,11 @@ def test_late_response_is_counted_and_not_believed() -> None:
     talk.until(10.075)
     talk.until(10.18)
     assert talk.hears(ANSWER_0, 10.18) == []
-    assert talk.session.statistics.rejected == 1
-    rejected, = talk.events()
-    assert rejected == FrameRejected(
-        says('unasked_pkw', message='function 26h, register 455'))
+    assert (talk.session.statistics.late, talk.session.statistics.rejected) == (1, 0)
+    assert talk.events() == [AnswerLate(pytest.approx(0.01))]
+    talk.hears(ANSWER_0, 10.1805)       # and one too many
+    assert talk.events() == [FrameRejected(
+        says('unasked_pkw', message='function 26h, register 455'))]
     assert talk.hears(IDLE_ANSWER, 10.181) == [READ_1]
     talk.hears(ANSWER_1, 10.182)
     assert talk.samples() == [(0x41, 0)]

@@ -403,8 +403,8 @@ def test_stop_goes_on_until_three_frames_were_taken() -> None:
 def test_drive_that_falls_silent_together_with_the_stop(mapping: str) -> None:
     talk = running(mapping=mapping)
     talk.deactivate(10.03)
-    sent = talk.until(10.3)
-    assert [text for _, text in sent] == [NEUTRAL] * 3
+    sent = talk.until(10.4)
+    assert [text for _, text in sent] == [NEUTRAL] * 6
     assert talk.session.stopped
     assert warnings(talk) == [says('may_still_be_running', why=says('stop_not_answered'))]
 
@@ -436,7 +436,7 @@ def test_second_end_while_the_last_answer_is_waited_for() -> None:
     talk.deactivate(10.03)
     talk.until(10.12)
     talk.deactivate(10.13)
-    assert [text for _, text in talk.until(11.0)] == [NEUTRAL] * 3
+    assert [text for _, text in talk.until(11.0)] == [NEUTRAL] * 6
     assert talk.session.stopped
     assert warnings(talk) == [says('may_still_be_running', why=says('stop_not_answered'))]
 

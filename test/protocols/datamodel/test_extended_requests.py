@@ -70,6 +70,9 @@ def test_answer_to_a_repeated_question() -> None:
     assert talk.outcomes() == [[7]]
     # and the answer to the first question, late
     talk.hears('10200281#0007000000000000', 10.26)
+    assert talk.session.statistics.late == 1
+    assert talk.events(FrameRejected) == []
+    talk.hears('10200281#0007000000000000', 10.27)      # and one too many
     assert len(talk.events(FrameRejected)) == 1
 
 

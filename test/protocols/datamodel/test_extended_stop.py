@@ -55,9 +55,10 @@ def test_answer_to_the_last_cycle_is_no_surprise() -> None:
     talk = online()
     talk.deactivate(10.01)
     talk.until(10.06 + TICK)
-    talk.hears(ANSWER, 10.062)
+    for at in (10.062, 10.063, 10.064):     # three of them went unanswered
+        talk.hears(ANSWER, at)
     assert talk.events(FrameRejected) == []
-    talk.hears(ANSWER, 10.063)
+    talk.hears(ANSWER, 10.065)
     assert len(talk.events(FrameRejected)) == 1
 
 
@@ -219,7 +220,7 @@ def test_disable_goes_with_the_cycles() -> None:
     assert request == '003FFFF0#0001000000000000'
     talk.hears('103FFFF0#03E800FA00030000', beat + 0.002)
     talk.deactivate(beat + 0.05)
-    assert [text for _, text in talk.until(beat + 5.0)] == [NEUTRAL] * 3
+    assert [text for _, text in talk.until(beat + 5.0)] == [NEUTRAL] * 6     # nobody answers
     silent(talk, beat + 6.0)
 
 
@@ -284,7 +285,7 @@ def test_disable_that_is_not_confirmed_is_told(answer: str, text: str) -> None:
             sent += [(now + 0.001 * step, frame)
                      for frame in talk.hears(answer, now + 0.001 * step)]
     assert [frame for _, frame in sent if frame != NEUTRAL] == [DISABLE, ASK_WORD] * 3
-    assert sent[-1][0] < now + 0.4
+    assert sent[-1][0] < now + 0.6
     silent(talk, now + 6.0)
     assert warnings(talk) == [
         f'told to stop, but control_word (P52): {text}: it may still be running']

@@ -9,7 +9,7 @@ from typing import Any
 from builders import drive, parameter
 import pytest
 
-from drive_can_bridge.core.errors import LocalProtocolError, RemoteProtocolError
+from drive_can_bridge.core.errors import LocalProtocolError, RemoteProtocolError, Unasked
 from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.protocols.datamodel import extended
 from drive_can_bridge.protocols.datamodel.mapping import effective
@@ -247,7 +247,7 @@ def test_an_answer_is_of_the_station_that_was_asked() -> None:
     with pytest.raises(RemoteProtocolError, match='not from station 2'):
         extended.decode_answer(answer, 2, (30, 2))
     for question in ((30, 1), (31, 2), None):
-        with pytest.raises(RemoteProtocolError, match='nobody asked'):
+        with pytest.raises(Unasked, match='nobody asked'):
             extended.decode_answer(answer, 1, question)
 
 

@@ -16,8 +16,8 @@ from standard_builders import (
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import (
-    ForeignMasterSeen, FrameRejected, Noted, ProcessDataReceived, SetpointsExpired, StationFound,
-    StationLost,
+    AnswerLate, ForeignMasterSeen, FrameRejected, Noted, ProcessDataReceived, SetpointsExpired,
+    StationFound, StationLost,
 )
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.setpoints import CommandOutcome
@@ -283,8 +283,8 @@ def test_a_late_answer_is_not_the_next_one() -> None:
     assert [text for _, text in talk.until(10.12)] == []
     # 150 ms after its request: nobody waits for it any more, and it begins the silence anew
     assert talk.hears(ANSWER, 10.17) == []
-    assert talk.session.statistics.rejected == 1
-    assert len(talk.events(FrameRejected)) == 1
+    assert (talk.session.statistics.late, talk.session.statistics.rejected) == (1, 0)
+    assert talk.events(AnswerLate) == [AnswerLate(pytest.approx(0.05))]
     assert [when for when, text in talk.until(10.3) if text.startswith('3F1#03')] == [
         pytest.approx(10.27)]
     assert talk.samples() == []

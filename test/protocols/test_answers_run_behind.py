@@ -1,0 +1,353 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+A drive whose answers come later than a period has stopped only if the stop was answered.
+
+What it answers to cycles of before shows nothing. A drive that is deaf from the stop on runs on,
+and is named as one that may; one that heard it is not, whatever got lost before.
+"""
+
+from collections.abc import Sequence
+import heapq
+from itertools import count
+from typing import Any
+
+from builders import ACTUAL, CONTROL, CURRENT, drive, frame, SPEED, STATUS, WORD
+from literal_drives import ExtendedDrive
+import pytest
+
+from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.control import ControlAction, ControlRequest
+from drive_can_bridge.core.events import AnswerLate, Event, FrameRejected, Noted
+from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.session import Session
+from drive_can_bridge.protocols.families import make_sessions
+
+
+class Inverter:
+    """CANnord: 7F04 runs it, and whatever is broadcast to it, too."""
+
+    def __init__(self, alone: int, broadcast: bool) -> None:
+        self.alone, self.broadcast, self.runs = alone, broadcast, False
+
+    def takes(self, sent: Frame) -> list[Frame]:
+        if sent.identifier != self.alone and not (self.broadcast and sent.identifier == 0x400):
+            return []
+        self.runs = sent.data[:2] == b'\x7F\x04'
+        return [] if sent.identifier == 0x400 else [
+            frame(f'{self.alone + 1:03X}#{"37" if self.runs else "31"}0B0000')]
+
+
+class Registers(dict[int, int]):
+    """Of a 29-bit drive: 52 is its word, if it has one, and 50 its setpoint."""
+
+    def __getitem__(self, number: int) -> int:
+        return 1 | 2 * (self.get(52) == 1) if number == 211 else super().__getitem__(number)
+
+
+class Extended(ExtendedDrive):
+    """DataModel, 29 bits."""
+
+    def __init__(self, *, slot: bool) -> None:
+        super().__init__(Registers(
+            {**dict(zip(range(122, 130), (50, 52 * slot, 0, 0, 209, 210, 211, 0))),
+             50: 0, 52: 0, 209: 0, 210: 0, 211: 0}))
+
+    @property
+    def runs(self) -> bool:
+        return bool(self.registers[50] or self.registers[52])
+
+
+def _extended(period: float, *, slot: bool, **options: Any,
+              ) -> tuple[list[DriveConfiguration], list[Any]]:
+    return [drive(period=period, request=(SPEED, WORD) if slot else (SPEED,),
+                  response=(ACTUAL, CURRENT, STATUS), control=CONTROL if slot else None,
+                  parameter_timeout=0.2, **options)], [Extended(slot=slot)]
+
+
+def _cannord(period: float, members: int = 1) -> tuple[list[DriveConfiguration], list[Any]]:
+    broadcast = 'group' if members > 1 else 'none'
+    return [drive('cannord', name=f'drive_{station}', station=station, request=(SPEED,),
+                  response=(ACTUAL,), period=period, broadcast=broadcast)
+            for station in range(1, members + 1)], [
+        Inverter(2 * station, members > 1) for station in range(1, members + 1)]
+
+
+KINDS = {
+    'cannord': _cannord,
+    'cannord group of two': lambda period: _cannord(period, 2),
+    'cannord group of four': lambda period: _cannord(period, 4),
+    '29 bit': lambda period: _extended(period, slot=False),
+    '29 bit, word in a slot': lambda period: _extended(period, slot=True),
+    '29 bit, maps assumed': lambda period: _extended(period, slot=True, mapping='assume'),
+}
+
+
+class Bus:
+    """Sessions that share a bus, and drives whose answers take a while."""
+
+    def __init__(self, kind: str, period: float, delay: float) -> None:
+        configurations, self.devices = KINDS[kind](period)
+        self.sessions: Sequence[Session] = make_sessions(configurations)
+        self.events: list[list[Event]] = [[] for _ in self.sessions]
+        self.delay = delay
+        self.now = 10.0
+        self.deaf: set[int] = set()
+        self.lose = 0           # so many answers get lost
+        self.coming: list[tuple[float, int, int, str]] = []
+        self.number = count()
+        self.sent: list[tuple[float, str]] = []
+        for session in self.sessions:
+            session.bus_up(self.now)
+            session.activate(self.now)
+        self.look()
+        self.live(1.5)
+
+    def look(self) -> None:
+        for session, events in zip(self.sessions, self.events):
+            while frames := session.take_frames():
+                for each in frames:
+                    self.sent.append((self.now, str(each)))
+                    for index, device in enumerate(self.devices):
+                        if index not in self.deaf:
+                            self.answer(index, device.takes(each))
+                session.frames_left(self.now)
+            events += session.take_events()
+
+    def answer(self, index: int, answers: list[Frame]) -> None:
+        for each in answers:
+            if self.lose > 0:
+                self.lose -= 1
+            else:
+                heapq.heappush(self.coming, (
+                    self.now + self.delay, next(self.number), index, str(each)))
+
+    def live(self, seconds: float) -> None:
+        end = self.now + seconds
+        while True:
+            due = max(self.now, min(session.next_timer() for session in self.sessions))
+            if self.coming and self.coming[0][0] <= min(due, end):
+                self.now, _, index, text = heapq.heappop(self.coming)
+                self.sessions[index].receive_frame(frame(text), self.now)
+            elif due <= end:
+                self.now = due
+                for session in self.sessions:
+                    session.handle_timer(self.now)
+            else:
+                self.now = end
+                return
+            self.look()
+
+    def run(self) -> None:
+        leader = self.sessions[0]
+        assert all(session.online for session in self.sessions)
+        if leader.control is not None:
+            leader.users.submit(ControlRequest(ControlAction.ENABLE), self.now)
+            self.look()
+            self.live(1.0)
+        for value in (0.0, 100.0):
+            leader.users.command(0, value, self.now)
+            self.live(0.15)
+        assert all(device.runs for device in self.devices)
+
+    def stop(self) -> list[bool]:
+        """End; return of which drives it was said that they may still be running."""
+        for events in self.events:
+            events.clear()
+        end = self.now + 0.5 + max(session.longest_stop for session in self.sessions)
+        for session in self.sessions:
+            session.deactivate(self.now)
+        self.look()
+        self.live(end - self.now)
+        assert all(session.stopped for session in self.sessions)
+        return [any(isinstance(event, Noted) and event.danger for event in events)
+                for events in self.events]
+
+
+LAGS = [(period, lag * period) for period in (0.01, 0.02, 0.05) for lag in (
+    0.2, 0.9, 1.3, 1.6, 2.2, 2.7)]
+
+
+@pytest.mark.parametrize(('period', 'delay'), LAGS)
+@pytest.mark.parametrize('kind', KINDS)
+def test_a_drive_that_is_deaf_from_the_stop_on_is_named(
+        kind: str, period: float, delay: float) -> None:
+    for place in range(5):
+        bus = Bus(kind, period, delay)
+        bus.run()
+        bus.live(0.2 * place * period)
+        bus.deaf = set(range(len(bus.devices)))
+        assert bus.stop() == [True] * len(bus.devices)
+
+
+@pytest.mark.parametrize(('period', 'delay'), LAGS)
+@pytest.mark.parametrize('kind', KINDS)
+def test_a_drive_that_heard_the_stop_is_not(kind: str, period: float, delay: float) -> None:
+    for place in range(5):
+        bus = Bus(kind, period, delay)
+        bus.run()
+        bus.live(0.2 * place * period)
+        assert bus.stop() == [False] * len(bus.devices)
+        assert not any(device.runs for device in bus.devices)
+
+
+@pytest.mark.parametrize('silence', [0.0, 1.7])
+@pytest.mark.parametrize('lost', [1, 2, 5, 40])
+@pytest.mark.parametrize('kind', KINDS)
+def test_what_was_lost_before_is_no_doubt(kind: str, lost: int, silence: float) -> None:
+    """A hundred answers are lost, one at a time: none of that says that they run behind."""
+    bus = Bus(kind, 0.02, 0.002)
+    if silence:
+        everybody = set(range(len(bus.devices)))
+        bus.deaf = everybody
+        bus.live(silence)
+        bus.deaf = set()
+        bus.live(2.5)
+    bus.run()
+    for _ in range(lost):
+        bus.lose = 1
+        bus.live(0.3)
+        for session in bus.sessions[:1]:
+            session.users.command(0, 100.0, bus.now)
+    if not all(device.runs for device in bus.devices):
+        bus.live(2.0)
+        bus.run()
+    assert bus.stop() == [False] * len(bus.devices)
+
+
+@pytest.mark.parametrize('kind', KINDS)
+def test_a_drive_that_misses_three_cycles_of_its_stop_gets_more(kind: str) -> None:
+    bus = Bus(kind, 0.02, 0.002)
+    bus.run()
+    everybody = set(range(len(bus.devices)))
+    bus.deaf = everybody
+    begun = bus.now
+    for session in bus.sessions:
+        session.deactivate(bus.now)
+    bus.look()
+    bus.live(0.09)      # three cycles
+    bus.deaf = set()
+    bus.sent.clear()
+    bus.live(2.0)
+    assert all(session.stopped for session in bus.sessions)
+    assert not any(device.runs for device in bus.devices)
+    assert not any(isinstance(event, Noted) and event.danger
+                   for events in bus.events for event in events)
+    assert bus.sent
+    assert bus.sent[-1][0] - begun < 0.4
+
+
+@pytest.mark.parametrize('kind', KINDS)
+def test_one_that_hears_nothing_gets_up_to_three_more(kind: str) -> None:
+    bus = Bus(kind, 0.02, 0.002)
+    bus.run()
+    bus.deaf = set(range(len(bus.devices)))
+    bus.sent.clear()
+    bus.stop()
+    cycles = '400' if 'group' in kind else '002' if 'cannord' in kind else '003FFFF0'
+    assert len([text for _, text in bus.sent if text.startswith(f'{cycles}#')]) == 6
+
+
+@pytest.mark.parametrize('members', [2, 4])
+def test_members_that_did_not_answer_get_frames_of_their_own(members: int) -> None:
+    """Two are deaf to broadcasts and to three cycles of the stop."""
+    bus = Bus(f'cannord group of {"two" if members == 2 else "four"}', 0.02, 0.002)
+    bus.run()
+    deaf = {0, members - 1}
+    bus.deaf = set(deaf)
+    for session in bus.sessions:
+        session.deactivate(bus.now)
+    bus.look()
+    bus.live(0.09)
+    for index in deaf:
+        bus.devices[index].broadcast = False
+    bus.deaf = set()
+    bus.sent.clear()
+    bus.live(2.0)
+    assert not any(device.runs for device in bus.devices)
+    alone = {f'{2 * index + 2:03X}' for index in deaf}
+    assert {text[:3] for _, text in bus.sent} == {'400', *alone}
+
+
+@pytest.mark.parametrize('refused', ['002', '004', '006', '008'])
+def test_members_that_a_broadcast_alone_started_are_named(refused: str) -> None:
+    """The bus takes the broadcast that starts them all, and no frame of a member."""
+    bus = Bus('cannord group of four', 0.02, 0.002)
+    leader = bus.sessions[0]
+    leader.users.submit(ControlRequest(ControlAction.ENABLE), bus.now)
+    while not bus.devices[1].runs:
+        for session in bus.sessions:
+            session.handle_timer(bus.now)
+        frames = leader.take_frames()
+        if frames:
+            for each in frames[:1]:
+                for device in bus.devices:
+                    device.takes(each)
+            leader.frames_left(bus.now, set(range(1, len(frames))))
+        else:
+            bus.now = leader.next_timer()
+        for _ in range(4):
+            if bus.coming:
+                break
+        bus.look()
+        bus.live(0.0)
+        if not frames or not bus.devices[1].runs:
+            bus.live(0.019)
+    bus.deaf = set(range(4))
+    assert bus.stop() == [True] * 4
+
+
+@pytest.mark.parametrize('delay', [0.025, 0.03, 0.035, 0.038, 0.05, 0.07])
+@pytest.mark.parametrize('members', ['two', 'four'])
+def test_a_group_whose_answers_take_longer_than_a_period_comes_online(
+        members: str, delay: float) -> None:
+    bus = Bus(f'cannord group of {members}', 0.02, delay)
+    bus.run()
+    assert not any(isinstance(event, FrameRejected)
+                   for events in bus.events for event in events)
+
+
+# -- late answers are counted, and are no sign of a second station --------------------------------
+
+
+@pytest.mark.parametrize('kind', ['cannord', '29 bit', '29 bit, maps assumed'])
+def test_late_answers_are_counted_and_told_once_in_a_while(kind: str) -> None:
+    bus = Bus(kind, 0.02, 0.002)
+    bus.events[0].clear()
+    statistics = bus.sessions[0].statistics
+    missed = statistics.missed
+    for number in range(1, 6):
+        # one answer takes 24 ms, and meets that to the next cycle
+        bus.delay = 0.0238
+        bus.live(0.02)
+        bus.delay = 0.002
+        bus.live(0.5)
+        assert statistics.missed == missed + number
+        assert statistics.late == number
+    assert statistics.rejected == 0
+    told = [event for event in bus.events[0] if isinstance(event, AnswerLate)]
+    assert len(told) == 1
+    bus.live(10.0)
+    bus.delay = 0.0238
+    bus.live(0.02)
+    bus.delay = 0.002
+    bus.live(0.5)
+    told = [event for event in bus.events[0] if isinstance(event, AnswerLate)]
+    assert len(told) == 2
+
+
+@pytest.mark.parametrize('kind', ['cannord', '29 bit', '29 bit, maps assumed'])
+def test_at_most_one_for_each_missed_exchange(kind: str) -> None:
+    """A second station answers, too: that is rejected."""
+    bus = Bus(kind, 0.02, 0.002)
+    statistics = bus.sessions[0].statistics
+    bus.lose = 2
+    bus.live(0.2)
+    assert (statistics.missed, statistics.late, statistics.rejected) == (2, 0, 0)
+    twice = {'cannord': '003#310B0000'}.get(kind, '103FFFF0#0000000000010000')
+    for _ in range(5):
+        bus.live(0.001)
+        bus.sessions[0].receive_frame(frame(twice), bus.now)
+        bus.look()
+        bus.live(0.0005)
+    assert statistics.late <= 2
+    assert statistics.rejected >= 3 - 1
