@@ -11,7 +11,7 @@ have been told to stop, or a warning has said that it may still be running.
 """
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 import math
 from typing import Any, ClassVar
 
@@ -57,6 +57,8 @@ class Observer:
         self.raws = [0, 0]
         self.since = [-math.inf, -math.inf]
         self.armed = [False, False]
+        #: the drive was told to be neutral, and has not answered that yet
+        self.held: Callable[[], bool] = lambda: False
         #: what the drive was told to run by, by frames that left, and not told to stop since
         self.running: set[object] = set()
         #: a warning has said since that it may still be running
@@ -125,6 +127,9 @@ class Observer:
             assert outcome is CommandOutcome.NOT_ARMED or (
                 outcome is CommandOutcome.DISABLED and not self.active)
             return
+        if self.held():
+            assert outcome is CommandOutcome.NOT_ARMED
+            return
         if self.control:
             if outcome is CommandOutcome.DISABLED or (
                     outcome is CommandOutcome.NOT_ARMED and self.faulted):
@@ -164,6 +169,7 @@ class AnyOrder(RuleBasedStateMachine):
         """Begin with a session that was told nothing yet."""
         self.session = session
         self.observer = observer
+        observer.held = lambda: session.neutral_stop.pending
         self.now = 1000.0
         self.open: list[ReadRequest | WriteRequest] = []
         self.control_requests: list[object] = []
@@ -311,7 +317,10 @@ class AnyOrder(RuleBasedStateMachine):
         self.session.users.submit(request, self.now)
         if not refusal:
             assert self.observer.active
-            self.wanted(action)
+            if self.session.control is None:
+                self.observer.disable()
+            else:
+                self.wanted(action)
         self.look()
 
     def wanted(self, action: ControlAction) -> None:

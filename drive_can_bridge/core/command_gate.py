@@ -48,6 +48,7 @@ class CommandGate:
         self.obeyed = leader or control
         self._report = report
         self._missed_limit = missed_limit
+        self._held = False  # neutral, whatever is commanded
         self._lacking = 0   # responses in a row without a status word
         self._status_in_sample = control is not None and any(
             parameter.name == control.table.status_parameter for parameter in sample)
@@ -79,8 +80,13 @@ class CommandGate:
     def _allow(self) -> None:
         """Take commands while they may move the drive, and only then: otherwise it is neutral."""
         presence, obeyed = self._presence, self.obeyed
-        self._setpoints.allow(presence.online and presence.active and (
+        self._setpoints.allow(presence.online and presence.active and not self._held and (
             obeyed is None or obeyed.operating))
+
+    def hold(self, held: bool) -> None:
+        """Be neutral and disarmed, and take no commands, or take them again."""
+        self._held = held
+        self._allow()
 
     def withdraw(self, reason: Sentence, now: float) -> None:
         """Go neutral, and back to ``disable``."""

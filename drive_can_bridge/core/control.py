@@ -39,6 +39,8 @@ answered together, at the first one's deadline at the latest. Of two different o
 
 A request that is refused changes nothing.
 
+*Quick stop of a drive without a word for it* is a DISABLE, which the answer says.
+
 *Quick stop of a drive that does not run* is a DISABLE: answered at once where that is known, and
 otherwise as soon as the drive confirms it. The same goes for a faulted drive, whose control word
 is ``disable`` in any case.

@@ -14,7 +14,7 @@ from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.core.control_operation import Answers, Operation
 from drive_can_bridge.core.control_texts import (
-    disregard_text, no_word_text, state_text, stuck_text, success_text,
+    disregard_text, state_text, stuck_text, success_text,
 )
 from drive_can_bridge.core.disregard import Disregard
 from drive_can_bridge.core.profile import ControlTable, StatusPattern
@@ -148,11 +148,9 @@ class ControlMachine:
         """Take a request; its outcome may be there when this returns."""
         self.handle_timer(now)
         action = request.action
+        if action is ControlAction.QUICK_STOP and action not in self._words:
+            action = ControlAction.DISABLE
         if action not in self._words and self._nothing_to_do(action):
-            under_way = self._operation
-            if action is ControlAction.QUICK_STOP and under_way is not None and (
-                    under_way.action not in _STOPS):
-                self._end(False, sentences.replaced('quick_stop'))  # what stands is to stay so
             self._answers.complete(
                 request, True, sentences.state_reached(self.state))
             return
@@ -169,7 +167,7 @@ class ControlMachine:
                 return
             may_run = self._may_run
             if under_way is not None:
-                self._end(False, sentences.replaced(action.value))
+                self._end(False, sentences.replaced(request.action.value))
             under_way = self._operation = Operation(action, now + self._timeout)
             if action is ControlAction.QUICK_STOP and may_run and not self._fault:
                 self._send(ControlAction.QUICK_STOP)
@@ -285,7 +283,7 @@ class ControlMachine:
     def _refusal(self, action: ControlAction) -> Sentence | None:
         """Return why a request cannot be taken, in words."""
         if action not in self._words:
-            return no_word_text(action)
+            return sentences.no_reset_word()
         if action is ControlAction.ENABLE and self._reports.missing:
             return sentences.members_offline(self._reports.missing)
         if action is ControlAction.ENABLE and self._fault:

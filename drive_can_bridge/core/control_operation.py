@@ -3,6 +3,7 @@
 
 from dataclasses import dataclass, field
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
 from drive_can_bridge.core.sentences import Sentence
 
@@ -12,7 +13,8 @@ class Operation:
     """
     What is under way.
 
-    :ivar requests: those that wait for it.
+    :ivar requests: those that wait for it; a quick stop for which there is no word waits for
+        ``disable``.
     :ivar pulsed: the reset word has left as often as it has to.
     """
 
@@ -35,7 +37,9 @@ class Answers:
     def answer(self, operation: Operation, success: bool, message: Sentence) -> None:
         """Answer all that wait for an operation."""
         for request in operation.requests:
-            self.complete(request, success, message)
+            instead = request.action is not operation.action
+            self.complete(
+                request, success, sentences.disabled_instead(message) if instead else message)
         operation.requests.clear()
 
     def take(self) -> list[ControlCompleted]:

@@ -66,16 +66,6 @@ def stuck_text(reports: StatusReports, table: ControlTable, wording: Wording | N
     return sentences.stuck(timeout, state, reports.text, remarks)
 
 
-#: how a refusal begins where a profile has no quick stop; others tell it by this
-NO_QUICK_STOP = 'no quick stop: '
-
-
-def no_word_text(action: ControlAction) -> Sentence:
-    """Say that a profile lacks the word for an action, and what there is instead."""
-    return (sentences.no_quick_stop_word() if action is ControlAction.QUICK_STOP else
-            sentences.no_reset_word())
-
-
 def success_text(table: ControlTable, sending: ControlAction, state: str) -> Sentence:
     """Name the state reached, or say that nobody knows."""
     return (sentences.state_not_reported(sending.value) if table.enabled is None else

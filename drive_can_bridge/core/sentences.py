@@ -249,9 +249,23 @@ def no_control_section() -> str:
 
 
 @sentence
-def no_quick_stop_word() -> str:
-    return ('no quick stop: the profile has no quick_stop word; '
-            '~/enable false disables the drive')
+def nothing_commanded() -> str:
+    return 'nothing is commanded'
+
+
+@sentence
+def neutral_without_control() -> str:
+    return 'neutral; it has no control word'
+
+
+@sentence
+def neutral_unanswered(timeout: float) -> str:
+    return f'told to be neutral, but no answer to that in {timeout:g} s'
+
+
+@sentence
+def disabled_instead(outcome: str) -> str:
+    return f'{outcome}; told to disable, the profile has no quick_stop word'
 
 
 @sentence

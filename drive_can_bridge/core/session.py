@@ -39,6 +39,7 @@ from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import Event
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.last_sent import LastSent
+from drive_can_bridge.core.neutral_stop import NeutralStop
 from drive_can_bridge.core.outbox import Outbox
 from drive_can_bridge.core.parts import AcyclicPart, Part
 from drive_can_bridge.core.process_image import ProcessImage
@@ -75,6 +76,7 @@ class Session(ABC):
     :ivar control: the control and status word machine, or None.
     :ivar setpoints: every ``cyclic_request`` parameter but the control word, in slot order.
     :ivar gate: whether commands reach the drive.
+    :ivar neutral_stop: the quick stop of a drive without a control word.
     :ivar roles: what the bridge uses parameters for.
     :ivar sample_parameters: of a sample, in the order of ``ProcessDataReceived.raws``.
     :ivar sent: what the drive was told last.
@@ -114,6 +116,7 @@ class Session(ABC):
         self.gate = CommandGate(
             self, self.setpoints, control, image.sample, self.report, leader,
             missed_limit=drive.missed_limit)
+        self.neutral_stop = NeutralStop(self)
         self.roles = roles or Roles(drive, controlled=control is not None)
         self.retry = RetryPolicy(
             timeout=drive.parameter_timeout, attempts=drive.parameter_retries + 1,
@@ -133,6 +136,8 @@ class Session(ABC):
         self._timed = [(part.next_timer, part.handle_timer) for part in parts]
         if self.control is not None:
             self._timed.append((self.control.next_timer, self._look_after_control))
+        else:
+            self._timed.append((self.neutral_stop.next_timer, self.neutral_stop.handle_timer))
         self._timed.append((channel.next_timer, channel.advance))
 
     # -- life cycle -------------------------------------------------------------------------------
@@ -279,6 +284,7 @@ class Session(ABC):
 
     def withdraw(self, reason: Sentence, now: float) -> None:
         """Go neutral, and back to ``disable``."""
+        self.neutral_stop.fail(reason)
         self.gate.withdraw(reason, now)
         if self.control is not None:
             self.withdrawn(now)
@@ -331,6 +337,9 @@ class Session(ABC):
     def withdrawn(self, now: float) -> None:
         """Take note that the control word is ``disable`` again."""
         self.see_to_control_word(now)
+
+    def hand_out_neutral(self, now: float) -> None:  # noqa: B027  where there may be no control
+        """Have all setpoints sent at once, neutral as they are: a drive without a control word."""
 
     def see_to_control_word(self, now: float) -> None:  # noqa: B027  optional
         """Have a control word sent that has changed."""

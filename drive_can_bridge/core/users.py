@@ -83,8 +83,11 @@ class Users:
             return
         session = self._session
         refusal = self.control_refusal(request.action)
-        if refusal or session.control is None:
+        if refusal:
             session.report.note(ControlCompleted(request, False, refusal))
+            return
+        if session.control is None:
+            session.neutral_stop.request(request, now)
             return
         if self._control is not None:
             self._control(request, now)
@@ -122,7 +125,7 @@ class Users:
     def control_refusal(self, action: ControlAction) -> Sentence:
         """Say why a control action cannot be asked for now; '' if it can."""
         session = self._session
-        if session.control is None:
+        if session.control is None and action is not ControlAction.QUICK_STOP:
             refusal = sentences.no_control_section()
         elif self._absence:
             refusal = self._absence

@@ -15,8 +15,6 @@ from drive_can_bridge.monitor.values import ParameterInfo
 OFFLINE, ONLINE = 'offline', 'online'
 #: key of diagnostics; there for drives with a control word only
 CONTROL_STATE = 'control_state'
-#: key of diagnostics beside it, and what it says of a drive without a quick stop
-QUICK_STOP, NO_QUICK_STOP = 'quick_stop', 'none'
 #: of a drive that exchanges nothing
 _SILENT_STATES = (OFFLINE, 'mapping differs', '')
 #: s after which a drive that is sampled all the time, and said to be online, has lost its bridge

@@ -11,7 +11,6 @@ import logging
 from typing import TypeVar
 
 from drive_can_bridge.clock import Clock
-from drive_can_bridge.core.control_texts import NO_QUICK_STOP as REFUSED
 from drive_can_bridge.core.parameters import Value
 from drive_can_bridge.monitor.drive import CONTROL_STATE
 from drive_can_bridge.monitor.model import Model
@@ -122,15 +121,6 @@ class Feed:
         """Stop a drive; return what became of it."""
         if stop not in stops(drive):
             return Outcome(False, 'no control word: only quick stop stops it')
-        outcome = await self._stop(drive, stop)
-        # a bridge of an older version does not disable by itself what has no quick stop
-        if outcome.success or not outcome.text.startswith(REFUSED):
-            return outcome
-        outcome = await self._stop(drive, Stop.DISABLE)
-        return Outcome(outcome.success,
-                       f'has no quick stop, told to disable: {outcome.text or "done"}')
-
-    async def _stop(self, drive: DriveSnapshot, stop: Stop) -> Outcome:
         return await self._told(lambda done: self._operations.stop(
             drive.name, stop, done, self._clock.now()))
 

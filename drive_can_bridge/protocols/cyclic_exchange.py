@@ -176,6 +176,11 @@ class CyclicExchange(Generic[TelegramT]):
                 or setpoints and self._session.setpoints.changed):
             self.timer.hurry(now)
 
+    def hand_out_neutral(self, now: float) -> None:
+        """Bring the next cycle forward: only its answer shows that the drive was told to stop."""
+        self.book.doubt()
+        self.timer.hurry(now)
+
     # -- sending ----------------------------------------------------------------------------------
 
     def put(self, frame: Frame, *to: 'CyclicExchange[Any]') -> None:
@@ -223,6 +228,7 @@ class CyclicExchange(Generic[TelegramT]):
         if not self.runs:
             for each in self._audience():
                 each._session.told.note(CYCLE, runs=False)
+            session.neutral_stop.all_left()
         if self._raws is not None:      # the first time that it left
             session.sent.take(self._raws)
             self._raws = None
@@ -291,6 +297,8 @@ class CyclicExchange(Generic[TelegramT]):
         """Take note that the drive has shown to have heard what it was told last, if it has."""
         if self._heeded and self._session.told.ran and self.book.stop_shown:
             self._session.told.answered()
+        if self.book.stop_shown:
+            self._session.neutral_stop.answered()
 
     def settle(self, now: float) -> None:
         """End an exchange: what has not arrived by now does not count for it any more."""

@@ -1,5 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""``~/enable``, ``~/reset_fault``, ``~/quick_stop`` of a drive whose profile has ``control``."""
+"""``~/quick_stop`` of a drive; ``~/enable`` and ``~/reset_fault`` if it has a control word."""
 
 from collections.abc import Callable
 from typing import Any
@@ -15,11 +15,13 @@ from drive_can_bridge.ros.service_thread import ServiceThread
 Submit = Callable[[ControlRequest], Question[ControlCompleted]]
 
 
-def control_services(node: Node, thread: ServiceThread, submit: Submit) -> CoroutineServices:
+def control_services(node: Node, thread: ServiceThread, submit: Submit, *,
+                     controlled: bool) -> CoroutineServices:
     """
     Return the control services of a drive.
 
     :param thread: serves them, and those of other drives, but nothing else.
+    :param controlled: it has a control word.
     """
     def serving(wanted: Callable[[Any], ControlAction]) -> Serve:
         async def callback(request: Any, response: Any) -> Any:
@@ -27,8 +29,10 @@ def control_services(node: Node, thread: ServiceThread, submit: Submit) -> Corou
             response.success, response.message = outcome.success, outcome.message
             return response
         return callback
-    return CoroutineServices(node, thread, {
-        'enable': (SetBool, serving(lambda request: ControlAction.ENABLE if request.data
-                                    else ControlAction.DISABLE)),
-        'reset_fault': (Trigger, serving(lambda _: ControlAction.RESET_FAULT)),
-        'quick_stop': (Trigger, serving(lambda _: ControlAction.QUICK_STOP))})
+    services: dict[str, tuple[type, Serve]] = {
+        'quick_stop': (Trigger, serving(lambda _: ControlAction.QUICK_STOP))}
+    if controlled:
+        services['enable'] = SetBool, serving(
+            lambda request: ControlAction.ENABLE if request.data else ControlAction.DISABLE)
+        services['reset_fault'] = Trigger, serving(lambda _: ControlAction.RESET_FAULT)
+    return CoroutineServices(node, thread, services)

@@ -128,8 +128,7 @@ class DriveReporter:
             more = session.facts()
             if session.control is not None:
                 known = session.control.state if session.active else 'unknown'
-                stop = 'none' if session.control.table.quick_stop is None else 'available'
-                more = {'control_state': known, 'quick_stop': stop, **more}
+                more = {'control_state': known, **more}
         self._latencies = statistics.latency.count, statistics.latency.total
         self._requests = statistics.requests_ok + statistics.requests_failed
         facts = {

@@ -135,8 +135,8 @@ class DriveNode(DriveListener):
             write_refusal=session.users.write_refusal, role=session.roles.role,
             active=lambda: session.active, restore=drive.profile.restore,
             failed=self._parameter_failed).services)
-        if session.control is not None:
-            self._services.append(control_services(self.node, control_thread, submit))
+        self._services.append(control_services(
+            self.node, control_thread, submit, controlled=session.control is not None))
 
     @property
     def name(self) -> str:

@@ -82,22 +82,17 @@ def faulted(table: ControlTable = FULL) -> ControlMachine:
 
 # -- words that a profile does not have -----------------------------------------------------------
 
+INSTEAD = says('disabled_instead', outcome=says('state_reached'))
+
+
 def test_what_is_reached_already_needs_no_word() -> None:
     """Like with a word: a quick stop while disabled and a reset without a fault succeed."""
     control = machine(replace(FULL, quick_stop=None, reset_fault=None))
     cycle(control, READY, 0.0)
     control.request(ControlRequest(QUICK_STOP), 0.1)
     control.request(ControlRequest(RESET_FAULT), 0.1)
-    assert outcomes(control) == [(QUICK_STOP, True, 'ready'), (RESET_FAULT, True, 'ready')]
-    control.request(ControlRequest(ENABLE), 0.2)
-    cycle(control, READY, 0.21)
-    cycle(control, ENABLED, 0.3)
-    outcomes(control)
-    control.request(ControlRequest(QUICK_STOP), 0.4)
-    (action, success, message), = outcomes(control)
-    assert (action, success) == (QUICK_STOP, False)
-    assert message.startswith('no quick stop: the profile has no quick_stop word')
-    assert control.word == RUN
+    assert outcomes(control) == [
+        (QUICK_STOP, True, INSTEAD), (RESET_FAULT, True, says('state_reached', state='ready'))]
     cycle(control, FAULT, 0.5)
     control.request(ControlRequest(RESET_FAULT), 0.6)
     assert outcomes(control) == [
@@ -113,7 +108,7 @@ def test_a_quick_stop_without_a_word_ends_an_enable_that_waits() -> None:
     assert control.pending
     control.request(ControlRequest(QUICK_STOP), 0.3)
     assert outcomes(control) == [
-        (ENABLE, False, says('replaced', action='quick_stop')), (QUICK_STOP, True, 'not ready')]
+        (ENABLE, False, says('replaced', action='quick_stop')), (QUICK_STOP, True, INSTEAD)]
     for step in range(5):
         assert cycle(control, READY, 0.4 + 0.1 * step) == OFF
     assert control.word == OFF
@@ -837,12 +832,25 @@ def test_quick_stop_of_a_faulted_drive_that_still_runs_is_a_disable() -> None:
     assert outcomes(control) == [(QUICK_STOP, True, 'fault')]
 
 
-def test_quick_stop_without_a_word_is_refused_and_disturbs_nothing() -> None:
+def test_quick_stop_without_a_word_disables_and_says_so() -> None:
     control = enabled(replace(FULL, quick_stop=None))
     control.request(ControlRequest(QUICK_STOP), 1.0)
-    assert outcomes(control) == [(
-        QUICK_STOP, False, says('no_quick_stop_word'))]
-    assert (control.word, control.pending) == (RUN, False)
+    assert (control.word, control.pending, control.operating) == (OFF, True, False)
+    assert cycle(control, ENABLED, 1.02) == OFF
+    assert outcomes(control) == []
+    cycle(control, READY, 1.04)
+    assert outcomes(control) == [(QUICK_STOP, True, INSTEAD)]
+    assert (control.word, control.pending) == (OFF, False)
+
+
+def test_it_joins_a_disable() -> None:
+    control = enabled(replace(FULL, quick_stop=None))
+    control.request(ControlRequest(DISABLE), 1.0)
+    control.request(ControlRequest(QUICK_STOP), 1.01)
+    cycle(control, ENABLED, 1.02)
+    cycle(control, READY, 1.04)
+    assert outcomes(control) == [
+        (DISABLE, True, says('state_reached', state='ready')), (QUICK_STOP, True, INSTEAD)]
 
 
 def test_quick_stop_without_a_status_is_answered_when_sent_and_keeps_braking() -> None:
@@ -1231,7 +1239,8 @@ class AnyConversation(RuleBasedStateMachine):
         elif action in (DISABLE, QUICK_STOP):
             assert self.control.word != self.table.enable, 'a stop takes effect at once'
             if action is QUICK_STOP and running:    # a faulted drive does not get here
-                assert self.control.word == self.table.quick_stop
+                assert self.control.word == (
+                    self.table.disable if self.table.quick_stop is None else self.table.quick_stop)
             self.may_enable = False
         for done in completed:
             assert done.request in self.open

@@ -39,7 +39,7 @@ DRIVE_KEYS = {
     'latency_max_ms', 'period_error_mean_ms', 'period_error_p99_ms', 'period_error_max_ms',
     'command_age_s', 'commands_refused', 'frames_rejected', 'late_answers',
     'parameter_requests_ok', 'parameter_requests_failed', 'last_parameter_error',
-    'control_state', 'quick_stop'}
+    'control_state'}
 
 Start = Callable[..., Bridge]
 

@@ -25,8 +25,8 @@ def enable(client: Client, value: bool = True) -> tuple[bool, str]:
     return answer.success, answer.message
 
 
-def trigger(client: Client, name: str) -> tuple[bool, str]:
-    answer = client.call(f'/lift/{name}', Trigger)
+def trigger(client: Client, name: str, drive: str = '/lift') -> tuple[bool, str]:
+    answer = client.call(f'{drive}/{name}', Trigger)
     return answer.success, answer.message
 
 
@@ -127,6 +127,25 @@ def test_quick_stop(bridge: StartBridge, client: Client) -> None:
         assert 2 in {words[0] for words in recorder.cycles(2)}
     assert not int(one.played['lift'].value('status_word')) & 2
     wait_until(lambda: one.played['lift'].value('control_word') == 0)
+
+
+def test_quick_stop_without_a_control_word(bridge: StartBridge, client: Client) -> None:
+    one = bridge()
+    one.online()
+    client.publish('/conveyor/command/speed_setpoint', Float64(data=0.0))
+    client.publish('/conveyor/command/speed_setpoint', Float64(data=300.0))
+    wait_until(lambda: float(one.played['conveyor'].value('speed_setpoint')) == 300.0)
+    assert trigger(client, 'quick_stop', '/conveyor') == (True, 'neutral; it has no control word')
+    assert one.played['conveyor'].value('speed_setpoint') == 0.0
+    names = {name for name, _ in client.node.get_service_names_and_types()}
+    assert not {'/conveyor/enable', '/conveyor/reset_fault'} & names
+    client.publish('/conveyor/command/speed_setpoint', Float64(data=300.0))
+    client.diagnostics('drive_can_bridge: drive conveyor',
+                       lambda drive: drive['state'] == 'not armed')
+    one.played['conveyor'].fault('off')
+    client.diagnostics('drive_can_bridge: drive conveyor',
+                       lambda drive: drive['state'] == 'offline')
+    assert trigger(client, 'quick_stop', '/conveyor') == (False, 'drive offline')
 
 
 def test_enable_that_gets_stuck_names_the_state(bridge: StartBridge, client: Client) -> None:

@@ -85,7 +85,8 @@ def test_enclaves_and_what_each_may(tmp_path: Path) -> None:
     assert moves <= allowed(policy, '/operator', 'topics', 'publish')
     assert moves <= allowed(policy, '/bridge', 'topics', 'subscribe')
     changes = {'/lift/enable', '/lift/quick_stop', '/lift/reset_fault', '/lift/set_parameters',
-               '/conveyor/set_parameters_atomically', '/drive_can_bridge/change_state'}
+               '/conveyor/quick_stop', '/conveyor/set_parameters_atomically',
+               '/drive_can_bridge/change_state'}
     assert changes <= allowed(policy, '/operator', 'services', 'request')
     assert changes <= allowed(policy, '/bridge', 'services', 'reply')
     # a drive without control has no such services, and nobody has a topic for a control word

@@ -167,6 +167,9 @@ class PkwSession(Session):
 
     # -- what the device is told ------------------------------------------------------------------
 
+    def hand_out_neutral(self, now: float) -> None:
+        self._writers.write_all_setpoints(now)
+
     def see_to_control_word(self, now: float) -> None:
         if self.online:
             self._writers.write_control(now, known=self._rounds.status_known)
@@ -212,6 +215,7 @@ class PkwSession(Session):
             if self.control is not None and now >= self.control.next_timer():
                 self.control.handle_timer(now)
                 self.control_changed(now)
+            self.neutral_stop.handle_timer(now)
             if self._writers.expire(now):
                 self._writers.write_setpoints(now)
         self._channel.advance(now)
@@ -234,7 +238,7 @@ class PkwSession(Session):
         if self.stage is not Stage.RUNNING:
             return soonest
         soonest = min(soonest, self._round_due, self._supervision.next_timer(),
-                      self.setpoints.expires_at)
+                      self.setpoints.expires_at, self.neutral_stop.next_timer())
         return soonest if self.control is None else min(soonest, self.control.next_timer())
 
     # -- state ------------------------------------------------------------------------------------

@@ -106,6 +106,13 @@ class Writers:
         if self._schedule.waiting and self._channel.is_idle(Lane.SETPOINTS):
             self._channel.run(self._write_setpoints(), lambda _: None, now, Lane.SETPOINTS)
 
+    def write_all_setpoints(self, now: float) -> None:
+        """Write all setpoints at once, whether they have changed or not; others make room."""
+        for index in range(len(self._setpoints.items)):
+            self._schedule.failed(index)
+        self._channel.make_room(now)
+        self.write_setpoints(now)
+
     def expire(self, now: float) -> bool:
         """
         Let setpoints go neutral that are too old, before any of them is handed out.
@@ -157,10 +164,15 @@ class Writers:
             return neutral
         del self._silences[index]
         if isinstance(reply, Refused):
-            self._failed(setpoint, sentences.write_refused(setpoint.parameter.name, reply.text),
-                         neutral=neutral)
+            why = sentences.write_refused(setpoint.parameter.name, reply.text)
+            self._failed(setpoint, why, neutral=neutral)
+            if neutral:
+                self._session.neutral_stop.refused(why)
             return neutral
         self._failures.pop(setpoint.parameter.name, None)
+        if neutral:     # and acknowledged
+            self._session.neutral_stop.left(setpoint.parameter.name)
+            self._session.neutral_stop.answered()
         if self._first.written(index):
             self._session.see_to_control_word(self._channel.now)
         return neutral

@@ -312,6 +312,9 @@ class ExtendedSession(Session):
         super().withdrawn(now)
         self._side.withdrawn()
 
+    def hand_out_neutral(self, now: float) -> None:
+        self._exchange.hand_out_neutral(now)
+
     def see_to_control_word(self, now: float) -> None:
         if self.stage is Stage.STOPPING:
             return

@@ -113,6 +113,12 @@ class SetpointWriter:
         self.look(now, known=known)
         self.write(now)
 
+    def write_all(self, now: float) -> None:
+        """Write all setpoints, whether they have changed or not, without waiting for a period."""
+        for index in range(len(self._parameters)):
+            self._schedule.failed(index)
+        self.write_word(now)
+
     def handle_timer(self, now: float) -> None:
         """Write what is due."""
         if now >= self._pulse_at and self._slot is not None:
@@ -140,6 +146,8 @@ class SetpointWriter:
             self._schedule.failed(index)
             return
         self._session.told.note_unacknowledged(index, runs=runs)
+        if not runs:
+            self._session.neutral_stop.left(self._parameters[index].name)
         control = self._session.control
         if index != self._slot or control is None:
             if self._first.written(index):

@@ -134,6 +134,9 @@ class StandardSession(Session):
         return 2 * (self.configuration.period + self.configuration.parameter_timeout
                     + float(self.configuration.options.quarantine))
 
+    def hand_out_neutral(self, now: float) -> None:
+        self._writer.write_all(now)
+
     def see_to_control_word(self, now: float) -> None:
         control, by_number = self.control, self._side.control_writer
         if control is None or not self.online or self.stage is not Stage.RUNNING:
@@ -154,8 +157,10 @@ class StandardSession(Session):
 
     def _answered(self, raws: Raws, now: float, found: bool) -> None:
         courier = self._side.courier
-        if self.told.ran and not found and courier.asked_at > courier.wrote_at:
-            self.told.answered()
+        if not found and courier.asked_at > courier.wrote_at:
+            self.neutral_stop.answered()
+            if self.told.ran:
+                self.told.answered()
         if self.control is None:
             return
         known, asked_at = self._status_slot is None, self._round.status_asked_at
