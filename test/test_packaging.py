@@ -185,7 +185,7 @@ sys.exit({function}())
 
 
 @pytest.mark.parametrize(('name', 'words', 'code', 'errors'), [
-    ('drive_can', ['validate', 'nothing.yaml'], 130, 'drive_can: interrupted\n'),
+    ('drive_can', ['validate', 'nothing.yaml'], 130, 'drive_can validate: interrupted\n'),
     ('drive_can', ['monitor'], 0, ''), ('drive_can_bridge', ['--help'], 0, '')])
 def test_interrupt_while_it_is_loaded(arguments: dict[str, Any], name: str, words: list[str],
                                       code: int, errors: str) -> None:

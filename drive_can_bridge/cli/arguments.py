@@ -4,6 +4,7 @@
 from argparse import ArgumentParser, ArgumentTypeError
 from collections.abc import Callable
 import math
+import os
 from pathlib import Path
 from typing import TypeVar
 
@@ -12,6 +13,8 @@ from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.monitor.text import is_ros_name
 
+#: stands for ``--params-file`` in commands that have no way through a bridge
+PARAMS_FILE = 'DRIVE_CAN_PARAMS_FILE'
 Parsed = TypeVar('Parsed')
 #: what an argument that begins with the name of a drive looks like
 _EXAMPLES = {'--fault': 'DRIVE:FAULT, for example conveyor:late=0.15',
@@ -59,8 +62,11 @@ def namespace(text: str) -> str:
 
 
 def add_params_file(parser: ArgumentParser, help_text: str) -> None:
-    """Add the option that names the parameter file."""
-    parser.add_argument('--params-file', metavar='FILE', type=Path, required=True, help=help_text)
+    """Add the option that names the parameter file; the environment stands for it."""
+    default = os.environ.get(PARAMS_FILE)
+    parser.add_argument('-p', '--params-file', metavar='FILE', type=Path, required=not default,
+                        default=Path(default) if default else None,
+                        help=f'{help_text} (default: ${PARAMS_FILE})')
 
 
 def add_seconds(parser: ArgumentParser) -> None:

@@ -40,7 +40,7 @@ def define(parser: ArgumentParser) -> None:
     parser.add_argument('--partial', action='store_true',
                         help='write the file although parameters could not be read; it lists them '
                              'in a comment')
-    add_words(parser, complete_drives, 'DRIVE', '*',
+    add_words(parser, complete_drives, '[DRIVE …] -o FILE', '*',
               'name or shell pattern; may be left out where there is only one')
 
 

@@ -15,13 +15,13 @@ from drive_can_bridge.process.presence import bridges, Present, short
 
 STOP = 'stop'
 _WORDS = {
-    STOP: ('[DRIVE]', '*', 'stop drives; without a name all drives of every bridge, at once',
+    STOP: ('[DRIVE …]', '*', 'stop drives; without a name all drives of every bridge, at once',
            'Calls ~/quick_stop of each drive, and asks nothing. Exit code 0: all have stopped. '
            '1: the lines at the top say who may still be running.'),
-    'enable': ('DRIVE', '+', 'enable drives', 'Calls ~/enable. Nothing moves: setpoints stay '
+    'enable': ('DRIVE …', '+', 'enable drives', 'Calls ~/enable. Nothing moves: setpoints stay '
                                               'neutral until they are armed.'),
-    'disable': ('DRIVE', '+', 'disable drives', 'Calls ~/enable with false.'),
-    'reset': ('DRIVE', '+', 'reset the faults of drives', 'Calls ~/reset_fault.'),
+    'disable': ('DRIVE …', '+', 'disable drives', 'Calls ~/enable with false.'),
+    'reset': ('DRIVE …', '+', 'reset the faults of drives', 'Calls ~/reset_fault.'),
 }
 #: in a pattern, not in a name
 _WILD = frozenset('*?[')
@@ -34,6 +34,7 @@ def define(parser: ArgumentParser) -> None:
     patterns = command in (STOP, 'disable')
     parser.allow_abbrev = False
     parser.description = f'{what[0].upper()}{what[1:]}. {how}'
+    parser.usage = f'%(prog)s [option …] {metavar}'
     words = parser.add_argument('words', metavar=metavar, nargs=nargs, help=(
         'a drive, by its name or its full name in the ROS graph (/cell/lift)'
         + ('; patterns too' if patterns else '')))

@@ -33,7 +33,7 @@ def define(parser: argparse.ArgumentParser) -> None:
         f'faults:\n{faults}\n\nROS traffic stays on this machine unless '
         f'{environment.DISCOVERY_RANGE} says otherwise.')
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.add_argument('--params-file', metavar='FILE', type=Path,
+    parser.add_argument('-p', '--params-file', metavar='FILE', type=Path,
                         help='parameter file of a bridge, instead of the one of the demo; its '
                              'buses are replaced by pseudo-terminals')
     parser.add_argument('--drive', action='store_true',

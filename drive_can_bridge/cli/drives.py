@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from fnmatch import fnmatchcase
 from pathlib import Path
 
+from drive_can_bridge.cli.arguments import namespace
 from drive_can_bridge.cli.command import complain, what_is_missing, WrongUsage
 from drive_can_bridge.cli.progress import Bar, waiting
 from drive_can_bridge.client.drive import Drive, Drives, ReadOutcome, Source
@@ -25,14 +26,16 @@ def add_words(parser: ArgumentParser, completer: Callable[..., list[str]], metav
     Add the positional arguments, and the options that say how to get to the drives.
 
     :param completer: proposes words to the shell.
+    :param metavar: how the words are written, as usage lines have it.
     """
     parser.allow_abbrev = False
     words = parser.add_argument('words', metavar=metavar, nargs=nargs, help=help_text)
     words.completer = completer     # type: ignore[attr-defined]  # for argcomplete
-    parser.add_argument('--params-file', metavar='FILE', type=Path,
+    parser.usage = f'%(prog)s [option …] {metavar}'     # argparse would repeat all of them
+    parser.add_argument('-p', '--params-file', metavar='FILE', type=Path,
                         help='open the buses of this parameter file; else the drives of a running '
                              'bridge are asked through it')
-    parser.add_argument('--namespace', metavar='NS',
+    parser.add_argument('--namespace', metavar='NS', type=namespace,
                         help='of the running bridge, where there are several')
     parser.add_argument('--nmt-start', action='store_true',
                         help='with --params-file: start CANopen nodes first, because others '

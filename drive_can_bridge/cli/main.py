@@ -13,6 +13,7 @@ from collections.abc import Sequence
 import importlib
 import io
 import os
+import re
 import signal
 import sys
 from typing import Any
@@ -21,36 +22,15 @@ from drive_can_bridge import __version__
 from drive_can_bridge.cli.argcomplete_hook import complete, typed
 from drive_can_bridge.cli.command import complain, FAILED, Parser, WRONG_USAGE, WrongUsage
 from drive_can_bridge.clock import Clock, SteadyClock
+from drive_can_bridge.cli.help import examples, Formatter, overview, SUBCOMMANDS
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.process.beginning import let_signals_in
 
 PROGRAM = 'drive_can'
 
-#: subcommand, the module of its name -> one line of help
-SUBCOMMANDS = {
-    'validate': 'check a parameter file without touching a bus',
-    'simulate': 'play every drive of a parameter file on its bus',
-    'demo': 'run a bridge, simulated drives and the live view of them',
-    'monitor': 'show all bridges and their drives, live',
-    'panel': 'show all bridges and their drives in a browser',
-    'stop': 'stop drives; without a name all drives of every bridge, at once',
-    'enable': 'enable drives',
-    'disable': 'disable drives',
-    'reset': 'reset the faults of drives',
-    'security': 'write who may talk to a bridge',
-    'profile': 'list, show, check and import parameter tables',
-    'scan': 'find the drives on a bus',
-    'probe': 'settle by reads which keys a drive needs',
-    'read': 'read parameters of a drive',
-    'write': 'set parameters of a drive',
-    'backup': 'write the settings of drives to files',
-    'restore': 'write the settings of a backup into a drive',
-    'compare': 'show what differs between backups and drives',
-    'record': 'write everything on the buses of a parameter file to a trace',
-    'decode': 'say what the frames of a trace, or of a bus, mean',
-}
 #: the module of a subcommand, where it is not called so itself
-MODULES = dict.fromkeys(('stop', 'enable', 'disable', 'reset'), 'control')
+MODULES = {**dict.fromkeys(('stop', 'enable', 'disable', 'reset'), 'control'),
+           'completion': 'completion_script'}
 #: what runs until a signal comes: that is no failure
 ENDLESS = ('simulate', 'demo', 'record', 'monitor', 'panel')
 #: options that make a subcommand one of these
@@ -59,6 +39,8 @@ ENDLESS_OPTIONS = ('--live', '--watch')
 SHOWING = ('validate', 'decode', 'profile')
 #: exit codes of what could not be done, where 1 says something else
 TROUBLE = {'compare': 2}
+#: what says itself where something is wrong: ``FILE:LINE:``, ``bus main:``, ``conveyor:``
+_PLACED = re.compile(r'(bus )?\w+: |.*?:\d+: |drives\.|buses\.')
 #: exit code of what is interrupted before it is done
 INTERRUPTED = 130
 
@@ -74,6 +56,7 @@ def main(argv: Sequence[str] | None = None, clock: Clock | None = None) -> int:
     arguments = list(sys.argv[1:] if argv is None else argv)
     wanted = _wanted(arguments)
     failed = TROUBLE.get(wanted, FAILED)
+    prefix = f'{PROGRAM} {wanted}'.rstrip()
     endless = wanted in ENDLESS or any(
         word.partition('=')[0] in ENDLESS_OPTIONS for word in arguments)
     if argv is None:
@@ -96,21 +79,23 @@ def main(argv: Sequence[str] | None = None, clock: Clock | None = None) -> int:
     except KeyboardInterrupt:
         if endless:
             return 0
-        complain(f'{PROGRAM}: interrupted')
+        complain(f'{prefix}: interrupted')
         return INTERRUPTED
     except DriveCanError as error:
-        complain(str(error))
+        text = str(error)
+        placed = text.startswith(f'{prefix}: ') or _PLACED.match(text)
+        complain(text if placed else f'{prefix}: {text}')
         return failed
     except OSError as error:
         place = f'{error.filename}: ' if error.filename else ''
-        complain(f'{PROGRAM}: {place}{error.strerror or error}')
+        complain(f'{prefix}: {place}{error.strerror or error}')
         return failed
     except ImportError as error:
-        complain(f'{PROGRAM}: this needs a Python module that is not installed: '
+        complain(f'{prefix}: this needs a Python module that is not installed: '
                  f'{error.name or error}')
         return failed
     except Exception as error:  # noqa: BLE001  no traceback ever reaches a user
-        complain(f'{PROGRAM}: internal error, please report it: {type(error).__name__}: {error}')
+        complain(f'{prefix}: internal error, please report it: {type(error).__name__}: {error}')
         return failed
     finally:
         if argv is None and endless:  # all is done; Python takes a moment to leave
@@ -138,16 +123,21 @@ def understood(arguments: list[str]) -> tuple[Any, argparse.Namespace]:
     completing = typed()
     wanted = _wanted(arguments if completing is None else completing)
     parser = Parser(
-        prog=PROGRAM, description='Tools of drive_can_bridge, the bridge from motor drives on '
-                                  'CAN buses to ROS 2.')
+        prog=PROGRAM, usage=f'{PROGRAM} SUBCOMMAND …', formatter_class=Formatter,
+        description='Tools of drive_can_bridge, the bridge from motor drives on CAN buses to '
+                    f'ROS 2.\n{overview(PROGRAM)}')
     parser.add_argument('--version', action='version', version=f'{PROGRAM} {__version__}')
-    subparsers = parser.add_subparsers(dest='subcommand', metavar='SUBCOMMAND', required=True)
-    parsers = {name: subparsers.add_parser(name, help=help_line)
-               for name, help_line in SUBCOMMANDS.items()}
+    subparsers = parser.add_subparsers(dest='subcommand', metavar='SUBCOMMAND', required=True,
+                                       help=argparse.SUPPRESS)
+    parsers = {name: subparsers.add_parser(name, prog=f'{PROGRAM} {name}',
+                                           formatter_class=Formatter)
+               for name in SUBCOMMANDS}
     module: Any = None
     if wanted in parsers:
         module = importlib.import_module(f'{__package__}.{MODULES.get(wanted, wanted)}')
-        module.define(parsers[wanted])
+        own = parsers[wanted]
+        module.define(own)
+        own.epilog = '\n\n'.join(filter(None, (own.epilog, examples(PROGRAM, wanted))))
     complete(parser)
     args, rest = parser.parse_known_args(arguments)
     if hasattr(args, 'words'):  # argparse takes positional arguments in one piece only

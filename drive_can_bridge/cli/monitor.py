@@ -7,6 +7,7 @@ on this host or others, and detaches again without any of them noticing.
 """
 
 import argparse
+import json
 from collections.abc import Callable
 import os
 import sys
@@ -15,7 +16,7 @@ from drive_can_bridge.cli.arguments import namespace
 from drive_can_bridge.cli.command import what_is_missing
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.errors import DriveCanError
-from drive_can_bridge.monitor.lines import balance, Lines
+from drive_can_bridge.monitor.lines import balance, documents, Lines
 from drive_can_bridge.monitor.model import Model
 from drive_can_bridge.monitor.source import Source
 from drive_can_bridge.process import environment
@@ -36,6 +37,9 @@ def define(parser: argparse.ArgumentParser) -> None:
         'line names the keys; elsewhere one line per drive and second.')
     parser.add_argument('--namespace', metavar='NS', default='', type=namespace,
                         help='only bridges in this namespace, or below it')
+    parser.add_argument('--json', action='store_true', help=(
+        'a JSON document per drive and second: time, drive, bridge, state, level, online, '
+        'message, control, setpoints and values (name: value, unit), exchanges, missed'))
     # how drive_can demo runs it
     parser.add_argument('--title', default='drive_can monitor', help=argparse.SUPPRESS)
     parser.add_argument('--quit-code', type=int, default=0, help=argparse.SUPPRESS)
@@ -87,7 +91,8 @@ def _show(source: Source, model: Model, watcher: SignalWatcher, args: argparse.N
           refusal: _Refusal) -> int:
     clock: Clock = args.clock
     place = environment.in_words()
-    if sys.stdout.isatty() and os.environ.get('TERM', 'dumb') not in ('dumb', 'unknown'):
+    if (not args.json and sys.stdout.isatty()
+            and os.environ.get('TERM', 'dumb') not in ('dumb', 'unknown')):
         try:
             from drive_can_bridge.view.live import show
             from drive_can_bridge.view.page import Setting
@@ -102,10 +107,11 @@ def _show(source: Source, model: Model, watcher: SignalWatcher, args: argparse.N
                 print(text)
             return code
     print(f'{args.title}: {place}', file=sys.stderr, flush=True)
-    return _print_lines(source, model, watcher, clock)
+    return _print_lines(source, model, watcher, clock, as_json=args.json)
 
 
-def _print_lines(source: Source, model: Model, watcher: SignalWatcher, clock: Clock) -> int:
+def _print_lines(source: Source, model: Model, watcher: SignalWatcher, clock: Clock, *,
+                 as_json: bool) -> int:
     """Print one line per drive and second, until a signal."""
     lines = Lines()
     due = clock.now() + LINE_PERIOD
@@ -115,7 +121,9 @@ def _print_lines(source: Source, model: Model, watcher: SignalWatcher, clock: Cl
         if now < due:
             continue
         due = max(due + LINE_PERIOD, now)
-        found = lines.look(model.look(now, 1e-9 * clock.stamp()), now)
+        snapshot = model.look(now, 1e-9 * clock.stamp())
+        found = ([json.dumps(each, ensure_ascii=False) for each in documents(snapshot)]
+                 if as_json else lines.look(snapshot, now))
         if found:
             print('\n'.join(found), flush=True)
     return 0

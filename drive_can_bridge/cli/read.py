@@ -30,7 +30,7 @@ def define(parser: ArgumentParser) -> None:
     parser.epilog = (
         'Exit code 0: all was read. 1: something was not, its row says why. 2: wrong '
         'usage.')
-    add_words(parser, complete_words, '[DRIVE] NAME', '*', (
+    add_words(parser, complete_words, '[DRIVE] [NAME …]', '*', (
         'the drive, also as a shell pattern (may be left out where there is only one); names of '
         'the profile, or raw ones: p30, p613.5, x2004.10'))
     parser.add_argument('--watch', metavar='S', type=above_zero,

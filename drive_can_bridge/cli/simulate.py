@@ -18,7 +18,7 @@ import sys
 import threading
 from typing import Any, TextIO
 
-from drive_can_bridge.cli.arguments import of_drive
+from drive_can_bridge.cli.arguments import add_params_file, of_drive
 from drive_can_bridge.cli.command import FAILED, WrongUsage
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.configuration import BridgeConfiguration, BusConfiguration
@@ -42,8 +42,7 @@ def define(parser: argparse.ArgumentParser) -> None:
         'SIGTERM.')
     parser.epilog = 'Lines on standard input: ' + '\n'.join(help_lines())
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.add_argument('--params-file', metavar='FILE', type=Path, required=True,
-                        help='parameter file of the bridge')
+    add_params_file(parser, 'parameter file of the bridge')
     parser.add_argument('--interface', help='python-can interface for all buses, instead of the '
                                             "file's")
     parser.add_argument('--channel', help="channel for all buses, instead of the file's")

@@ -2,13 +2,20 @@
 """The subcommand ``drive_can validate``: check a parameter file without touching a bus."""
 
 from argparse import ArgumentParser, Namespace
+import json
+import re
 import sys
+from typing import Any
 
+from drive_can_bridge.cli.command import FAILED
 from drive_can_bridge.configuration.bus_check import Adapters
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.configuration.traffic_check import bus_shares
 from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration
+from drive_can_bridge.core.errors import ConfigurationError
 from drive_can_bridge.core.parameters import Parameter
+
+_PLACE = re.compile(r'(.*?):(\d+): (?:([\w.\[\]-]+): )?(.*)', re.DOTALL)
 
 
 def define(parser: ArgumentParser) -> None:
@@ -19,6 +26,10 @@ def define(parser: ArgumentParser) -> None:
         '(FILE:LINE: key.path: what is wrong, what is allowed).')
     parser.epilog = 'Exit code 0: everything is all right. 1: it is not. 2: wrong usage.'
     parser.add_argument('file', metavar='FILE', help='ROS 2 parameter file of the bridge')
+    parser.add_argument('--json', action='store_true', help=(
+        'a JSON document a line: drive, bus, interface, channel, protocol, station, profile, '
+        'period, request, response, load_percent; or level (warning, error), file, line, key, '
+        'message'))
 
 
 def run(args: Namespace) -> int:
@@ -28,14 +39,27 @@ def run(args: Namespace) -> int:
     :raises ConfigurationError: the file has problems.
     :raises OSError: the file cannot be read.
     """
-    configuration = configuration_from_file(args.file, adapters=_adapters())
+    try:
+        configuration = configuration_from_file(args.file, adapters=_adapters())
+    except ConfigurationError as error:
+        if not args.json:
+            raise
+        for problem in error.problems:
+            _print_json(_place('error', problem))
+        return FAILED
     for warning in configuration.warnings:
-        print(f'warning: {warning}', file=sys.stderr)
+        if args.json:
+            _print_json(_place('warning', warning))
+        else:
+            print(f'warning: {warning}', file=sys.stderr)
     shares: dict[str, float] = {}
     for bus in configuration.buses.values():
         shares.update(bus_shares(
             bus, [drive for drive in configuration.drives.values() if drive.bus == bus.name]))
     for drive in configuration.drives.values():
+        if args.json:
+            _print_json(_document(drive, configuration.buses[drive.bus], shares[drive.name]))
+            continue
         print(summary(drive, configuration.buses[drive.bus], shares[drive.name]))
     return 0
 
@@ -51,6 +75,27 @@ def summary(drive: DriveConfiguration, bus: BusConfiguration, share: float) -> s
             f'period {1000 * drive.period:g} ms, '
             f'request {_names(drive.cyclic_request)}, response {_names(drive.cyclic_response)}, '
             f'load {100 * share:.1f} %')
+
+
+def _document(drive: DriveConfiguration, bus: BusConfiguration, share: float) -> dict[str, Any]:
+    return {'drive': drive.name, 'bus': drive.bus, 'interface': bus.interface,
+            'channel': bus.channel, 'protocol': drive.protocol, 'station': drive.station,
+            'profile': drive.profile.name, 'period': drive.period,
+            'request': [each.name for each in drive.cyclic_request],
+            'response': [each.name for each in drive.cyclic_response],
+            'load_percent': round(100 * share, 1)}
+
+
+def _place(level: str, problem: str) -> dict[str, Any]:
+    """Take ``FILE:LINE: key.path: what is wrong`` apart."""
+    found = _PLACE.fullmatch(problem)
+    file, line, key, message = found.groups() if found else (None, None, None, problem)
+    return {'level': level, 'file': file, 'line': None if line is None else int(line),
+            'key': key, 'message': message}
+
+
+def _print_json(document: dict[str, Any]) -> None:
+    print(json.dumps(document, ensure_ascii=False))
 
 
 def _names(parameters: tuple[Parameter, ...]) -> str:

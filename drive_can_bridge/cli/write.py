@@ -28,7 +28,7 @@ def define(parser: ArgumentParser) -> None:
     parser.epilog = (
         'Exit code 0: all was written. 1: something was not, its row says why. 2: wrong '
         'usage, nothing was sent. After Ctrl-C (130) the write under way is complete.')
-    add_words(parser, complete_words, '[DRIVE] NAME=VALUE', '+', (
+    add_words(parser, complete_words, '[DRIVE] NAME=VALUE …', '+', (
         'the drive, also as a shell pattern (may be left out where there is only one); names of '
         'the profile, or raw ones, with the new value'))
 
@@ -41,6 +41,8 @@ def run(args: Namespace) -> int:
     :raises WrongUsage: it is not clear which drive is meant, or a word is no NAME=VALUE.
     :raises DriveCanError: another master, a bus or a bridge that is not there.
     """
+    # what the command line alone shows to be wrong; the first word may be a drive
+    _assignments(args.words if '=' in args.words[0] else args.words[1:])
     with source_of(args) as source:
         names, words = split_words(source.names, args.words)
         wanted = _assignments(words)

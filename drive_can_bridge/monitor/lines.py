@@ -1,7 +1,11 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Drives in lines of text, for pipes and for the end."""
 
-from drive_can_bridge.monitor.snapshot import DriveSnapshot, Snapshot, Times
+from collections.abc import Sequence
+import math
+from typing import Any
+
+from drive_can_bridge.monitor.snapshot import DriveSnapshot, Shown, Snapshot, Times
 
 
 #: s that a drive which came online may take until it is known what its values mean, and until the
@@ -36,6 +40,30 @@ class Lines:
             # without its descriptors a value has no unit, which is better than no value
             return bool(drive.parameters) or elapsed > _PATIENCE
         return elapsed > _PATIENCE and drive.asked_for < elapsed
+
+
+def documents(snapshot: Snapshot) -> list[dict[str, Any]]:
+    """Return what programs are told of each drive."""
+    return [{'time': round(snapshot.at, 3), 'drive': drive.name, 'bridge': drive.bridge,
+             'state': drive.state, 'level': drive.level.name, 'online': drive.online,
+             'message': drive.advice, 'control': drive.control,
+             'setpoints': _values(drive.setpoints), 'values': _values(drive.values),
+             'exchanges': drive.exchanges, 'missed': drive.missed} for drive in snapshot.drives]
+
+
+def _values(shown: Sequence[Shown]) -> dict[str, dict[str, Any]]:
+    return {each.name: {'value': _value(each.text), 'unit': each.unit} for each in shown}
+
+
+def _value(text: str) -> float | bool | str | None:
+    """Return a value that is shown as a number where it is one; None: there is none yet."""
+    if text in ('true', 'false'):
+        return text == 'true'
+    try:
+        number = float(text)
+    except ValueError:
+        return text or None
+    return number if math.isfinite(number) else text
 
 
 def line(drive: DriveSnapshot) -> str:

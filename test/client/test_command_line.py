@@ -2,12 +2,16 @@
 """What the words of a command line may be, and how columns stand."""
 
 from argparse import ArgumentTypeError
+import shlex
+import sys
 
 import pytest
 
-from drive_can_bridge.cli.arguments import above_zero, of_drive, whole
+from drive_can_bridge.cli import completion_script
+from drive_can_bridge.cli.arguments import above_zero, of_drive, PARAMS_FILE, whole
 from drive_can_bridge.cli.command import WrongUsage
-from drive_can_bridge.cli.main import main
+from drive_can_bridge.cli.help import EXAMPLES, SUBCOMMANDS
+from drive_can_bridge.cli.main import main, understood
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.text import column_lines
 
@@ -48,3 +52,54 @@ def test_a_name_that_names_no_file(words: tuple[str, ...], name: str,
     line, = capsys.readouterr().err.splitlines()
     assert line.startswith(f'drive_can {words[0]}')
     assert f'argument -o/--output: {name!r} names no file' in line
+
+
+@pytest.mark.parametrize('subcommand', SUBCOMMANDS)
+def test_each_has_two_examples_that_are_understood(
+        subcommand: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match='0'):
+        main([subcommand, '--help'])
+    told = capsys.readouterr().out
+    for example in EXAMPLES[subcommand]:
+        assert f'\n  drive_can {example}\n' in told
+        _, args = understood(shlex.split(example))
+        assert args.subcommand == subcommand
+
+
+def test_the_file_of_the_environment_stands_for_the_option_where_no_bridge_is_asked(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    def file(*words: str) -> str:
+        return str(understood(list(words))[1].params_file)
+    monkeypatch.setenv(PARAMS_FILE, 'robot.yaml')
+    for words in (('probe',), ('record', '-o', 'x.log'), ('decode', 'x.log'), ('simulate',)):
+        assert file(*words) == 'robot.yaml'
+        assert file(*words, '-p', 'other.yaml') == 'other.yaml'
+    for words in (('read',), ('write', 'a=1'), ('backup', '-o', 'x'), ('restore', 'x'),
+                  ('compare', 'a', 'b'), ('stop',), ('demo',)):
+        assert file(*words) == 'None'
+    monkeypatch.setenv(PARAMS_FILE, '')
+    with pytest.raises(SystemExit, match='2'):
+        understood(['probe'])
+
+
+@pytest.mark.parametrize('words', [
+    ('write', 'conveyor'), ('write', 'conveyor', 'ramp_time'), ('write', 'ramp_time=1', 'x='),
+    ('write', 'lift', 'a=1', 'a=2'), ('read', '--namespace', 'a b'), ('read', '--nmt-start'),
+    ('compare', 'a'), ('restore', 'a', 'b', 'c')])
+def test_wrong_usage_is_told_before_a_bridge_is_looked_for(
+        words: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, 'drive_can_bridge.client.bridged.source', None)
+    try:
+        code = main(words)
+    except SystemExit as ended:
+        code = int(ended.code or 0)
+    assert code == 2
+
+
+def test_completion(capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip('argcomplete')
+    for shell in completion_script.SHELLS:
+        assert main(['completion', shell]) == 0
+        assert 'drive_can' in capsys.readouterr().out
+    with pytest.raises(SystemExit, match='2'):
+        main(['completion', 'dos'])

@@ -3,6 +3,7 @@
 
 from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
+import json
 import os
 from pathlib import Path
 import re
@@ -85,8 +86,8 @@ def test_broken_yaml_of_a_profile_is_one_problem(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(('name', 'line'), [
-    ('nothing.yaml', 'drive_can: nothing.yaml: No such file or directory\n'),
-    ('/', 'drive_can: /: Is a directory\n')])
+    ('nothing.yaml', 'drive_can validate: nothing.yaml: No such file or directory\n'),
+    ('/', 'drive_can validate: /: Is a directory\n')])
 def test_no_file(name: str, line: str) -> None:
     done = run('validate', name)
     assert (done.returncode, done.stdout, done.stderr) == (1, '', line)
@@ -97,7 +98,7 @@ def test_pipe_is_not_waited_for(tmp_path: Path) -> None:
     os.mkfifo(path)
     done = run('validate', str(path))
     assert (done.returncode, done.stdout, done.stderr) == (
-        1, '', f'drive_can: {path}: not a regular file, allowed is one\n')
+        1, '', f'drive_can validate: {path}: not a regular file, allowed is one\n')
     os.mkfifo(tmp_path / 'table.yaml')
     good = tmp_path / 'f.yaml'
     good.write_text(changed(FILE, '    autostart: true\n',
@@ -113,7 +114,7 @@ def test_file_that_is_too_large(tmp_path: Path) -> None:
         file.truncate(5 << 20)
     done = run('validate', str(path))
     assert (done.returncode, done.stdout, done.stderr) == (
-        1, '', f'drive_can: {path}: too large, allowed are 4 MiB\n')
+        1, '', f'drive_can validate: {path}: too large, allowed are 4 MiB\n')
     path = write(tmp_path)
     with (tmp_path / 'table.yaml').open('ab') as file:
         file.truncate(5 << 20)
@@ -153,10 +154,27 @@ def test_version_and_help() -> None:
     done = run('--help')
     assert done.returncode == 0
     for name in ('validate', 'simulate', 'demo'):
-        assert f'    {name} ' in done.stdout
+        assert f'\n  {name} ' in done.stdout
         help_ = run(name, '--help')
         assert (help_.returncode, help_.stderr) == (0, '')
         assert help_.stdout.startswith(f'usage: drive_can {name}')
+
+
+def test_json(tmp_path: Path) -> None:
+    file = write(tmp_path)
+    done = run('validate', str(file), '--json')
+    documents = [json.loads(line) for line in done.stdout.splitlines()]
+    assert (done.returncode, done.stderr) == (0, '')
+    assert [(each['drive'], each['protocol'], each['station']) for each in documents] == [
+        ('conveyor', 'datamodel_extended', 1), ('lift', 'datamodel_extended', 2)]
+    text = file.read_text(encoding='utf-8')
+    file.write_text(text.replace('station: 1', 'station: 1000'), encoding='utf-8')
+    done = run('validate', str(file), '--json')
+    document, = [json.loads(line) for line in done.stdout.splitlines()]
+    assert (done.returncode, done.stderr) == (1, '')
+    line = 1 + text[:text.index('station: 1')].count('\n')
+    assert (document['level'], document['file'], document['line'], document['key']) == (
+        'error', str(file), line, 'drives.conveyor.station')
 
 
 @pytest.mark.parametrize('name', EXAMPLES)
@@ -285,6 +303,6 @@ def test_interrupted(monkeypatch: pytest.MonkeyPatch,
 
     monkeypatch.setattr(front_end, '_run', stop)
     assert front_end.main(['validate']) == 130
-    assert capsys.readouterr() == ('', 'drive_can: interrupted\n')
+    assert capsys.readouterr() == ('', 'drive_can validate: interrupted\n')
     for endless in (['simulate'], ['record'], ['decode', '--live']):
         assert front_end.main(endless) == 0

@@ -1,6 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Values as they are written, histories, rates, whose samples are received, hints."""
 
+import json
 import math
 
 from monitor_builders import info, seen, three_drives
@@ -11,6 +12,7 @@ from drive_can_bridge.core.parameters import Value, ValueKind
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.monitor.hints import hints
 from drive_can_bridge.monitor.history import columns, History, Rate
+from drive_can_bridge.monitor.lines import documents
 from drive_can_bridge.monitor.plan import SamplingPlan
 from drive_can_bridge.monitor.values import ParameterInfo
 
@@ -145,3 +147,13 @@ def test_hints_are_commands_for_this_drive() -> None:
         "ros2 topic pub -r 10 /lift/command/speed_setpoint std_msgs/msg/Float64 '{data: 0.0}'",
         'ros2 param list /lift', 'ros2 param get /lift ramp_time', 'ros2 topic echo /diagnostics']
     assert [command for command, _ in hints(None, '')] == ['ros2 topic echo /diagnostics']
+
+
+def test_documents_have_numbers_for_programs() -> None:
+    found = {each['drive']: each for each in documents(seen(three_drives()))}
+    assert json.loads(json.dumps(list(found.values()))) == list(found.values())
+    for name, drive in ((drive.name, drive) for drive in seen(three_drives()).drives):
+        assert (found[name]['state'], found[name]['online']) == (drive.state, drive.online)
+        assert list(found[name]['values']) == [each.name for each in drive.values]
+    values = [each['value'] for drive in found.values() for each in drive['values'].values()]
+    assert any(isinstance(value, float) for value in values)

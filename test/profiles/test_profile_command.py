@@ -67,7 +67,8 @@ class TestList:
 
     def test_no_such_directory(self, capsys: pytest.CaptureFixture[str]) -> None:
         assert main(['profile', 'list', '--directory', '/nowhere']) == 1
-        assert capsys.readouterr().err == '/nowhere is no directory\n'
+        assert capsys.readouterr().err == (
+            'drive_can profile: /nowhere is no directory\n')
 
 
 class TestShow:
@@ -220,7 +221,8 @@ class TestImport:
 
     def test_missing_file(self, capsys: pytest.CaptureFixture[str]) -> None:
         assert main(['profile', 'import', '/nowhere.csv']) == 1
-        assert capsys.readouterr().err == 'drive_can: /nowhere.csv: No such file or directory\n'
+        assert capsys.readouterr().err == (
+            'drive_can profile: /nowhere.csv: No such file or directory\n')
 
     def test_no_directory_to_write_to(self, table: Path,
                                       capsys: pytest.CaptureFixture[str]) -> None:
@@ -310,4 +312,4 @@ def test_what_has_no_end_is_not_read(name: str, tmp_path: Path) -> None:
         capture_output=True, text=True, timeout=60.0, check=False,
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (limit, limit)))
     assert (done.returncode, done.stdout, done.stderr) == (
-        1, '', f'drive_can: {file}: {reason}\n')
+        1, '', f'drive_can profile: {file}: {reason}\n')

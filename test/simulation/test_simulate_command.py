@@ -180,8 +180,8 @@ def test_python_can_interface(start: Any) -> None:
     (('--axis', 'lift:load=2'), 2, "'load=2' is not possible; allowed: load=0…1"),
     (('--interface', 'nonsense'), 1, 'nonsense'),
     (('--pty-link', '/dev/null/x'), 1, '/dev/null'),
-    (('--params-file', '/nowhere.yaml'), 1, 'drive_can: /nowhere.yaml: No such file'),
-    (('--params-file', '/dev/null'), 1, 'drive_can: /dev/null: not a regular file'),
+    (('--params-file', '/nowhere.yaml'), 1, 'drive_can simulate: /nowhere.yaml: No such file'),
+    (('--params-file', '/dev/null'), 1, 'drive_can simulate: /dev/null: not a regular file'),
 ])
 def test_what_cannot_be(start: Any, arguments: tuple[str, ...], status: int, message: str,
                         ) -> None:

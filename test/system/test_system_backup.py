@@ -185,5 +185,5 @@ class TestBrokenOff:
                                      '--params-file', str(processes.directory / 'bridge.yaml'))
         simulator.frame('^505#')
         assert backup.end(signal.SIGINT) == 130
-        assert backup.errors == ['drive_can: interrupted']
+        assert backup.errors == ['drive_can backup: interrupted']
         assert sorted(each.name for each in processes.directory.glob('*.yaml')) == ['bridge.yaml']

@@ -153,7 +153,7 @@ def test_ctrl_c_waits_for_the_write_under_way(processes: Processes, client: Clie
     assert write.wait() == 130
     assert [line.split()[0] for line in write.lines] == ['name', 'ramp_time']
     assert write.lines[1].endswith('  written')
-    assert write.errors == ['drive_can: interrupted']
+    assert write.errors == ['drive_can write: interrupted']
     assert not simulator.frames('#2710', since=before)
 
 

@@ -138,7 +138,7 @@ def test_a_table_on_a_full_disk(file: Path, trace: Path, tmp_path: Path,
     table = tmp_path / 'values.csv'
     table.symlink_to('/dev/full')
     assert drive_can('decode', trace, '--csv', table, '--params-file', file) == 1
-    assert capsys.readouterr() == ('', f'drive_can: {table}: No space left on device\n')
+    assert capsys.readouterr() == ('', f'drive_can decode: {table}: No space left on device\n')
 
 
 def test_a_picture_on_a_full_disk(file: Path, trace: Path, tmp_path: Path,
@@ -147,7 +147,7 @@ def test_a_picture_on_a_full_disk(file: Path, trace: Path, tmp_path: Path,
     picture = tmp_path / 'values.svg'
     picture.symlink_to('/dev/full')
     assert drive_can('decode', trace, '--params-file', file, '--plot', picture) == 1
-    assert capsys.readouterr() == ('', f'drive_can: {picture}: No space left on device\n')
+    assert capsys.readouterr() == ('', f'drive_can decode: {picture}: No space left on device\n')
 
 
 def test_nothing_is_replaced_for_a_trace_that_cannot_be_read(file: Path, trace: Path,
@@ -180,7 +180,7 @@ def test_plot(file: Path, trace: Path, tmp_path: Path,
      'drive_can decode: --drive lift: no such drive; drives: conveyor'),
     (['trace'], 2, 'drive_can decode: trace: no trace format has the suffix (none); known are '
      '.asc, .blf, .candump, .csv, .db, .log, .mf4, .trc, .txt, and .gz behind those of text'),
-    (['absent.log'], 1, 'drive_can: absent.log: No such file or directory'),
+    (['absent.log'], 1, 'drive_can decode: absent.log: No such file or directory'),
     (['empty.log'], 1, 'empty.log: there is no frame in it'),
     (['empty.log', '--summary'], 1, 'empty.log: there is no frame in it'),
 ])
