@@ -536,8 +536,8 @@ def looked_for() -> str:
 
 
 @sentence
-def bus_is_down(reason: str) -> str:
-    return f'bus down: {reason}'
+def bus_is_down(bus: str, reason: str) -> str:
+    return f'bus {bus} is down'     # why is told once, at the bus
 
 
 @sentence

@@ -233,8 +233,9 @@ class Session(ABC):
         if not (self.active or self.stopped):
             self.told.doubt()   # no answer to the stop will come
         self.users.fail_all(sentences.bus_down())
-        self.lose(sentences.bus_is_down(reason), now)
-        self.go_idle(sentences.bus_is_down(reason))
+        down = sentences.bus_is_down(self.configuration.bus, reason)
+        self.lose(down, now)
+        self.go_idle(down)
         self.outbox.clear()
         self._leave_owing(sentences.bus_lost_before_stop())
 

@@ -28,8 +28,8 @@ class Lines:
 
     def look(self, snapshot: Snapshot, now: float) -> list[str]:
         """Return a line for each drive."""
-        return [line(drive) if self._known(drive, now) else f'{drive.label} offline'
-                for drive in snapshot.drives]
+        return [line(drive) if self._known(drive, now) or not drive.online
+                else f'{drive.label} offline' for drive in snapshot.drives]
 
     def _known(self, drive: DriveSnapshot, now: float) -> bool:
         if not drive.online:
@@ -67,9 +67,10 @@ def _value(text: str) -> float | bool | str | None:
 
 
 def line(drive: DriveSnapshot) -> str:
-    """Write ``conveyor online actual_speed=12.3 rpm motor_current=1.25 A``."""
+    """Write ``conveyor online actual_speed=12.3 rpm motor_current=1.25 A``, or why it is not."""
     if not drive.online:
-        return f'{drive.label} offline'
+        why = drive.advice.removeprefix('offline').lstrip(': ')
+        return f'{drive.label} offline' + f': {why}' * bool(why)
     known = [shown.assignment for shown in drive.values if shown.assignment]
     return ' '.join([drive.label, 'online', *known])
 

@@ -17,12 +17,14 @@ from drive_can_bridge.core.statistics import Statistic
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.core.words import value_text
 from drive_can_bridge.exchange.exchange import BusExchange
+from drive_can_bridge.ros.absence import absence
 from drive_can_bridge.ros.advice import how_to_enable, how_to_reset
 from drive_can_bridge.ros.drive_node import DriveNode, late_text
 from drive_can_bridge.ros.quality import publisher
 from drive_can_bridge.ros.stamps import Stamps
 from drive_can_bridge.transport.end_point import Counts, REFUSED_FRAMES
 from drive_can_bridge.transport.error_frames import ADVICE_DISTURBED, BUS_OFF, BusError
+from drive_can_bridge.transport.failures import with_outlook
 
 #: bus load above which a bus is never OK
 LOAD_WARNING = 70.0
@@ -70,8 +72,9 @@ class BusReporter:
             state = link.controller
         if exchange.bus_state != 'up':
             level = DiagnosticStatus.ERROR
-            message = (f'{exchange.bus_state}: {exchange.bus_reason or "not open yet"}; '
-                       f'tried again every {exchange.bus.reconnect_period:g} s')
+            reason = exchange.bus_reason or 'not open yet'
+            message = with_outlook(f'{exchange.bus_state}: {reason}',
+                                   exchange.bus.reconnect_period)
         elif link.controller or new.error_frames and link.last_bus_error is not None:
             level = DiagnosticStatus.WARN
             message = _bus_error(link.last_bus_error, link.controller, new.error_frames)
@@ -165,12 +168,8 @@ class DriveReporter:
                 advice += ', or set mapping: configure'
             return DiagnosticStatus.ERROR, f'{session.offline_advice}; {advice}'
         if state is DriveState.OFFLINE:
-            what: str = session.offline_advice
-            if drive.exchange.bus_state == 'up':
-                what += '; check its power, cable, station number and bit rate'
-            if not session.ever_online:
-                return DiagnosticStatus.STALE, f'not seen since start: {what}'
-            return DiagnosticStatus.ERROR, f'offline: {what}'
+            level = DiagnosticStatus.ERROR if session.ever_online else DiagnosticStatus.STALE
+            return level, absence(drive)
         if state is DriveState.FAULT:
             told = [f'fault: remove its cause, then {how_to_reset(session, drive.node)}',
                     *self._warnings(rejected)]

@@ -26,7 +26,7 @@ from drive_can_bridge.core.events import (
 from drive_can_bridge.core.requests import (
     Failure, ReadRequest, Request,
 )
-from drive_can_bridge.core.sentences import bridge_inactive
+from drive_can_bridge.core.sentences import bridge_inactive, NOTHING, Sentence
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.exchange.exchange import BusExchange
@@ -65,6 +65,8 @@ class DriveNode(DriveListener):
     :param identified: takes the drive's identity in words whenever it changes.
     :ivar joint_commands: the commands for all joints of its bus, which whichever of its drives is
         served next takes for all of them; None: there are none.
+    :ivar lost_at: when it went offline last, of :meth:`.Clock.stamp`.
+    :ivar lost_for: why it did.
     :ivar witness: is told of events, too; None: nobody is.
     """
 
@@ -87,6 +89,9 @@ class DriveNode(DriveListener):
             drive.profile, submit=self._submit_quietly, online=lambda: session.online,
             tell=identified, warn=lambda text: self.warn(text, text))
         self.times_lost = 0
+        self.lost_at = 0
+        self._stamp = clock.stamp
+        self.lost_for: Sentence = NOTHING
         self.rejected_text = ''
         self._may_run = False   # and nothing has been heard of it since
         self.foreign_text = ''
@@ -228,6 +233,7 @@ class DriveNode(DriveListener):
         elif isinstance(event, StationLost):
             self._online.publish(Bool(data=False))
             self.samples.forget()
+            self.lost_at, self.lost_for = self._stamp(), event.reason
             if self.session.active:
                 self.times_lost += 1
                 self._log.warning(f'offline: {event.reason}', urgent=True)

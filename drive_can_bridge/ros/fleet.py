@@ -21,6 +21,7 @@ from drive_can_bridge.exchange.stop import stop_all
 from drive_can_bridge.process.presence import BRIDGE, Presence
 from drive_can_bridge.process.scheduling import raise_priority
 from drive_can_bridge.protocols.families import FAMILIES, make_sessions
+from drive_can_bridge.ros.absence import Attendance
 from drive_can_bridge.ros.diagnostics import Diagnostics
 from drive_can_bridge.ros.drive_node import DriveNode
 from drive_can_bridge.ros.executor_thread import ExecutorThread
@@ -31,6 +32,7 @@ from drive_can_bridge.ros.periodic_thread import PeriodicThread
 from drive_can_bridge.ros.service_thread import ServiceThread
 from drive_can_bridge.ros.stamps import Stamps
 from drive_can_bridge.transport.end_point import EndPoint
+from drive_can_bridge.transport.failures import with_outlook
 
 #: s that is waited for the first attempt to open the buses, to report what can never work
 FIRST_ATTEMPT_TIMEOUT = 3.0
@@ -97,6 +99,8 @@ class Fleet:
                 'diagnostics', configuration.diagnostics_period, self.diagnostics.publish,
                 lambda text: log.error(f'diagnostics: {text}'), clock)
             closing.callback(self._reporting.stop)
+            self._attendance = Attendance(log, list(self.drives.values()), clock)
+            closing.callback(self._attendance.end)
             self._closing = closing.pop_all()
 
     def _drives_of(self, bus: BusConfiguration) -> list[DriveConfiguration]:
@@ -151,11 +155,13 @@ class Fleet:
         """Begin the exchange with every drive."""
         for exchange in self.exchanges.values():
             exchange.activate()
+        self._attendance.begin()
         self._log.info(f'active: {counted(len(self.drives), "drive", "drives")} on '
                        f'{counted(len(self.exchanges), "bus", "buses")}')
 
     def stop(self) -> None:
         """Stop the drives safely, if they run."""
+        self._attendance.end()
         for bus, reason in stop_all(self.exchanges.values(), self._clock).items():
             self._log.error(f'bus {bus}: the stop frames could not all be sent: {reason}')
 
@@ -194,7 +200,7 @@ class Fleet:
             return
         if bus in self.exchanges:   # else it was given up while it was still being opened
             again = self.configuration.buses[bus].reconnect_period
-            self._log.speaker(f'bus {bus}').error(f'{reason}; tried again every {again:g} s')
+            self._log.speaker(f'bus {bus}').error(with_outlook(reason, again))
         self._flight.bus_lost(bus)
 
     def fatal(self, bus: str, reason: str, *, misconfigured: bool) -> None:

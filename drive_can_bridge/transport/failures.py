@@ -10,6 +10,8 @@ import errno
 
 from drive_can_bridge.core.text import printable
 
+_GONE = 'is gone: unplugged?'
+
 
 def in_words(error: BaseException) -> str:
     """Return one readable line for any exception."""
@@ -22,6 +24,18 @@ def with_cause(error: BaseException) -> str:
     text, cause = in_words(error), error.__cause__
     reason = in_words(cause) if cause is not None else ''
     return text if reason in text else f'{text}: {reason}'
+
+
+def gone(adapter: str) -> str:
+    """Say that an adapter that was there is not any more."""
+    return f'adapter {adapter} {_GONE}'
+
+
+def with_outlook(reason: str, period: float) -> str:
+    """Add to the reason why a bus is down what becomes of it."""
+    if reason.endswith(_GONE):
+        return f'{reason} Goes on by itself when it is back'
+    return f'{reason}; tried again every {period:g} s'
 
 
 def is_malformed(error: BaseException) -> bool:
@@ -49,6 +63,16 @@ def _is_missing_library(error: OSError) -> bool:
     text = str(error).lower()
     return error.errno is None and any(words in text for words in (
         'library not found', 'cannot open shared object file', 'could not find module'))
+
+
+def is_absence(error: BaseException) -> bool:
+    """Tell whether a device could not be opened because it is not there."""
+    cause: BaseException | None = error
+    while cause is not None:
+        if getattr(cause, 'errno', None) in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
+            return True
+        cause = cause.__cause__
+    return False
 
 
 def is_full_queue(error: BaseException) -> bool:

@@ -25,7 +25,8 @@ from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, Trans
 from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.transport.end_point import Counts, EndPoint
 from drive_can_bridge.transport.error_frames import ADVICE_ALONE, BUS_OFF, BusError
-from drive_can_bridge.transport.failures import in_words
+from drive_can_bridge.transport.failures import gone, in_words
+from drive_can_bridge.transport.places import adapter_of, device_of, is_absent
 from drive_can_bridge.transport.port import open_port
 
 #: s that a receive may block: how soon a stop, or a loss seen by a sender, is noticed
@@ -33,6 +34,8 @@ RECEIVE_TIMEOUT = 0.02
 #: send time-outs, and s, that nothing may leave until the bus counts as blocked
 BLOCKED_TIMEOUTS = 4
 BLOCKED_AFTER = 0.05
+#: looks, and s between them, at the name of a device that has failed
+_GOING, _MOMENT = 10, 0.01
 #: why nothing is sent through a port that is not known to work
 NOT_READ_YET = 'not read yet'
 
@@ -81,6 +84,7 @@ class Link:
                  opener: Callable[[], EndPoint] | None = None) -> None:
         self.bus = bus
         self._open = opener or (lambda: open_port(bus, clock, routes, stations=stations))
+        self._clock = clock
         self._now = clock.now
         self.error_witness: Callable[[int, bytes], None] | None = None
         self.taken = False
@@ -236,7 +240,7 @@ class Link:
                 self._read(port, frame)
             except BusUnavailable as error:
                 self.taken = error.taken
-                reason = in_words(error)
+                reason = gone(adapter_of(self.bus)) if opened and self._gone() else in_words(error)
                 self.last_error = reason
                 self._close_port()
                 if reason != reported:
@@ -244,6 +248,15 @@ class Link:
                 reported = reason
                 self._tell_tried()
             self._end.wait(self._now() + self.bus.reconnect_period)
+
+    def _gone(self) -> bool:
+        """Tell whether the adapter was unplugged; its name goes a moment after it."""
+        if device_of(self.bus) is not None:
+            for _ in range(_GOING):
+                if is_absent(self.bus) or self._closing:
+                    break
+                self._clock.wait(self._now() + _MOMENT)
+        return is_absent(self.bus)
 
     def _read(self, port: EndPoint, frame: Frame | None) -> None:
         receive = port.receive

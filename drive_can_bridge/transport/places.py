@@ -9,6 +9,7 @@ is not plugged in), the name has to do.
 
 import os
 from pathlib import Path
+import socket
 import stat
 from typing import NamedTuple
 
@@ -54,6 +55,25 @@ def device_of(bus: BusConfiguration) -> str | None:
     if bus.interface not in SERIAL_INTERFACES or '://' in channel:
         return None
     return channel.split('@')[0]        # slcan: the speed of the port may follow
+
+
+def adapter_of(bus: BusConfiguration) -> str:
+    """Return what people call the adapter of a bus: ``/dev/ttyACM0``, ``can0``."""
+    return device_of(bus) or str(bus.channel)
+
+
+def is_absent(bus: BusConfiguration) -> bool:
+    """Tell whether the adapter of a bus is not there, as far as that can be seen."""
+    device = device_of(bus)
+    if device is not None:
+        return not os.path.exists(device)
+    if bus.interface != 'socketcan':
+        return False
+    try:
+        socket.if_nametoindex(str(bus.channel))
+    except OSError:
+        return True
+    return False
 
 
 def _port_names(channel: str, path: str | None) -> tuple[str, ...]:

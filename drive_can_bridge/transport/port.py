@@ -28,9 +28,11 @@ from drive_can_bridge.transport.error_frames import (
     ADVICE_ALONE, ADVICE_DISTURBED, BUS_OFF, BusError, decode_error_frame,
 )
 from drive_can_bridge.transport.failures import (
-    in_words, is_full_queue, is_malformed, is_misconfiguration, with_cause,
+    in_words, is_absence, is_full_queue, is_malformed, is_misconfiguration, with_cause,
 )
-from drive_can_bridge.transport.places import device_of, SERIAL_INTERFACES
+from drive_can_bridge.transport.places import (
+    adapter_of, device_of, is_absent, SERIAL_INTERFACES,
+)
 from drive_can_bridge.transport.raw_socket import RawSocket
 from drive_can_bridge.transport.serial_writer import announcing, SerialWriter, watched
 
@@ -289,6 +291,8 @@ def _open(bus: BusConfiguration, clock: Clock, routes: Sequence[Route],
         text = f'{where}: {in_words(error)}'
         if is_misconfiguration(error):
             raise BusMisconfigured(text) from error
+        if is_absence(error) and is_absent(bus):
+            text = f'adapter {adapter_of(bus)} is not there: check its plug and its name'
         raise BusUnavailable(text) from error
     try:
         # SocketCAN opens an interface that is down; the first look tells

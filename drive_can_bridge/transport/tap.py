@@ -14,8 +14,9 @@ from drive_can_bridge.clock import Clock, Mailbox
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusUnavailable
 from drive_can_bridge.core.record import Record
-from drive_can_bridge.transport.failures import in_words
+from drive_can_bridge.transport.failures import gone, in_words, with_outlook
 from drive_can_bridge.transport.messages import record_of
+from drive_can_bridge.transport.places import adapter_of, is_absent
 from drive_can_bridge.transport.port import open_port, Port
 
 #: entries that may wait for whoever takes them; beyond, they are lost and counted
@@ -89,8 +90,9 @@ class Tap:
                     self._listen(self._port)
             except BusUnavailable as error:
                 if self._port is not None:
-                    self._complain(f'bus {self.bus.name}: {in_words(error)}; tried again every '
-                                   f'{self.bus.reconnect_period:g} s')
+                    reason = gone(adapter_of(self.bus)) if is_absent(self.bus) else in_words(error)
+                    self._complain(f'bus {self.bus.name}: '
+                                   f'{with_outlook(reason, self.bus.reconnect_period)}')
                 self._close_port()
                 self.heard_until = self._today()  # nothing will be
                 self._end.wait(self._clock.now() + self.bus.reconnect_period)

@@ -92,8 +92,8 @@ def test_loss_of_the_bus() -> None:
     made.receive_frame(Frame(1, b'', False), 3.0)
     made.done.clear()
     made.bus_down(4.0, 'unplugged')
-    assert made.done == ['cancel', 'lost: bus down: unplugged', 'idle: bus down: unplugged']
-    assert made.take_events() == [StationLost(says('bus_is_down', reason='unplugged'))]
+    assert made.done == ['cancel', 'lost: bus main is down', 'idle: bus main is down']
+    assert made.take_events() == [StationLost(says('bus_is_down', bus='main', reason='unplugged'))]
     assert made.take_frames() == []
     made.users.submit(read(GAIN), 5.0)
     assert [event.outcomes for event in made.take_events()] == [(Failure('bus down'),)]

@@ -451,7 +451,8 @@ def test_bus_that_is_lost_and_comes_back() -> None:
     bench.online()
     bench.exchange.bus_lost('unplugged')
     assert (bench.exchange.bus_state, bench.exchange.bus_reason) == ('down', 'unplugged')
-    assert bench.notes[0].events[-1] == StationLost(says('bus_is_down', reason='unplugged'))
+    assert bench.notes[0].events[-1] == StationLost(
+        says('bus_is_down', bus='main', reason='unplugged'))
     assert bench.at(10.1) == []
     bench.exchange.bus_opened()
     assert bench.link.take() == [ASK_MAP_1]

@@ -360,7 +360,8 @@ def test_bus_down_is_silence_at_once(partner: Partner) -> None:
     assert partner.talk.bus_down(partner.now) == []
     partner.live(3.0)
     assert partner.take() == []
-    assert partner.talk.session.offline_advice == says('bus_is_down', reason='unplugged')
+    assert partner.talk.session.offline_advice == says(
+        'bus_is_down', bus='main', reason='unplugged')
     assert partner.talk.session.stopped
 
 

@@ -253,7 +253,7 @@ def test_diagnostics(start: Start, client: Client, facts: Facts) -> None:
     client.diagnostics(STATUS, lambda drive: drive['state'] != 'fault')
     drive.fault('off')
     status = client.diagnostics(STATUS, lambda drive: drive['state'] == 'offline')
-    assert status['level'] == 'ERROR' and status['message'].startswith('offline: ')
+    assert status['level'] == 'ERROR' and status['message'].startswith('silent since ')
     assert 'check' in status['message'] and 'power' in status['message']
     drive.fault('ok')
     one.online()

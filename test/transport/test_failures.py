@@ -6,7 +6,7 @@ import errno
 import can
 import pytest
 
-from drive_can_bridge.transport.failures import is_misconfiguration
+from drive_can_bridge.transport.failures import gone, is_misconfiguration, with_outlook
 
 
 def wrapped(cause: Exception) -> Exception:
@@ -35,3 +35,9 @@ def test_what_will_never_work(error: Exception) -> None:
 def test_what_may_work_later(error: Exception) -> None:
     assert not is_misconfiguration(error)
     assert not is_misconfiguration(wrapped(error))
+
+
+def test_what_becomes_of_a_bus_that_is_down() -> None:
+    assert with_outlook(gone('/dev/ttyACM0'), 1.0) == (
+        'adapter /dev/ttyACM0 is gone: unplugged? Goes on by itself when it is back')
+    assert with_outlook('no such device', 0.5) == 'no such device; tried again every 0.5 s'

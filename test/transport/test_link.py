@@ -110,7 +110,7 @@ class Bench:
     """A link on ports of ours; ``ports`` are those that it got."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, kind: type[FakePort] = FakePort, *,
-                 send_timeout: float = 0.01) -> None:
+                 send_timeout: float = 0.01, bus: BusConfiguration = BUS) -> None:
         self.kind = kind
         self.ports: list[FakePort] = []
         self.refusals: deque[Exception] = deque()
@@ -118,7 +118,7 @@ class Bench:
         self.stations: set[int] = set()
         self.listener = Listener()
         monkeypatch.setattr(link_module, 'open_port', self._open)
-        self.link = Link(BUS, [], self.listener, REAL, send_timeout=send_timeout, stations=3)
+        self.link = Link(bus, [], self.listener, REAL, send_timeout=send_timeout, stations=3)
         self.link.start()
 
     def _open(self, bus: BusConfiguration, clock: object, routes: object, *,
@@ -471,3 +471,24 @@ def test_reconnections_leave_no_descriptors(monkeypatch: pytest.MonkeyPatch,
     link.stop()
     assert after <= before + 1
     assert len(listener.told) == 1
+
+
+def test_an_adapter_that_is_unplugged_is_told_once(make: Callable[..., Bench],
+                                                   tmp_path: Path) -> None:
+    device = tmp_path / 'ttyACM0'
+    device.touch()
+    bench = make(bus=BusConfiguration('main', 'slcan', f'{device}@115200', reconnect_period=0.02))
+    wait_for(lambda: bench.listener.told == ['opened'])
+    bench.refusals += [BusUnavailable(f'could not open port {device}: [Errno 2]')] * 5
+    device.unlink()
+    bench.ports[0].coming.append(BusUnavailable(
+        'receive: device reports readiness to read but returned no data'))
+    wait_for(lambda: len(bench.ports) == 2)
+    wait_for(lambda: len(bench.listener.told) == 3)
+    assert bench.listener.told == [
+        'opened', f'lost: adapter {device} is gone: unplugged?', 'opened']
+    # one that fails while it is there is another matter
+    device.touch()
+    bench.ports[1].coming.append(BusUnavailable('receive: overheated'))
+    wait_for(lambda: len(bench.listener.told) == 5)
+    assert bench.listener.told[3] == 'lost: receive: overheated'

@@ -484,6 +484,6 @@ def test_bus_down_is_silence() -> None:
     talk.until(10.021)
     assert talk.bus_down(10.021) == []
     assert talk.session.next_timer() == math.inf
-    assert talk.session.offline_advice == says('bus_is_down', reason='unplugged')
+    assert talk.session.offline_advice == says('bus_is_down', bus='main', reason='unplugged')
     assert talk.bus_up(12.0) == []
     assert talk.until(12.001) == [(12.0, READY_FRAME)]

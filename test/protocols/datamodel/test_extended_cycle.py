@@ -404,8 +404,8 @@ def test_first_cycle_keeps_its_distance_to_the_last_one() -> None:
 def test_bus_down_is_silence_and_offline() -> None:
     talk = online()
     assert talk.bus_down(10.01) == []
-    assert talk.events() == [StationLost(says('bus_is_down', reason='unplugged'))]
-    assert talk.session.offline_advice == says('bus_is_down', reason='unplugged')
+    assert talk.events() == [StationLost(says('bus_is_down', bus='main', reason='unplugged'))]
+    assert talk.session.offline_advice == says('bus_is_down', bus='main', reason='unplugged')
     assert talk.session.next_timer() == math.inf
     assert talk.at(20.0) == []
     assert talk.session.stopped

@@ -1,0 +1,100 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""What is said of drives that are not there."""
+
+from contextlib import nullcontext
+import time
+from types import SimpleNamespace
+from typing import Any
+
+from clocks import REAL
+import pytest
+
+pytest.importorskip('rclpy')
+from drive_can_bridge.core import sentences
+from drive_can_bridge.core.drive_state import DriveState
+from drive_can_bridge.ros.absence import absence, Attendance
+
+
+def drive(name: str = 'lift', **changes: Any) -> Any:
+    """Return what a drive node has of it."""
+    facts: dict[str, Any] = {
+        'bus_state': 'up', 'advice': sentences.maps_unread(), 'ever_online': False,
+        'online': False, 'active': True, 'defect': '', 'state': DriveState.OFFLINE, 'lost_at': 0,
+        'lost_for': sentences.NOTHING, **changes}
+    exchange = SimpleNamespace(bus=SimpleNamespace(name='main'), bus_state=facts['bus_state'],
+                               lock=nullcontext())
+    session = SimpleNamespace(offline_advice=facts['advice'], **{
+        key: facts[key] for key in ('ever_online', 'online', 'active', 'defect', 'state')})
+    return SimpleNamespace(name=name, exchange=exchange, session=session,
+                           lost_at=facts['lost_at'], lost_for=facts['lost_for'])
+
+
+class Lines:
+    """A log."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+
+    def speaker(self, name: str) -> Any:
+        return SimpleNamespace(warning=lambda text: self.lines.append(f'{name}: {text}'))
+
+    def warning(self, text: str) -> None:
+        self.lines.append(text)
+
+
+def test_one_that_was_never_seen_is_told_what_to_correct() -> None:
+    assert absence(drive()) == (
+        'not seen since start: no answer to mapping read: drive silent, wrong station, bit rate '
+        'or identifier mode; check its power, cable, station number and bit rate')
+
+
+@pytest.mark.parametrize('advice', [
+    sentences.looked_for(), sentences.maps_unread(), sentences.cycles_unanswered(),
+    sentences.reads_unanswered(), sentences.rounds_unanswered(),
+    sentences.silent('no answer', 'wrong station, bit rate or P509 not set')])
+def test_one_that_was_online_has_the_right_station_and_bit_rate(
+        advice: sentences.Sentence) -> None:
+    at = int(time.mktime((2026, 3, 4, 17, 4, 58, 0, 0, -1))) * 10**9
+    told = absence(drive(ever_online=True, advice=advice, lost_at=at,
+                         lost_for=sentences.silent_for_cycles('no cyclic response', 3)))
+    assert told == ('silent since 17:04:58, was online before: check its power and cable (no '
+                    'cyclic response for 3 cycles)')
+
+
+def test_what_is_known_of_it_now_is_said() -> None:
+    told = absence(drive(ever_online=True, advice=sentences.node_state('pre-operational'),
+                         lost_for=sentences.no_heartbeat(0.1)))
+    assert told.endswith('(node is pre-operational)')
+
+
+@pytest.mark.parametrize(('state', 'ever', 'expected'), [
+    ('down', True, 'bus main is down'), ('down', False, 'bus main is down'),
+    ('opening', False, 'bus main is not open yet')])
+def test_a_bus_that_is_lost_is_told_at_the_bus(state: str, ever: bool, expected: str) -> None:
+    assert absence(drive(bus_state=state, ever_online=ever)) == expected
+
+
+def test_who_is_missing_is_told_with_a_sum() -> None:
+    log = Lines()
+    seen = [drive(f'd{number}', ever_online=True, online=True, state=DriveState.ONLINE)
+            for number in range(12)]
+    lost = drive('lost', ever_online=True)
+    other = drive('other', state=DriveState.MAPPING_DIFFERS)    # it answers
+    Attendance(log, [*seen, drive('a'), lost, other, drive('b')], REAL).look()  # type: ignore[arg-type]
+    assert [line.split(': ')[0] for line in log.lines] == ['a', 'b', '12 of 16 drives online; not '
+                                                           'seen']
+    assert log.lines[2].endswith('not seen: a, b')
+    assert 'not seen since start: ' in log.lines[0]
+
+
+def test_on_a_bus_that_is_down_they_are_told_too() -> None:
+    log = Lines()
+    Attendance(log, [drive(bus_state='down')], REAL).look()  # type: ignore[arg-type, list-item]
+    assert log.lines == ['lift: not seen since start: bus main is down',
+                         '0 of 1 drive online; not seen: lift']
+
+
+def test_where_all_were_seen_nothing_is_said() -> None:
+    log = Lines()
+    Attendance(log, [drive(ever_online=True)], REAL).look()  # type: ignore[arg-type, list-item]
+    assert log.lines == []
