@@ -6,6 +6,7 @@ from collections.abc import Callable
 import math
 import os
 from pathlib import Path
+import re
 from typing import TypeVar
 
 from drive_can_bridge.cli.command import WrongUsage
@@ -30,6 +31,15 @@ def above_zero(text: str) -> float:
     if not (math.isfinite(value) and value > 0):
         raise ArgumentTypeError(f'{text}: allowed is a number above 0')
     return value
+
+
+def bitrate(text: str) -> int:
+    """Read a bit rate, ``125000`` or ``500k`` or ``1M``."""
+    found = re.fullmatch(r'([0-9]+(?:\.[0-9]+)?)([kKmM]?)(?:bit/s)?', text.strip())
+    value = float(found[1]) * {'': 1.0, 'k': 1e3, 'm': 1e6}[found[2].lower()] if found else 0.0
+    if not 1000 <= value <= 8e6:
+        raise ArgumentTypeError(f'{text}: allowed are 1000 to 8000000 bit/s, also as 500k')
+    return round(value)
 
 
 def whole(low: int, high: int) -> Callable[[str], int]:

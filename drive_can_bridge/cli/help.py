@@ -45,7 +45,7 @@ EXAMPLES: dict[str, tuple[str, str]] = {
     'demo': ('demo', 'demo --drive --duration 60'),
     'simulate': ('simulate -p robot.yaml --pty', 'simulate -p robot.yaml --interface vcan0'),
     'scan': ('scan --interface socketcan --channel can0',
-             'scan --interface slcan --channel /dev/ttyACM0 --bitrate 125000 -o found.yaml'),
+             'scan --interface slcan --channel /dev/ttyACM0 --bitrate 125k -o found.yaml'),
     'probe': ('probe -p robot.yaml', 'probe lift -p robot.yaml --json'),
     'profile': ('profile list', 'profile import drive.eds -o drive.yaml'),
     'validate': ('validate robot.yaml', 'validate robot.yaml --json'),

@@ -5,8 +5,9 @@ from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+import shlex
 
-from drive_can_bridge.cli.arguments import above_zero, output_path
+from drive_can_bridge.cli.arguments import above_zero, bitrate, output_path
 from drive_can_bridge.cli.command import complain, FAILED, WrongUsage
 from drive_can_bridge.cli.found_file import tables_beside, write_parameter_file
 from drive_can_bridge.cli.questions import agree_to_hazard, agreed
@@ -38,7 +39,8 @@ def define(parser: ArgumentParser) -> None:
         'usage, or a question that could not be asked.')
     parser.add_argument('--interface', required=True, help='python-can interface: socketcan, …')
     parser.add_argument('--channel', required=True, help='what it calls its channel: can0, …')
-    parser.add_argument('--bitrate', type=int, default=125_000, metavar='B', help='bit/s')
+    parser.add_argument('--bitrate', type=bitrate, default=125_000, metavar='B',
+                        help='bit/s, also as 500k (default: 125k)')
     parser.add_argument('--listen', type=above_zero, default=2.0, metavar='S',
                         help='s to listen before anything is asked (default 2)')
     parser.add_argument('--passive', action='store_true', help='only listen')
@@ -100,12 +102,14 @@ def _scan(args: Namespace, bus: BusConfiguration) -> int:
         try:
             survey = Survey(bus, port, args.clock.now)
             survey.listen(args.listen)
-            if not args.passive:
-                _ask(args, survey)
+            asked = [] if args.passive else _ask(args, survey)
         finally:
             port.close()
+    if survey.master:
+        complain(f'there is another master ({survey.master}): only listening')
     _tell_trouble(survey, port, asked=not args.passive)
     _show(args, survey)
+    _tell_left_out(args, survey, asked)
     if args.output is not None and not survey.sightings:
         complain(f'{args.output}: not written, no drive was found')
     elif args.output is not None:
@@ -114,22 +118,48 @@ def _scan(args: Namespace, bus: BusConfiguration) -> int:
                 [survey.scouts[each.protocol].settings(each.station)
                  for each in survey.sightings]):
             complain(f'written: {path}')
+        complain(f'next: drive_can validate {shlex.quote(str(args.output))}')
+    elif survey.sightings:
+        complain(f'next: {_command(args)} -o found.yaml')
     return 0 if survey.sightings or survey.nodes else FAILED
 
 
-def _ask(args: Namespace, survey: Survey) -> None:
-    for name, family in FAMILIES.items():
-        if not survey.master and survey.scouts[name].unmistakable:
-            survey.ask(family.name)
-    for name in args.protocols:
-        if not survey.master and not survey.nodes:
+def _ask(args: Namespace, survey: Survey) -> list[str]:
+    """Ask; return the families that were asked."""
+    asked = []
+    for name in [*(each for each in FAMILIES if survey.scouts[each].unmistakable),
+                 *args.protocols]:
+        if not survey.master and not survey.forbidden(survey.scouts[name]):
+            asked.append(name)
             survey.ask(name)
-        if survey.nodes:
+        if survey.forbidden(survey.scouts[name]):
             complain(f'{name} is not asked: there is a CANopen node '
                      f'({", ".join(map(str, survey.nodes))}), which might take its reads for '
                      'process data')
-    if survey.master:
-        complain(f'there is another master ({survey.master}): only listening')
+    return asked
+
+
+def _tell_left_out(args: Namespace, survey: Survey, asked: Sequence[str]) -> None:
+    """Say at which bit rate this was, what was not asked, and how to."""
+    left = [name for name in FAMILIES if name not in asked]
+    told = f'{args.bitrate} bit/s, {survey.frames} frames heard'
+    if args.passive:
+        told += '; nothing was asked: --passive'
+    elif left and not survey.master and not survey.nodes and not survey.trouble:
+        told += (f'; not asked: {", ".join(left)}: their reads may be commands to other devices '
+                 f'({_command(args)} --protocols {left[0]})')
+    elif left:
+        told += f'; not asked: {", ".join(left)}'
+    complain(told)
+
+
+def _command(args: Namespace) -> str:
+    """Return the command line that does the same again."""
+    words = ['drive_can', 'scan', '--interface', args.interface, '--channel', args.channel,
+             '--bitrate', str(args.bitrate)]
+    if args.protocols:
+        words += ['--protocols', ','.join(args.protocols)]
+    return shlex.join(words)
 
 
 def _show(args: Namespace, survey: Survey) -> None:
@@ -172,9 +202,9 @@ def _compare_bitrates(args: Namespace, bus: BusConfiguration) -> int:
         raise WrongUsage(f'--bitrates: {bus.interface} has no listen-only mode here, and trying '
                          'bit rates without it would disturb the bus')
     heard = 0
-    for bitrate in args.bitrates:
+    for rate in args.bitrates:
         with Ownership([(bus, ())], 'drive_can scan', END_FIRST):
-            port = open_port(replace(bus, bitrate=bitrate, options={'listen_only': True}),
+            port = open_port(replace(bus, bitrate=rate, options={'listen_only': True}),
                              args.clock)
             try:
                 survey = Survey(bus, port, args.clock.now)
@@ -182,7 +212,7 @@ def _compare_bitrates(args: Namespace, bus: BusConfiguration) -> int:
             finally:
                 port.close()
         heard += survey.frames
-        print(f'{bitrate} bit/s: {survey.frames} frames, {port.error_frames} error frames'
+        print(f'{rate} bit/s: {survey.frames} frames, {port.error_frames} error frames'
               + ('' if not survey.sightings else ': ' + ', '.join(
                   f'{each.protocol} {each.station}' for each in survey.sightings)))
     if not heard:
@@ -202,9 +232,7 @@ def _protocols(text: str) -> list[str]:
 
 def _bitrates(text: str) -> list[int]:
     try:
-        rates = [int(rate) for rate in text.split(',')]
-    except ValueError:
-        rates = [0]
-    if min(rates) < 1000:
-        raise ArgumentTypeError(f'{text}: allowed are bit rates separated by commas')
-    return rates
+        return [bitrate(rate) for rate in text.split(',')]
+    except ArgumentTypeError:
+        raise ArgumentTypeError(f'{text}: allowed are bit rates separated by commas, 1000 and '
+                                'above, also as 500k') from None

@@ -18,7 +18,7 @@ import sys
 import threading
 from typing import Any, TextIO
 
-from drive_can_bridge.cli.arguments import add_params_file, of_drive
+from drive_can_bridge.cli.arguments import add_params_file, bitrate, of_drive
 from drive_can_bridge.cli.command import FAILED, WrongUsage
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.configuration import BridgeConfiguration, BusConfiguration
@@ -46,7 +46,7 @@ def define(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--interface', help='python-can interface for all buses, instead of the '
                                             "file's")
     parser.add_argument('--channel', help="channel for all buses, instead of the file's")
-    parser.add_argument('--bitrate', type=_bitrate, metavar='B',
+    parser.add_argument('--bitrate', type=bitrate, metavar='B',
                         help="bit/s of all buses, instead of the file's; whoever sets another one "
                              'on a pseudo-terminal then hears nothing')
     parser.add_argument('--pty', action='store_true',
@@ -173,12 +173,6 @@ def _load(path: Path) -> BridgeConfiguration:
     # imported late: it reads schemas, and --help needs none
     from drive_can_bridge.configuration.load import configuration_from_file
     return configuration_from_file(path)
-
-
-def _bitrate(text: str) -> int:
-    if not text.isdecimal() or int(text) < 1000:
-        raise argparse.ArgumentTypeError(f'{text}: allowed are bit/s, 1000 or more')
-    return int(text)
 
 
 def _on_buses(configuration: BridgeConfiguration, interface: str | None, channel: str | None,

@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from drive_can_bridge.cli import completion_script
-from drive_can_bridge.cli.arguments import above_zero, of_drive, PARAMS_FILE, whole
+from drive_can_bridge.cli.arguments import above_zero, bitrate, of_drive, PARAMS_FILE, whole
 from drive_can_bridge.cli.command import WrongUsage
 from drive_can_bridge.cli.help import EXAMPLES, SUBCOMMANDS
 from drive_can_bridge.cli.main import main, understood
@@ -28,6 +28,14 @@ def test_an_integer_within_limits(text: str) -> None:
     with pytest.raises(ArgumentTypeError, match=f'{text}: allowed are 1 to 5'):
         whole(1, 5)(text)
     assert [whole(1, 5)(each) for each in ('1', '5')] == [1, 5]
+
+
+def test_a_bit_rate() -> None:
+    assert [bitrate(text) for text in ('125000', '500k', '1M', '83.3k', '250kbit/s')
+            ] == [125_000, 500_000, 1_000_000, 83_300, 250_000]
+    for text in ('0', '99', '5g', 'x', '', '-500k', '1e99', '9M'):
+        with pytest.raises(ArgumentTypeError, match='allowed are 1000 to 8000000 bit/s'):
+            bitrate(text)
 
 
 def test_an_argument_of_a_drive_that_is_not_there() -> None:

@@ -195,7 +195,8 @@ def test_a_bit_rate_that_cannot_be(start: Any) -> None:
     command = start('--bitrate', '99')
     assert command.process.wait(30.0) == 2
     assert command.errors[-1].endswith(
-        '--bitrate: 99: allowed are bit/s, 1000 or more; see drive_can simulate --help')
+        '--bitrate: 99: allowed are 1000 to 8000000 bit/s, also as 500k; '
+        'see drive_can simulate --help')
 
 
 def test_reader_of_the_output_who_left(start: Any) -> None:

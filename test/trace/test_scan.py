@@ -2,6 +2,7 @@
 """Finding drives: what is found, what is asked, and that nobody is moved by it."""
 
 from collections import deque
+from dataclasses import replace
 import json
 from pathlib import Path
 from random import Random
@@ -408,10 +409,36 @@ def test_beside_a_bridge_all_drives_are_found_by_listening(
         assert drive_can('scan', '--interface', 'virtual', '--channel', 'all_families',
                          '--bitrate', 500_000, '--listen', 2.0, '--json') == 0
         assert [drive.violations for drive in bus.simulation.drives.values()] == foreign
-    out, err = capsys.readouterr()
+        out, err = capsys.readouterr()
+        drive_can('scan', '--interface', 'virtual', '--channel', 'all_families', '--bitrate',
+                  '500k', '--listen', 0.5, '--passive')
     assert {(each['protocol'], each['station']) for each in map(json.loads, out.splitlines())} == {
         (drive.protocol, drive.station) for drive in played.drives.values()}
     assert 'there is another master' in err and 'only listening' in err
+    err = capsys.readouterr().err
+    assert 'there is another master' in err
+    assert '500000 bit/s, ' in err and 'nothing was asked: --passive' in err
+
+
+def test_what_was_not_asked_is_named_with_the_next_command(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    played = configuration_from_file(config_file('example.yaml'))
+    bus, = played.buses.values()
+    played = replace(played, buses={bus.name: replace(bus, interface='virtual',
+                                                      channel='scan_next')})
+    again = 'drive_can scan --interface virtual --channel scan_next --bitrate 500000'
+    with Simulation(played, REAL):
+        assert drive_can(*again.split()[1:], '--listen', 0.1) == 0
+        err = capsys.readouterr().err.splitlines()
+        left = ', '.join(name for name in FAMILIES if name not in SAFE)
+        first = next(name for name in FAMILIES if name not in SAFE)
+        assert err[-2].startswith('500000 bit/s, ')
+        assert f'; not asked: {left}: ' in err[-2]
+        assert err[-2].endswith(f'({again} --protocols {first})')
+        assert err[-1] == f'next: {again} -o found.yaml'
+        output = tmp_path / 'found.yaml'
+        assert drive_can(*again.split()[1:], '--listen', 0.1, '-o', output) == 0
+        assert capsys.readouterr().err.splitlines()[-1] == f'next: drive_can validate {output}'
 
 
 def test_named_families_need_a_word(capsys: pytest.CaptureFixture[str],
