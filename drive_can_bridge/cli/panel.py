@@ -7,6 +7,7 @@ A ROS client and a web server, nothing of a bridge. It never moves anything.
 
 import argparse
 from collections.abc import Callable
+import socket
 import sys
 
 from drive_can_bridge.cli.arguments import namespace, whole
@@ -90,7 +91,8 @@ def _serve(args: argparse.Namespace, ended: Callable[[], bool]) -> bool:
             print(f'{role.value}: {address(listener, access.tokens[role])}', flush=True)
     try:
         app = application(Feed(source, Operations(source.node), model, args.clock), access,
-                          Setting(place, args.allow_writes))
+                          Setting(place, f'{socket.gethostname()} · {place.partition(",")[0]}',
+                                  args.allow_writes))
         serve(app, listener, ended=ended, ready=ready)
     finally:
         source.close()

@@ -9,14 +9,17 @@ import re
 
 from drive_can_bridge.core.words import counted
 from drive_can_bridge.monitor.reports import Level
-from drive_can_bridge.monitor.snapshot import DriveSnapshot, Snapshot, UNKNOWN
+from drive_can_bridge.monitor.snapshot import DriveSnapshot, Shown, Snapshot, UNKNOWN
 
 #: drives that one page shows in the order of their configuration, and in full; more are sorted
 FEW = 6
 #: drives with the same trouble that are named
 _NAMED = 4
 _OTHER = '…'
-_TIME = re.compile(r'\b\d+:\d\d:\d\d\b|\b\d+(?:\.\d+)? s\b')
+#: what differs although the trouble is the same: times and counts, not which fault it is
+_VARYING = re.compile(r'\b\d+:\d\d:\d\d\b|(?<!fault )\b\d+(?:\.\d+)?\b')
+#: units of what moves
+_MOVING = {'rpm', 'rad/s', 'deg/s', 'rev', 'rev/s', 'Hz', 'm/s', 'mm/s', 'm', 'mm', 'rad', 'deg'}
 
 
 class Tone(Enum):
@@ -63,17 +66,26 @@ def counts_in_words(drives: Sequence[DriveSnapshot]) -> str:
     return counted(len(drives), 'drive', 'drives') + (f': {told}' if told else '')
 
 
+def principal(items: Sequence[Shown]) -> Shown | None:
+    """Return the value that tells most: what moves, or else one with a unit, or the first."""
+    wishes: tuple[Callable[[Shown], bool], ...] = (
+        lambda item: item.unit in _MOVING, lambda item: bool(item.unit), lambda item: True)
+    return next((item for wish in wishes for item in items if wish(item)), None)
+
+
 @dataclass(frozen=True, slots=True)
 class Trouble:
     """
     What is not well, and what to do.
 
     :param who: a bus, a drive, or how many of them; begins the text.
+    :param drives: full names of those.
     """
 
     tone: Tone
     who: str
     text: str
+    drives: tuple[str, ...] = ()
 
 
 def troubles(snapshot: Snapshot) -> list[Trouble]:
@@ -87,17 +99,19 @@ def troubles(snapshot: Snapshot) -> list[Trouble]:
     alike: dict[tuple[Tone, str], list[DriveSnapshot]] = {}
     for drive in snapshot.drives:
         if drive.level is not Level.OK and not drive.silent:
-            key = tone_of(drive), _TIME.sub(_OTHER, _of_anybody(drive))
+            key = tone_of(drive), _VARYING.sub(_OTHER, _of_anybody(drive))
             alike.setdefault(key, []).append(drive)
     for (tone, text), drives in alike.items():
         if len(drives) == 1:
-            found.append(Trouble(tone, drives[0].label, f': {drives[0].advice}'))
+            drive = drives[0]
+            found.append(Trouble(tone, drive.label, f': {drive.advice}', (drive.name,)))
         else:
             texts = {_of_anybody(drive) for drive in drives}
             text = text if len(texts) > 1 else texts.pop()
             names = ', '.join(drive.label for drive in drives[:_NAMED])
             more = f' and {len(drives) - _NAMED} more' if len(drives) > _NAMED else ''
-            found.append(Trouble(tone, f'{len(drives)} drives', f' {text} ({names}{more})'))
+            found.append(Trouble(tone, f'{len(drives)} drives', f' {text} ({names}{more})',
+                                 tuple(drive.name for drive in drives)))
     return sorted(found, key=lambda trouble: _RANKS[trouble.tone])
 
 

@@ -9,13 +9,13 @@ from nicegui import ui
 
 from drive_can_bridge.monitor.reports import Level
 from drive_can_bridge.monitor.snapshot import DriveSnapshot, Snapshot, Times
+from drive_can_bridge.monitor.summary import tone_of
 from drive_can_bridge.panel.access import Role
 from drive_can_bridge.panel.chart import Chart
 from drive_can_bridge.panel.feed import Feed, stops, View
 from drive_can_bridge.panel.parameter_table import ParameterTable
 from drive_can_bridge.panel.parts import (
-    box, button, Changing, in_script, level_class, Look, place_in_words, stop_buttons, Values,
-    words,
+    box, button, Changing, in_script, Look, place_in_words, StopButtons, tone_class, Values, words,
 )
 
 #: bits that are good news when they are not set
@@ -36,8 +36,10 @@ class DrivePage:
         self._role = role
         self._writes = allow_writes and role is Role.OPERATOR
         self.view = View(self.show, [name])
-        self._gone = words(f'There is no drive {name} now. It appears here when its bridge runs.',
-                           'note')
+        with box('note') as self._gone:
+            words(f'There is no drive {name} now', 'title')
+            words('It appears here when its bridge runs.')
+            ui.link('All drives', '/').classes('back')
         self._content = Changing(box('page-of'), self._make)
         self._drive: DriveSnapshot | None = None
 
@@ -69,7 +71,7 @@ class _Content:
                 self._state = words('', 'chip state')
                 self._control = words('')
                 box('space')
-                stop_buttons(drive, role)
+                self._stops = StopButtons(drive, role)
             self._advice = words('', 'advice')
             self._place = words('', 'dim')
         with ui.tabs().props('no-caps').classes('tabs') as tabs:
@@ -99,10 +101,12 @@ class _Content:
         panels.on_value_change(lambda: self._parameters.look(self._panels.value == 'Parameters'))
 
     def show(self, drive: DriveSnapshot, snapshot: Snapshot) -> None:
-        self._look.set(level_class(drive.level))
+        self._look.set(tone_class(tone_of(drive)))
+        self._stops.show(drive)
         self._state.set_text(drive.state or 'unknown')
         self._control.set_text('' if drive.control == drive.state else drive.control)
-        self._advice.set_text('' if drive.level is Level.OK else drive.advice)
+        self._advice.set_text(
+            '' if drive.level is Level.OK or drive.silent else drive.advice)
         self._place.set_text(' · '.join(filter(None, (
             place_in_words(drive), f'{drive.rate:.0f} exchanges/s' if drive.rate else '',
             f'by {drive.bridge}'))))

@@ -1,7 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The ASGI middleware in front of everything: nothing comes in but by :mod:`.access`."""
 
-import html
 import http
 from typing import Any
 
@@ -10,6 +9,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from drive_can_bridge.monitor.source import Stop
 from drive_can_bridge.panel.access import Access, Entry, Refusal, Role
+from drive_can_bridge.panel.plain import plain_page
 
 #: where the role of a request stands in its scope
 ROLE = 'drive_can_role'
@@ -35,9 +35,6 @@ _HEADERS = [
 ]
 _NO_PLACE = Refusal(503, 'too many connections are open already: try again in a while')
 _TOO_MUCH = Refusal(413, f'too much at once: at most {BODY_MAX} bytes')
-_PAGE = ('<!doctype html><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
-         '<title>drive_can panel</title><body style="font: 1.1em sans-serif; margin: 2em">'
-         '<h1>drive_can panel</h1><p>{reason}</p></body>')
 
 
 class Gate:
@@ -114,7 +111,7 @@ async def _refuse(refusal: Refusal, scope: Scope, send: Send) -> None:
         return
     wants_page = any(name == b'accept' and b'text/html' in value
                      for name, value in scope['headers'])
-    body = (_PAGE.format(reason=html.escape(refusal.reason)) if wants_page
+    body = (plain_page(refusal.status, refusal.reason) if wants_page
             else f'{http.HTTPStatus(refusal.status).phrase}: {refusal.reason}\n').encode()
     kind = b'text/html' if wants_page else b'text/plain'
     prefix = 'websocket.' if websocket else ''

@@ -12,11 +12,12 @@ from nicegui import app as framework, ui
 from nicegui.client import Client
 from nicegui.element import Element
 from starlette.requests import Request
-from starlette.responses import PlainTextResponse, Response
+from starlette.responses import HTMLResponse, PlainTextResponse, Response
 from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp
 
 from drive_can_bridge import __version__
+from drive_can_bridge.monitor.snapshot import Snapshot
 from drive_can_bridge.panel.access import Access, Role
 from drive_can_bridge.panel.actions import Actions, ALL
 from drive_can_bridge.panel.backups import Backups
@@ -25,7 +26,8 @@ from drive_can_bridge.panel.feed import Feed, View
 from drive_can_bridge.panel.gate import Gate, ROLE
 from drive_can_bridge.panel.log_page import LogPage
 from drive_can_bridge.panel.overview import Overview
-from drive_can_bridge.panel.parts import box, button, in_script, words
+from drive_can_bridge.panel.parts import Banner, box, button, in_script, words
+from drive_can_bridge.panel.plain import plain_page
 
 _STATIC = Path(__file__).parent / 'static'
 _HEAD = ''.join((
@@ -47,10 +49,12 @@ class Setting:
     What holds for the whole panel.
 
     :param place: where bridges are looked for, in words.
+    :param robot: which one this is: host and domain.
     :param allow_writes: parameters may be written and backups restored.
     """
 
     place: str
+    robot: str = ''
     allow_writes: bool = False
 
 
@@ -78,10 +82,11 @@ def _add_pages(feed: Feed, setting: Setting) -> None:
     def shown(request: Request, here: str, make: Callable[[Role], View]) -> Response | None:
         role = request.scope[ROLE]
         if _full(role):
-            return _too_many()
-        with _frame(here, role):
+            return _too_many(request)
+        page, banner = _frame(here, role, setting)
+        with page:
             view = make(role)
-        _live(feed, view)
+        _live(feed, view, banner)
         return None
 
     @ui.page('/')
@@ -106,32 +111,47 @@ def _full(role: Role) -> bool:
 
 async def _nothing(request: Request, _: Exception) -> Response:
     """Say that there is no such page; the web framework would make one, for anybody."""
-    return PlainTextResponse('there is nothing at this address\n', 404)
+    return _said(request, 404, 'there is nothing at this address')
 
 
-def _too_many() -> Response:
-    return PlainTextResponse(f'{PAGES_MAX} pages are open already with this token: close some, or '
-                             'wait a minute\n', 503)
+def _too_many(request: Request) -> Response:
+    return _said(request, 503, f'{PAGES_MAX} pages are open already with this token: close some, '
+                               'or wait a minute')
 
 
-def _frame(here: str, role: Role) -> Element:
-    """Make what all pages have; return where the page goes."""
+def _said(request: Request, status: int, reason: str) -> Response:
+    """Say why there is no page: in one, to a browser."""
+    if 'text/html' in request.headers.get('accept', ''):
+        return HTMLResponse(plain_page(status, reason), status)
+    return PlainTextResponse(f'{reason}\n', status)
+
+
+def _frame(here: str, role: Role, setting: Setting) -> tuple[Element, Banner]:
+    """Make what all pages have; return where the page goes, and what stands above it."""
     ui.add_head_html(_HEAD)
     with box('bar'):
         words('drive_can', 'brand')
         for path, name in _PAGES.items():
             ui.link(name, path).classes('here' if path == here else '')
+        words(setting.robot, 'robot')
         words(role.value, 'role')
         box('space')
         if role is Role.OPERATOR:
             button('Quick stop all', 'stop',
                    f"panel.stop('quick_stop', {in_script(ALL)}, 'all drives')"
                    ).props(f'title="{_STOP_ALL}"')
-    return box('page')
+    banner = Banner()
+    return box('page'), banner
 
 
-def _live(feed: Feed, view: View) -> None:
+def _live(feed: Feed, view: View, banner: Banner) -> None:
     """Show what is known, and all that follows while the page is looked at."""
+    update = view.update
+
+    def both(snapshot: Snapshot) -> None:
+        banner.show(snapshot)
+        update(snapshot)
+    view.update = both
     view.update(feed.snapshot)
     client = ui.context.client
     client.on_connect(lambda: feed.show(view))

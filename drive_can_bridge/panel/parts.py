@@ -8,18 +8,20 @@ Text goes in as text, never as HTML: descriptions and log lines come from anybod
 from collections.abc import Callable, Sequence
 import json
 import math
+import time
 from typing import Any
 
 from nicegui import ui
 from nicegui.element import Element
 
 from drive_can_bridge.monitor.reports import Level
-from drive_can_bridge.monitor.snapshot import DriveSnapshot, Shown
+from drive_can_bridge.monitor.snapshot import DriveSnapshot, Shown, Snapshot
 from drive_can_bridge.monitor.source import Stop
+from drive_can_bridge.monitor.summary import silence, Tone
 from drive_can_bridge.panel.access import Role
 from drive_can_bridge.panel.feed import stops
 
-_STOPS = {Stop.QUICK_STOP: ('Quick stop', 'stop'), Stop.DISABLE: ('Disable', 'danger')}
+_STOPS = {Stop.QUICK_STOP: 'Quick stop', Stop.DISABLE: 'Disable'}
 
 
 def box(classes: str = '', tag: str = 'div') -> Element:
@@ -81,6 +83,11 @@ def level_class(level: Level) -> str:
     return level.name.lower()
 
 
+def tone_class(tone: Tone) -> str:
+    """Return the class of a colour."""
+    return tone.name.lower()
+
+
 def button(text: str, classes: str, script: str) -> Element:
     """
     Make a button that does something in the browser.
@@ -100,13 +107,42 @@ def in_script(value: Any) -> str:
     return json.dumps(value).replace('<', '\\u003c')
 
 
-def stop_buttons(drive: DriveSnapshot, role: Role) -> None:
-    """Make the buttons that stop a drive, those that it has, for an operator."""
-    if role is Role.OPERATOR:
-        for stop in stops(drive):
-            text, classes = _STOPS[stop]
-            button(text, classes, f'panel.stop({in_script(stop.value)}, {in_script(drive.name)}, '
-                                  f'{in_script(drive.label)})')
+class StopButtons:
+    """The buttons that stop a drive, those that it has, for an operator."""
+
+    def __init__(self, drive: DriveSnapshot, role: Role) -> None:
+        self._buttons = []
+        self._off = False
+        if role is Role.OPERATOR:
+            with box('stops'):
+                self._buttons = [
+                    button(_STOPS[stop], 'danger', f'panel.stop({in_script(stop.value)}, '
+                           f'{in_script(drive.name)}, {in_script(drive.label)})')
+                    for stop in stops(drive)]
+
+    def show(self, drive: DriveSnapshot) -> None:
+        """Switch them off while they reach nobody."""
+        if drive.silent is not self._off:
+            self._off = drive.silent
+            for each in self._buttons:
+                each.props(**{'add' if drive.silent else 'remove': 'disabled'})
+
+
+class Banner:
+    """What is said above every page, once."""
+
+    def __init__(self) -> None:
+        self._lines = Changing(box('banners'), lambda lines: [
+            words(line, 'banner') for line in lines])
+
+    def show(self, snapshot: Snapshot) -> None:
+        """Say which bridges are silent."""
+        self._lines.of(tuple(silence(snapshot, clock)))
+
+
+def clock(at: float) -> str:
+    """Write the time of day, where the panel runs."""
+    return time.strftime('%H:%M:%S', time.localtime(at))
 
 
 class Values:

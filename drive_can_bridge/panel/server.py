@@ -40,8 +40,7 @@ _LINES_MAX, _WHILE = 10, 60.0
 _GRACE = 1
 
 
-_SHOWN_OUT_WORDS = ('too many connections are open already, or nothing came on this one for '
-                    f'{FIRST_BYTE:g} s: try again in a while\n')
+_SHOWN_OUT_WORDS = 'too many connections are open already: try again in a while\n'
 _SHOWN_OUT = ('HTTP/1.1 503 Service Unavailable\r\nContent-Type: text/plain\r\n'
               f'Connection: close\r\nContent-Length: {len(_SHOWN_OUT_WORDS)}\r\n\r\n'
               f'{_SHOWN_OUT_WORDS}').encode()
@@ -113,7 +112,9 @@ class Connection(H11Protocol):
 
     def _first_byte_due(self) -> None:
         if self in self._outside and not self._heard:
-            self.show_out()
+            # without a word: browsers connect in advance, and would take it for the answer to what
+            # they ask later
+            self.transport.close()
 
     def _first_request_due(self) -> None:
         if self in self._outside:

@@ -6,7 +6,7 @@ They get the most telling table that leaves room for the rest of the page: every
 or one line each; and where not even that fits, as many as fit around the one that is marked.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 import math
 
 from rich.table import Table
@@ -16,7 +16,9 @@ from drive_can_bridge.monitor.reports import Level
 from drive_can_bridge.monitor.snapshot import (
     BusSnapshot, DriveSnapshot, Shown, Snapshot, UNKNOWN,
 )
-from drive_can_bridge.monitor.summary import counts_in_words, in_order, troubles
+from drive_can_bridge.monitor.summary import (
+    counts_in_words, in_order, principal, troubles,
+)
 from drive_can_bridge.view.parts import (
     DIM, GAP, LEVEL_STYLES, Lines, milliseconds, NO_VALUE, plain_table, spark, state, times,
     TONE_STYLES, ValueColumns, wrapped,
@@ -29,8 +31,6 @@ _EXCHANGE_WIDTH = 28
 _LOAD_WIDTH = 12
 #: %, above which a bus is never OK
 LOAD_WARNING = 70.0
-#: units of what moves
-_MOVING = {'rpm', 'rad/s', 'deg/s', 'rev', 'rev/s', 'Hz', 'm/s', 'mm/s', 'm', 'mm', 'rad', 'deg'}
 
 
 def drives_table(drives: Sequence[DriveSnapshot], marked: str | None, *, width: int, height: int,
@@ -171,13 +171,6 @@ def _line_table(all_drives: Sequence[DriveSnapshot], drives: Sequence[DriveSnaps
 
 def _cell(columns: ValueColumns, item: Shown | None) -> Text:
     return columns.short(item) if item else Text(NO_VALUE, style=DIM)
-
-
-def principal(items: Sequence[Shown]) -> Shown | None:
-    """Return the value that tells most: what moves, or else one with a unit, or the first."""
-    wishes: tuple[Callable[[Shown], bool], ...] = (
-        lambda item: item.unit in _MOVING, lambda item: bool(item.unit), lambda item: True)
-    return next((item for wish in wishes for item in items if wish(item)), None)
 
 
 def advice_lines(snapshot: Snapshot, width: int, *, brief: bool = False) -> Lines:

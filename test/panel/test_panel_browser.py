@@ -3,7 +3,9 @@
 
 from collections.abc import Iterator
 from pathlib import Path
+import re
 import signal
+import socket
 import time
 from urllib.parse import urlsplit
 
@@ -81,7 +83,7 @@ def test_an_edit_reaches_the_drive_and_its_refusal_is_shown(site: Site, browser:
     browser.click('.q-tab', 'Parameters')
     browser.shows('ramp_time')
     browser.search('ramp_time')
-    browser.shows('1 of 6 parameters')
+    browser.shows('1 of 8 parameters')
     wait_for(lambda: browser.field('ramp_time') not in ('', None), 'its value, as read')
     browser.write('ramp_time', '2.5')
     browser.shows('written')
@@ -188,10 +190,14 @@ def test_the_bridge_dies_and_comes_back(site: Site, browser: Browser) -> None:
     browser.shows('conveyor')
     browser.run('window.mark = 1')
     assert site.bridge.end(signal.SIGKILL) == -signal.SIGKILL
-    browser.shows('is it still running')
+    browser.shows('silent since .*stop buttons have no effect')
+    assert browser.run('return [...document.querySelectorAll("[data-drive] button")].every('
+                       '(each) => each.disabled)')
     site.bridge = site.start_bridge()
     browser.shows('bus main: up')
-    browser.gone('is it still running')
+    browser.gone('silent since')
+    assert browser.run('return [...document.querySelectorAll("[data-drive] button")].some('
+                       '(each) => !each.disabled)')
     # all that without loading the page anew
     assert browser.run('return window.mark') == 1
 
@@ -253,3 +259,24 @@ def last_line(site: Site, identifier: str) -> str:
     """Return the newest frame with an identifier."""
     lines = site.frame_log.read_text(encoding='ascii').splitlines()
     return next((line for line in reversed(lines) if f' {identifier}#' in line), '')
+
+
+def test_what_is_touched_is_large_enough(site: Site, phone: Browser) -> None:
+    phone.open(site.addresses['operator'])
+    for path in ('/', '/drive/lift', '/log', '/drive/nobody'):
+        phone.open(f'http://{site.host}{path}')
+        phone.shows('Quick stop all')
+        assert phone.fits
+        small = phone.run(
+            'return [...document.querySelectorAll("button, a, .q-tab, .q-field__control")]'
+            '.filter((each) => each.offsetParent).map((each) => [each.textContent, '
+            'each.getBoundingClientRect()]).filter(([_, place]) => place.height < 43.9 '
+            '|| place.width < 43.9).map(([text, place]) => `${text}: ${place.height}`)')
+        assert small == []
+
+
+def test_which_robot_it_is_stands_above_every_page(site: Site, browser: Browser) -> None:
+    browser.open(site.addresses['viewer'])
+    for path in ('/', '/log', '/drive/lift'):
+        browser.open(f'http://{site.host}{path}')
+        browser.shows(f'{re.escape(socket.gethostname())} · ROS domain \\d+')

@@ -51,6 +51,11 @@ def test_a_browser_is_told_in_a_page(site: Site) -> None:
     assert answer.status == 401
     assert answer.headers['content-type'].startswith('text/html')
     assert 'with its token' in answer.text
+    nothing = site.get('/nothing', 'viewer', Accept='text/html')
+    assert nothing.status == 404
+    # the same page, with a way back
+    for text in (answer.text, nothing.text):
+        assert '<a href="/">All drives</a>' in text
 
 
 def test_the_printed_address_opens_and_leaves_a_cookie_for_this_site_only(site: Site) -> None:
@@ -250,11 +255,12 @@ def test_a_thousand_connections(site: Site) -> None:
         def refused() -> bool:
             for key, _ in listening.select(0):
                 listening.unregister(key.fileobj)
-                told.append(key.fileobj.recv(4096))  # type: ignore[union-attr]
+                said = key.fileobj.recv(4096)  # type: ignore[union-attr]
+                told.extend([said] if said else [])     # the others have waited too long
             return len(told) > 500
         wait_for(refused, 'refusals')
         assert all(b'connections are open already' in each for each in told)
-        # who says nothing is shown out after a while: then there is room for those who talk
+        # who says nothing makes room for those who talk
         wait_for(lambda: room(site), 'room for a viewer')
     assert site.do('quick_stop', 'operator', STOP).said['success'] is True
 

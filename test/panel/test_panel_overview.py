@@ -1,0 +1,149 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""What the overview shows of many drives, of few, and of those of a silent bridge."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from drive_can_bridge.monitor.reports import Level
+from drive_can_bridge.monitor.snapshot import BridgeSnapshot, DriveSnapshot, LogLine, Snapshot
+from drive_can_bridge.panel.access import Role
+
+pytest.importorskip('nicegui', reason="needs the extra 'panel'")
+
+BRIDGE = '/drive_can_bridge'
+STATES = {
+    'online': (Level.OK, 'online'), 'disabled': (Level.OK, 'disabled: call ~/enable'),
+    'offline': (Level.STALE, 'not seen since start'),
+    'not armed': (Level.WARN, 'not armed: publish 0 to /{}/command/speed')}
+HIDDEN = 'hidden-now'
+
+
+@pytest.fixture
+def page() -> Iterator[Any]:
+    """Return a page, with nobody who looks at it."""
+    from nicegui.client import Client
+    from nicegui.page import page as kind
+    client = Client(kind(''))
+    with client:
+        yield client
+    client.delete()
+
+
+def seen(*states: str, silent: bool = False) -> Snapshot:
+    drives = []
+    for number, state in enumerate(states):
+        name = f'axis_{number}'
+        level, advice = STATES[state]
+        drives.append(DriveSnapshot(
+            f'/{name}', name, BRIDGE, 'unknown' if silent else state, level,
+            state != 'offline' and not silent, advice.format(name), silent=silent,
+            facts={'control_state': 'enabled'}))
+    return Snapshot(1000.0, (BridgeSnapshot(BRIDGE, 7.0 if silent else 0.0),),
+                    drives=tuple(drives))
+
+
+def shown(page: Any, kind: str) -> list[Any]:
+    """Return the elements of a class, as they are in the page."""
+    return [each for each in page.elements.values() if kind in each.classes]
+
+
+def texts(page: Any, kind: str) -> list[str]:
+    return [''.join(getattr(each, 'text', '') for each in found.descendants(include_self=True))
+            for found in shown(page, kind)]
+
+
+def overview(snapshot: Snapshot, role: Role = Role.OPERATOR) -> Any:
+    from drive_can_bridge.panel.overview import Overview
+    made = Overview(role, 'ROS domain 7')
+    made.show(snapshot)
+    return made
+
+
+def test_six_are_cards_and_seven_are_rows_the_worst_first(page: Any) -> None:
+    made = overview(seen('online', 'disabled', 'not armed', 'online', 'online', 'offline'))
+    assert (len(shown(page, 'card')), len(shown(page, 'drive-row'))) == (6, 0)
+    made.show(seen('online', 'disabled', 'not armed', 'not armed', 'online', 'online', 'offline'))
+    assert len(shown(page, 'card')) == 0
+    rows = sorted(shown(page, 'drive-row'), key=lambda row: int(row.style['order']))
+    assert [row.props['data-drive'] for row in rows] == [
+        f'/axis_{number}' for number in (6, 2, 3, 1, 0, 4, 5)]
+    assert [set(row.classes) & {'ok', 'off', 'warn', 'error', 'unknown'} for row in rows] == [
+        {'error'}, {'warn'}, {'warn'}, {'off'}, {'ok'}, {'ok'}, {'ok'}]
+    assert texts(page, 'count') == ['1 offline', '2 not armed', '1 disabled', '3 online']
+    assert texts(page, 'trouble') == [
+        'axis_6: not seen since start',
+        '2 drives not armed: publish 0 to /\N{HORIZONTAL ELLIPSIS}/command/speed (axis_2, axis_3)']
+    # one gets worse: it goes up, and no row is made anew, somebody may be about to click
+    made.show(seen('offline', 'disabled', 'not armed', 'not armed', 'online', 'online', 'offline'))
+    assert set(shown(page, 'drive-row')) == set(rows)
+    assert [row.style['order'] for row in rows] == ['1', '2', '3', '4', '0', '5', '6']
+
+
+def test_equal_advice_stands_once_above_cards(page: Any) -> None:
+    overview(seen('not armed', 'not armed', 'offline'))
+    assert len(texts(page, 'trouble')) == 1
+    assert sum('publish 0' in text for text in texts(page, 'card')) == 0
+    assert sum('not seen' in text for text in texts(page, 'card')) == 1
+
+
+def test_many_are_filtered(page: Any) -> None:
+    made = overview(seen(*['online'] * 6, 'not armed', 'not armed'))
+
+    def left() -> list[str]:
+        return [row.props['data-drive'] for row in shown(page, 'drive-row')
+                if HIDDEN not in row.classes]
+    made._filter.set_value('armed')
+    assert left() == ['/axis_6', '/axis_7']
+    made._filter.set_value('armed AXIS_7')
+    assert left() == ['/axis_7']
+    made._filter.set_value('')
+    assert len(left()) == 8
+
+
+def test_buttons_of_a_silent_bridge_are_off(page: Any) -> None:
+    made = overview(seen('online', 'online'))
+
+    def off() -> list[bool]:
+        return ['disabled' in each.props for each in shown(page, 'danger')]
+    assert off() == [False] * 4
+    made.show(seen('online', 'online', silent=True))
+    assert off() == [True] * 4
+    assert all('unknown' in card.classes for card in shown(page, 'card'))
+    made.show(seen('online', 'online'))
+    assert off() == [False] * 4
+
+
+def test_the_banner_says_so_once(page: Any) -> None:
+    from drive_can_bridge.panel.parts import Banner
+    banner = Banner()
+    banner.show(seen('online', 'online', silent=True))
+    text, = texts(page, 'banner')
+    assert text.startswith('bridge silent since ')
+    assert text.endswith(': its drives may still be running; stop buttons have no effect')
+    banner.show(seen('online', 'online'))
+    assert texts(page, 'banner') == []
+
+
+def test_the_log_is_filtered_and_stands_still_on_request(page: Any) -> None:
+    from drive_can_bridge.panel.log_page import LogPage
+    made = LogPage()
+
+    def log(count: int) -> Snapshot:
+        return Snapshot(log=tuple(LogLine(
+            float(number), 'WARN' if number % 2 else 'INFO', 'bridge', f'line {number}')
+            for number in range(count)))
+
+    def lines() -> list[str]:
+        return [text.rpartition(' ')[2] for text in reversed(texts(page, 'text'))]
+    made.show(log(4))
+    assert sorted(lines()) == ['0', '1', '2', '3']
+    made._pause()
+    made.show(log(5))
+    assert len(lines()) == 4
+    made._pause()
+    assert len(lines()) == 5
+    made._filter.set_value('warn')
+    assert sorted(lines()) == ['1', '3']
+    assert texts(page, 'number')[0].startswith('1970-01-01 ')
