@@ -21,8 +21,8 @@ from typing import Any
 from drive_can_bridge import __version__
 from drive_can_bridge.cli.argcomplete_hook import complete, typed
 from drive_can_bridge.cli.command import complain, FAILED, Parser, WRONG_USAGE, WrongUsage
-from drive_can_bridge.clock import Clock, SteadyClock
 from drive_can_bridge.cli.help import examples, Formatter, overview, SUBCOMMANDS
+from drive_can_bridge.clock import Clock, SteadyClock
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.process.beginning import let_signals_in
 

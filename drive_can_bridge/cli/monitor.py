@@ -7,8 +7,8 @@ on this host or others, and detaches again without any of them noticing.
 """
 
 import argparse
-import json
 from collections.abc import Callable
+import json
 import os
 import sys
 
