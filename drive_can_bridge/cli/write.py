@@ -106,6 +106,12 @@ def _value(parameter: Parameter, text: str) -> Value | None:
     return value if isinstance(value, int) else None
 
 
+def _shown(parameter: Parameter | None, text: str) -> Value | str:
+    """Return what was to be written as a program takes it; the text where it is no value."""
+    value = None if parameter is None else _value(parameter, text)
+    return text if value is None else value
+
+
 def _show(args: Namespace, drives: Drives, wanted: dict[str, str],
           outcomes: Sequence[tuple[Drive, WriteOutcome]]) -> None:
     rows = []
@@ -113,7 +119,7 @@ def _show(args: Namespace, drives: Drives, wanted: dict[str, str],
         parameter = outcome.parameter
         if args.json:
             print_json({'drive': drive.name, 'name': outcome.name,
-                        'value': wanted[outcome.name], 'ok': outcome.ok,
+                        'value': _shown(parameter, wanted[outcome.name]), 'ok': outcome.ok,
                         'reason': outcome.reason})
             continue
         result = outcome.reason or 'written'

@@ -25,16 +25,17 @@ commands need that have to know which drive is meant:
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol
 
 from drive_can_bridge.core.directory import ParameterDirectory
-from drive_can_bridge.core.errors import ValueRefused
+from drive_can_bridge.core.errors import DriveCanError, ValueRefused
 from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.profile import RestoreTable
 from drive_can_bridge.core.roles import Role
+from drive_can_bridge.core.words import hint
 from drive_can_bridge.process.interruption import finish_first
 
 
@@ -126,6 +127,9 @@ class Drive(ABC):
     def __init__(self, facts: DriveFacts, directory: ParameterDirectory) -> None:
         self.facts = facts
         self._directory = directory
+
+    def __repr__(self) -> str:
+        return f'<Drive {self.name}>'
 
     @property
     def name(self) -> str:
@@ -268,6 +272,21 @@ class Drive(ABC):
         """Write a value that nothing speaks against; without looking first if ``blind``."""
 
 
+class NoDrive(DriveCanError, KeyError):
+    """
+    There is no drive of this name, or none that a pattern fits.
+
+    :param known: those that there are.
+    """
+
+    def __init__(self, name: object, known: Iterable[str]) -> None:
+        names = list(known)
+        super().__init__(f'no drive {name!r}{hint(str(name), names)}; there are: '
+                         f'{", ".join(names) or "none"}')
+
+    __str__ = Exception.__str__     # KeyError shows it in quotes
+
+
 class Drives(Mapping[str, Drive]):
     """
     The drives that were opened, by name, in the order of the configuration.
@@ -285,7 +304,18 @@ class Drives(Mapping[str, Drive]):
         self.warnings = tuple(warnings)
 
     def __getitem__(self, name: str) -> Drive:
-        return self._drives[name]
+        """
+        Return a drive.
+
+        :raises NoDrive: none of this name was opened.
+        """
+        try:
+            return self._drives[name]
+        except KeyError:
+            raise NoDrive(name, self._drives) from None
+
+    def __repr__(self) -> str:
+        return f'<Drives {", ".join(self._drives) or "none"}>'
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._drives)

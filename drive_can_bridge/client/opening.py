@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
 
-from drive_can_bridge.client.drive import Drives, Source
+from drive_can_bridge.client.drive import Drives, NoDrive, Source
 from drive_can_bridge.clock import Clock, SteadyClock
 from drive_can_bridge.core.errors import DriveCanError
 
@@ -55,8 +55,7 @@ def open_drives(params_file: str | Path | None = None, *, only: str | Sequence[s
         for pattern in [only] if isinstance(only, str) else only:
             found = [name for name in source.names if fnmatchcase(name, pattern)]
             if not found:
-                raise DriveCanError(f'no drive {pattern!r}; there are: '
-                                    f'{", ".join(source.names) or "none"}')
+                raise NoDrive(pattern, source.names)
             names += found
         drives = source.open(names)
     except BaseException:

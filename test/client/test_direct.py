@@ -285,6 +285,23 @@ def test_names(world: World) -> None:
         open_drives(world.file, only=['x?'])
 
 
+def test_a_name_that_nobody_has(world: World, drives: Drives) -> None:
+    for caught in (DriveCanError, KeyError):
+        with pytest.raises(caught) as refused:
+            drives['conveyer']
+        assert str(refused.value) == (
+            "no drive 'conveyer' (did you mean 'conveyor'?); there are: conveyor, lift, mixer, "
+            'pump')
+    assert drives.get('conveyer') is None and 'conveyer' not in drives
+    with pytest.raises(DriveCanError, match="did you mean 'lift'"):
+        open_drives(world.file, only='lifd')
+
+
+def test_what_they_look_like(drives: Drives) -> None:
+    assert repr(drives) == '<Drives conveyor, lift, mixer, pump>'
+    assert repr(drives['lift']) == '<Drive lift>'
+
+
 def test_one_name_is_no_sequence_of_letters(tmp_path: Path) -> None:
     with a_world(tmp_path, conveyor=CONVEYOR, lift=LIFT) as world:
         with open_drives(world.file, only='con*') as drives:

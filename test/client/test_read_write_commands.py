@@ -178,8 +178,18 @@ def test_integers_and_bools_are_written_as_in_files(run: Run, world: World, name
 def test_write_json(run: Run) -> None:
     code, lines, _ = run('write', 'lift', 'ramp_time=2', '--json')
     assert code == 0
-    assert json.loads(lines[0]) == {'drive': 'lift', 'name': 'ramp_time', 'value': '2',
+    assert json.loads(lines[0]) == {'drive': 'lift', 'name': 'ramp_time', 'value': 2.0,
                                     'ok': True, 'reason': ''}
+
+
+@pytest.mark.parametrize(('name', 'text', 'value'), [
+    ('p30', '100', 100), ('brake_enabled', 'true', True), ('ramp_time', 'soon', 'soon'),
+    ('nothing', '3', '3')])
+def test_write_json_has_what_was_asked_for_in_its_own_type(run: Run, name: str, text: str,
+                                                           value: object) -> None:
+    _, lines, _ = run('write', 'conveyor', f'{name}={text}', '--json')
+    found = json.loads(lines[0])['value']
+    assert (found, type(found)) == (value, type(value))
 
 
 def test_a_write_that_does_not_arrive(run: Run, world: World) -> None:

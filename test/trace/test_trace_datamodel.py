@@ -43,6 +43,18 @@ def test_an_answer_that_never_comes() -> None:
     assert (observed.exchanges, observed.missed, observed.late, observed.unasked) == (0, 2, 1, 1)
 
 
+def test_a_response_too_short_for_its_map() -> None:
+    """Also at the beginning of a trace, and where the requests are not in it."""
+    witness = Witness(drive())
+    short = '103FFFF0#FA240005'
+    first, = witness.hears(short, 0.0)
+    assert 'MALFORMED' in first and '4 data bytes' in first
+    asked = witness.hears('003FFFF0#0000000000000000', 0.02) and witness.hears(short, 0.021)
+    assert 'MALFORMED' in asked[0] and '4 data bytes' in asked[0]
+    unasked, = witness.hears(short, 0.022)
+    assert 'UNASKED' in unasked and '4 data bytes' in unasked
+
+
 def test_reads_and_writes() -> None:
     witness = Witness(drive())
     # V28, V29, V16, V18 of the golden vectors: P30 and P31 are listed, P36 is not

@@ -121,11 +121,10 @@ class CannordObserver(DriveObserver):
         parameters, word = self._parameters[_RESPONSE][0], raws[0]
         remark = state_of(word).value
         needed = len(parameters)
-        if self._cycle.asked and len(raws) < needed:
-            verdict, latency = Verdict.MALFORMED, self._cycle.answer(now)[1]
+        verdict, latency = self._cycle.answer(now)
+        if len(raws) < needed:      # also where nobody was heard to ask
+            verdict = Verdict.MALFORMED if verdict is Verdict.NORMAL else verdict
             remark = f'{len(raws) - 1} values, {needed - 1} needed; {remark}'
-        else:
-            verdict, latency = self._cycle.answer(now)
         if latency != latency and is_faulted(word):     # NaN: nobody asked
             verdict, remark = Verdict.NORMAL, f'{remark}, told without being asked'
         self.tell(now, _RESPONSE, _CYCLIC, title, parameters, raws, verdict=verdict,

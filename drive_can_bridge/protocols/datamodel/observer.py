@@ -125,7 +125,11 @@ class ExtendedObserver(DriveObserver):
                 self._cycle.answer(now)
             return
         verdict, latency = self._cycle.answer(now)
-        if verdict is _NORMAL:
+        if wrong:   # nobody was heard to ask for it
+            self.tell(now, _RESPONSE, _CYCLIC, 'cyclic response', self._response, raws,
+                      verdict=Verdict.MALFORMED if verdict is _NORMAL else verdict,
+                      remark=wrong, latency=latency)
+        elif verdict is _NORMAL:
             self.emit(Telegram(now, self.name, _RESPONSE, _CYCLIC, 'cyclic response',
                                self._response, raws, verdict, '', latency))
         else:
