@@ -414,14 +414,14 @@ def by_hand(load: Load, rounds: int) -> dict[str, Any]:
                         ('bare', [[*bare, 'stop'], [*bare, 'read'], [*bare, 'write', value]])):
                     if not stopper.ask('enable'):
                         raise SystemExit('the drive was not enabled')
-                    bus.drives.ask('clear')
+                    bus.drives[0].ask('clear')
                     for name, command in zip(('stop', 'read', 'write'), words):
                         begun = time.monotonic()
                         subprocess.run(command, stdout=subprocess.DEVNULL, check=False)
                         elapsed = time.monotonic() - begun
                         if name == 'stop':
                             found['stop done'][who].append(elapsed)
-                            elapsed = min(bus.drives.ask('stops'), default=math.inf) - begun
+                            elapsed = min(bus.drives[0].ask('stops'), default=math.inf) - begun
                         found[name][who].append(elapsed)
     return found
 

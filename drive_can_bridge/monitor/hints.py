@@ -33,8 +33,7 @@ def hints(drive: DriveSnapshot | None, environment: str) -> list[tuple[str, str]
 def _commands(drive: DriveSnapshot) -> list[tuple[str, str]]:
     found = []
     if drive.control:
-        found.append((f"ros2 service call {drive.name}/enable std_srvs/srv/SetBool "
-                      f"'{{data: true}}'", 'by its control word'))
+        found.append((f'drive_can enable {drive.name}', 'by its control word; or stop, disable'))
     commanded = [info for info in drive.parameters if info.facts.get('role') == 'cyclic'
                  and not info.read_only]
     setpoint = min(commanded, key=lambda info: seems_limit(info.name), default=None)

@@ -143,7 +143,7 @@ def test_hints_are_commands_for_this_drive() -> None:
     commands = [command for command, _ in hints(lift, 'export ROS_DOMAIN_ID=7')]
     assert commands == [
         'export ROS_DOMAIN_ID=7', 'ros2 topic echo /lift/response',
-        "ros2 service call /lift/enable std_srvs/srv/SetBool '{data: true}'",
+        'drive_can enable /lift',
         "ros2 topic pub -r 10 /lift/command/speed_setpoint std_msgs/msg/Float64 '{data: 0.0}'",
         'ros2 param list /lift', 'ros2 param get /lift ramp_time', 'ros2 topic echo /diagnostics']
     assert [command for command, _ in hints(None, '')] == ['ros2 topic echo /diagnostics']
