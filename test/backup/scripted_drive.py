@@ -38,6 +38,12 @@ class Fate(Enum):
     SIGNAL = 'it is done, and a signal came meanwhile'
     BROKEN_OFF = 'it is done, and a second signal breaks in'
     ENABLED = 'it is done, and somebody enables the drive'
+    KILLED_BEFORE = 'the process dies before it'
+    KILLED_AFTER = 'the process dies before its answer'
+
+
+class Killed(BaseException):
+    """Nothing runs any more."""
 
 
 class ScriptedDrive(Drive):
@@ -114,6 +120,8 @@ class ScriptedDrive(Drive):
         fate = self._fates.get(self.writes)
         self._bus_lost = self._bus_lost or fate is Fate.BUS
         self._check_bus()
+        if fate is Fate.KILLED_BEFORE:
+            raise Killed
         self._deaf = self._deaf or fate is Fate.DEAF
         if fate is Fate.AWAY:
             self._away_until = self.now + 5.0
@@ -126,6 +134,8 @@ class ScriptedDrive(Drive):
         refused = fate is Fate.REFUSED or name != 'mode' and not self.in_mode
         if not refused:
             self.registers[name] = int(value)
+        if fate is Fate.KILLED_AFTER:
+            raise Killed
         if fate is Fate.CUT:
             self._away_until = self.now + 5.0
         self._mute = self._mute or fate is Fate.MUTE

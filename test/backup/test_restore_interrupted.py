@@ -4,7 +4,7 @@
 from itertools import product
 
 import pytest
-from scripted_drive import Fate, FILE, MODE, OTHER, restored, ScriptedDrive, SETTINGS
+from scripted_drive import Fate, FILE, Killed, MODE, OTHER, restored, ScriptedDrive, SETTINGS
 
 from drive_can_bridge.backup.restore import PATIENCE
 
@@ -62,10 +62,10 @@ def test_a_drive_that_is_enabled_by_now_is_told_nothing() -> None:
     assert (result.enabled, result.stopped, drive.writes) == (True, [*SETTINGS], 0)
 
 
-STORIES = [dict(zip(numbers, fates)) for numbers in ((1,), (2,), (3,), (4,), (5,))
-           for fates in product(Fate, repeat=1)]
+FATES = [fate for fate in Fate if fate not in (Fate.KILLED_BEFORE, Fate.KILLED_AFTER)]
+STORIES = [{number: fate} for number in WRITES for fate in FATES]
 STORIES += [{one: first, two: second} for one in WRITES for two in range(one + 1, 9)
-            for first, second in product(Fate, repeat=2)]
+            for first, second in product(FATES, repeat=2)]
 
 
 def test_whatever_comes_between() -> None:
@@ -88,3 +88,15 @@ def test_whatever_comes_between() -> None:
         drive.ended()
         assert restored(drive).complete, told
         assert drive.registers == FILE, told
+
+
+@pytest.mark.parametrize('number', WRITES)
+@pytest.mark.parametrize('fate', [Fate.KILLED_BEFORE, Fate.KILLED_AFTER])
+def test_what_a_killed_restore_leaves_is_brought_to_its_end_by_the_next(
+        number: int, fate: Fate) -> None:
+    drive = ScriptedDrive({number: fate})
+    with pytest.raises(Killed):
+        restored(drive)
+    drive.ended()
+    result = restored(drive)
+    assert (result.complete, drive.registers) == (True, FILE)
