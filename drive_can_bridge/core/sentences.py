@@ -827,3 +827,142 @@ def never_written(number: int) -> str:
 @sentence
 def one_half(of: str, writable: bool) -> str:
     return f'one half of {of}: set that' if writable else f'read-only: one half of {of}'
+
+
+# -- diagnostics: how a bus is --------------------------------------------------------------------
+
+
+@sentence
+def bus_up(interface: str, channel: str) -> str:
+    return f'{interface} {channel}'
+
+
+@sentence
+def bus_not_up(state: str, outlook: str) -> str:
+    return f'{state}: {outlook}'
+
+
+@sentence
+def bus_disturbed(what: str, advice: str) -> str:
+    return f'{what}: {advice}'
+
+
+@sentence
+def frames_overflowed(frames: int) -> str:
+    return (f'{frames} received frames lost: this machine is too slow for the traffic, see what '
+            f'else it does')
+
+
+@sentence
+def frames_not_sent(frames: int, why: str) -> str:
+    return f'{frames} frames not sent: {why}'
+
+
+@sentence
+def bus_load_high(percent: float) -> str:
+    return f'bus load {percent:.0f} %: raise the period of some drives or the bit rate'
+
+
+# -- diagnostics: how a drive is, and what to do --------------------------------------------------
+
+
+@sentence
+def online() -> str:
+    return 'online'
+
+
+@sentence
+def activate_bridge() -> str:
+    return 'bridge inactive: activate it'
+
+
+@sentence
+def bridge_ended() -> str:
+    return 'bridge ended: start it again'
+
+
+@sentence
+def stopped_for_defect(why: str) -> str:
+    return (f'offline: {why}; told to stop, looked for again in a moment; please report this '
+            f'defect of the bridge with its log')
+
+
+@sentence
+def bus_of_drive_down(bus: str) -> str:
+    return f'bus {bus} is down'
+
+
+@sentence
+def bus_of_drive_opening(bus: str) -> str:
+    return f'bus {bus} is not open yet'
+
+
+@sentence
+def never_seen(why: str) -> str:
+    return (f'not seen since start: {why}; check its power, cable, station number and bit '
+            f'rate')
+
+
+@sentence
+def silent_since(since: str, why: str) -> str:
+    return f'silent since {since}, was online before: check its power and cable ({why})'
+
+
+@sentence
+def maps_to_correct(why: str) -> str:
+    return f'{why}; correct the drive or the configuration, or set mapping: configure'
+
+
+@sentence
+def maps_not_kept(why: str) -> str:
+    return (f'{why}; the drive does not keep the maps that are written: correct the drive or '
+            f'the configuration')
+
+
+@sentence
+def fault(reset: str) -> str:
+    return f'fault: remove its cause, then {reset}'
+
+
+@sentence
+def still_running(state: str) -> str:
+    return f'told to stop, and still {state}'
+
+
+@sentence
+def disabled(enable: str) -> str:
+    return f'disabled: {enable}'
+
+
+@sentence
+def disabled_and_commanded(enable: str) -> str:
+    return f'disabled: {enable}; commands arrive, and change nothing'
+
+
+@sentence
+def not_armed(wanted: Sequence[str]) -> str:
+    return f'not armed: publish {" and ".join(wanted)}'
+
+
+@sentence
+def slow_exchange(mean: float, period: float) -> str:
+    return (f'an exchange takes {1e3 * mean:.0f} ms, the period is {1e3 * period:g} ms: the '
+            f'drive is slow; choose a longer period or a shorter cyclic_response')
+
+
+@sentence
+def one_master_only(seen: str) -> str:
+    return f'{seen}: there must be one master only'
+
+
+@sentence
+def frames_rejected(frames: int, last: str) -> str:
+    return (f'{frames} frames rejected, the last: {last}; check for a second station with the '
+            f'same number')
+
+
+@sentence
+def answer_late(seconds: float) -> str:
+    late = 1e3 * seconds
+    return (f'answer {late:.{int(late < 1.0)}f} ms after its period: the computer or the drive is '
+            f'too slow')

@@ -5,7 +5,9 @@ from collections.abc import Sequence
 import time
 
 from drive_can_bridge.clock import Clock
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.drive_state import DriveState
+from drive_can_bridge.core.sentences import Sentence
 from drive_can_bridge.core.words import counted
 from drive_can_bridge.ros.drive_node import DriveNode
 from drive_can_bridge.ros.log import Log
@@ -20,19 +22,19 @@ _FIRST_START = frozenset((
     'silent', 'reconnected'))
 
 
-def absence(drive: DriveNode) -> str:
+def absence(drive: DriveNode) -> Sentence:
     """Say of a drive that is offline since when, and what to do about it."""
     session, exchange = drive.session, drive.exchange
     what = session.offline_advice
     if exchange.bus_state != 'up':      # which is told once, there
-        down = 'not open yet' if exchange.bus_state == 'opening' else 'down'
-        return f'bus {exchange.bus.name} is {down}'
+        return (sentences.bus_of_drive_opening if exchange.bus_state == 'opening' else
+                sentences.bus_of_drive_down)(exchange.bus.name)
     if not session.ever_online:
-        return f'{_NEVER}{what}; check its power, cable, station number and bit rate'
+        return sentences.never_seen(what)
     since = time.strftime('%H:%M:%S', time.localtime(drive.lost_at // 1_000_000_000))
     if what.code in _FIRST_START:
         what = drive.lost_for
-    return f'silent since {since}, was online before: check its power and cable ({what})'
+    return sentences.silent_since(since, what)
 
 
 class Attendance:

@@ -11,15 +11,17 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
 from drive_can_bridge.clock import Clock
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.frame import STUFFING
+from drive_can_bridge.core.sentences import NOTHING, Sentence, together
 from drive_can_bridge.core.statistics import Statistic
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.core.words import value_text
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.ros.absence import absence
 from drive_can_bridge.ros.advice import how_to_enable, how_to_reset
-from drive_can_bridge.ros.drive_node import DriveNode, late_text
+from drive_can_bridge.ros.drive_node import DriveNode
 from drive_can_bridge.ros.quality import publisher
 from drive_can_bridge.ros.stamps import Stamps
 from drive_can_bridge.transport.end_point import Counts, REFUSED_FRAMES
@@ -38,7 +40,7 @@ class Report:
 
     name: str
     level: bytes
-    message: str
+    message: Sentence
     facts: dict[str, str] = field(default_factory=dict)
 
 
@@ -66,32 +68,32 @@ class BusReporter:
         new_failures = failures - self._failures
         self._bits, self._reported_at = bits, now
         self._failures, self._counts = failures, counts
-        level, message = DiagnosticStatus.OK, f'{exchange.bus.interface} {exchange.bus.channel}'
+        level, message = DiagnosticStatus.OK, sentences.bus_up(
+            exchange.bus.interface, str(exchange.bus.channel))
         state = exchange.bus_state
         if state == 'up' and link.controller or state == 'down' and link.controller == BUS_OFF:
             state = link.controller
         if exchange.bus_state != 'up':
             level = DiagnosticStatus.ERROR
             reason = exchange.bus_reason or 'not open yet'
-            message = with_outlook(f'{exchange.bus_state}: {reason}',
-                                   exchange.bus.reconnect_period)
+            message = sentences.bus_not_up(
+                exchange.bus_state, with_outlook(reason, exchange.bus.reconnect_period))
         elif link.controller or new.error_frames and link.last_bus_error is not None:
             level = DiagnosticStatus.WARN
             message = _bus_error(link.last_bus_error, link.controller, new.error_frames)
         elif new.overflowed > 0:
             level = DiagnosticStatus.WARN
-            message = (f'{new.overflowed} received frames lost: this machine is too slow for the '
-                       f'traffic, see what else it does')
+            message = sentences.frames_overflowed(new.overflowed)
         elif new_failures:
             level = DiagnosticStatus.WARN
             why = REFUSED_FRAMES if new.refused > 0 else link.last_error
-            message = f'{new_failures} frames not sent: {why}'
+            message = sentences.frames_not_sent(new_failures, why)
         elif self._load > LOAD_WARNING:
             level = DiagnosticStatus.WARN
-            message = (f'bus load {self._load:.0f} %: raise the period of some drives or '
-                       f'the bit rate')
+            message = sentences.bus_load_high(self._load)
         return Report(f'bus {exchange.bus.name}', level, message, {
             'state': state,
+            'code': message.code,
             'load_percent': f'{self._load:.1f}',
             'frames_sent': str(link.frames_sent - counts.refused),
             'frames_received': str(link.frames_received),
@@ -115,7 +117,7 @@ class DriveReporter:
         self._rejected = self._late = 0
         self._latencies = 0, 0.0        # how many, and their sum
         self._requests = 0
-        self.inactive = 'bridge inactive: activate it'
+        self.inactive = sentences.activate_bridge()
 
     def report(self, now: float) -> Report:
         """Return the report of this moment."""
@@ -136,6 +138,7 @@ class DriveReporter:
         self._requests = statistics.requests_ok + statistics.requests_failed
         facts = {
             'state': state.value,
+            'code': message.code,
             'exchanges': str(statistics.exchanges),
             'missed_exchanges': str(statistics.missed),
             **_times('latency', statistics.latency),
@@ -152,69 +155,64 @@ class DriveReporter:
         }
         return Report(f'drive {drive.name}', level, message, facts)
 
-    def _judge(self, state: DriveState, rejected: int, now: float) -> tuple[bytes, str]:
+    def _judge(self, state: DriveState, rejected: int, now: float) -> tuple[bytes, Sentence]:
         drive, session = self._drive, self._drive.session
         if session.defect and drive.exchange.active:
-            return DiagnosticStatus.ERROR, (
-                f'offline: {session.defect}; told to stop, looked for again in a moment; please '
-                f'report this defect of the bridge with its log')
+            return DiagnosticStatus.ERROR, sentences.stopped_for_defect(session.defect)
         if not session.active:
             return DiagnosticStatus.STALE, self.inactive
         if state is DriveState.MAPPING_DIFFERS:
-            advice = 'correct the drive or the configuration'
-            if session.configuration.options.mapping == 'configure':
-                advice = f'the drive does not keep the maps that are written: {advice}'
-            else:
-                advice += ', or set mapping: configure'
-            return DiagnosticStatus.ERROR, f'{session.offline_advice}; {advice}'
+            said = (sentences.maps_not_kept
+                    if session.configuration.options.mapping == 'configure'
+                    else sentences.maps_to_correct)
+            return DiagnosticStatus.ERROR, said(session.offline_advice)
         if state is DriveState.OFFLINE:
             level = DiagnosticStatus.ERROR if session.ever_online else DiagnosticStatus.STALE
             return level, absence(drive)
         if state is DriveState.FAULT:
-            told = [f'fault: remove its cause, then {how_to_reset(session, drive.node)}',
+            told = [sentences.fault(how_to_reset(session, drive.node)),
                     *self._warnings(rejected)]
-            return DiagnosticStatus.ERROR, '; '.join(told)
+            return DiagnosticStatus.ERROR, together(told)
         told = self._warnings(rejected)
         obeyed = session.gate.obeyed
         if obeyed is not None and obeyed.disregard:
-            return DiagnosticStatus.ERROR, '; '.join((obeyed.disregard, *told))
+            return DiagnosticStatus.ERROR, together((obeyed.disregard, *told))
         if obeyed is not None and obeyed.stopping and obeyed.unconfirmed:
-            told.append(f'told to stop, and still {obeyed.state}')
+            told.append(sentences.still_running(obeyed.state))
         if state is DriveState.DISABLED:
-            disabled = f'disabled: {how_to_enable(session, drive.node)}'
+            advice = how_to_enable(session, drive.node)
             if now - session.setpoints.ignored_at < COMMANDS_RECENT:
-                told.append(f'{disabled}; commands arrive, and change nothing')
+                told.append(sentences.disabled_and_commanded(advice))
             elif not told:
-                return DiagnosticStatus.OK, disabled
+                return DiagnosticStatus.OK, sentences.disabled(advice)
             else:
-                told.append(disabled)
+                told.append(sentences.disabled(advice))
         if state is DriveState.NOT_ARMED:
             told.append(self._how_to_arm())
         if told:
-            return DiagnosticStatus.WARN, '; '.join(told)
-        return DiagnosticStatus.OK, 'online'
+            return DiagnosticStatus.WARN, together(told)
+        return DiagnosticStatus.OK, sentences.online()
 
-    def _warnings(self, rejected: int) -> list[str]:
+    def _warnings(self, rejected: int) -> list[Sentence]:
         """Return everything that is not well although the drive answers."""
         drive, session = self._drive, self._drive.session
-        told: list[str] = []
+        told: list[Sentence] = []
         if session.warning:
             told.append(session.warning)
         slow = self._slowness()
         if slow:
             told.append(slow)
         if drive.foreign_text:
-            told.append(f'{drive.foreign_text}: there must be one master only')
-            drive.foreign_text = ''
+            told.append(sentences.one_master_only(drive.foreign_text))
+            drive.foreign_text = NOTHING
         if rejected:
-            told.append(f'{rejected} frames rejected, the last: {drive.rejected_text}; check for '
-                        f'a second station with the same number')
+            told.append(sentences.frames_rejected(rejected, drive.rejected_text))
         late, self._late = session.statistics.late - self._late, session.statistics.late
         if late:
-            told.append(late_text(session.statistics.late_by))
+            told.append(sentences.answer_late(session.statistics.late_by))
         return told
 
-    def _slowness(self) -> str:
+    def _slowness(self) -> Sentence:
         """Tell of rounds of polling that take longer than the period allows."""
         session = self._drive.session
         statistics = session.statistics
@@ -224,14 +222,13 @@ class DriveReporter:
         # up the conversation: that is no fault of the drive
         if latency.count <= max(count, 1) or self._requests != (
                 statistics.requests_ok + statistics.requests_failed):
-            return ''
+            return NOTHING
         mean = (latency.total - total) / (latency.count - count)
         if mean <= period:
-            return ''
-        return (f'an exchange takes {1e3 * mean:.0f} ms, the period is {1e3 * period:g} ms: the '
-                f'drive is slow; choose a longer period or a shorter cyclic_response')
+            return NOTHING
+        return sentences.slow_exchange(mean, period)
 
-    def _how_to_arm(self) -> str:
+    def _how_to_arm(self) -> Sentence:
         drive, session = self._drive, self._drive.session
         name = drive.node.get_fully_qualified_name()
         wanted = []
@@ -242,7 +239,7 @@ class DriveReporter:
             else:
                 neutral = value_text(parameter.value_from_raw(setpoint.neutral))
                 wanted.append(f'{neutral} to {name}/command/{parameter.name}')
-        return f'not armed: publish {" and ".join(wanted)}'
+        return sentences.not_armed(wanted)
 
 
 class StatusMessage:
@@ -313,7 +310,7 @@ class Diagnostics:
     def conclude(self) -> None:
         """Publish for the last time: the drives have been stopped, and the process ends."""
         for drive in self.drives:
-            drive.inactive = 'bridge ended: start it again'
+            drive.inactive = sentences.bridge_ended()
         self.publish()
 
     def reports(self, now: float) -> list[Report]:
@@ -326,12 +323,13 @@ class Diagnostics:
         self._node.destroy_publisher(self._publisher)
 
 
-def _bus_error(error: BusError | None, controller: str, count: int) -> str:
+def _bus_error(error: BusError | None, controller: str, count: int) -> Sentence:
     """Say what error frames of a bus that is up mean, and what to do."""
     told = [f'controller {controller}'] if controller else []
     if count:
         told.append(f'{count} error frames' + (f' (the last: {error.text})' if error else ''))
-    return f'{", ".join(told)}: {error.advice if error else ADVICE_DISTURBED}'
+    return sentences.bus_disturbed(
+        ', '.join(told), error.advice if error else ADVICE_DISTURBED)
 
 
 def _times(name: str, statistic: Statistic) -> dict[str, str]:

@@ -26,7 +26,7 @@ from drive_can_bridge.core.events import (
 from drive_can_bridge.core.requests import (
     Failure, ReadRequest, Request,
 )
-from drive_can_bridge.core.sentences import bridge_inactive, NOTHING, Sentence
+from drive_can_bridge.core.sentences import answer_late, bridge_inactive, NOTHING, Sentence
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.exchange.exchange import BusExchange
@@ -92,9 +92,9 @@ class DriveNode(DriveListener):
         self.lost_at = 0
         self._stamp = clock.stamp
         self.lost_for: Sentence = NOTHING
-        self.rejected_text = ''
+        self.rejected_text: Sentence = NOTHING
         self._may_run = False   # and nothing has been heard of it since
-        self.foreign_text = ''
+        self.foreign_text: Sentence = NOTHING
         # a local remapping wins over a process-wide ``__node:=``, which would rename every drive;
         # time and qualities are the bridge's, whose parameters everybody sees
         self.node = Node(
@@ -260,7 +260,7 @@ class DriveNode(DriveListener):
             self.rejected_text = event.text
             self.warn('rejected', f'frame rejected: {event.text}')
         elif isinstance(event, AnswerLate):
-            self._log.warning(late_text(event.seconds))
+            self._log.warning(answer_late(event.seconds))
         elif isinstance(event, ForeignMasterSeen):
             self.foreign_text = event.text
             self.warn('foreign master', event.text)
@@ -305,10 +305,3 @@ class DriveNode(DriveListener):
         self.requests_refused += uncounted
         self.session.statistics.last_request_error = text
         self.warn(f'parameter {text}', text)
-
-
-def late_text(seconds: float) -> str:
-    """Say how late an answer came, and what that means."""
-    late = 1e3 * seconds
-    return (f'answer {late:.{int(late < 1.0)}f} ms after its period: the computer or the drive is '
-            f'too slow')

@@ -35,7 +35,7 @@ VALUES = {'actual_speed': (Float64, 'std_msgs/msg/Float64'),
           'status_word': (Int64, 'std_msgs/msg/Int64')}
 COMMANDS = {'speed_setpoint': Float64, 'mode': Int64, 'brake': Bool}
 DRIVE_KEYS = {
-    'state', 'exchanges', 'missed_exchanges', 'latency_mean_ms', 'latency_p99_ms',
+    'state', 'code', 'exchanges', 'missed_exchanges', 'latency_mean_ms', 'latency_p99_ms',
     'latency_max_ms', 'period_error_mean_ms', 'period_error_p99_ms', 'period_error_max_ms',
     'command_age_s', 'commands_refused', 'frames_rejected', 'late_answers',
     'parameter_requests_ok', 'parameter_requests_failed', 'last_parameter_error',

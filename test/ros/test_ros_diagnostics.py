@@ -13,18 +13,18 @@ import pytest
 from std_msgs.msg import Float64
 
 from drive_can_bridge.core.errors import BusUnavailable
-from drive_can_bridge.core.sentences import NOTHING
+from drive_can_bridge.core.sentences import answer_late, NOTHING
 from drive_can_bridge.ros.diagnostics import BusReporter, DriveReporter
-from drive_can_bridge.ros.drive_node import late_text
 from drive_can_bridge.transport import link
 from drive_can_bridge.transport.end_point import Counts
 
 BUS, DRIVE = 'drive_can_bridge: bus main', 'drive_can_bridge: drive conveyor'
 BUS_KEYS = {
-    'state', 'load_percent', 'frames_sent', 'frames_received', 'frames_rejected', 'error_frames',
+    'state', 'code', 'load_percent', 'frames_sent', 'frames_received', 'frames_rejected',
+    'error_frames',
     'bus_off_count', 'reconnections', 'send_failures'}
 DRIVE_KEYS = {
-    'state', 'exchanges', 'missed_exchanges', 'latency_mean_ms', 'latency_p99_ms',
+    'state', 'code', 'exchanges', 'missed_exchanges', 'latency_mean_ms', 'latency_p99_ms',
     'latency_max_ms', 'period_error_mean_ms', 'period_error_p99_ms', 'period_error_max_ms',
     'command_age_s', 'commands_refused', 'frames_rejected', 'late_answers',
     'parameter_requests_ok', 'parameter_requests_failed', 'last_parameter_error', 'short_frames'}
@@ -199,7 +199,7 @@ def test_strangers_are_counted_and_told(bridge: StartBridge, client: Client) -> 
 @pytest.mark.parametrize(('seconds', 'words'), [
     (0.004, '4 ms'), (0.0003, '0.3 ms'), (0.1234, '123 ms')])
 def test_a_late_answer_in_words(seconds: float, words: str) -> None:
-    assert late_text(seconds) == (
+    assert answer_late(seconds) == (
         f'answer {words} after its period: the computer or the drive is too slow')
 
 
