@@ -70,7 +70,7 @@ def line(drive: DriveSnapshot) -> str:
     """Write ``conveyor online actual_speed=12.3 rpm motor_current=1.25 A``, or why it is not."""
     if not drive.online:
         why = drive.advice.removeprefix('offline').lstrip(': ')
-        return f'{drive.label} offline' + f': {why}' * bool(why)
+        return f'{drive.label} offline' + f' ({why})' * bool(why)
     known = [shown.assignment for shown in drive.values if shown.assignment]
     return ' '.join([drive.label, 'online', *known])
 
