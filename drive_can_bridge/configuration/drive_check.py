@@ -28,6 +28,9 @@ LISTS = ('cyclic_request', 'cyclic_response')
 #: keys that a drive does not simply have as they are given
 _MADE = ('profile', 'protocol', 'rearm', 'joint')
 
+#: s, from which on a period was probably meant in ms
+_LONG_PERIOD = 5.0
+
 
 class DriveChecker:
     """
@@ -51,7 +54,7 @@ class DriveChecker:
             self._wrong((), f'{show(self._name)} is the name of the bridge itself, allowed is any '
                             'other')
         bus = self._entry.get('bus')
-        if bus is not None and bus not in self._buses:
+        if bus is not None and self._buses and bus not in self._buses:
             self._wrong(('bus',), f'{show(bus)} is unknown, {suggestion(bus, self._buses)}')
         family = FAMILIES.get(self._entry.get('protocol', ''))
         self._load_profile(family)
@@ -64,6 +67,10 @@ class DriveChecker:
         self._check_status(drive)
         if not family.cyclic and not drive.cyclic_response and not self._is_damaged(LISTS[1]):
             self._wrong((LISTS[1],), f'empty, allowed in {family.name} is at least one parameter')
+        if drive.period >= _LONG_PERIOD:
+            self._tree.suspicious((*self._path, 'period'), f'{drive.period:g} s from one exchange '
+                                  f'to the next: it is in seconds, {drive.period:g} ms are '
+                                  f'{drive.period / 1000:g}')
         self._place(family.check(drive), Tree.wrong)
         self._place(family.warnings(drive), Tree.suspicious)
         drive = replace(drive, joint=check_joint(self._tree, drive))

@@ -19,13 +19,15 @@ from drive_can_bridge.configuration.tree_reader import DUPLICATE, Rules, TreeRea
 from drive_can_bridge.configuration.yaml_nodes import (
     BrokenYaml, Kind, Node, read_documents,
 )
-from drive_can_bridge.core.words import show, suggestion
+from drive_can_bridge.core.words import nearest, show, suggestion
 
 PARAMETERS_KEY = 'ros__parameters'
 #: tells the section of a bridge from those of other nodes
 MARK = 'buses'
 #: tell a profile, which is no file for nodes
 _PROFILE_KEYS = {'protocols', 'parameters'}
+#: how much a key has to look like that to be a slip of the pen, and no namespace
+_SLIP = 0.75
 #: the node that a section with wildcards is meant for, where it leaves the name open
 _NODE = 'drive_can_bridge'
 
@@ -102,8 +104,9 @@ class _FileReader:
             if key.text == PARAMETERS_KEY:
                 has_parameters = True
                 self._parameters(value, path, key.line)
-            elif key.text.startswith(PARAMETERS_KEY):
-                # rcl compares the beginning only, and would take it for the real one.
+            elif key.text.startswith(PARAMETERS_KEY) or path and nearest(
+                    key.text, [PARAMETERS_KEY], cutoff=_SLIP) is not None:
+                # rcl compares the beginning only, and would take a longer one for the real one
                 self._note(key.line, here, f'misspelt, allowed is {PARAMETERS_KEY}')
             elif value.kind is Kind.MAPPING:
                 self._names(value, here)
@@ -201,6 +204,10 @@ def read_parameter_file(path: FilePath) -> tuple[Tree | None, list[Problem]]:
     if len(ours) == 1:
         tree = _as_rcl_merges(reader.sections, ours[0])
         tree.problems[:0] = problems
+        if ours[0].name.rpartition('/')[2] not in (_NODE, '*', '**'):
+            tree.warnings.append(Problem(
+                str(path), tree.line(()), ours[0].name, f'fits no bridge that has its usual name, '
+                f'allowed is /**/{_NODE}, or a bridge that is started with this name'))
         return tree, tree.problems
     for section in ours:
         problems.extend(section.tree.problems)

@@ -10,6 +10,7 @@ It takes no recursion, so that no nesting of a file ends in the depths of the C 
 from collections.abc import Iterator
 from enum import Enum
 from pathlib import Path as FilePath
+import re
 from typing import NamedTuple
 
 import yaml
@@ -23,7 +24,8 @@ _LOADER = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
 #: of what is read at all, in MiB and in levels
 SIZE_MAX = 4
 DEPTH_MAX = 32
-_OPENED = ('while scanning a quoted scalar', 'while parsing a flow')
+#: what is noticed to be wrong much later: where it begins is the line to look at
+_OPENED = ('while scanning a quoted scalar', 'while parsing a flow', 'while scanning a simple key')
 
 
 class BrokenYaml(Exception):
@@ -113,15 +115,20 @@ def _documents(data: bytes) -> list[Document]:
             elif isinstance(event, yaml.DocumentStartEvent):
                 starts.append(line)
     except (yaml.YAMLError, ValueError, OverflowError) as error:
-        raise _broken(error, line) from None
+        raise _broken(error, line, data) from None
     return list(map(Document, starts, roots))
 
 
-def _broken(error: Exception, line: int) -> BrokenYaml:
+def _broken(error: Exception, line: int, data: bytes) -> BrokenYaml:
     mark = getattr(error, 'problem_mark', None)
-    if str(getattr(error, 'context', '')).startswith(_OPENED):
-        # What was never closed is noticed much later; the beginning is the line to look at.
+    context = str(getattr(error, 'context', ''))
+    if context.startswith(_OPENED):
         mark = getattr(error, 'context_mark', None) or mark
     line = mark.line + 1 if mark is not None else line
-    what = getattr(error, 'problem', None) or getattr(error, 'reason', None)
-    return BrokenYaml(line, f'not valid YAML: {what or "unreadable"}')
+    indentation = re.match(rb'\s*', b''.join(data.splitlines()[line - 1:line]))
+    if indentation is not None and b'\t' in indentation[0]:
+        return BrokenYaml(line, 'a tab in the indentation, allowed are spaces')
+    what = getattr(error, 'problem', None) or getattr(error, 'reason', None) or 'unreadable'
+    if context.startswith('while parsing a block mapping'):
+        what += ' (no key above it is indented like it: is one missing?)'
+    return BrokenYaml(line, f'not valid YAML: {what}')

@@ -16,6 +16,7 @@ shutdown   deactivate and cleanup as far as needed
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
+import shlex
 from typing import Any
 
 from rclpy.context import Context
@@ -79,6 +80,7 @@ class BridgeNode(LifecycleNode):
         self._fatal = fatal
         # now: later on, somebody may have edited or removed them
         self._unseen = unseen_problems(map(Path, files), self.get_fully_qualified_name())
+        self._files = list(files)
         self._transition_lock = clock.lock()
         self._control_thread = ServiceThread('control', self.context, self.log.error, clock,
                                              raise_priority, share=1.0,
@@ -193,7 +195,9 @@ class BridgeNode(LifecycleNode):
             configuration = configuration_from_overrides(self._node_parameters.current,
                                                          adapters=adapters)
         except ConfigurationError as error:
-            raise ConfigurationError([*problems, *error.problems]) from None
+            lines = [f'drive_can validate {shlex.quote(file)} names the lines'
+                     for file in self._files[:1]]
+            raise ConfigurationError([*problems, *error.problems, *lines]) from None
         if problems:
             raise ConfigurationError(problems)
         return configuration

@@ -75,7 +75,7 @@ def _main(watcher: SignalWatcher, arguments: list[str]) -> int:
         with _quiet_rcl():
             rest = remove_ros_args(arguments)[1:]
     except Exception as error:  # noqa: BLE001  it parses them all, files included
-        print(f'drive_can_bridge: {_parse_error(error)}', file=sys.stderr)
+        print(f'drive_can_bridge: {_parse_error(error, arguments)}', file=sys.stderr)
         return 1
     if rest:
         if rest[0] in ('-h', '--help'):
@@ -89,7 +89,7 @@ def _main(watcher: SignalWatcher, arguments: list[str]) -> int:
         with _quiet_rcl():
             rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
     except Exception as error:  # noqa: BLE001  rcl's parse errors come as several types
-        print(f'drive_can_bridge: {_parse_error(error)}', file=sys.stderr)
+        print(f'drive_can_bridge: {_parse_error(error, arguments)}', file=sys.stderr)
         return 1
     try:
         return _run(watcher, arguments)
@@ -172,10 +172,20 @@ def _parameter_files(arguments: Sequence[str]) -> list[str]:
             if option == '--params-file']
 
 
-def _parse_error(error: Exception) -> str:
-    """Return what rcl says without the file positions of its C sources."""
+def _parse_error(error: Exception, arguments: Sequence[str]) -> str:
+    """Return what is wrong with a file, or what rcl says without positions of its C sources."""
+    from drive_can_bridge.configuration.parameter_file import read_sections
+    from drive_can_bridge.configuration.problems import report
     from drive_can_bridge.transport.failures import in_words
 
+    for path in map(Path, _parameter_files(arguments)):
+        try:
+            problems = report(read_sections(path)[1])
+        except OSError:     # which rcl says, too
+            continue
+        if problems:
+            more = f' (drive_can validate {path} shows all)' if problems[1:] else ''
+            return f'{problems[0]}{more}'
     text = in_words(error).replace('failed to initialize rcl: ', '')
     if text.startswith('['):  # a bare list of what it does not know
         return f'unknown ROS arguments: {text}'

@@ -382,3 +382,17 @@ def test_fast_cycle_that_was_allowed(tmp_path: Path) -> None:
     text = changed(FILE, 'period: 0.02', 'period: 0.004\n        allow_fast_cycle: true')
     assert problems(tmp_path, text) == []
     assert problems(tmp_path, changed(FILE, 'period: 0.02', 'period: 0.005')) == []
+
+
+@pytest.mark.parametrize(('period', 'told'), [('20', True), ('5.0', True), ('0.5', False)])
+def test_a_period_that_was_meant_in_milliseconds(tmp_path: Path, period: str, told: bool) -> None:
+    found = warnings(tmp_path, changed(FILE, 'period: 0.02', f'period: {period}'))
+    assert [line for line in found if '.period: ' in line and 'it is in seconds' in line] == (
+        found if told else [])
+    assert bool(found) == told
+
+
+def test_without_buses_their_absence_is_all_that_is_told(tmp_path: Path) -> None:
+    begin, rest = FILE.split('    buses:\n')
+    text = begin + rest[rest.index('    drives:\n'):]
+    assert [line.split(': ')[1] for line in problems(tmp_path, text)] == ['buses']

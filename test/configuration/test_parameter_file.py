@@ -109,8 +109,10 @@ CASES = [
     ('x:\n  a: 1\n',
      ['f.yaml:5: x/a: no mapping (rcl refuses the file), allowed: ros__parameters']),
     ('x:\n  ros_parameters: [1]\n',
-     ['f.yaml:5: x/ros_parameters: no mapping (rcl refuses the file), did you mean '
-      "'ros__parameters'?"]),
+     ['f.yaml:5: x/ros_parameters: misspelt, allowed is ros__parameters']),
+    # one line, and not one for everything below it
+    ('x:\n  ros_parameters: {a: 1, b: {c: 2}}\n',
+     ['f.yaml:5: x/ros_parameters: misspelt, allowed is ros__parameters']),
     ('x:\n',
      ['f.yaml:4: x: no mapping (rcl refuses the file), allowed is ros__parameters below it']),
     ('x y:\n  ros__parameters: {a: 1}\n',
@@ -170,7 +172,10 @@ def test_problem(tmp_path: Path, tail: str, expected: list[str]) -> None:
 @pytest.mark.parametrize(('tail', 'line', 'what'), [
     ('    a: b: c\n', 4, 'mapping values are not allowed in this context'),
     ('    a: "open\n    b: 1\n', 4, 'found unexpected end of stream'),
-    ('  \ta: 1\n', 4, 'found character that cannot start any token'),
+    # where it begins, not where it is noticed
+    ('    drives\n    a: 1\n', 4, "could not find expected ':'"),
+    ('    a:\n      b: 1\n   c: 1\n', 6, 'did not find expected key (no key above it is '
+     'indented like it: is one missing?)'),
     ('    a: [1\n    b: 1\n', 4, "did not find expected ',' or ']'"),
     ('    a: @x\n', 4, 'found character that cannot start any token'),
 ])
@@ -178,6 +183,23 @@ def test_broken_yaml(tmp_path: Path, tail: str, line: int, what: str) -> None:
     pytest.importorskip('yaml._yaml', reason='the wording is that of libyaml')
     assert read(tmp_path, HEAD + BUSES + tail) == (
         None, [f'f.yaml:{line}: yaml: not valid YAML: {what}'])
+
+
+@pytest.mark.parametrize('tail', ['  \ta: 1\n', '\ta: 1\n', '    \ta: 1\n'])
+def test_tabs(tmp_path: Path, tail: str) -> None:
+    assert read(tmp_path, HEAD + BUSES + tail) == (
+        None, ['f.yaml:4: yaml: a tab in the indentation, allowed are spaces'])
+
+
+@pytest.mark.parametrize(('top', 'fits'), [
+    ('/**/drive_can_bridge', True), ('/**', True), ('/ns/drive_can_bridge', True),
+    ('/**/drive_can_brige', False), ('conveyors', False), ('/ns/other', False)])
+def test_a_name_that_only_a_renamed_bridge_has(tmp_path: Path, top: str, fits: bool) -> None:
+    path = tmp_path / 'f.yaml'
+    path.write_text(f'{top}:\n  ros__parameters:\n{BUSES}', encoding='utf-8')
+    tree, problems = read_parameter_file(path)
+    assert tree is not None and problems == []
+    assert [warning.key for warning in tree.warnings] == ([] if fits else [top])
 
 
 def test_bytes_that_are_no_text(tmp_path: Path) -> None:
