@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 # Nothing that runs from here leaves this machine, unless you say otherwise.
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 
-.PHONY: help demo test setup bench pictures lint clean
+.PHONY: help demo test check-stops setup bench pictures lint clean
 .NOTPARALLEL:
 .DEFAULT_GOAL := help
 
@@ -16,6 +16,7 @@ help:
 	@echo 'make test    all tests; ARGS="..." goes to pytest (-n 0: one after the other)'
 	@echo '             DRIVE_CAN_TEST_PROFILE=long: what is random looks longer, as in CI;'
 	@echo '             DRIVE_CAN_TEST_SEED=...: for the same random examples again'
+	@echo 'make check-stops  stories of stops, judged from the motor, without end; ARGS="--kind ... --seed ..."'
 	@echo 'make bench   measurements; ARGS="..." goes to bench/run.py'
 	@echo 'make pictures  those of README and docs, from a demo that runs'
 	@echo 'make lint    style and types'
@@ -35,6 +36,9 @@ demo:
 
 test:
 	@.ci/test '$(PYTHON)' '$(VENV)' $(ARGS)
+
+check-stops: setup
+	@exec $(BIN)/python .ci/foreground $(BIN)/python test/stop_checker.py $(ARGS)
 
 bench: setup
 	@exec $(BIN)/python .ci/foreground $(BIN)/python bench/run.py $(ARGS)

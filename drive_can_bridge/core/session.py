@@ -230,7 +230,7 @@ class Session(ABC):
     def bus_down(self, now: float, reason: str) -> None:
         """Handle the loss of the bus: requests fail, the drive is offline."""
         self.bus_available = False
-        if not (self.active or self.stopped):
+        if self.unshown or not (self.active or self.stopped):
             self.told.doubt()   # no answer to the stop will come
         self.users.fail_all(sentences.bus_down())
         down = sentences.bus_is_down(self.configuration.bus, reason)
@@ -427,6 +427,11 @@ class Session(ABC):
     def facts(self) -> dict[str, str]:
         """Return what diagnostics show of this family beyond what all families have."""
         return {}
+
+    @property
+    def unshown(self) -> bool:
+        """The drive was told to run, and has not shown to have heard that it was told to stop."""
+        return self.told.ran
 
     @property
     def offline_advice(self) -> Sentence:

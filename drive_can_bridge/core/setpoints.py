@@ -100,8 +100,9 @@ class Setpoints:
         """Take a command that is too old to move anything: one that equals neutral disarms."""
         setpoint = self.items[index]
         if setpoint.armed and setpoint.armed_by(value):
+            before = setpoint.raw
             setpoint.disarm()
-            self.changed = True
+            self.changed |= setpoint.raw != before
 
     def expire(self, now: float) -> list[Setpoint]:
         """

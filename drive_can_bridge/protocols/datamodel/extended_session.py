@@ -329,6 +329,10 @@ class ExtendedSession(Session):
         return {'short_frames': str(self.statistics.short)}
 
     @property
+    def unshown(self) -> bool:
+        return super().unshown and not self._exchange.book.stop_shown
+
+    @property
     def warning(self) -> Sentence:
         return self._maps.unknown if self._phase is Phase.CYCLIC else NOTHING
 

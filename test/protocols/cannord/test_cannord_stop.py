@@ -463,3 +463,14 @@ def test_inverter_that_falls_silent_at_rest_is_no_worry() -> None:
     talk = online()
     talk.until(12.0)
     assert warnings(talk) == []
+
+
+def test_bus_that_is_lost_before_silent_neutral_cycles_count_as_unheard() -> None:
+    """It fell silent while it ran, and what it was told since, nobody answered."""
+    talk = running()
+    talk.until(10.13)
+    assert not talk.session.online
+    assert warnings(talk) == []
+    talk.bus_down(10.135)
+    assert warnings(talk) == [
+        'the bus was lost before it could be told to stop: it may still be running']

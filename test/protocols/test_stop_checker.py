@@ -1,0 +1,77 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Stories of drives that run, judged from their motors; and some that show a broken stop."""
+
+from collections.abc import Callable
+from itertools import islice
+from typing import Any
+
+import pytest
+from stop_checker import (
+    all_stories, broken, check, KINDS, shortest, some_stories, Story, tell, Violation,
+)
+
+from drive_can_bridge.core.control_machine import ControlMachine
+from drive_can_bridge.core.setpoints import Setpoint
+from drive_can_bridge.core.told import Told
+from drive_can_bridge.protocols.exchange_book import ExchangeBook
+from drive_can_bridge.protocols.safe_stop import SafeStop
+
+#: stories by chance of each kind; ``make check-stops`` goes on for as long as somebody lets it
+BY_CHANCE = 60
+
+
+@pytest.mark.parametrize('kind', KINDS)
+def test_no_motor_runs_on(kind: str) -> None:
+    assert check(kind, all_stories(1)) == 40
+    assert check(kind, islice(some_stories(1), BY_CHANCE)) == BY_CHANCE
+
+
+@pytest.mark.parametrize('kind', [kind for kind, entry in KINDS.items() if 0 < entry.unseen < 9])
+def test_short_restarts_are_the_one_exception(kind: str) -> None:
+    """docs/safety.md names them: with a word that is sent all the time, nobody can see them."""
+    stories: list[Story] = [(('power', 0.9),), (('late', 0.013), ('power', 0.9)),
+                            *[(('quiet', 0.01 * place), ('power', 0.9)) for place in range(12)]]
+    assert not any(broken(kind, story) for story in stories)
+    if '11 bit' not in kind and 'PKW' not in kind:      # which have to be very short
+        assert any(broken(kind, story, lenient=False) for story in stories)
+
+
+def _nothing(*_: Any, **__: Any) -> None:
+    pass
+
+
+def _heard(self: ExchangeBook, received_at: float) -> None:
+    HEARD(self, received_at)
+    self.stop_shown = True
+
+
+HEARD, DONE = ExchangeBook.heard, SafeStop._done
+#: what is broken, and a story of a kind in which that shows
+DEFECTS: list[tuple[type, str, Callable[..., Any], str, Story]] = [
+    (Told, 'note', _nothing, 'CANnord', (('bus down', 0.013),)),
+    (Told, 'note', _nothing, 'PKW, no word', (('bus down', 0.013),)),
+    (Told, 'doubt', lambda self: False, '29 bit, no word', (('silent', 0.0), ('end', 0.0))),
+    (ExchangeBook, 'heard', _heard, 'CANnord', (('late', 0.4), ('silent', 0.0), ('end', 0.0))),
+    (SafeStop, '_done', lambda self, failed: DONE(self, []), '11 bit, no word',
+     (('silent', 0.0), ('end', 0.0))),
+    (ControlMachine, 'withdraw', _nothing, 'CANnord', (('silent', 0.9), ('well', 0.9))),
+    (Setpoint, 'disarm', _nothing, '29 bit, no word', (('quiet', 0.9),)),
+]
+
+
+@pytest.mark.parametrize(('owner', 'name', 'instead', 'kind', 'story'), DEFECTS)
+def test_what_is_broken_is_seen(owner: type, name: str, instead: Callable[..., Any], kind: str,
+                                story: Story, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert not broken(kind, story)
+    monkeypatch.setattr(owner, name, instead)
+    assert broken(kind, story)
+
+
+def test_the_shortest_story_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Told, 'note', _nothing)
+    story: Story = (('late', 0.1), ('bus down', 0.013), ('stall', 0.1))
+    assert shortest('CANnord', story)[0] == (('bus down', 0.013),)
+    with pytest.raises(Violation, match=r"CANnord: the bus is lost: .*\('bus down', 0.013\)"):
+        check('CANnord', [story])
+    with pytest.raises(Violation):
+        tell('CANnord', story)

@@ -1,0 +1,655 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+Whatever happens to drives, no motor runs on by our word: stories by the thousand, judged there.
+
+A *story* is what happens to a drive that runs, one thing after the other: users, a bus, a drive
+that is deaf, mute, late or without power, a process that stands still. Real sessions go through
+it in virtual time, against drives that are registers and literal bytes. What is right is judged
+from their motors, by these rules:
+
+1. What runs and is not wanted any more has stopped, 3 s after the drive can be talked to again.
+2. A stop that has ended without the word that the drive may still be running has stopped it.
+3. Nothing begins to run, or is given a setpoint, without an enable and a command of a user who
+   meant it: later than the last loss, stall, stop, restart or end.
+4. A drive that runs when its bus is lost is said to run, perhaps.
+
+Nothing in here asks a session what it owes, and no codec of the package is used.
+
+.. code-block:: console
+
+    $ python test/stop_checker.py                # all stories of three things, then longer ones
+    $ python test/stop_checker.py --seed 5 --kind 'CANnord'
+"""
+
+import argparse
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+import heapq
+from itertools import chain, count, islice, product
+import math
+import random
+import sys
+import time
+from typing import Any
+
+from builders import (
+    ACTUAL, CONTROL, CURRENT, drive, frame, INT16, parameter, RAM, RO, SPEED, STATUS, WORD,
+)
+from literal_drives import ExtendedDrive, PkwNode, StandardDrive
+
+from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
+from drive_can_bridge.core.events import Noted, StationFound, StationLost
+from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.profile import ControlTable, StatusPattern
+from drive_can_bridge.protocols.families import make_sessions
+
+PERIOD = 0.05
+#: s until a frame is answered, and by a drive that is late
+PROMPT, LATE = 0.002, 1.4 * PERIOD
+#: s that a drive is talked to until it has to stand
+STOPPED_AFTER = 3.0
+#: stories that are told of each kind before the next has its turn
+AT_ONCE = 100
+#: steps of a while: what takes more does not end
+STEPS_MAX = 20_000
+#: s until the bridge has looked at maps that somebody has changed
+MAPS_LOOKED_AT = 1.2
+#: s by which a setpoint may be older than ``command_timeout`` when it reaches the drive
+SLACK = 0.12
+COMMAND_TIMEOUT = 0.5
+#: raw and physical value of the setpoint that users want, and how often they say so (s)
+RAW, VALUE, COMMANDED_EVERY = 50, 5.0, 0.1
+
+TESYS_STATUS = parameter('system_status_1', 455, access=RO)
+TESYS_WORD = parameter('control_register_1', 704, storage=RAM)
+TESYS_SPEED = parameter('speed', 710, storage=RAM, scale=0.1, unit='Hz')
+TESYS_CONTROL = ControlTable(
+    parameter='control_register_1', disable=0, enable=1, reset_fault=8,
+    status_parameter='system_status_1', ready=StatusPattern(1, 1),
+    enabled=StatusPattern(0x80, 0x80), fault=StatusPattern(4, 4))
+FREQUENCY = parameter('frequency_setpoint', None, type=INT16, scale=0.1, unit='Hz')
+
+
+class Motor(dict[int, int]):
+    """
+    The registers of a drive, and the motor that obeys them.
+
+    :param word: number of the control word; None: the setpoint alone moves it.
+    :param status: number of the status word, and its bits for ready and enabled.
+    :param moved: called when it begins to run, or gets another setpoint while it runs.
+    """
+
+    def __init__(self, rest: dict[int, int], *, setpoint: int, word: int | None,
+                 status: int | None = None, bits: tuple[int, int] = (1, 2),
+                 moved: Callable[[bool], None]) -> None:
+        super().__init__(rest)
+        self.setpoint, self.word, self.status, self.bits = setpoint, word, status, bits
+        self.moved = moved
+        self.initial = dict(rest)
+        self.before = (False, 0)
+        self.restarts()
+
+    @property
+    def runs(self) -> bool:
+        return self[self.setpoint] != 0 if self.word is None else self[self.word] == 1
+
+    def look(self) -> None:
+        """Tell what a frame, taken as a whole, has moved."""
+        now = self.runs, self[self.setpoint] if self.runs else 0
+        before, self.before = self.before, now
+        moves = now[1] not in (0, before[1])
+        if now[0] and (moves or not before[0]):
+            self.moved(moves)
+
+    def restarts(self) -> None:
+        """Be without power for a moment: nothing but the maps is kept."""
+        for number in {self.setpoint, self.word} - {None}:
+            self[number] = 0    # type: ignore[index]
+        self.before = (False, 0)
+
+    def __getitem__(self, number: int) -> int:
+        if number == self.status:
+            ready, enabled = self.bits
+            return ready | enabled * self.runs
+        return super().__getitem__(number)
+
+
+class Inverter:
+    """CANnord: 7F04 runs it; obeys its own identifier, and those of broadcasts."""
+
+    def __init__(self, motor: Motor, alone: int, *others: int) -> None:
+        self.registers, self.alone, self.obeys = motor, alone, (alone, *others)
+
+    def takes(self, sent: Frame) -> list[Frame]:
+        if sent.identifier not in self.obeys:
+            return []
+        self.registers[1] = int(sent.data[:2] == b'\x7F\x04')
+        self.registers[2] = int.from_bytes(sent.data[2:4], 'little')
+        if sent.identifier != self.alone:
+            return []
+        return [frame(f'{self.alone + 1:03X}#{"37" if self.registers.runs else "31"}0B0000')]
+
+
+@dataclass(frozen=True)
+class Kind:
+    """
+    A kind of drive, or group of them.
+
+    :ivar unseen: s after a restart for which nobody can know of it: where its word, or a setpoint
+        without one, is sent all the time. docs/safety.md names that.
+    """
+
+    configure: Callable[[], list[DriveConfiguration]]
+    make: Callable[[Callable[[bool], None], int], Any]
+    unseen: float = 0.0
+    maps: bool = False
+
+
+def _extended(*, slot: bool = False, control: bool = True, **options: Any) -> Kind:
+    more: tuple[Parameter, ...] = (WORD,) if slot else ()
+    return Kind(
+        lambda: [drive('datamodel_extended', control=CONTROL if control else None, period=PERIOD,
+                       request=(SPEED, *more), response=(ACTUAL, CURRENT, STATUS), **options)],
+        lambda moved, _: ExtendedDrive(Motor(
+            {**dict(zip(range(122, 130), (50, 52 * slot, 0, 0, 209, 210, 211, 0))),
+             50: 0, 52: 0, 209: 0, 210: 0, 211: 0},
+            setpoint=50, word=52 if control else None, status=211, moved=moved)),
+        unseen=4 * PERIOD if slot or not control else 0.0, maps=True)
+
+
+def _standard(*, slot: bool = False, control: bool = True) -> Kind:
+    more: tuple[Parameter, ...] = (WORD,) if slot else ()
+    return Kind(
+        lambda: [drive('datamodel_standard', control=CONTROL if control else None, period=PERIOD,
+                       request=(SPEED, *more), response=(ACTUAL, CURRENT, STATUS))],
+        lambda moved, _: StandardDrive(Motor(
+            {50: 0, 52: 0, 209: 0, 210: 0, 211: 0}, setpoint=50, word=52 if control else None,
+            status=211, moved=moved)),
+        unseen=0.005 if control else math.inf)
+
+
+def _pkw(*, slot: bool = False, control: bool = True) -> Kind:
+    more = (TESYS_WORD,) if slot else ()
+    return Kind(
+        lambda: [drive('canopen_pkw', station=5, table=(TESYS_STATUS, TESYS_WORD, TESYS_SPEED),
+                       control=TESYS_CONTROL if control else None, period=0.1,
+                       request=(TESYS_SPEED, *more), response=(TESYS_STATUS,),
+                       parameter_timeout=0.2, refresh_interval=0.3)],
+        lambda moved, _: PkwNode(5, Motor(
+            {455: 0, 704: 0, 710: 0}, setpoint=710, word=704 if control else None, status=455,
+            bits=(1, 0x80), moved=moved)),
+        unseen=0.11 if slot else 0.0)
+
+
+def _cannord(members: int = 1) -> Kind:
+    return Kind(
+        lambda: [drive('cannord', name=f'drive_{station}', station=station, table=(FREQUENCY,),
+                       request=(FREQUENCY,), response=(), period=PERIOD,
+                       broadcast='group' if members > 1 else 'none')
+                 for station in range(1, members + 1)],
+        lambda moved, index: Inverter(
+            Motor({1: 0, 2: 0}, setpoint=2, word=1, moved=moved), 2 * index + 2,
+            *[0x400] * (members > 1)),
+        unseen=4 * PERIOD * members)
+
+
+KINDS: dict[str, Kind] = {
+    '29 bit, word by number': _extended(),
+    '29 bit, word in its slot': _extended(slot=True),
+    '29 bit, no word': _extended(control=False),
+    '29 bit, maps assumed': _extended(mapping='assume'),
+    '29 bit, maps assumed, word in its slot': _extended(slot=True, mapping='assume'),
+    '29 bit, maps configured': _extended(mapping='configure'),
+    '29 bit, maps configured, word in its slot': _extended(slot=True, mapping='configure'),
+    '11 bit, word by number': _standard(),
+    '11 bit, word with its setpoints': _standard(slot=True),
+    '11 bit, no word': _standard(control=False),
+    'PKW, word by number': _pkw(),
+    'PKW, word with its setpoints': _pkw(slot=True),
+    'PKW, no word': _pkw(control=False),
+    'CANnord': _cannord(),
+    'CANnord, group of two': _cannord(2),
+    'CANnord, group of four': _cannord(4),
+}
+
+#: what may happen, and how many s pass then
+THINGS = ('run', 'enable', 'zero', 'quiet', 'disable', 'quick_stop', 'silent', 'mute', 'late',
+          'twice', 'well', 'power', 'stall', 'late process', 'bus down', 'bus up', 'refuses',
+          'maps', 'end', 'begin')
+PAUSES = (0.013, 0.9)
+Story = tuple[tuple[str, float], ...]
+
+
+class Violation(AssertionError):
+    """A rule is broken."""
+
+
+@dataclass
+class Partner:
+    """One drive, and what its users may expect of it."""
+
+    index: int
+    device: Any
+    motor: Motor
+    wanted: bool = False            # an enable that nothing has ended
+    armed: bool = False             # a command that means it, and nothing has ended it
+    unwanted_since: float = math.inf
+    said: bool = False              # that it may still be running, since it was found
+    restarted_at: float = -math.inf
+    events: list[Any] = field(default_factory=list)
+
+
+class World:
+    """
+    Sessions of a kind, their drives, their users and their bus.
+
+    :param lenient: short restarts that nobody can see are forgiven.
+    """
+
+    def __init__(self, kind: str, *, lenient: bool = True) -> None:
+        self.kind = KINDS[kind]
+        self.unseen = self.kind.unseen if lenient else 0.0
+        self.now = 10.0
+        self.sessions = make_sessions(self.kind.configure())
+        self.partners: list[Partner] = []
+        for index in range(len(self.sessions)):
+            device = self.kind.make(lambda moves, index=index: self.moved(index, moves), index)
+            self.partners.append(Partner(index, device, device.registers))
+        self.leader = self.sessions[0]
+        self.control = self.leader.control is not None
+        self.deaf = self.mute = self.twice = self.refusing = False
+        self.bus = self.active = True
+        self.delay = PROMPT
+        self.coming: list[tuple[float, int, int, str]] = []
+        self.number = count()
+        self.looked_at = -math.inf
+        self.commanded_at = -math.inf
+        self.publish_at = math.inf
+        for session in self.sessions:
+            session.bus_up(self.now)
+            session.activate(self.now)
+        self.took()
+        self.live(0.6)
+        if not all(session.online for session in self.sessions):
+            raise Violation('a drive that is there is not found')
+
+    # -- the bus ----------------------------------------------------------------------------------
+
+    def took(self) -> None:
+        """Have the drives hear what the sessions send, and listen to these."""
+        for session, partner in zip(self.sessions, self.partners):
+            while frames := session.take_frames():
+                if not self.refusing and self.bus:
+                    for each in frames:
+                        self.hear(each)
+                session.frames_left(
+                    self.now, range(len(frames)) if self.refusing or not self.bus else ())
+            for event in session.take_events():
+                self.told(partner, event)
+
+    def hear(self, sent: Frame) -> None:
+        if self.deaf:
+            return
+        for partner in self.partners:
+            answers = partner.device.takes(sent)
+            partner.motor.look()
+            for answer in () if self.mute else answers * (1 + self.twice):
+                heapq.heappush(self.coming, (
+                    self.now + self.delay, next(self.number), partner.index, str(answer)))
+
+    def told(self, partner: Partner, event: Any) -> None:
+        if isinstance(event, Noted):
+            partner.said = partner.said or event.danger
+        elif isinstance(event, StationFound):
+            partner.said = False
+        elif isinstance(event, StationLost):
+            self.ends()
+        elif isinstance(event, ControlCompleted) and not event.success and (
+                event.request.action is ControlAction.ENABLE):
+            self.ends()
+
+    def live(self, seconds: float) -> None:
+        """Let time pass."""
+        end = self.now + seconds
+        for _ in range(STEPS_MAX):
+            due = max(self.now, min(self.publish_at, *(
+                session.next_timer() for session in self.sessions), math.inf))
+            if self.coming and self.coming[0][0] <= min(due, end):
+                at, _, index, text = heapq.heappop(self.coming)
+                self.now = max(self.now, at)
+                if self.bus:
+                    self.sessions[index].receive_frame(frame(text), self.now)
+            elif due <= end:
+                self.now = due
+                self.publish()
+                for session in self.sessions:
+                    if session.next_timer() <= self.now:
+                        session.handle_timer(self.now)
+            else:
+                self.now = end
+                self.took()
+                return
+            self.took()
+            self.judge()
+        raise Violation('a timer is never done')
+
+    def publish(self) -> None:
+        """Command what users have wanted, again and again, whatever became of the drive."""
+        if self.now >= self.publish_at:
+            self.publish_at = self.now + COMMANDED_EVERY
+            self.command(VALUE)
+
+    def command(self, value: float) -> None:
+        self.commanded_at = self.now
+        self.leader.users.command(0, value, self.now)
+
+    # -- the judge --------------------------------------------------------------------------------
+
+    def ends(self) -> None:
+        """Take note of something after which nothing may be resumed."""
+        for partner in self.partners:
+            partner.armed = False
+            if partner.wanted:
+                partner.wanted = False
+                partner.unwanted_since = self.now
+
+    def moved(self, index: int, moves: bool) -> None:
+        """Judge a motor that begins to run, or gets a setpoint (``moves``)."""
+        partner = self.partners[index]
+        if self.unseen and self.now - partner.restarted_at <= self.unseen + self.delay:
+            partner.wanted = partner.armed = True   # as far as anybody but the drive can know
+            return
+        if self.control and not partner.wanted:
+            raise Violation(f'drive {index + 1} starts by itself')
+        if moves and not partner.armed:
+            raise Violation(f'drive {index + 1} gets a setpoint that nobody has armed')
+        if moves and self.now - self.commanded_at > COMMAND_TIMEOUT + SLACK:
+            raise Violation(f'drive {index + 1} gets a setpoint that is '
+                            f'{self.now - self.commanded_at:.3f} s old')
+
+    def reachable(self) -> bool:
+        return self.bus and not (self.deaf or self.mute or self.refusing)
+
+    def judge(self) -> None:
+        """Judge motors that run although they shall not."""
+        for partner in self.partners:
+            runs = partner.motor.runs
+            if not runs or partner.wanted and self.control or not self.control and (
+                    partner.armed and self.now - self.commanded_at <= COMMAND_TIMEOUT):
+                partner.unwanted_since = math.inf
+            elif partner.unwanted_since == math.inf or not self.reachable() or not self.active:
+                partner.unwanted_since = self.now
+            elif self.now - partner.unwanted_since > STOPPED_AFTER:
+                raise Violation(f'drive {partner.index + 1} runs on')
+
+    def settle(self) -> None:
+        """Let time pass until nothing runs that shall not; the judge says how long that takes."""
+        self.live(0.6)
+        while self.active and any(
+                partner.unwanted_since < math.inf for partner in self.partners):
+            self.live(0.2)
+
+    def stop_is_honest(self, when: str) -> None:
+        for partner in self.partners:
+            if partner.motor.runs and not partner.said:
+                raise Violation(f'{when}: drive {partner.index + 1} runs, and nobody says so')
+
+    # -- what happens -----------------------------------------------------------------------------
+
+    def happens(self, thing: str) -> None:
+        getattr(self, '_' + thing.replace(' ', '_'))()
+        self.took()
+
+    def _ask(self, action: ControlAction) -> None:
+        session = self.leader
+        if session.control is None or session.users.control_refusal(action):
+            return
+        if action is ControlAction.ENABLE:
+            for partner in self.partners:
+                partner.wanted = True
+        elif action is not ControlAction.QUICK_STOP or (
+                session.control.table.quick_stop is not None):
+            self.ends()
+        session.users.submit(ControlRequest(action), self.now)
+
+    def _enable(self) -> None:
+        self._ask(ControlAction.ENABLE)
+
+    def _zero(self) -> None:
+        """Command neutral, which arms, and go on with what is wanted."""
+        for partner in self.partners:
+            partner.armed = True
+        self.command(0.0)
+        self.publish_at = self.now + 0.03
+
+    def _run(self) -> None:
+        self._enable()
+        self.took()
+        self.live(0.3)
+        self._zero()
+        self.live(0.15)
+
+    def _quiet(self) -> None:
+        self.publish_at = math.inf
+
+    def _disable(self) -> None:
+        self._ask(ControlAction.DISABLE)
+        if not self.control:
+            self._quiet()
+
+    def _quick_stop(self) -> None:
+        self._ask(ControlAction.QUICK_STOP)
+
+    def _silent(self) -> None:
+        self.deaf = True
+
+    def _mute(self) -> None:
+        self.mute = True
+
+    def _late(self) -> None:
+        self.delay = LATE
+
+    def _twice(self) -> None:
+        self.twice = True
+
+    def _well(self) -> None:
+        self.deaf = self.mute = self.twice = self.refusing = False
+        self.delay = PROMPT
+
+    def _power(self) -> None:
+        """Lose power for a moment, unseen."""
+        for partner in self.partners:
+            partner.motor.restarts()
+            partner.restarted_at = self.now
+        if self.unseen == 0.0 or self.control:
+            self.ends_unless_unseen()
+        for partner in self.partners:
+            if isinstance(partner.device, PkwNode):
+                partner.device.restarts()
+                if not self.mute and not self.deaf and self.bus:
+                    heapq.heappush(self.coming, (
+                        self.now + 0.001, next(self.number), partner.index, '705#00'))
+
+    def ends_unless_unseen(self) -> None:
+        if self.unseen == 0.0 or isinstance(self.partners[0].device, (PkwNode, StandardDrive)):
+            self.ends()
+
+    def _stall(self) -> None:
+        self.now += 1.3
+        self.ends()
+        for session in self.sessions:
+            session.time_lost(self.now)
+
+    def _late_process(self) -> None:
+        """Stand still for less than a second; what arrived meanwhile comes first."""
+        self.now += 0.4
+
+    def _bus_down(self) -> None:
+        if self.bus:
+            for session in self.sessions:
+                session.bus_down(self.now, 'unplugged')
+            self.took()
+            self.bus = False
+            self.coming.clear()
+            self.ends()
+            if self.active:
+                self.stop_is_honest('the bus is lost')
+
+    def _bus_up(self) -> None:
+        if not self.bus:
+            self.bus = True
+            for session in self.sessions:
+                session.bus_up(self.now)
+
+    def _refuses(self) -> None:
+        self.refusing = True
+
+    def _maps(self) -> None:
+        """Have somebody change the request map: what was the setpoint is nothing any more."""
+        if self.kind.maps:
+            self.looked_at = self.now + MAPS_LOOKED_AT
+            for partner in self.partners:
+                partner.motor[122] = 209
+
+    def _end(self) -> None:
+        """End, as the exchange does: wait for the stop, give up at last."""
+        if not self.active:
+            return
+        if self.now < self.looked_at:   # until then nobody knows of other maps
+            self.live(self.looked_at - self.now)
+        self.active = False
+        self.ends()
+        for partner in self.partners:
+            partner.said = False
+        for session in self.sessions:
+            session.deactivate(self.now)
+        self.took()
+        end = self.now + 0.5 + max(session.longest_stop for session in self.sessions)
+        while not all(session.stopped for session in self.sessions) and self.now < end:
+            self.live(0.02)
+        for session in self.sessions:
+            if not session.stopped:
+                session.give_up(self.now)
+        self.took()
+        self.stop_is_honest('the end')
+
+    def _begin(self) -> None:
+        if not self.active:
+            self.active = True
+            for partner in self.partners:
+                partner.unwanted_since = math.inf
+            for session in self.sessions:
+                session.activate(self.now)
+
+
+def tell(kind: str, story: Story, *, lenient: bool = True) -> None:
+    """
+    Live through a story, and what follows: everything is well again, and ends.
+
+    :raises Violation: a rule is broken.
+    """
+    world = World(kind, lenient=lenient)
+    world.happens('run')
+    if not all(partner.motor.runs for partner in world.partners):
+        raise Violation('a drive does not run that was told to')
+    for thing, seconds in story:
+        world.happens(thing)
+        world.live(seconds)
+    world.happens('bus up')
+    world.happens('well')
+    world.settle()
+    world.happens('end')
+
+
+# -- stories --------------------------------------------------------------------------------------
+
+
+def broken(kind: str, story: Story, *, lenient: bool = True) -> str:
+    """Return which rule a story breaks; '' if none."""
+    try:
+        tell(kind, story, lenient=lenient)
+    except Violation as violation:
+        return str(violation)
+    return ''
+
+
+def shortest(kind: str, story: Story) -> tuple[Story, str]:
+    """Leave away whatever a story does not need in order to break a rule."""
+    changed = True
+    while changed:
+        changed = False
+        for place in range(len(story)):
+            shorter = story[:place] + story[place + 1:]
+            if broken(kind, shorter):
+                story, changed = shorter, True
+                break
+    return story, broken(kind, story)
+
+
+def all_stories(depth: int) -> Iterator[Story]:
+    """Return every story of so many things."""
+    for things in product(product(THINGS, PAUSES), repeat=depth):
+        yield tuple(things)
+
+
+def some_stories(seed: int, depths: Sequence[int] = (3, 4, 5, 6)) -> Iterator[Story]:
+    """Return stories by chance, without end."""
+    chance = random.Random(seed)
+    while True:
+        yield tuple((chance.choice(THINGS), chance.choice((0.0, 0.003, *PAUSES, 0.11)))
+                    for _ in range(chance.choice(depths)))
+
+
+def check(kind: str, stories: Iterable[Story]) -> int:
+    """
+    Live through stories; return how many.
+
+    :raises Violation: the shortest story that breaks a rule.
+    """
+    told = 0
+    for story in stories:
+        told += 1
+        if broken(kind, story):
+            least, why = shortest(kind, story)
+            raise Violation(f'{kind}: {why}, after {list(least)}')
+    return told
+
+
+def main() -> int:
+    """Check without end, and say how many stories were told."""
+    parser = argparse.ArgumentParser(
+        description='tell stories of drives that run, and look at their motors')
+    parser.add_argument('--seed', type=int, default=int(time.time()))
+    parser.add_argument('--kind', choices=KINDS, action='append', default=[])
+    parser.add_argument('--depth', type=int, default=3, help='of the stories that are all told')
+    parser.add_argument('--seconds', type=float, default=math.inf,
+                        help='of stories by chance, then; without it they go on without end')
+    options = parser.parse_args()
+    begun, number = time.monotonic(), 0
+    print(f'seed {options.seed}', flush=True)
+    rounds = chain((all_stories(depth) for depth in range(1, options.depth + 1)),
+                   (islice(some_stories(seed), AT_ONCE) for seed in count(options.seed)))
+    by_chance_at = math.inf
+    try:
+        for place, stories in enumerate(rounds):
+            if place == options.depth:
+                by_chance_at = time.monotonic()
+            while part := list(islice(stories, AT_ONCE)):
+                for kind in options.kind or KINDS:
+                    if time.monotonic() >= by_chance_at + options.seconds:
+                        return 0
+                    number += check(kind, part)
+                    print(f'{number} stories in {time.monotonic() - begun:.0f} s: nothing wrong '
+                          f'with {kind}', flush=True)
+    except Violation as violation:
+        print(f'after {number} stories: {violation}')
+        return 1
+    except KeyboardInterrupt:
+        pass
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
