@@ -279,7 +279,7 @@ class Simulator(Process):
         super().kill()
 
     def frames(self, pattern: str = '', since: int = 0) -> list[str]:
-        """Return the logged frames, as ``003FFFF0#0000000000000000 R``; R: from the bridge."""
+        """Return the logged frames, as ``003FFFF0#000003E800000000 R``; R: from the bridge."""
         expression = re.compile(pattern)
         lines = self.lines
         self._frames += [line.split(' ', 2)[2] for line in lines[self._looked:]

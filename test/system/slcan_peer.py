@@ -19,6 +19,8 @@ from waiting import wait_for
 
 
 ZEROS = '0' * 16
+#: request data of the conveyor that stands: speed 0, torque limit 100 % (1000 = 03E8h)
+NEUTRAL_WORDS = '000003E8' + '0' * 8
 
 
 class Line(NamedTuple):

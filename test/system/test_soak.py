@@ -34,10 +34,10 @@ GROWTH = 16.0
 LOG_MAX = 50_000
 
 CYCLIC = '^003FFFF0#'
-NEUTRAL = '^003FFFF0#0{16} R'
-MOVING = '^003FFFF0#(?!0{16} R).* R'
+NEUTRAL = '^003FFFF0#000003E80{8} R'
+MOVING = '^003FFFF0#(?!000003E80{8} R).* R'
 #: to the neighbour, which nobody ever sends a neutral command
-NEIGHBOUR_MOVING = '^005FFFF0#(?!0{16} R).* R'
+NEIGHBOUR_MOVING = '^005FFFF0#(?!000003E80{8} R).* R'
 FAULTS = ('silent', 'late=0.015', 'late=0.5', 'drop=2', 'drop=5', 'length=3', 'length=0',
           'foreign', 'duplicate', 'stuck=ramp_time', 'off', 'restart', 'restart=0.1', 'forget',
           'trip', 'foreign duplicate drop=3')
@@ -67,7 +67,6 @@ class Soak:
         client.online(self.neighbour)
         client.publish(f'{self.neighbour}/command/speed_setpoint', 150.0)
         client.publish(f'{self.neighbour}/command/torque_limit', 100.0)
-        client.publish(f'{self.conveyor}/command/torque_limit', 0.0)
 
     # -- what happens -----------------------------------------------------------------------------
 
@@ -184,7 +183,7 @@ class Soak:
         """See an orderly end, and that nothing has grown."""
         assert self.bridge.end(self.random.choice((signal.SIGINT, signal.SIGTERM))) == 0
         wait_for_end(lambda: self.simulator.frames('^003FFFF0.* R$'),
-                     ['003FFFF0#0000000000000000 R'] * 3)
+                     ['003FFFF0#000003E800000000 R'] * 3)
         assert not [line for line in self.bridge.errors
                     if 'internal error' in line or '[FATAL]' in line]
         warm, late = self.megabytes[WARM:], self.megabytes[-WARM:]

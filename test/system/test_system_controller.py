@@ -16,15 +16,15 @@ from parameter_files import bridge_file, CONVEYOR
 from processes import Client, Processes
 import pytest
 from repeating import again_and_again
-from slcan_peer import ZEROS
+from slcan_peer import NEUTRAL_WORDS, ZEROS
 from test_system_reconnection import rearm_and_move, start_moving, status_of
 from waiting import SLOWNESS, wait_for, wait_for_end
 
 from drive_can_bridge.cli.main import main as drive_can
 
 CYCLIC_REQUEST = 'T003FFFF08'
-MOVING = f'{CYCLIC_REQUEST}05DC{ZEROS[4:]}'
-NEUTRAL = CYCLIC_REQUEST + ZEROS
+MOVING = f'{CYCLIC_REQUEST}05DC{NEUTRAL_WORDS[4:]}'
+NEUTRAL = CYCLIC_REQUEST + NEUTRAL_WORDS
 #: what the smallest send buffer of the kernel holds, and one frame in the controller
 UNDER_WAY = 3 + 1
 PERIOD = 0.1
@@ -48,7 +48,7 @@ def start_feeding(client: Client, drive: str, adapter: KernelAdapter) -> None:
     client.online(drive)
     since = len(adapter.lines)
     client.publish(f'{drive}/command/speed_setpoint', 0.0)
-    client.diagnostics(status_of(drive), message='not armed: publish 0 to [^ ]*/torque_limit$')
+    client.diagnostics(status_of(drive), state='^online$')
     client.publish(f'{drive}/command/speed_setpoint', 150.0)
     adapter.wait_for(MOVING, since)
 

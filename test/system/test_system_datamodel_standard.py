@@ -28,7 +28,7 @@ SHORT = {**CONVEYOR, 'protocol': 'datamodel_standard',
 #: Reg.209 to 211 in one read
 ASK = r'^3F1#03D1000300000000 R$'
 ANSWER = r'^7F1#.{12}A5A5 T$'
-NEUTRAL = r'^3F1#063[23]000000000000 R$'
+NEUTRAL = r'^3F1#06(320000|3303E8)0{8} R$'
 MOVING = r'^3F1#063200(?!0000)'
 SECONDS = 6.0
 
@@ -49,8 +49,7 @@ class Bench:
 
     def arm(self, drive: str) -> None:
         """Send neutral until nothing waits for it."""
-        for name in ('torque_limit', 'speed_setpoint'):
-            self.client.publish(f'{drive}/command/{name}', 0.0)
+        self.client.publish(f'{drive}/command/speed_setpoint', 0.0)
         self.client.diagnostics(status_of(drive), state='^online$')
 
     def move(self, drive: str, speed: float) -> None:

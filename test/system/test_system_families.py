@@ -54,11 +54,11 @@ SPEED = {'torque_limit': 100.0, 'speed_setpoint': 150.0}
 FAMILIES = [
     Facts(
         # longer than the drive needs: it begins to count when it gets round to it
-        {**CONVEYOR, 'eeprom_write_gap': 0.2}, SPEED, '^003FFFF0#0{16} R$',
+        {**CONVEYOR, 'eeprom_write_gap': 0.2}, SPEED, '^003FFFF0#000003E80{8} R$',
         ('^003FFFF0#05DC03E800000000 R$',),
         ('actual_speed', 145.0, 155.0),
         ('ramp_time', 7.25, '^003001E1#02D5000000000000 R$', '^102001E1#02D5.* T$'),
-        ('ramp_time', 61.0, '0.01 to 60 s'), ('^003FFFF0#', '0{16} R', 3)),
+        ('ramp_time', 61.0, '0.01 to 60 s'), ('^003FFFF0#', '000003E80{8} R', 3)),
     Facts(
         SHORT, SPEED, '^3F1#063[23]000000000000 R$',
         # 1000 = 03E8h, 1500 = 05DCh, one frame each

@@ -81,7 +81,7 @@ def test_signal_while_deactivating(processes: Processes, client: Client, namespa
     timer.join()
     assert bridge.wait() == 0
     wait_for_end(lambda: simulator.frames('^003FFFF0.* R$'),
-                 ['003FFFF0#0000000000000000 R'] * 3)
+                 ['003FFFF0#000003E800000000 R'] * 3)
     assert not [line for line in bridge.errors if '[ERROR]' in line]
 
 

@@ -9,9 +9,9 @@ from processes import Client, Process, Processes, Simulator
 from waiting import SLOWNESS
 
 CYCLIC = '^003FFFF0#'
-NEUTRAL = '^003FFFF0#0{16} R'
+NEUTRAL = '^003FFFF0#000003E80{8} R'
 #: anything cyclic with a setpoint that is not neutral
-MOVING = '^003FFFF0#(?!0{16} R)'
+MOVING = '^003FFFF0#(?!000003E80{8} R)'
 MISSED_LIMIT = 4
 
 
@@ -116,7 +116,7 @@ def test_drive_falls_silent_and_comes_back(processes: Processes, client: Client,
     simulator.frame('^002007A4', since=last, count=3)
     after = [frame for frame in simulator.frames(' R$', since=last) if '003FFFF0' in frame]
     assert [frame.split('#')[1] for frame in after] == (
-        ['05DC000000000000 R'] * MISSED_LIMIT + ['0000000000000000 R'] * 3)
+        ['05DC03E800000000 R'] * MISSED_LIMIT + ['000003E800000000 R'] * 3)
 
     back = len(simulator.frames())
     simulator.write('conveyor ok')

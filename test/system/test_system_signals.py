@@ -39,8 +39,8 @@ def test_while_active(processes: Processes, client: Client, namespace: str, tmp_
     assert bridge.end(number) == code
     # nobody tells the drive that a bridge has gone: three neutral frames have to
     wait_for_end(lambda: simulator.frames('^003FFFF0.* R$'),
-                 ['003FFFF0#0000000000000000 R'] * 3)
-    assert '003FFFF0#05DC000000000000 R' in simulator.frames('^003FFFF0.* R$')[-8:]
+                 ['003FFFF0#000003E800000000 R'] * 3)
+    assert '003FFFF0#05DC03E800000000 R' in simulator.frames('^003FFFF0.* R$')[-8:]
     # and then nothing at all
     client.online(f'/{namespace}/conveyor', wanted=False)
     count = len(simulator.frames(' R$'))
@@ -162,7 +162,7 @@ def test_two_signals_while_active(processes: Processes, client: Client, namespac
     # one stop, unless this process has to wait for a processor between the two
     assert bridge.wait() in (0, 128 + signal.SIGINT, 128 + signal.SIGTERM)
     # whoever stops a whole group of processes sends two at once: the drive is told all the same
-    wait_for_end(lambda: simulator.frames('^003FFFF0.* R$'), ['003FFFF0#0000000000000000 R'])
+    wait_for_end(lambda: simulator.frames('^003FFFF0.* R$'), ['003FFFF0#000003E800000000 R'])
 
 
 def test_drives_that_a_second_signal_leaves_unstopped_are_named(

@@ -7,7 +7,7 @@ from pathlib import Path
 from parameter_files import bridge_file, CONVEYOR
 from processes import Client, Processes
 import pytest
-from slcan_peer import Peer, ZEROS
+from slcan_peer import NEUTRAL_WORDS, Peer, ZEROS
 from waiting import wait_for_end
 
 CYCLIC_REQUEST = 'T003FFFF08'
@@ -36,7 +36,7 @@ def test_adapter_that_takes_nothing(processes: Processes, client: Client, namesp
     client.online(drive)
     client.publish(f'{drive}/command/speed_setpoint', 0.0)
     client.diagnostics(f'{namespace}/drive_can_bridge: drive conveyor',
-                       message='not armed: publish 0 to [^ ]*/torque_limit$')
+                       state='^online$')
     client.publish(f'{drive}/command/speed_setpoint', 150.0)
     peer.wait_for(f'{CYCLIC_REQUEST}05DC')
 
@@ -54,29 +54,29 @@ def test_adapter_that_takes_nothing(processes: Processes, client: Client, namesp
     peer.wait_for('O', count)
     reopened = count + peer.lines[count:].index('O')
     requests = peer.wait_for(CYCLIC_REQUEST, reopened, 20)
-    assert set(requests) == {CYCLIC_REQUEST + ZEROS}
+    assert set(requests) == {CYCLIC_REQUEST + NEUTRAL_WORDS}
     # before that: no more than the kernel cannot take back, neutral as soon as the drive was
     # offline, and no command that was made of a torn one
     old = peer.lines[count:reopened]
     assert sum(len(line) + 1 for line in old) <= 2 * READY
-    whole = [line for line in old if len(line) >= len(CYCLIC_REQUEST + ZEROS)]
+    whole = [line for line in old if len(line) >= len(CYCLIC_REQUEST + NEUTRAL_WORDS)]
     # and its stop by number, which is read back
     by_number = {line for line in whole if line.startswith(('T0020', 'T0030'))}
     assert all(line.endswith(ZEROS) for line in by_number)
     assert set(whole) - by_number <= {
-        CYCLIC_REQUEST + ZEROS, f'{CYCLIC_REQUEST}05DC{ZEROS[4:]}'}
+        CYCLIC_REQUEST + NEUTRAL_WORDS, f'{CYCLIC_REQUEST}05DC{NEUTRAL_WORDS[4:]}'}
     assert sum('05DC' in line for line in whole) <= MISSED_LIMIT + 5
     assert old[-4:].count('C') >= 1
     assert not [line for line in old if line.endswith('C') and len(line) > 1]
     assert client.get(drive, 'ramp_time') == [1.0]
     client.publish(f'{drive}/command/speed_setpoint', 0.0)
     client.diagnostics(f'{namespace}/drive_can_bridge: drive conveyor',
-                       message='not armed: publish 0 to [^ ]*/torque_limit$')
+                       state='^online$')
     client.publish(f'{drive}/command/speed_setpoint', 150.0)
     peer.wait_for(f'{CYCLIC_REQUEST}05DC', count)
     assert bridge.end() == 0
     wait_for_end(lambda: [line for line in peer.lines if line.startswith('T')],
-                 [CYCLIC_REQUEST + ZEROS] * 3)
+                 [CYCLIC_REQUEST + NEUTRAL_WORDS] * 3)
 
 
 def test_stop_while_the_adapter_takes_nothing(processes: Processes, client: Client,
@@ -103,7 +103,7 @@ def test_stop_of_a_drive_that_moves_while_the_adapter_takes_nothing(
     client.online(drive)
     client.publish(f'{drive}/command/speed_setpoint', 0.0)
     client.diagnostics(f'{namespace}/drive_can_bridge: drive conveyor',
-                       message='not armed: publish 0 to [^ ]*/torque_limit$')
+                       state='^online$')
     client.publish(f'{drive}/command/speed_setpoint', 150.0)
     peer.wait_for(f'{CYCLIC_REQUEST}05DC')
     peer.stop_reading()

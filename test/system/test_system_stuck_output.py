@@ -43,12 +43,12 @@ def test_a_drive_falls_silent_and_the_bridge_is_stopped(
     # the other one is asked as if nothing had happened, with what it is told to do
     count = len(simulator.frames())
     requests = simulator.frame(f'^{REQUEST}.* R$', since=count, count=100)
-    assert set(requests) == {f'{REQUEST}#05DC000000000000 R'}
+    assert set(requests) == {f'{REQUEST}#05DC03E800000000 R'}
     assert client.get(f'/{namespace}/conveyor', 'ramp_time') == [1.0]
     assert output.full
     assert bridge.end(signal.SIGTERM, timeout=10.0) == 0
     wait_for_end(lambda: simulator.frames(f'^{REQUEST}.* R$'),
-                 [f'{REQUEST}#0000000000000000 R'] * 3)
+                 [f'{REQUEST}#000003E800000000 R'] * 3)
 
 
 def test_what_was_not_read_is_told_later(processes: Processes, client: Client, namespace: str,
@@ -101,4 +101,4 @@ def test_whoever_closes_its_outputs_gets_a_bridge_all_the_same(
     start_moving(client, f'/{namespace}/conveyor')
     assert bridge.end(signal.SIGTERM) == 0
     wait_for_end(lambda: simulator.frames(f'^{REQUEST}.* R$'),
-                 [f'{REQUEST}#0000000000000000 R'] * 3)
+                 [f'{REQUEST}#000003E800000000 R'] * 3)
