@@ -5,7 +5,7 @@ from array import array
 from collections.abc import Iterable, Sequence
 import csv
 import math
-from typing import Any, TextIO
+from typing import Any, NamedTuple, TextIO
 
 from drive_can_bridge.core.configuration import BridgeConfiguration, DriveConfiguration
 from drive_can_bridge.core.errors import DriveCanError
@@ -19,6 +19,12 @@ _STRETCH = 0.001
 _STRETCHES_MAX = 4096
 #: the words of a family that has its control built in
 _BUILT_IN = (('control_word', Direction.REQUEST), ('status_word', Direction.RESPONSE))
+#: the bit of a status word that says that there is a fault
+FAULT = 'fault'
+#: height of a lane of bits, of 1
+LANE = 0.8
+#: marks of a drive that are shown
+_MARKS_MAX = 10_000
 _VALID = (Verdict.NORMAL, Verdict.LATE, Verdict.SUSPICIOUS)
 
 Column = tuple[str, str, Direction]
@@ -136,6 +142,51 @@ class Curve:
         return [time for time, _ in found], [value for _, value in found]
 
 
+class Lanes(NamedTuple):
+    """
+    A word of named bits: a lane each, from the bottom, in which a set bit is high.
+
+    :param bits: name and place.
+    """
+
+    name: str
+    bits: tuple[tuple[str, int], ...]
+    curves: tuple[Curve, ...]
+
+    def add(self, time: float, raw: int) -> None:
+        """Take a word."""
+        for lane, ((_, bit), curve) in enumerate(zip(self.bits, self.curves)):
+            curve.add(time, lane + LANE * (raw >> bit & 1))
+
+
+class Marks:
+    """What went wrong with a drive: when answers were missing, from when to when a fault was."""
+
+    def __init__(self) -> None:
+        self.lost: list[float] = []
+        self.faults: list[tuple[float, float]] = []
+        self._since = self._last = math.nan
+
+    def add(self, time: float, telegram: Telegram) -> None:
+        """Take a telegram."""
+        if telegram.verdict is Verdict.LOST and len(self.lost) < _MARKS_MAX:
+            self.lost.append(time)
+        for parameter, raw in zip(telegram.parameters, telegram.raws):
+            bit = dict(parameter.bits).get(FAULT)
+            if bit is not None and telegram.verdict in _VALID:
+                self._fault(time, bool(raw >> bit & 1))
+
+    def _fault(self, time: float, there: bool) -> None:
+        if self._since == self._since:      # not NaN
+            if there:
+                self.faults[-1] = self._since, time
+                return
+            self.faults[-1], self._since = (self._since, time), math.nan
+        elif there and len(self.faults) < _MARKS_MAX:
+            self._since = time
+            self.faults.append((time, time))
+
+
 class Plotter:
     """
     Collects curves for a picture.
@@ -146,6 +197,8 @@ class Plotter:
 
     def __init__(self, configuration: BridgeConfiguration, wanted: Sequence[str]) -> None:
         self._curves: dict[tuple[str, str], Curve] = {}
+        self._lanes: dict[tuple[str, str], Lanes] = {}
+        self._marks: dict[str, Marks] = {}
         self._start = math.nan
         for text in wanted:
             drive_name, _, name = text.partition('.')
@@ -164,6 +217,7 @@ class Plotter:
 
     def _add(self, drive: DriveConfiguration, name: str) -> None:
         parameter = drive.profile.parameters.get(name)
+        self._marks.setdefault(drive.name, Marks())
         unit = parameter.unit if parameter is not None else ''
         self._curves[drive.name, name] = Curve(f'{drive.name}.{name}', unit)
 
@@ -171,16 +225,30 @@ class Plotter:
         """Take a telegram."""
         if self._start != self._start:      # NaN
             self._start = telegram.time
+        marks = self._marks.get(telegram.drive)
+        if marks is not None:
+            marks.add(telegram.time - self._start, telegram)
         if not telegram.raws or telegram.verdict not in _VALID:
             return
         for parameter, raw in zip(telegram.parameters, telegram.raws):
+            place = telegram.drive, parameter.name
+            if parameter.bits and place in self._curves:
+                self._lanes_of(place, parameter).add(telegram.time - self._start, raw)
+                continue
             curve = self._curves.get((telegram.drive, parameter.name))
             if curve is not None:
                 curve.add(telegram.time - self._start, float(parameter.value_from_raw(raw)))
 
+    def _lanes_of(self, place: tuple[str, str], parameter: Parameter) -> Lanes:
+        lanes = self._lanes.get(place)
+        if lanes is None:
+            lanes = self._lanes[place] = Lanes(
+                '.'.join(place), parameter.bits, tuple(Curve(name) for name, _ in parameter.bits))
+        return lanes
+
     def draw(self, path: str) -> None:
         """
-        Write the picture: a panel for each unit.
+        Write the picture: a panel for each unit, and one with lanes for each word of named bits.
 
         :raises DriveCanError: nothing to draw.
         :raises ImportError: matplotlib is not installed.
@@ -192,11 +260,13 @@ class Plotter:
         for curve in self._curves.values():
             if curve.points()[0]:
                 panels.setdefault(curve.unit, []).append(curve)
-        if not panels:
+        if not panels and not self._lanes:
             raise DriveCanError('nothing to plot: none of these values is in the trace')
-        figure, axes = pyplot.subplots(len(panels), 1, sharex=True, squeeze=False,
-                                       figsize=(12, 1.5 + 2.2 * len(panels)),
-                                       constrained_layout=True)
+        heights = [*([2.2] * len(panels)),
+                   *(0.6 + 0.2 * len(lanes.bits) for lanes in self._lanes.values())]
+        figure, axes = pyplot.subplots(len(heights), 1, sharex=True, squeeze=False,
+                                       figsize=(12, 1.5 + sum(heights)),
+                                       height_ratios=heights, constrained_layout=True)
         for axis, (unit, curves) in zip(axes[:, 0], panels.items()):
             for curve in curves:
                 axis.plot(*curve.points(), label=curve.name, linewidth=1.0,
@@ -204,6 +274,26 @@ class Plotter:
             axis.set_ylabel(unit or '–')
             axis.grid(visible=True, alpha=0.3)
             axis.legend(loc='upper right', fontsize='small')
+        for axis, lanes in zip(axes[len(panels):, 0], self._lanes.values()):
+            for lane, curve in enumerate(lanes.curves):
+                times, values = curve.points()
+                axis.fill_between(times, lane, values, step='post', linewidth=1.0,
+                                  color='tab:red' if curve.name == FAULT else 'tab:blue')
+            axis.set_yticks([lane + 0.5 * LANE for lane in range(len(lanes.bits))],
+                            [name for name, _ in lanes.bits], fontsize='small')
+            axis.set_title(lanes.name, loc='left', fontsize='small')
+            axis.grid(visible=True, axis='x', alpha=0.3)
+        for axis in axes[:, 0]:
+            self._mark(axis)
         axes[-1, 0].set_xlabel('s since the trace began')
         figure.savefig(path)
         pyplot.close(figure)
+
+    def _mark(self, axis: Any) -> None:
+        """Show what went wrong: a red tick for each missing answer, red ground for a fault."""
+        lost = [time for marks in self._marks.values() for time in marks.lost]
+        axis.plot(lost, [0.02] * len(lost), '|', color='tab:red', markersize=9,
+                  transform=axis.get_xaxis_transform())
+        for marks in self._marks.values():
+            for begin, end in marks.faults:
+                axis.axvspan(begin, end, color='tab:red', alpha=0.12, linewidth=0)

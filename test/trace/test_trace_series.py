@@ -1,7 +1,9 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Curves in bounded memory."""
 
-from drive_can_bridge.trace.series import Curve
+from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.protocols.observer import Direction, Kind, Telegram, Verdict
+from drive_can_bridge.trace.series import Curve, Lanes, Marks
 
 
 def test_a_short_curve_is_kept_as_it_is() -> None:
@@ -24,3 +26,29 @@ def test_a_long_one_keeps_its_extremes_everywhere() -> None:
     assert peaks == [0.02 * (20_000 * peak + 137) for peak in range(10)]
     # no part of the time is thinner than another
     assert max(after - before for before, after in zip(times, times[1:])) < 4000 / 1000
+
+
+STATUS = Parameter('status_word', number=211, bits=(('enabled', 1), ('fault', 3)))
+
+
+def telegram(time: float, raw: int, verdict: Verdict = Verdict.NORMAL) -> Telegram:
+    return Telegram(time, 'lift', Direction.RESPONSE, Kind.CYCLIC, 'cyclic response', (STATUS,),
+                    () if verdict is Verdict.LOST else (raw,), verdict)
+
+
+def test_what_went_wrong_is_marked() -> None:
+    marks = Marks()
+    for time, raw in ((0.0, 2), (1.0, 8), (2.0, 10), (3.0, 2), (5.0, 8), (6.0, 8)):
+        marks.add(time, telegram(time, raw))
+    marks.add(4.0, telegram(4.0, 0, Verdict.LOST))
+    marks.add(4.5, telegram(4.5, 8, Verdict.MALFORMED))
+    assert marks.lost == [4.0]
+    assert marks.faults == [(1.0, 3.0), (5.0, 6.0)], 'the last one to the end of the trace'
+
+
+def test_a_word_has_a_lane_for_each_bit() -> None:
+    lanes = Lanes('lift.status_word', STATUS.bits, (Curve('enabled'), Curve('fault')))
+    for time, raw in ((0.0, 0), (1.0, 2), (2.0, 10)):
+        lanes.add(time, raw)
+    assert [curve.points() for curve in lanes.curves] == [
+        ([0.0, 1.0, 2.0], [0.0, 0.8, 0.8]), ([0.0, 1.0, 2.0], [1.0, 1.0, 1.8])]
