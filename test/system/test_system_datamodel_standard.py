@@ -28,7 +28,7 @@ SHORT = {**CONVEYOR, 'protocol': 'datamodel_standard',
 #: Reg.209 to 211 in one read
 ASK = r'^3F1#03D1000300000000 R$'
 ANSWER = r'^7F1#.{12}A5A5 T$'
-NEUTRAL = r'^3F1#06(320000|3303E8)0{8} R$'
+NEUTRAL = r'^3F1#06(320{12}|3300E8030{6}) R$'
 MOVING = r'^3F1#063200(?!0000)'
 SECONDS = 6.0
 

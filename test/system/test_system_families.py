@@ -50,7 +50,8 @@ class Facts:
     profile: str = ''
 
 
-SPEED = {'torque_limit': 100.0, 'speed_setpoint': 150.0}
+#: 1500 = 05DCh; the torque limit beside it is 100 %, 1000 = 03E8h, and needs no arming
+SPEED = {'speed_setpoint': 150.0}
 FAMILIES = [
     Facts(
         # longer than the drive needs: it begins to count when it gets round to it
@@ -60,9 +61,7 @@ FAMILIES = [
         ('ramp_time', 7.25, '^003001E1#02D5000000000000 R$', '^102001E1#02D5.* T$'),
         ('ramp_time', 61.0, '0.01 to 60 s'), ('^003FFFF0#', '000003E80{8} R', 3)),
     Facts(
-        SHORT, SPEED, '^3F1#063[23]000000000000 R$',
-        # 1000 = 03E8h, 1500 = 05DCh, one frame each
-        ('^3F1#063300E803000000 R$', '^3F1#063200DC05000000 R$'),
+        SHORT, SPEED, '^3F1#06(320{12}|3300E8030{6}) R$', ('^3F1#063200DC05000000 R$',),
         ('actual_speed', 149.9, 150.1),
         ('ramp_time', 7.25, '^3F1#061E00D502000000 R$', '^7F1#D502A5A5A5A5A5A5 T$'),
         ('ramp_time', 61.0, '0.01 to 60 s'), ('^3F1#063200', '0000000000 R', 1)),

@@ -243,7 +243,7 @@ def test_error_frames_and_lost_frames(processes: Processes, client: Client, name
         count = len(simulator.frames())
         raw.send(packed(0x20000040, '0000000000000000'))
         client.online(drive, wanted=False)
-        bridge.error('conveyor: offline: bus down: bus-off')
+        bridge.error('conveyor: offline: bus main is down$')
         client.online(drive)
         rearm_and_move(client, drive, bridge, simulator, count + 8)
         facts = client.diagnostics(bus, state='^up$')
