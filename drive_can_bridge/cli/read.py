@@ -101,6 +101,8 @@ def document(drive: Drive, outcome: ReadOutcome) -> dict[str, Any]:
     parameter = outcome.parameter
     return {
         'drive': drive.name, 'name': outcome.name, 'value': outcome.value,
+        'text': '' if parameter is None or outcome.value is None else (
+            parameter.name_of(outcome.value)),
         'unit': parameter.unit if parameter else '', 'raw': outcome.raw,
         'number': parameter.number if parameter else None,
         'index': parameter.index if parameter else None,
@@ -110,6 +112,14 @@ def document(drive: Drive, outcome: ReadOutcome) -> dict[str, Any]:
         'reason': outcome.reason}
 
 
+def _shown(outcome: ReadOutcome) -> str:
+    """Write a value, and its name beside it."""
+    if outcome.value is None:
+        return '–'
+    name = outcome.parameter.name_of(outcome.value) if outcome.parameter else ''
+    return f'{value_text(outcome.value)} {name}' if name else value_text(outcome.value)
+
+
 def _rows(drives: Drives, outcomes: Sequence[tuple[Drive, ReadOutcome]],
           ) -> list[tuple[str, ...]]:
     rows: list[tuple[str, ...]] = []
@@ -117,7 +127,7 @@ def _rows(drives: Drives, outcomes: Sequence[tuple[Drive, ReadOutcome]],
         parameter = outcome.parameter
         rows.append((
             drive.name if len(drives) > 1 else '', outcome.name,
-            '–' if outcome.value is None else value_text(outcome.value),
+            _shown(outcome),
             parameter.unit if parameter else '',
             '–' if outcome.raw is None else str(outcome.raw),
             parameter.address if parameter else '',

@@ -15,6 +15,8 @@ from drive_can_bridge.configuration.scalars import read_scalar
 from drive_can_bridge.core.parameters import Parameter, Value, ValueKind
 
 _HEADINGS = ('drive', 'name', 'value', 'unit', 'number', 'storage', 'result')
+#: of the names that a value may have
+_NAMES_SHOWN = 12
 #: octal to parameter files, and decimal to most people
 _AMBIGUOUS = re.compile(r'\s*[+-]?0[0-9]')
 
@@ -88,14 +90,21 @@ def _write_one(drive: Drive, name: str, text: str,
     value = None if parameter is None else _value(parameter, text)
     if parameter is not None and value is None:
         outcomes.append((drive, WriteOutcome(
-            name, False, parameter, f'wrong type: {text!r}, expected {parameter.kind.words}')))
+            name, False, parameter, f'wrong type: {text!r}, expected {_expected(parameter)}')))
         return
     drive.write({name: 0 if value is None else value},
                 told=lambda outcome: outcomes.append((drive, outcome)))
 
 
 def _value(parameter: Parameter, text: str) -> Value | None:
-    """Read a value as a parameter file would; None: it is none of the parameter's kind."""
+    """
+    Read a value as a parameter file would, or by its name.
+
+    :return: None: it is none of the parameter's kind.
+    """
+    named = parameter.value_named(text)
+    if named is not None:
+        return named
     value = None if _AMBIGUOUS.match(text) else read_scalar(text)
     if parameter.kind is ValueKind.BOOL:
         return value if isinstance(value, bool) else None
@@ -110,6 +119,12 @@ def _shown(parameter: Parameter | None, text: str) -> Value | str:
     """Return what was to be written as a program takes it; the text where it is no value."""
     value = None if parameter is None else _value(parameter, text)
     return text if value is None else value
+
+
+def _expected(parameter: Parameter) -> str:
+    names = ', '.join(name for _, name in parameter.values[:_NAMES_SHOWN])
+    more = ' …' if len(parameter.values) > _NAMES_SHOWN else ''
+    return parameter.kind.words + (f' or one of {names}{more}' if names else '')
 
 
 def _show(args: Namespace, drives: Drives, wanted: dict[str, str],

@@ -13,6 +13,9 @@ import re
 from typing import Any
 
 from drive_can_bridge.configuration.control_check import check_control, control_table
+from drive_can_bridge.configuration.names_check import (
+    check_fault, check_values, fault_table, named,
+)
 from drive_can_bridge.configuration.problems import Path, Problem, Tree
 from drive_can_bridge.configuration.restore_check import (
     check_identity, check_restore, restore_table,
@@ -23,7 +26,7 @@ from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import (
     Access, Parameter, ParameterType, STEP_TOLERANCE, Storage, Value,
 )
-from drive_can_bridge.core.profile import Profile
+from drive_can_bridge.core.profile import FaultTable, Profile
 from drive_can_bridge.core.words import show, suggestion
 
 #: names that a drive's node uses itself
@@ -35,7 +38,7 @@ RESERVED = frozenset((
 #: what the values of a parameter's keys become
 _MADE: dict[str, Callable[[Any], Any]] = {
     'type': ParameterType, 'access': Access, 'storage': Storage,
-    'bits': lambda bits: tuple(bits.items()),
+    'bits': lambda bits: tuple(bits.items()), 'values': lambda given: (),
     **dict.fromkeys(('scale', 'offset', 'minimum', 'maximum', 'arming_tolerance'), float)}
 #: what reads as the name of a parameter that stands in no profile
 RAW_NAME = re.compile(r'p[0-9]+|x[0-9a-f]+', re.ASCII)
@@ -79,15 +82,28 @@ def profile_from_tree(tree: Tree) -> LoadedProfile:
         _check_parameter(tree, path, parameter, entry)
         _check_neutral_from(tree, path, parameter, entry)
         _check_limit(tree, path, parameter, entry)
+        check_values(tree, path, parameter, entry)
         # An entry of which a part was cut out would be checked with values it never had.
         if tree.is_sound(path):
-            parameters[name] = _narrowed(tree, path, parameter)
+            parameters[name] = replace(_narrowed(tree, path, parameter),
+                                       values=named(entry.get('values', {})))
     _check_measured(tree, parameters, names)
     control = None
     if isinstance(tree.data.get('control'), dict):
         check_control(tree, parameters, names)
         if tree.is_sound(('control',)):
             control = control_table(tree.data['control'])
+    fault = None
+    if isinstance(tree.data.get('fault'), dict):
+        check_fault(tree, parameters, names)
+        if tree.is_sound(('fault',)) and tree.data['fault']['parameter'] in parameters:
+            fault = fault_table(tree.data['fault'], parameters)
+            built_in = {'cannord', 'cia402'} & {*tree.data.get('protocols', ())}
+            if control is None and fault.bit is None and not built_in and not (
+                    tree.is_damaged(('control',))):
+                tree.suspicious(('fault',), 'bit is missing: without a control section nothing '
+                                'says when there is a fault, allowed is bit: PARAMETER.BIT')
+            _name_faults(parameters, fault)
     check_identity(tree, parameters, names)
     check_restore(tree, parameters, names)
     profile = Profile(
@@ -96,8 +112,15 @@ def profile_from_tree(tree: Tree) -> LoadedProfile:
         protocols=tuple(tree.data.get('protocols', ())),
         parameters=parameters, control=control,
         identity=tuple(name for name in tree.data.get('identity', ()) if name in parameters),
-        restore=restore_table(tree, parameters))
+        restore=restore_table(tree, parameters), fault=fault)
     return LoadedProfile(profile, tree, names)
+
+
+def _name_faults(parameters: dict[str, Parameter], fault: FaultTable) -> None:
+    """Let the names of faults stand beside their number wherever it is shown."""
+    number = parameters[fault.parameter]
+    if not number.values:
+        parameters[number.name] = replace(number, values=fault.codes)
 
 
 def _parameter(name: str, entry: dict[str, Any]) -> Parameter:

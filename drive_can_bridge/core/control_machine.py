@@ -40,6 +40,7 @@ class ControlMachine:
     :param unheard: says which of them may run without answering any more; '' if none.
     :param wording: what the family knows of status words.
     :ivar table: the words and conditions.
+    :ivar fault_text: which fault it is, if somebody knows.
     :ivar take_completed: returns the outcomes since the last call; asked after every frame.
     """
 
@@ -59,6 +60,7 @@ class ControlMachine:
         self._sending = ControlAction.DISABLE   # by name: two words may have the same bits
         self._sent = self._again = False        # the current word left; is to leave once more
         self._fault: bool | None = None         # None: not known
+        self.fault_text = ''
         self._reached = False                   # enabled was confirmed for this enable word
         self._disregard = Disregard(timeout)
         self._operation: Operation | None = None
@@ -287,7 +289,7 @@ class ControlMachine:
         if action is ControlAction.ENABLE and self._reports.missing:
             return sentences.members_offline(self._reports.missing)
         if action is ControlAction.ENABLE and self._fault:
-            return sentences.reset_first()
+            return sentences.reset_first(self.fault_text)
         under_way = self._operation
         if under_way is None or under_way.action not in _STOPS or action in _STOPS:
             return None

@@ -108,6 +108,7 @@ class Parameter:
     :param limit: it bounds, and moves nothing: it needs no arming, and the last command stands.
     :param arming_tolerance: how far from neutral a command may be and still arm.
     :param bits: named bits, (name, bit number).
+    :param values: names of values, (raw integer, name).
     :param subindex: array index (CANnord) or CANopen sub-index.
     :param index: CANopen index.
     :param listed: stands in the profile; False for a parameter addressed by its raw name.
@@ -134,6 +135,7 @@ class Parameter:
     arming_tolerance: float = 0.0
     description: str = ''
     bits: tuple[tuple[str, int], ...] = ()
+    values: tuple[tuple[int, str], ...] = ()
     subindex: int | None = None
     index: int | None = None
     word_order: str | None = None
@@ -161,6 +163,22 @@ class Parameter:
     def writable(self) -> bool:
         """Can be written by a service or command."""
         return self.access is not Access.READ_ONLY
+
+    def shown(self, raw: int) -> str:
+        """Write a value as the drive's manual does: with as many decimals as a raw step has."""
+        value = self.value_from_raw(raw)
+        decimals = max(0, -math.floor(math.log10(abs(self.scale)) + 1e-9)) if self.scaled else 0
+        return f'{value:.{decimals}f}' if decimals <= 6 else value_text(value)
+
+    def name_of(self, value: Value) -> str:
+        """Return the name of a value; '' if it has none."""
+        return next((name for raw, name in self.values
+                     if self.value_from_raw(raw) == value), '') if self.values else ''
+
+    def value_named(self, name: str) -> Value | None:
+        """Return the value that a name stands for; None: none has it."""
+        return next((self.value_from_raw(raw) for raw, known in self.values if known == name),
+                    None)
 
     @property
     def address(self) -> str:

@@ -49,6 +49,21 @@ class ControlTable:
 
 
 @dataclass(frozen=True, slots=True)
+class FaultTable:
+    """
+    The ``fault`` section of a profile: which fault it is.
+
+    :param parameter: name of the parameter that carries the number.
+    :param codes: names of faults, (raw integer, name).
+    :param bit: (parameter, mask): says that there is a fault where no control section does.
+    """
+
+    parameter: str
+    codes: tuple[tuple[int, str], ...] = ()
+    bit: tuple[str, int] | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class RestoreStep:
     """
     One write around a restored backup: ``word = (word read & ~mask) | bits``.
@@ -101,4 +116,5 @@ class Profile:
     control: ControlTable | None = None
     identity: tuple[str, ...] = ()
     restore: RestoreTable = RestoreTable()
+    fault: FaultTable | None = None
     sha256: str = ''

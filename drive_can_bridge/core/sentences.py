@@ -274,8 +274,19 @@ def no_reset_word() -> str:
 
 
 @sentence
-def reset_first() -> str:
-    return 'fault: reset it first'
+def reset_first(fault: str = '') -> str:
+    return (f'fault {fault}: remove its cause, then reset it first' if fault else
+            'fault: reset it first')
+
+
+@sentence
+def fault_named(number: str, name: str) -> str:
+    return f'fault {number}{" " * bool(name)}{name}: remove its cause, then reset it'
+
+
+@sentence
+def fault_unread(reason: str) -> str:
+    return f'fault (number not read: {reason})'
 
 
 @sentence
@@ -920,8 +931,8 @@ def maps_not_kept(why: str) -> str:
 
 
 @sentence
-def fault(reset: str) -> str:
-    return f'fault: remove its cause, then {reset}'
+def fault(reset: str, which: str = 'fault') -> str:
+    return f'{which}: remove its cause, then {reset}'
 
 
 @sentence

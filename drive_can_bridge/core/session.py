@@ -37,6 +37,7 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import Event
+from drive_can_bridge.core.fault_watch import FaultWatch
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.last_sent import LastSent
 from drive_can_bridge.core.neutral_stop import NeutralStop
@@ -76,6 +77,7 @@ class Session(ABC):
     :ivar control: the control and status word machine, or None.
     :ivar setpoints: every ``cyclic_request`` parameter but the control word, in slot order.
     :ivar gate: whether commands reach the drive.
+    :ivar fault_watch: knows which fault the drive has; None: the profile does not say how.
     :ivar neutral_stop: the quick stop of a drive without a control word.
     :ivar roles: what the bridge uses parameters for.
     :ivar sample_parameters: of a sample, in the order of ``ProcessDataReceived.raws``.
@@ -117,6 +119,8 @@ class Session(ABC):
             self, self.setpoints, control, image.sample, self.report, leader,
             missed_limit=drive.missed_limit)
         self.neutral_stop = NeutralStop(self)
+        table = drive.profile.fault
+        self.fault_watch = None if table is None else FaultWatch(self, table)
         self.roles = roles or Roles(drive, controlled=control is not None)
         self.retry = RetryPolicy(
             timeout=drive.parameter_timeout, attempts=drive.parameter_retries + 1,
@@ -392,6 +396,8 @@ class Session(ABC):
         """Return what happened since the last call."""
         if self.control is not None:
             self.report.events += self.control.take_completed()
+        if self.fault_watch is not None:
+            self.fault_watch.look(self.report.events)
         return self.report.take()
 
     def control_changed(self, now: float) -> None:
@@ -417,7 +423,12 @@ class Session(ABC):
     @property
     def state(self) -> DriveState:
         """The state in one word."""
-        return DriveState.OFFLINE if self.defect else self.gate.state
+        if self.defect:
+            return DriveState.OFFLINE
+        watch = self.fault_watch
+        if watch is not None and watch.shows and self.control is None and self.online:
+            return DriveState.FAULT
+        return self.gate.state
 
     @property
     def warning(self) -> Sentence:

@@ -106,6 +106,8 @@ class Users:
 
     def _completed(self, event: RequestCompleted) -> None:
         session = self._session
+        if session.fault_watch is not None and session.fault_watch.take(event):
+            return
         if session.serving and event.outcomes:
             session.online = any(map(is_answer, event.outcomes))
         session.report.note(event)

@@ -60,7 +60,7 @@ def _value(text: str) -> float | bool | str | None:
     if text in ('true', 'false'):
         return text == 'true'
     try:
-        number = float(text)
+        number = float(text.partition(' ')[0])      # behind it, the name of the value
     except ValueError:
         return text or None
     return number if math.isfinite(number) else text

@@ -7,6 +7,7 @@ import math
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import ParameterType, Value, ValueKind
 from drive_can_bridge.core.text import printable
+from drive_can_bridge.core.value_names import taken_apart
 
 _DECIMALS_MAX = 6
 #: columns for a value of which nothing is known
@@ -47,6 +48,11 @@ class ParameterInfo:
         return self.facts.get('unit', '')
 
     @property
+    def names(self) -> dict[int, str]:
+        """Names of values, of those that have one."""
+        return dict(taken_apart(self.facts.get('values', '')))
+
+    @property
     def readable(self) -> bool:
         """Can be read by a service."""
         return self.facts.get('access') != 'wo'
@@ -79,7 +85,7 @@ class ParameterInfo:
         if kind is None:
             return _WIDTH
         if self.kind is ValueKind.INTEGER:
-            return max(len(self.text(end)) for end in kind.raw_range)
+            return max(len(self.text(each)) for each in (*kind.raw_range, *self.names))
         scale, offset = self._number('scale', 1.0), self._number('offset', 0.0)
         return max(len(self.text(end * scale + offset)) for end in kind.raw_range)
 
@@ -90,7 +96,7 @@ class ParameterInfo:
         if isinstance(value, int):
             if self.name.endswith(_WORD_SUFFIX) and value >= 0:
                 return f'0x{value:0{8 if "32" in self.facts.get("type", "") else 4}X}'
-            return str(value)
+            return f'{value} {name}' if (name := self.names.get(value)) else str(value)
         if not math.isfinite(value):
             return str(value)
         decimals = self._decimals
@@ -100,8 +106,9 @@ class ParameterInfo:
 
     def assignment(self, value: Value) -> str:
         """Write ``actual_speed=12.3 rpm``; integers as they are, for programs to read."""
-        text = (str(value) if isinstance(value, int) and not isinstance(value, bool)
-                else self.text(value))
+        plain = isinstance(value, int) and not isinstance(value, bool) and (
+            value not in self.names)
+        text = str(value) if plain else self.text(value)
         return f'{self.name}={text}{f" {self.unit}" if self.unit else ""}'
 
     def parse(self, text: str) -> Value:
@@ -111,6 +118,9 @@ class ParameterInfo:
         :raises ValueRefused: not a value of this kind; says what is.
         """
         word = text.strip()
+        for number, name in self.names.items():
+            if word in (name, f'{number} {name}'):
+                return number
         try:
             # Python takes 1_5 for 15, and digits of all scripts
             if '_' in word or not word.isascii():

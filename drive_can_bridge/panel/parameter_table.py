@@ -167,6 +167,7 @@ def _limits(info: ParameterInfo) -> str:
         return 'true, false'
     return ' · '.join(filter(None, (
         f'{info.range_text} {info.unit}'.strip() if info.range_text else '',
+        ', '.join(f'{value} {name}' for value, name in info.names.items()),
         info.refusal.partition(':')[0])))
 
 

@@ -114,6 +114,7 @@ def description(name: str, parameter: Parameter, entry: dict[str, Any]) -> dict[
         'neutral': parameter.neutral, 'neutral_from': parameter.neutral_from or None,
         'limit': parameter.limit,
         'arming_tolerance': parameter.arming_tolerance, 'bits': dict(parameter.bits),
+        'values': {str(raw): name for raw, name in parameter.values},
         'word_order': parameter.word_order, 'protected': parameter.protected,
         'description': parameter.description, 'source': entry.get('source'),
         'verified': parameter.verified, 'open': entry.get('open')}

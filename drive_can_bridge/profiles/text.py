@@ -21,6 +21,7 @@ GROUPS = (
      'protected'),
     ('description',),
     ('bits',),
+    ('values',),
     ('source', 'verified', 'open'),
 )
 _ROOM = WIDTH - 6

@@ -26,6 +26,8 @@ def how_to_enable(session: Session, node: Node) -> str:
 
 def how_to_reset(session: Session, node: Node) -> str:
     """Say what to do about a drive in fault, when its cause is gone."""
+    if session.control is None:
+        return 'reset it at the drive'
     lead, own = session.enabled_by, session.configuration.name
     return (f'call ~/reset_fault ({_by_hand("reset", own, node)}) and ~/enable '
             f'({_by_hand("enable", lead, node)})')

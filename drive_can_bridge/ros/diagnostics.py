@@ -15,6 +15,7 @@ from drive_can_bridge.core import sentences
 from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.frame import STUFFING
 from drive_can_bridge.core.sentences import NOTHING, Sentence, together
+from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.statistics import Statistic
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.core.words import value_text
@@ -134,6 +135,8 @@ class DriveReporter:
             if session.control is not None:
                 known = session.control.state if session.active else 'unknown'
                 more = {'control_state': known, **more}
+            if session.fault_watch is not None:
+                more = {**more, 'fault_code': session.fault_watch.text}
         self._latencies = statistics.latency.count, statistics.latency.total
         self._requests = statistics.requests_ok + statistics.requests_failed
         facts = {
@@ -170,7 +173,7 @@ class DriveReporter:
             level = DiagnosticStatus.ERROR if session.ever_online else DiagnosticStatus.STALE
             return level, absence(drive)
         if state is DriveState.FAULT:
-            told = [sentences.fault(how_to_reset(session, drive.node)),
+            told = [sentences.fault(how_to_reset(session, drive.node), _fault_text(session)),
                     *self._warnings(rejected)]
             return DiagnosticStatus.ERROR, together(told)
         told = self._warnings(rejected)
@@ -321,6 +324,14 @@ class Diagnostics:
     def destroy(self) -> None:
         """Take the publisher out of the graph."""
         self._node.destroy_publisher(self._publisher)
+
+
+def _fault_text(session: Session) -> str:
+    """Say that there is a fault, and which, as far as that is known."""
+    watch = session.fault_watch
+    if watch is None or not (watch.text or watch.unread):
+        return 'fault'
+    return f'fault {watch.text}' if watch.text else sentences.fault_unread(watch.unread)
 
 
 def _bus_error(error: BusError | None, controller: str, count: int) -> Sentence:

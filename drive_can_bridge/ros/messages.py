@@ -7,10 +7,10 @@ from rcl_interfaces.msg import Parameter as ParameterMessage, ParameterDescripto
 from rclpy.parameter import Parameter, parameter_value_to_python
 
 from drive_can_bridge.core.parameters import Value
-from drive_can_bridge.core.text import printable
+from drive_can_bridge.core.text import printable, TEXT_MAX
 
 #: characters of ``additional_constraints`` that are looked at
-_CONSTRAINTS_MAX = 2000
+_CONSTRAINTS_MAX = 65536
 
 
 def value_of(message: ParameterValue) -> object:
@@ -45,7 +45,8 @@ def facts_of(message: ParameterDescriptor) -> dict[str, str]:
     except ValueError:
         return {}
     pairs = (word.partition('=') for word in words)
-    return {printable(key): printable(value) for key, separator, value in pairs if separator}
+    return {printable(key): printable(value, None if key == 'values' else TEXT_MAX)
+            for key, separator, value in pairs if separator}
 
 
 def limits_of(message: ParameterDescriptor) -> tuple[float | None, float | None]:

@@ -13,6 +13,7 @@ from std_msgs.msg import Bool, Float64, Int64
 from drive_can_bridge.core.parameters import Parameter, Value, ValueKind
 from drive_can_bridge.core.roles import Role
 from drive_can_bridge.core.text import printable
+from drive_can_bridge.core.value_names import joined
 
 TOPIC_TYPES: dict[ValueKind, Any] = {
     ValueKind.DOUBLE: Float64, ValueKind.INTEGER: Int64, ValueKind.BOOL: Bool,
@@ -71,6 +72,7 @@ def constraints(parameter: Parameter, role: Role | None, error: str = '') -> str
         'storage': None if parameter.storage is None else parameter.storage.value,
         'protected': str(parameter.protected).lower(),
         'role': None if role is None else role.value,
+        'values': None if parameter.scaled else joined(parameter.values) or None,
         'error': printable(error) or None,
     }
     return ' '.join(f'{key}={_quoted(str(value))}' for key, value in fields.items()

@@ -61,6 +61,11 @@ class MotorPlant:
         self._jitter = 0    # raw steps by which measured positions are off at the moment
         self._control_name = control_name = control.parameter if control else ''
         self._shown = {p.name for p in configuration.cyclic_response}
+        self._fault = fault = configuration.profile.fault
+        self._fault_code = float(FAULT_CODE)
+        if fault is not None and fault.codes:
+            raw = names.likely_fault(fault.codes)
+            self._fault_code = float(registers.parameters[fault.parameter].value_from_raw(raw))
         parameters = registers.parameters if movable is None else movable
         pairs = names.pairs(parameters, without=control_name)
         self._setpoints = {pair.setpoint.name for pair in pairs}
@@ -122,7 +127,9 @@ class MotorPlant:
         ends, nearest = parameter.type.raw_range, scales.nearest_raw
         actual = self._actuals.get(parameter.name)
         quantity = names.measured(parameter)
-        if quantity is None and parameter.name in self._shown:
+        if self._fault is not None and parameter.name == self._fault.parameter:
+            quantity = Quantity.FAULT_CODE
+        elif quantity is None and parameter.name in self._shown:
             quantity = names.BY_UNIT.get(parameter.unit)
         if quantity is Quantity.POSITION:
             where = actual or (lambda: scales.position_value(parameter, self.motor.position))
@@ -144,7 +151,7 @@ class MotorPlant:
         if quantity is Quantity.TEMPERATURE:
             return lambda: scales.temperature_value(parameter, motor.temperature)
         if quantity is Quantity.FAULT_CODE:
-            return lambda: self.operation.fault_code(FAULT_CODE)
+            return lambda: self.operation.fault_code(self._fault_code)
         full = scales.rating(parameter, quantity)
         shares: dict[Quantity, Callable[[], float]] = {
             Quantity.TORQUE: lambda: motor.torque,

@@ -161,6 +161,13 @@ def limits(parameters: Mapping[str, Parameter]) -> list[tuple[Parameter, Quantit
         and parameter.writable and (parameter.limit or words_of(parameter) & _UPPER_WORDS)]
 
 
+def likely_fault(codes: Sequence[tuple[int, str]]) -> int:
+    """Return what a drive trips with most of all: an overcurrent, if it knows one."""
+    known = [raw for raw, _ in codes if raw]
+    return next((raw for raw, name in codes if raw and 'overcurrent' in name.lower()),
+                known[0] if known else 0)
+
+
 def crossings(parameters: Mapping[str, Parameter]) -> dict[str, list[tuple[str, str]]]:
     """
     Find settings of which one must not exceed the other: ``minimum_speed``, ``maximum_speed``.

@@ -1,7 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Raw integers as people read them: ``500.0 rpm``, ``0003h (ready, enabled)``."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 import math
 
 from drive_can_bridge.core.parameters import Parameter, ParameterType
@@ -31,17 +31,26 @@ class ValueFormat:
 
 
 def _format_of(parameter: Parameter) -> Format:
-    name = parameter.name
+    name, names = parameter.name, dict(parameter.values)
     if parameter.scaled:
         digits = max(_digits(parameter.scale), _digits(parameter.offset))
         scale, offset = parameter.scale, parameter.offset
         unit = f' {parameter.unit}' if parameter.unit else ''
+        if parameter.values:
+            return lambda raw: (f'{name} {raw * scale + offset:.{digits}f}{unit}'
+                                f'{_named(names, raw)}')
         return lambda raw: f'{name} {raw * scale + offset:.{digits}f}{unit}'
     if parameter.type is ParameterType.BOOL:
         return lambda raw: f'{name} {"true" if raw else "false"}'
     if parameter.bits:
         return lambda raw: f'{name} {_bits_text(parameter, raw)}'
+    if parameter.values:
+        return lambda raw: f'{name} {raw}{_named(names, raw)}'
     return lambda raw: f'{name} {raw}'
+
+
+def _named(names: Mapping[int, str], raw: int) -> str:
+    return f' {names[raw]}' if raw in names else ''
 
 
 def _digits(step: float) -> int:

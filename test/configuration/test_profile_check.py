@@ -241,6 +241,27 @@ CASES = [
      ['table.yaml:4: parameters.speed.limit: stands beside neutral_from, allowed is one of '
       'them']),
     ('storage: ram}', 'storage: ram, limit: true, neutral: 0}', []),
+    ('storage: ram}', 'storage: ram, values: {0: terminals, 3: bus, 0x10: "on", -1: other}}',
+     ['table.yaml:6: parameters.word.values.-1: -1 does not fit, allowed is 0 to 65535']),
+    ('storage: ram}', 'storage: ram, values: {0: off, 1: on}}',
+     ['table.yaml:6: parameters.word.values.0: false, off or no without quotes is a bool, allowed '
+      'is text: write it in quotes',
+      'table.yaml:6: parameters.word.values.1: true, on or yes without quotes is a bool, allowed '
+      'is text: write it in quotes']),
+    ('storage: ram}', 'storage: ram, values: {0: a, 1: a, 0x0: b, 2: 5}}',
+     ["table.yaml:6: parameters.word.values.1: 'a' is the name of 0 too, allowed is another one",
+      'table.yaml:6: parameters.word.values.0x0: 0x0 stands twice (as 0), allowed is once',
+      'table.yaml:6: parameters.word.values.2: 5 is a number, allowed is text']),
+    ('type: bool}', 'type: bool, values: {0: a}}',
+     ["table.yaml:7: parameters.flag.values: 'flag' is a bool, allowed in integers without scale, "
+      'offset and unit']),
+    ('control:\n', 'fault: {parameter: statsu, codes: {7: hot}}\ncontrol:\n',
+     ["table.yaml:16: fault.parameter: 'statsu' is unknown, did you mean 'status'?"]),
+    ('control:\n', 'fault: {parameter: order, codes: {7: hot, 9: hot}, bit: status.ready}\n'
+     'control:\n',
+     ["table.yaml:16: fault.parameter: 'order' is write-only, allowed is one with access ro or rw",
+      "table.yaml:16: fault.codes.9: 'hot' is the name of 7 too, allowed is another one"]),
+    ('control:\n', 'fault: {parameter: current, codes: {7: hot}}\ncontrol:\n', []),
     ('parameters:', 'parametrs:',
      ['table.yaml:1: parameters: missing, allowed is a mapping',
       "table.yaml:3: parametrs: unknown key, did you mean 'parameters'?"]),

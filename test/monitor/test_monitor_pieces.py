@@ -157,3 +157,16 @@ def test_documents_have_numbers_for_programs() -> None:
         assert list(found[name]['values']) == [each.name for each in drive.values]
     values = [each['value'] for drive in found.values() for each in drive['values'].values()]
     assert any(isinstance(value, float) for value in values)
+
+
+def test_names_of_values_stand_beside_the_number_and_are_read() -> None:
+    told = ParameterInfo('source', ValueKind.INTEGER, facts={
+        'type': 'uint16', 'values': '0:terminals 3:panel of the drive'})
+    assert [told.text(value) for value in (0, 3, 5)] == [
+        '0 terminals', '3 panel of the drive', '5']
+    assert told.assignment(3) == 'source=3 panel of the drive'
+    assert [told.parse(text) for text in ('terminals', '3 panel of the drive', '3', '5')] == [
+        0, 3, 3, 5]
+    assert told.width == len('3 panel of the drive')
+    with pytest.raises(ValueRefused):
+        told.parse('panel')

@@ -90,7 +90,7 @@ class TestShow:
             'subindex': 3, 'type': 'uint16', 'scale': 1.0, 'offset': 0.0, 'unit': '%',
             'access': 'rw', 'storage': 'eeprom', 'minimum': 5.0, 'maximum': 100.0,
             'neutral': None, 'neutral_from': None, 'limit': False, 'arming_tolerance': 0.0,
-            'bits': {}, 'word_order': None, 'protected': False,
+            'bits': {}, 'values': {}, 'word_order': None, 'protected': False,
             'description': 'Full load current in percent of the largest one of the controller; a '
                            'small contactor rating raises the minimum',
             'source': 'installation_guide (unit, step, limits), memory (number)',

@@ -93,7 +93,8 @@ def test_fault_and_reset(bridge: StartBridge, client: Client, lift: dict[str, An
     assert status['level'] == 'ERROR'
     assert '~/reset_fault' in status['message'] and '~/enable' in status['message']
     wait_until(lambda: drive.value('control_word') == 0)
-    assert enable(client) == (False, 'fault: reset it first')
+    success, message = enable(client)
+    assert not success and message.startswith('fault') and message.endswith('reset it first')
     assert trigger(client, 'quick_stop')[0]
     success, message = trigger(client, 'reset_fault')
     assert success, message
@@ -111,6 +112,22 @@ def test_a_fault_that_lasts_cannot_be_reset(bridge: StartBridge, client: Client)
     client.diagnostics(DRIVE, lambda drive: drive['state'] == 'fault')
     success, message = trigger(client, 'reset_fault')
     assert not success and 'fault still present' in message
+
+
+def test_a_fault_says_which_it_is(bridge: StartBridge, client: Client) -> None:
+    one = bridge(parameters(lift=LIFT))
+    one.online()
+    client.diagnostics(DRIVE, lambda drive: drive['fault_code'] == '')
+    one.played['lift'].fault('trip')
+    status = client.diagnostics(DRIVE, lambda drive: drive['fault_code'] == '7 overcurrent')
+    assert status['level'] == 'ERROR'
+    assert status['message'].startswith('fault 7 overcurrent: remove its cause, then call ')
+    client.wait_logged('lift: fault 7 overcurrent: remove its cause')
+    success, message = enable(client)
+    assert not success and message.startswith('fault 7 overcurrent: remove its cause, then ')
+    one.played['lift'].fault('ok')
+    assert trigger(client, 'reset_fault')[0]
+    client.diagnostics(DRIVE, lambda drive: drive['fault_code'] == '')
 
 
 def test_quick_stop(bridge: StartBridge, client: Client) -> None:

@@ -27,7 +27,8 @@ DRIVE_KEYS = {
     'state', 'code', 'exchanges', 'missed_exchanges', 'latency_mean_ms', 'latency_p99_ms',
     'latency_max_ms', 'period_error_mean_ms', 'period_error_p99_ms', 'period_error_max_ms',
     'command_age_s', 'commands_refused', 'frames_rejected', 'late_answers',
-    'parameter_requests_ok', 'parameter_requests_failed', 'last_parameter_error', 'short_frames'}
+    'parameter_requests_ok', 'parameter_requests_failed', 'last_parameter_error', 'short_frames',
+    'fault_code'}
 
 
 def test_names_and_keys(bridge: StartBridge, client: Client) -> None:

@@ -10,6 +10,7 @@ from drive_can_bridge.core.parameters import (
 )
 from drive_can_bridge.core.roles import Role
 from drive_can_bridge.core.text import printable
+from drive_can_bridge.core.value_names import taken_apart
 from drive_can_bridge.ros.messages import facts_of, limits_of, parameter_message
 
 _TYPES = {ValueKind.DOUBLE: float, ValueKind.INTEGER: int, ValueKind.BOOL: bool}
@@ -32,7 +33,7 @@ def parameter_of(message: ParameterDescriptor, *, listed: bool = True) -> Parame
             minimum=minimum, maximum=maximum,
             subindex=_number(facts, 'subindex'), index=_number(facts, 'index'),
             scaled='scale' in facts, listed=listed, protected=facts.get('protected') == 'true',
-            width_known='type' in facts)
+            width_known='type' in facts, values=taken_apart(facts.get('values', '')))
     except ValueError:
         return None
     text = printable(message.description)

@@ -1,0 +1,56 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Names of values: ``read`` shows them beside the number, ``write`` takes them instead."""
+
+from collections.abc import Iterator
+import json
+
+from client_builders import a_world, CONVEYOR, World
+import pytest
+
+from drive_can_bridge.cli.main import main
+
+PROFILE = """\
+protocols: [datamodel_extended]
+parameters:
+  speed_setpoint: {number: 50, type: int16, scale: 0.1, unit: rpm, neutral: 0}
+  actual_speed: {number: 209, type: int16, scale: 0.1, unit: rpm, access: ro}
+  source: {number: 70, storage: ram, values: {0: terminals, 3: bus, 4: panel of the drive}}
+"""
+
+
+@pytest.fixture(scope='module')
+def world(tmp_path_factory: pytest.TempPathFactory) -> Iterator[World]:
+    folder = tmp_path_factory.mktemp('world')
+    (folder / 'named.yaml').write_text(PROFILE, encoding='utf-8')
+    with a_world(folder, conveyor={
+            **CONVEYOR, 'profile': str(folder / 'named.yaml'),
+            'cyclic_request': ['speed_setpoint'], 'cyclic_response': ['actual_speed']}) as made:
+        yield made
+
+
+def run(world: World, capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str]:
+    code = main([*words, '--params-file', str(world.file)])
+    return code, capsys.readouterr().out
+
+
+@pytest.mark.parametrize(('word', 'value', 'shown'), [
+    ('bus', 3, '3 bus'), ('panel of the drive', 4, '4 panel of the drive'),
+    ('0', 0, '0 terminals'), ('5', 5, '5')])
+def test_there_and_back(world: World, capsys: pytest.CaptureFixture[str], word: str, value: int,
+                        shown: str) -> None:
+    code, said = run(world, capsys, 'write', 'conveyor', f'source={word}')
+    assert code == 0, said
+    assert world.drives['conveyor'].value('source') == value
+    code, said = run(world, capsys, 'read', 'conveyor', 'source')
+    assert code == 0
+    assert f' {shown} ' in said.splitlines()[1]
+    code, said = run(world, capsys, 'read', 'conveyor', 'source', '--json')
+    document = json.loads(said)
+    assert (document['value'], document['text']) == (value, shown.partition(' ')[2])
+
+
+def test_an_unknown_name_is_told_the_known_ones(
+        world: World, capsys: pytest.CaptureFixture[str]) -> None:
+    code, said = run(world, capsys, 'write', 'conveyor', 'source=buss')
+    assert code == 1
+    assert 'an integer or one of terminals, bus, panel of the drive' in said

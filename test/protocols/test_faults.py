@@ -1,0 +1,125 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Which fault it is: the profile's section ``fault``, in all families."""
+
+from dataclasses import replace
+from typing import Any
+
+from builders import ACTUAL, CONTROL, CURRENT, parameter, RO, STATUS, TABLE
+import pytest
+from saying import says
+from test_contract import Partner, PARTNERS
+
+from drive_can_bridge.core.control import ControlAction, ControlRequest
+from drive_can_bridge.core.drive_state import DriveState
+from drive_can_bridge.core.events import Noted
+from drive_can_bridge.core.profile import FaultTable
+
+CODE = parameter('fault_code', 217, access=RO)
+CODES = ((7, 'overcurrent'), (9, 'hot'))
+#: those whose status word is a parameter; CANnord has its own test below
+NAMES = sorted(set(PARTNERS) - {'cannord'})
+
+
+def meet(name: str, *, control: Any = CONTROL, mapped: bool = False, bit: Any = None,
+         **options: Any) -> Partner:
+    """Have a drive online that can tell of faults."""
+    partner = PARTNERS[name](control=control, **options)
+    drive = partner.talk.session.configuration
+    profile = replace(
+        drive.profile, fault=FaultTable('fault_code', CODES, bit),
+        parameters={each.name: each for each in (*TABLE, CODE)})
+    response = (ACTUAL, CURRENT, STATUS, CODE) if mapped else (ACTUAL, CURRENT, STATUS)
+    drive = replace(drive, profile=profile, cyclic_response=response)
+    partner.configuration = drive
+    partner.talk = type(partner.talk)(drive)
+    partner.registers[217] = 0
+    if name == 'datamodel_extended' and mapped:
+        partner.registers[129] = 217
+    partner.start()
+    assert partner.talk.session.online
+    partner.talk.events()
+    return partner
+
+
+def trip(partner: Partner, code: int) -> list[object]:
+    """Let the drive trip; return what is said of it then."""
+    partner.registers[217], partner.registers[211] = code, 8
+    partner.live(0.5)
+    return [note.text for note in partner.talk.events(Noted)]
+
+
+def text(partner: Partner) -> str:
+    watch = partner.talk.session.fault_watch
+    assert watch is not None
+    return watch.text
+
+
+@pytest.mark.parametrize('name', NAMES)
+@pytest.mark.parametrize('mapped', [False, True])
+class TestKnown:
+
+    def test_it_is_told_once_with_number_and_name(self, name: str, mapped: bool) -> None:
+        partner = meet(name, mapped=mapped)
+        assert text(partner) == ''
+        said = trip(partner, 7)
+        assert said.count(says('fault_named', number='7', name='overcurrent')) == 1
+        assert text(partner) == '7 overcurrent'
+        assert partner.talk.session.state is DriveState.FAULT
+        partner.registers[217] = 9      # only the first counts
+        partner.live(0.5)
+        assert text(partner) == '7 overcurrent'
+        partner.registers[211] = 1
+        partner.live(0.5)
+        assert text(partner) == ''
+        assert says('fault_named', number='9', name='hot') in trip(partner, 9)
+
+    def test_refusals_name_it(self, name: str, mapped: bool) -> None:
+        partner = meet(name, mapped=mapped)
+        trip(partner, 7)
+        partner.talk.session.users.submit(ControlRequest(ControlAction.ENABLE), partner.now)
+        (_, success, message), = partner.talk.control_outcomes()
+        assert (success, message) == (False, says('reset_first', fault='7 overcurrent'))
+        assert message.startswith('fault 7 overcurrent: remove its cause, then ')
+
+    def test_a_number_without_a_name(self, name: str, mapped: bool) -> None:
+        partner = meet(name, mapped=mapped)
+        assert says('fault_named', number='8', name='') in trip(partner, 8)
+        assert text(partner) == '8'
+
+    def test_a_drive_without_control_says_it_by_a_bit(self, name: str, mapped: bool) -> None:
+        partner = meet(name, mapped=mapped, control=None, bit=('status_word', 8))
+        assert says('fault_named', number='7', name='overcurrent') in trip(partner, 7)
+        assert partner.talk.session.state is DriveState.FAULT
+        partner.registers[211] = 1
+        partner.live(0.2)
+        assert partner.talk.session.state is DriveState.NOT_ARMED
+
+    def test_a_drive_that_is_found_in_fault(self, name: str, mapped: bool) -> None:
+        partner = meet(name, mapped=mapped)
+        trip(partner, 7)
+        partner.mute = True
+        partner.live(1.0)
+        assert text(partner) == ''
+        partner.mute = False
+        partner.live(2.0)
+        assert text(partner) == '7 overcurrent'
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_a_number_that_cannot_be_read(name: str) -> None:
+    partner = meet(name, parameter_timeout=0.05, parameter_retries=0)
+    del partner.registers[217]
+    partner.registers[211] = 8
+    partner.live(1.0)
+    notes = [note.text for note in partner.talk.events(Noted)]
+    assert notes.count(says('fault_unread')) == 1
+    assert text(partner) == ''
+    assert partner.talk.session.state is DriveState.FAULT
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_a_mapped_number_may_come_a_moment_later(name: str) -> None:
+    partner = meet(name, mapped=True)
+    trip(partner, 0)
+    assert text(partner) == ''
+    assert says('fault_named', number='7', name='overcurrent') in trip(partner, 7)
