@@ -10,6 +10,7 @@ import pytest
 from std_msgs.msg import Float64
 from std_srvs.srv import SetBool, Trigger
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control_machine import ControlMachine
 
 DRIVE = 'drive_can_bridge: drive lift'
@@ -52,7 +53,8 @@ def test_a_drive_that_runs_on_under_disable_is_an_error(
         bridge: StartBridge, client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
     one = bridge(parameters(lift=LIFT))
     one.online()
-    monkeypatch.setattr(ControlMachine, 'disregard', 'still enabled: stop it by other means')
+    monkeypatch.setattr(
+        ControlMachine, 'disregard', sentences.uncoded('still enabled: stop it by other means'))
     status = client.diagnostics(DRIVE, lambda drive: 'still enabled' in drive['message'])
     assert status['level'] == 'ERROR'
     assert status['message'].startswith('still enabled: stop it by other means')
