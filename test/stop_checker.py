@@ -137,6 +137,7 @@ class Kind:
     """
     A kind of drive, or group of them.
 
+    :ivar maps: somebody may change them, and the bridge looks.
     :ivar unseen: s after a restart for which nobody can know of it: where its word, or a setpoint
         without one, is sent all the time. docs/safety.md names that.
     """
@@ -156,7 +157,8 @@ def _extended(*, slot: bool = False, control: bool = True, **options: Any) -> Ki
             {**dict(zip(range(122, 130), (50, 52 * slot, 0, 0, 209, 210, 211, 0))),
              50: 0, 52: 0, 209: 0, 210: 0, 211: 0},
             setpoint=50, word=52 if control else None, status=211, moved=moved)),
-        unseen=4 * PERIOD if slot or not control else 0.0, maps=True)
+        unseen=4 * PERIOD if slot or not control else 0.0,
+        maps=options.get('mapping') != 'assume')
 
 
 def _standard(*, slot: bool = False, control: bool = True) -> Kind:
@@ -237,7 +239,7 @@ class Partner:
     armed: bool = False             # a command that means it, and nothing has ended it
     unwanted_since: float = math.inf
     said: bool = False              # that it may still be running, since it was found
-    restarted_at: float = -math.inf
+    unseen_until: float = -math.inf     # a restart
     events: list[Any] = field(default_factory=list)
 
 
@@ -265,6 +267,7 @@ class World:
         self.coming: list[tuple[float, int, int, str]] = []
         self.number = count()
         self.looked_at = -math.inf
+        self.enabling = False   # a call that nobody has answered yet
         self.commanded_at = -math.inf
         self.publish_at = math.inf
         for session in self.sessions:
@@ -306,9 +309,11 @@ class World:
             partner.said = False
         elif isinstance(event, StationLost):
             self.ends()
-        elif isinstance(event, ControlCompleted) and not event.success and (
+        elif isinstance(event, ControlCompleted) and (
                 event.request.action is ControlAction.ENABLE):
-            self.ends()
+            self.enabling = False
+            if not event.success:
+                self.ends()
 
     def live(self, seconds: float) -> None:
         """Let time pass."""
@@ -358,7 +363,7 @@ class World:
     def moved(self, index: int, moves: bool) -> None:
         """Judge a motor that begins to run, or gets a setpoint (``moves``)."""
         partner = self.partners[index]
-        if self.unseen and self.now - partner.restarted_at <= self.unseen + self.delay:
+        if self.now < self.looked_at or self.now <= partner.unseen_until:
             partner.wanted = partner.armed = True   # as far as anybody but the drive can know
             return
         if self.control and not partner.wanted:
@@ -399,7 +404,10 @@ class World:
     # -- what happens -----------------------------------------------------------------------------
 
     def happens(self, thing: str) -> None:
+        looking = self.now < self.looked_at
         getattr(self, '_' + thing.replace(' ', '_'))()
+        if looking and thing != 'end':      # which may keep the bridge from it
+            self.looked_at = self.now + MAPS_LOOKED_AT
         self.took()
 
     def _ask(self, action: ControlAction) -> None:
@@ -407,6 +415,7 @@ class World:
         if session.control is None or session.users.control_refusal(action):
             return
         if action is ControlAction.ENABLE:
+            self.enabling = True
             for partner in self.partners:
                 partner.wanted = True
         elif action is not ControlAction.QUICK_STOP or (
@@ -462,7 +471,8 @@ class World:
         """Lose power for a moment, unseen."""
         for partner in self.partners:
             partner.motor.restarts()
-            partner.restarted_at = self.now
+            if self.unseen:     # what was answered before arrives later
+                partner.unseen_until = self.now + self.unseen + self.delay
         if self.unseen == 0.0 or self.control:
             self.ends_unless_unseen()
         for partner in self.partners:
@@ -473,6 +483,9 @@ class World:
                         self.now + 0.001, next(self.number), partner.index, '705#00'))
 
     def ends_unless_unseen(self) -> None:
+        """Take note of a restart; a call that waits for its answer goes on."""
+        if self.enabling:
+            return
         if self.unseen == 0.0 or isinstance(self.partners[0].device, (PkwNode, StandardDrive)):
             self.ends()
 
