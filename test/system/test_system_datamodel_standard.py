@@ -131,12 +131,12 @@ def test_answers_that_are_150_ms_late(start: type[Bench]) -> None:
     bench.bridge.error('short: offline: no complete round of reads for 3 periods')
     assert client.values(f'{drive}/actual_speed')[-1] <= 150.1
     assert client.values(f'{drive}/actual_speed')[0] >= 149.9
-    facts = bench.facts(drive, state='^offline$', frames_rejected='^[1-9]')
+    facts = bench.facts(drive, state='^offline$', late_answers='^[1-9]')
     assert facts['level'] == '2'
     assert client.get(drive, 'ramp_time', 'maximum_speed') == [None, None]
     # the late answers do come, and are thrown away
-    count = int(facts['frames_rejected'])
-    while int(bench.facts(drive)['frames_rejected']) < count + 2:
+    count = int(facts['late_answers'])
+    while int(bench.facts(drive)['late_answers']) < count + 2:
         pass
     # the other one does not mind
     assert bench.facts(bench.long)['state'] in ('online', 'not armed')
