@@ -16,7 +16,8 @@ from drive_can_bridge.demo.child import Child
 
 pytest.importorskip('rclpy')
 
-LINE = re.compile(r'(conveyor|lift|turntable) (?:offline|online( \w+=-?[\d.]+( [^\s=]+)?)+)')
+LINE = re.compile(r'(conveyor|lift|turntable) '
+                  r'(?:offline(?: \(.+\))?|online( \w+=-?[\d.]+( [^\s=]+)?)+)')
 FRAME = re.compile(r'\(\d+\.\d{6}\) (\w+) ([0-9A-F]{3}|[0-9A-F]{8})#((?:[0-9A-F]{2}){0,8})')
 #: what drives are sent that stand still: torque limits stay at 100 %
 NEUTRAL = {'003FFFF0': '000003E800000000', '005FFFF0': '0000000000000000',
@@ -110,7 +111,7 @@ def test_it_ends_after_its_time(start: Start) -> None:
 def test_a_silent_drive_is_offline(start: Start) -> None:
     demo = start('--fault', 'lift:silent')
     demo.line('^conveyor online')
-    assert demo.line('^lift ') == 'lift offline'
+    demo.line(r'^lift offline \(not seen since start: ')
     assert demo.end(signal.SIGTERM) == 0
 
 
@@ -145,12 +146,13 @@ def test_it_ends_when_nobody_reads(start: Start, tmp_path: Path) -> None:
     assert 'Traceback' not in demo.errors
 
 
-def test_a_second_signal_ends_at_once(start: Start) -> None:
+def test_two_signals_in_one_breath_are_one_stop(start: Start) -> None:
+    """A terminal and a launcher both signal; how a second stop ends: test_signal_watcher."""
     demo = start()
     demo.line('^conveyor online')
     demo.process.send_signal(signal.SIGTERM)
     demo.process.send_signal(signal.SIGINT)
-    assert demo.process.wait(20.0) in (128 + signal.SIGINT, 128 + signal.SIGTERM)
+    assert demo.process.wait(60.0) in (0, 128 + signal.SIGINT)     # the machine may have paused
 
 
 @pytest.mark.parametrize(('arguments', 'code', 'words'), [

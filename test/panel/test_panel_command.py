@@ -22,7 +22,7 @@ def test_wrong_usage(run: Run, arguments: list[str]) -> None:
 
 
 @pytest.mark.parametrize(('missing', 'words'), [
-    ('rclpy', 'needs ROS 2'), ('nicegui', "the extra 'panel'")])
+    ('rclpy', 'needs ROS 2'), ('nicegui', "-m pip install 'nicegui")])
 def test_what_is_missing_is_said(run: Run, tmp_path: Path, missing: str, words: str) -> None:
     (tmp_path / f'{missing}.py').write_text(
         f"raise ModuleNotFoundError('no', name='{missing}')\n", encoding='utf-8')
