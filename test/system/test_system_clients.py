@@ -109,7 +109,6 @@ def test_callers_that_vanish(bench: Bench) -> None:
 
 def test_flood_of_commands_and_requests(bench: Bench) -> None:
     client, drive = bench.client, bench.drive
-    client.publish(f'{drive}/command/torque_limit', 0.0)
     client.publish(f'{drive}/command/speed_setpoint', 0.0)
     client.diagnostics(status_of(drive), state='^online$')
     client.silence(f'{drive}/command/speed_setpoint')
@@ -139,7 +138,6 @@ def test_flood_of_commands_and_requests(bench: Bench) -> None:
 
 def test_nonsense(bench: Bench) -> None:
     client, drive = bench.client, bench.drive
-    client.publish(f'{drive}/command/torque_limit', 0.0)
     client.publish(f'{drive}/command/speed_setpoint', 0.0)
     client.diagnostics(status_of(drive), state='^online$')
     client.publish(f'{drive}/command/speed_setpoint', 150.0)
