@@ -83,11 +83,11 @@ def test_json(run: Run, world: World) -> None:
     code, lines, _ = run('read', '--json', 'conveyor', 'ramp_time', 'nothing')
     assert code == 1
     assert [json.loads(line) for line in lines] == [
-        {'drive': 'conveyor', 'name': 'ramp_time', 'value': 2.5, 'unit': 's', 'raw': 250,
-         'number': 30, 'index': None, 'subindex': None, 'storage': 'eeprom',
+        {'drive': 'conveyor', 'name': 'ramp_time', 'value': 2.5, 'text': '', 'unit': 's',
+         'raw': 250, 'number': 30, 'index': None, 'subindex': None, 'storage': 'eeprom',
          'description': 'Ramp from standstill to maximum speed', 'reason': ''},
-        {'drive': 'conveyor', 'name': 'nothing', 'value': None, 'unit': '', 'raw': None,
-         'number': None, 'index': None, 'subindex': None, 'storage': None, 'description': '',
+        {'drive': 'conveyor', 'name': 'nothing', 'value': None, 'text': '', 'unit': '',
+         'raw': None, 'number': None, 'index': None, 'subindex': None, 'storage': None, 'description': '',
          'reason': 'unknown parameter nothing'}]
 
 

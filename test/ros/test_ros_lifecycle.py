@@ -139,7 +139,7 @@ def test_a_failing_part_leaves_nothing_behind(bridge: StartBridge, client: Clien
     one = waiting(bridge, parameters(conveyor=CONVEYOR, lift=LIFT))
     before = threads()
 
-    def fail(*_: Any) -> None:
+    def fail(*_: Any, **__: Any) -> None:
         raise RuntimeError('no more services')
     monkeypatch.setattr(drive_node, 'control_services', fail)
     assert not client.transition(CONFIGURE)

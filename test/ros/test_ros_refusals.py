@@ -65,9 +65,10 @@ def written(directory: Path, *, node: str = '/**/drive_can_bridge', **bus: Any) 
 
 
 def problem(told: tuple[int, list[str]]) -> str:
-    """Return the one problem that was logged."""
-    code, (line,) = told
+    """Return the one problem that was logged; behind it stands what names its line."""
+    code, (line, *more) = told
     assert code == 1
+    assert [each for each in more if ' names the lines' not in each] == []
     match = LOGGED.fullmatch(line)
     assert match, line
     return match.group(2)
