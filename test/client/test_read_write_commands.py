@@ -87,8 +87,8 @@ def test_json(run: Run, world: World) -> None:
          'raw': 250, 'number': 30, 'index': None, 'subindex': None, 'storage': 'eeprom',
          'description': 'Ramp from standstill to maximum speed', 'reason': ''},
         {'drive': 'conveyor', 'name': 'nothing', 'value': None, 'text': '', 'unit': '',
-         'raw': None, 'number': None, 'index': None, 'subindex': None, 'storage': None, 'description': '',
-         'reason': 'unknown parameter nothing'}]
+         'raw': None, 'number': None, 'index': None, 'subindex': None, 'storage': None,
+         'description': '', 'reason': 'unknown parameter nothing'}]
 
 
 def test_options_stand_anywhere(run: Run, world: World, capsys: pytest.CaptureFixture[str],
