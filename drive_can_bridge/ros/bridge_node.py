@@ -255,12 +255,14 @@ class BridgeNode(LifecycleNode):
     def stop(self) -> None:
         """Stop the drives and publish a last diagnostic message; for the end of the process."""
         self._ending = True
-        if self._transition_lock.acquire(timeout=5.0):
-            try:
-                self._stop_drives()
-                if self._fleet is not None:
-                    self._fleet.diagnostics.conclude()
-            finally:
+        # a transition under way may take longer, such as a stop by writes that nobody answers
+        alone = self._transition_lock.acquire(timeout=5.0)
+        try:
+            self._stop_drives()
+            if self._fleet is not None:
+                self._fleet.diagnostics.conclude()
+        finally:
+            if alone:
                 self._transition_lock.release()
 
     def close(self) -> None:
