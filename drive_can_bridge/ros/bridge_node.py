@@ -15,6 +15,7 @@ shutdown   deactivate and cleanup as far as needed
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+import gc
 from pathlib import Path
 import shlex
 from typing import Any
@@ -232,6 +233,7 @@ class BridgeNode(LifecycleNode):
         fleet, self._fleet = self._fleet, None
         if fleet is not None:
             fleet.close()
+            gc.collect()    # see scheduling.PASSES
 
     def _dismiss(self, drives: Iterable[DriveNode] = ()) -> None:
         """Take drives out of the graph, each as soon as its last caller has an answer."""
