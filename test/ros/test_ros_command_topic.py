@@ -118,6 +118,27 @@ def test_age(skew: int) -> None:
     assert came(5000) == (1, [])
 
 
+def test_of_two_commanders_the_one_whose_clock_is_behind_can_only_stop() -> None:
+    taken = Taken(Float64)
+    now = 10_000_000 * MS
+
+    def sends(value: float, behind: int) -> tuple[list[float], list[float]]:
+        now_used, now_old = len(taken.used), len(taken.old)
+        taken.subscription.put(serialize_message(Float64(data=value)), now - behind * MS, now)
+        taken.topic.take(1.0)
+        return taken.used[now_used:], taken.old[now_old:]
+    assert sends(1.0, 0) == ([1.0], [])
+    # a laptop whose clock lags moves nothing; what is neutral disarms all the same
+    assert sends(2.0, 10_000) == ([], [2.0])
+    assert sends(1.0, 0) == ([1.0], [])
+    # one whose clock is ahead takes over, and the first can still stop
+    assert sends(3.0, -10_000) == ([3.0], [])
+    assert sends(1.0, 0) == ([], [1.0])
+    assert len(taken.late) == 2     # and it is told
+    taken.topic.forget()            # nobody publishes any more
+    assert sends(1.0, 0) == ([1.0], [])
+
+
 def test_what_is_thrown_away_may_still_stop() -> None:
     taken = Taken(Float64)
     taken.subscription.put(serialize_message(Float64(data=1.0)), 10_000 * MS, 10_000 * MS)
