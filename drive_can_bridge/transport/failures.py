@@ -11,8 +11,8 @@ import errno
 from drive_can_bridge.core.text import printable
 
 _GONE = 'is gone: unplugged?'
-_NO_SOCKETCAN = ('this kernel has no SocketCAN: "modprobe can_raw" loads it where there is one (some '
-                 'containers and virtual machines have none)')
+_NO_SOCKETCAN = ('this kernel has no SocketCAN: "modprobe can_raw" loads it where there is one '
+                 '(some containers and virtual machines have none)')
 
 
 def in_words(error: BaseException) -> str:
