@@ -15,6 +15,8 @@ from drive_can_bridge.resources import profiles_directory, share_directory
 PAGE = 'profile_trust.md'
 #: how an entry's key ``verified`` is shown
 TRUST_WORDS: dict[bool | None, str] = {True: 'yes', False: 'no', None: ''}
+#: and how the entries of each kind are headed, in the order of the page
+TITLES: dict[bool | None, str] = {True: 'verified', False: 'not verified', None: 'not judged'}
 
 _HEAD = """\
 # How far the shipped profiles can be trusted
@@ -44,24 +46,25 @@ def _section(checked: Checked) -> Iterator[str]:
     yield f'{profile.description}. {len(profile.parameters)} entries, {checked.count(True)} of ' \
           'them verified.'
     yield ''
-    yield '| entries | verified | open | source |'
-    yield '|---|---|---|---|'
-    for row, names in _rows(checked).items():
-        yield f'| {", ".join(names)} | {" | ".join(row)} |'
-    yield ''
-    yield '| source | what it is |'
-    yield '|---|---|'
+    for verified, title in TITLES.items():
+        if rows := _rows(checked, verified):
+            yield f'| {title} | open | source |'
+            yield '|---|---|---|'
+            for row, names in rows.items():
+                yield f'| {", ".join(names)} | {" | ".join(row)} |'
+            yield ''
     for key, text in checked.sources.items():
-        yield f'| {key} | {_cell(text)} |'
+        yield f'* **{key}**: {text}'
 
 
-def _rows(checked: Checked) -> dict[tuple[str, ...], list[str]]:
-    """Return the entries, with their addresses, by what is said of their trust."""
+def _rows(checked: Checked, verified: bool | None) -> dict[tuple[str, ...], list[str]]:
+    """Return the entries, with their addresses, by what is open of them and their sources."""
     rows: dict[tuple[str, ...], list[str]] = {}
     for name, entry in checked.entries.items():
         parameter = checked.loaded.profile.parameters[name]
-        row = TRUST_WORDS[parameter.verified], _cell(entry.get('open', '')), \
-            _cell(entry.get('source', ''))
+        if parameter.verified is not verified:
+            continue
+        row = _cell(entry.get('open', '')), _cell(entry.get('source', ''))
         address = '' if parameter.number is parameter.index is None else f' {parameter.address}'
         rows.setdefault(row, []).append(f'`{name}`{address}')
     return rows
