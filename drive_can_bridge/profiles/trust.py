@@ -22,8 +22,8 @@ _HEAD = """\
 # How far the shipped profiles can be trusted
 
 Which entries of the shipped profiles are backed by a document, and by which. *Verified*: address,
-type, scale and unit are. *Open*: what nothing backs. None has been compared with a device. An entry
-without a number is in process data only.
+type, scale and unit are. *Open*: what nothing backs. None has been compared with a device. What
+has no number is in process data only.
 
 Made by `python3 -m drive_can_bridge.profiles.trust`; edit the profiles ([keys](profiles.md)).
 """
