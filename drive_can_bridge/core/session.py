@@ -440,6 +440,11 @@ class Session(ABC):
         return {}
 
     @property
+    def may_run(self) -> bool:
+        """Nothing has shown yet that the drive does not run by our word."""
+        return self.duty.may_run
+
+    @property
     def unshown(self) -> bool:
         """The drive was told to run, and has not shown to have heard that it was told to stop."""
         return self.duty.unshown

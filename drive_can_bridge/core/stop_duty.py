@@ -1,12 +1,13 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-The rule book of stops: may a drive be running by our word, and has it been told to stop?
+The rule book of stops: what a drive was told to do, and whether it is owed a stop.
 
-*Whatever was told to run is told to stop.* What a drive is told travels separately: by cycles, as
-a control word that is written by number, as setpoints that are. Each of these *channels* has a
-:class:`Debt`. Sessions say what has :class:`Happened`; the table :data:`ROWS` says what the debt
-is from then on, and what the session has to :class:`Do`. Nobody else decides that, and nobody else
-changes a debt. What is not in the table changes nothing.
+*Whatever was told to run is told to stop.* May a drive be running by our word, and has it been
+told to stop? It is told separately by cycles, by a control word that is written by number, by
+setpoints that are. Each of these *channels* has a :class:`Debt`. Sessions say what has
+:class:`Happened`; the table :data:`ROWS` says what the debt is from then on, and what the session
+has to :class:`Do`. Nobody else decides that, and nobody else changes a debt. What is not in the
+table changes nothing.
 
 .. code-block:: text
 
@@ -28,8 +29,6 @@ arrives, and is red when a single row is changed.
 from collections.abc import Hashable
 from enum import Enum, IntEnum
 from typing import NamedTuple
-
-from drive_can_bridge.core.told import Told, UNHEARD
 
 #: what a drive is told by cycles
 CYCLE = 'cycle'
@@ -183,14 +182,12 @@ class StopDuty:
         what stopped it has arrived.
     """
 
-    __slots__ = ('_debts', '_differed', '_rules', '_told', 'owed', 'unshown')
+    __slots__ = ('_debts', '_rules', 'owed', 'unshown')
 
     def __init__(self, rules: dict[tuple[Debt, Happened], Rule] = RULES) -> None:
         self._rules = rules
         self._debts: dict[Hashable, Debt] = {}      # those of whom anything is owed
         self.owed = self.unshown = False
-        self._differed = False
-        self._told = Told()     # what this takes the place of: both agree
 
     @property
     def may_run(self) -> bool:
@@ -201,52 +198,19 @@ class StopDuty:
         """Tell whether a channel has told it to run, and not to stop since."""
         return self._debts.get(channel) in RUNNING
 
-    def channel(self, channel: Hashable, happened: Happened) -> None:
-        """Take what happened to one channel."""
+    def channel(self, channel: Hashable, happened: Happened) -> Do:
+        """Take what happened to one channel; return what has to be done."""
         debt = self._debts.get(channel, _NONE)
         rule = self._rules.get((debt, happened))
-        if rule is not None and rule.becomes is not debt:
+        if rule is None:
+            return Do.NOTHING
+        if rule.becomes is not debt:
             self._change(channel, rule.becomes)
             self._look()
-        if happened is Happened.MISROUTED:
-            self._differed = True
-            return
-        if happened is Happened.RUN_LEFT:
-            self._told.note_unacknowledged(channel, runs=True)
-        else:
-            self._told.note(channel, runs=happened is Happened.RUN_WRITTEN)
-        self._agree()
+        return rule.do
 
     def happened(self, happened: Happened) -> Do:
         """Take what happened to the drive; return what has to be done."""
-        do = self._happened(happened)
-        self._differed = self._differed or happened is Happened.MAPS_DIFFER
-        told = self._told
-        if happened in (Happened.STOPPED, Happened.SAID, Happened.ACTIVATED):
-            told.stopped()
-        elif happened is Happened.ANSWERED:
-            told.answered()
-        elif happened in (Happened.SILENT, Happened.SHOWED_UP) or (
-                happened is Happened.UNANSWERED and not told.owed):
-            told.doubt()
-        elif happened is Happened.MAPS_DIFFER and told.ran and not told.runs(UNHEARD):
-            # what was not heard stays so: there the table is stricter
-            told.ran = False
-            told.note(CYCLE, runs=True)
-        self._agree()
-        return do
-
-    def _agree(self) -> None:
-        # where maps differed, a control word that stopped it, and was not shown, stays owed, too
-        told = self._told
-        self._differed = self._differed and (self.may_run or told.owed or told.ran)
-        agree = (self.owed >= told.owed and self.may_run >= told.ran if self._differed else
-                 (self.owed, self.unshown) == (told.owed, told.ran))
-        if not agree:
-            raise AssertionError(
-                f'{self._debts}, but {self._told._running}, ran {self._told.ran}')
-
-    def _happened(self, happened: Happened) -> Do:
         do, debts = Do.NOTHING, self._debts
         if not debts:
             return do

@@ -50,7 +50,8 @@ HEARD, DONE = ExchangeBook.heard, SafeStop._done
 DEFECTS: list[tuple[type, str, Callable[..., Any], str, Story]] = [
     (StopDuty, 'channel', _nothing, 'CANnord', (('bus down', 0.013),)),
     (StopDuty, 'channel', _nothing, 'PKW, no word', (('bus down', 0.013),)),
-    (StopDuty, 'happened', lambda self, happened: Do.NOTHING, '29 bit, no word', (('silent', 0.0), ('end', 0.0))),
+    (StopDuty, 'happened', lambda self, happened: Do.NOTHING, '29 bit, no word',
+     (('silent', 0.0), ('end', 0.0))),
     (ExchangeBook, 'heard', _heard, 'CANnord', (('late', 0.4), ('silent', 0.0), ('end', 0.0))),
     (SafeStop, '_done', lambda self, failed: DONE(self, []), '11 bit, no word',
      (('silent', 0.0), ('end', 0.0))),

@@ -243,7 +243,8 @@ class ExtendedSession(Session):
     def _missed(self, reason: Sentence, now: float) -> None:
         if self._phase is Phase.LEAVING:
             if self._exchange.cycles_left == 0:
-                self.duty.happened(Happened.SILENT)     # if nobody answers any more: next it is told by number
+                # if nobody answers any more: next it is told by number
+                self.duty.happened(Happened.SILENT)
                 self.start_over(now)
             return
         if not reason:
@@ -292,7 +293,8 @@ class ExtendedSession(Session):
                     self.start_over(now)
                 return
             self.be_online()
-            self.duty.happened(Happened.ANSWERED)   # a neutral cycle, right after a look at its maps
+            # a neutral cycle, right after a look at its maps
+            self.duty.happened(Happened.ANSWERED)
             self._side.found(now)
         slot = self._side.status_slot
         if self.control is not None and slot is not None:
