@@ -258,6 +258,7 @@ def test_deactivate_waits_for_the_neutral_cycles() -> None:
     assert not bench.exchange.active
 
 
+@pytest.mark.real
 def test_deactivate_with_the_timer_thread() -> None:
     bench = Bench(drive(period=0.005, mapping='assume'), real_time=True)
     bench.exchange.bus_opened()
@@ -513,6 +514,7 @@ def test_defect_of_the_reader_is_fatal() -> None:
     assert bench.exchange.bus_state == 'failed'
 
 
+@pytest.mark.real
 def test_defect_in_the_timer_thread_is_told_not_swallowed() -> None:
     bench = Bench(drive(mapping='assume', period=0.005), real_time=True)
     failing = threading.Event()

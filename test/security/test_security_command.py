@@ -118,6 +118,7 @@ def test_a_namespace(tmp_path: Path) -> None:
     assert '/diagnostics' in allowed(policy, '/bridge', 'topics', 'publish')
 
 
+@pytest.mark.real
 def test_it_fits_what_a_bridge_has(run: Run, tmp_path: Path) -> None:
     rclpy = pytest.importorskip('rclpy')
     from rclpy.context import Context
