@@ -118,14 +118,15 @@ def _restore(args: Namespace, backup: Backup, drive: Drive) -> int:
         return FAILED
     if drive.enabled() is Enabled.YES:      # since it was asked
         return _is_enabled(drive)
-    with Bar(f'writing {drive.name}', len(plan.changes), args.clock.now) as bar, \
-            postponed(lambda: complain(f'{drive.name}: ending after the write under way')) \
+    with postponed(lambda: complain(f'{drive.name}: ending after the write under way')) \
             as interrupted:
-        result = Restorer(drive, plan, stopped=lambda: bool(interrupted),
-                          clock=args.clock.now,
-                          wait=lambda s: args.clock.wait(args.clock.now() + s),
-                          told=bar.step, hint=complain).run()
-    return _report(args, drive, plan, result, interrupted)
+        with Bar(f'writing {drive.name}', len(plan.changes), args.clock.now) as bar:
+            result = Restorer(drive, plan, stopped=lambda: bool(interrupted),
+                              clock=args.clock.now,
+                              wait=lambda s: args.clock.wait(args.clock.now() + s),
+                              told=bar.step, hint=complain).run()
+        # a second signal does not keep from anybody what was written
+        return _report(args, drive, plan, result, interrupted)
 
 
 def _may_be(args: Namespace, backup: Backup, drive: Drive) -> bool:

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import math
 from typing import Any
 
+from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.monitor.snapshot import DriveSnapshot, Shown, Snapshot, Times
 
 
@@ -67,12 +68,13 @@ def _value(text: str) -> float | bool | str | None:
 
 
 def line(drive: DriveSnapshot) -> str:
-    """Write ``conveyor online actual_speed=12.3 rpm motor_current=1.25 A``, or why it is not."""
+    """Write ``conveyor online actual_speed=12.3 rpm motor_current=1.25 A``, or what is wrong."""
     if not drive.online:
         why = drive.advice.removeprefix('offline').lstrip(': ')
         return f'{drive.label} offline' + f' ({why})' * bool(why)
     known = [shown.assignment for shown in drive.values if shown.assignment]
-    return ' '.join([drive.label, 'online', *known])
+    fault = [f'({drive.advice})'] * (drive.state == DriveState.FAULT.value)
+    return ' '.join([drive.label, 'online', *fault, *known])
 
 
 def balance(snapshot: Snapshot) -> list[str]:

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator
 import json
 import os
 from pathlib import Path
+import signal
 import sys
 from typing import Any, NamedTuple
 
@@ -12,6 +13,7 @@ from backup_builders import BY_HAND, Shop
 import pytest
 
 from drive_can_bridge.backup.reader import read_backup
+from drive_can_bridge.cli import restore
 from drive_can_bridge.cli.main import main
 from drive_can_bridge.client.direct_drive import DirectDrive
 from drive_can_bridge.client.drive import WriteOutcome
@@ -217,6 +219,25 @@ class TestRestore:
             'it, then repeat the command to go on')
         assert shop.values('lift', 'ramp_time') == (5.0,)
         assert shop.values('lift', 'maximum_speed') != (7.0,)
+
+    def test_a_second_signal_keeps_from_nobody_what_was_written(
+            self, shop: Shop, command: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+        put, report = DirectDrive.put, restore._report
+
+        def interrupted(*args: Any, **options: Any) -> WriteOutcome:
+            signal.raise_signal(signal.SIGINT)
+            return put(*args, **options)
+
+        def interrupted_again(*args: Any) -> int:
+            signal.raise_signal(signal.SIGINT)
+            return report(*args)
+        monkeypatch.setattr(DirectDrive, 'put', interrupted)
+        monkeypatch.setattr(restore, '_report', interrupted_again)
+        file = shop.write_backup('conveyor', ramp_time=5.0, jog_speed=7.0)
+        said = command('restore', str(file), '--yes')
+        assert (said.code, said.errors[-1]) == (
+            130, 'conveyor: interrupted. Written: ramp_time. Not written: jog_speed. Repeat the '
+                 'command to go on')
 
     def test_whether_it_is_enabled_is_not_known(self, shop: Shop, command: Command) -> None:
         file = shop.write_backup('mixer', acceleration_time=5.0)

@@ -120,6 +120,16 @@ def test_samples_that_nobody_asked_for_are_not_waited_for() -> None:
     assert lines.look(model.look(NOW + 4.7, AT), NOW + 4.7) == ['conveyor online']
 
 
+def test_a_line_says_which_fault_there_is() -> None:
+    advice = 'fault 7 overcurrent: remove its cause, then reset it'
+    lines, model = Lines(), model_of([drive_status(level=2, state='fault', message=advice)])
+    model.described('/conveyor', PARAMETERS)
+    model.sampled(['/conveyor'], NOW)
+    model.responded('/conveyor', [('actual_speed', 0.0)], NOW + 0.1)
+    assert lines.look(model.look(NOW + 0.2, AT), NOW + 0.2) == [
+        f'conveyor online ({advice}) actual_speed=0.0 rpm']
+
+
 def test_a_drive_without_process_values_is_online_in_a_word() -> None:
     lines, model = Lines(), model_of([drive_status()])
     model.described('/conveyor', PARAMETERS)
