@@ -134,7 +134,8 @@ class ServoDrive:
         self.powered = True             # no safe torque off
         self.told: list[int] = []
         self.fixed: dict[tuple[int, int], int] = {}     # (index, sub-index) -> abort code
-        self.braking = 0                # SYNCs until a quick stop, or a ramp, has ended
+        self.braking = 0                # SYNCs until a quick stop has ended
+        self.ramp = 0                   # SYNCs that it takes to disable operation
         self.heard_bridge = 0
         self._staged: list[tuple[int, bytes]] = []
         self.objects = {
@@ -234,7 +235,7 @@ class ServoDrive:
 
     def write(self, index: int, subindex: int, content: bytes) -> None:
         self.objects[index, subindex] = content
-        if index == 0x6060:
+        if index == 0x6060 and (0x6061, 0) in self.objects:
             self.objects[0x6061, 0] = content
         if index == 0x6040:
             self._control(int.from_bytes(content, 'little'))
@@ -247,7 +248,11 @@ class ServoDrive:
             2, 'little')
 
     def runs_down(self) -> None:
-        """Let a quick stop get on."""
+        """Let a quick stop, or a ramp, get on."""
+        if self.ramp and self.told[-1:] == [0x07] and self.state == self.ENABLED:
+            self.ramp -= 1
+            if not self.ramp:
+                self.becomes(self.ON)
         if self.state == self.QUICK_STOP and self.braking:
             self.braking -= 1
             if not self.braking and self.number(0x605A) < 5:
@@ -273,6 +278,8 @@ class ServoDrive:
             pass
         elif command == 0x06:
             self.becomes(self.READY if self.powered or state != self.OFF else self.OFF)
+        elif command == 0x07 and state == self.ENABLED and self.ramp:
+            pass
         elif command == 0x07 and state in (self.READY, self.ENABLED):
             self.becomes(self.ON)
         elif command == 0x0F and state in (self.READY, self.ON):

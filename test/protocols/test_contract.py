@@ -250,7 +250,7 @@ class Cia402Partner(Partner):
 
     @staticmethod
     def raw_name(number: int) -> str:
-        return f'x{0x2000 + number:04x}.00'
+        return f'x{0x6042 if number == 50 else 0x2000 + number:04x}.00'
 
     def enable(self) -> None:
         self.deliver(self.talk.asks(ControlAction.ENABLE, self.now))

@@ -162,8 +162,6 @@ class Cia402Session(Session):
         self._bring_up = BringUp(self, self._node, self._rules)
         self.look_after(Looks(self._next_look, self._look), self._watch, self.exchange,
                         channel=self._channel)
-        if options.mode == 'ip':
-            self._rules.mode_bits = states.INTERPOLATE
         self._phase = Phase.IDLE
         self._look_at = math.inf        # when the set-up begins again
         self._nmt_at = -math.inf        # when the node was sent NMT because it is silent
