@@ -164,7 +164,10 @@ class TestRounds:
         one.rounds()
         one.asks(1, ControlAction.DISABLE)
         one.live(0.006)
-        assert one.rounds() == [['201', '202', '203', '080']]
+        first, *more = one.rounds()
+        assert sorted(first[:3]) == ['201', '202', '203']   # whoever stops, begins
+        assert first[3:] == ['080']
+        assert len(more) < 2
         assert one.drives[2].state == ServoDrive.ON
         assert one.drives[1].state == one.drives[3].state == ServoDrive.ENABLED
         assert one.now - at < 0.05
