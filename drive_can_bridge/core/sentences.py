@@ -392,6 +392,11 @@ def word_stays() -> str:
 
 
 @sentence
+def still_braking() -> str:
+    return 'still braking: the word stays'
+
+
+@sentence
 def now_disable() -> str:
     return 'now disable'
 
