@@ -1,19 +1,14 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The simulated drive of CiA 402: objects, PDOs, states and modes, in literal frames and times."""
 
-from cia402_builders import NODE, Servo
+import cia402_builders
+from cia402_builders import BEGINNING, Servo
 import pytest
 
 from drive_can_bridge.core.errors import ConfigurationError, ValueRefused
 from drive_can_bridge.simulation.cia402 import SimulatedServoDrive
 from drive_can_bridge.simulation.cia402_pdos import Habits
 from drive_can_bridge.simulation.motor_plant import MotorPlant
-
-import cia402_builders
-
-#: 1.2345 revolutions of 10,000 increments: where a new axis stands
-BEGINNING = 12_345
-
 
 # -- objects --------------------------------------------------------------------------------------
 
