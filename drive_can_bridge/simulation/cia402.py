@@ -2,11 +2,11 @@
 """
 A simulated servo drive of CiA 402 on CANopen.
 
-Its PDOs are in :mod:`~.cia402_pdos`, its objects in :mod:`~.cia402_objects`, state machine and axis
-in :mod:`~.cia402_plant`. It begins as it leaves the factory, with the control word in RPDO1 and the
-status word in TPDO1; with ``mapping: verify`` or ``assume`` as configured, since somebody must have
-set it up. It watches a master's heartbeat (1016h) from the first one on, and does then what 6007h
-says.
+Its PDOs are in :mod:`~.cia402_pdos`, its objects in :mod:`~.cia402_objects`, state machine and
+axis in :mod:`~.cia402_plant`. It begins as it leaves the factory, with the control word in RPDO1
+and the status word in TPDO1; with ``mapping: verify`` or ``assume`` as configured, since somebody
+must have set it up. It watches a master's heartbeat (1016h) from the first one on, and where that
+is missing does what 6007h says.
 """
 
 from collections.abc import Iterable, Mapping, Sequence

@@ -1,9 +1,9 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-The inside of a simulated drive of CiA 402: its state machine, its modes, and the axis that it moves.
+The inside of a simulated drive of CiA 402: its state machine, its modes, and the axis it moves.
 
-The axis is counted in revolutions, and what objects say of it in the units that the profile has for
-them; without one an increment is 1/10,000 of a revolution, and speeds are increments per second.
+The axis is counted in revolutions, and what objects say of it in the units that the profile has
+for them; without one an increment is 1/10,000 of a revolution, and speeds are increments per s.
 """
 
 from collections.abc import Callable, Collection
@@ -276,7 +276,7 @@ class ServoPlant:
     def _mode(self) -> int:
         return self.raw(states.MODE)
 
-    # -- what the control word does -------------------------------------------------------------------
+    # -- what the control word does ---------------------------------------------------------------
 
     def control(self, word: int) -> None:
         """Take a control word."""

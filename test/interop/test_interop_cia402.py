@@ -3,8 +3,8 @@
 CiA 402 against a CANopen stack that nobody here wrote: the package ``canopen``.
 
 Its node of profile 402 drives our simulated drive: it maps PDOs, walks states, sets modes, homes.
-And a device made of its SDO server and its PDOs is driven by our bridge. It is no dependency of the
-bridge: without it these tests skip.
+And a device made of its SDO server and its PDOs is driven by our bridge. It is no dependency of
+the bridge: without it these tests skip.
 """
 
 from collections.abc import Iterator

@@ -2,8 +2,8 @@
 """
 Finding out by reads of objects how a drive of CiA 402 wants to be configured.
 
-``mode``: 6502h says which there are. ``mapping``: PDOs that are as the file wants them already need
-no writing. ``disable_word``: 605Ch and 605Bh say what brakes. ``bridge_heartbeat``: without 1016h
+``mode``: 6502h says which there are. ``mapping``: PDOs that are as the file wants them already
+need no writing. ``disable_word``: 605Ch and 605Bh say what brakes. ``bridge_heartbeat``: without 1016h
 nobody watches the bridge.
 """
 
@@ -45,11 +45,12 @@ class Cia402Prober(Prober):
                 (yield from self._disable_word()), (yield from self._bridge_heartbeat())]
 
     def _mode(self) -> Generator[Question, Frame | None, Finding]:
-        offered, wanted = (yield from self._value(MODES_OFFERED, 0)), self.drive.options.mode
+        offered = yield from self._value(MODES_OFFERED, 0)
         if offered is None:
             return Finding('mode', None, 'no 6502h: the drive does not say which modes it has')
         names = [name for name, mode in MODES.items() if offered >> mode.number - 1 & 1]
         told = f'6502h is {offered:08X}h: {", ".join(names) or "none of those known here"}'
+        wanted = self.drive.options.mode
         return Finding('mode', wanted if wanted in names else None, told)
 
     def _mapping(self) -> Generator[Question, Frame | None, Finding]:
