@@ -85,7 +85,7 @@ class CyclicExchange(Generic[TelegramT]):
                  unheard: Callable[[], bool] | None = None, heeded: bool = True,
                  timer: CycleTimer | None = None) -> None:
         self.book = ExchangeBook(session.configuration, session.statistics, timer)
-        self.timer = self.book.timer
+        self.timer: CycleTimer = self.book.timer
         self.word: int | None = None
         self.cycles_left = -1
         self.again = self.insisting = self.runs = False

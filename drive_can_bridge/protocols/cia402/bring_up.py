@@ -82,7 +82,7 @@ class BringUp:
     :param rules: learn what the drive does at a quick stop.
     :ivar watch: sub-index of 1016h by which the drive watches the bridge, written by us; None.
     :ivar options: what 605Ah, 605Bh, 605Ch say, by index; without those that the drive lacks.
-    :ivar started_at: when the node was started last.
+    :ivar status: the status word that it began with.
     """
 
     def __init__(self, session: Session, node: Node, rules: DriveRules) -> None:
@@ -96,6 +96,7 @@ class BringUp:
         self._told: set[str] = set()
         self.watch: int | None = None
         self.options: dict[int, int] = {}
+        self.status = 0
 
     def run(self) -> Script:
         """Do it; returns an :class:`Outcome`."""
@@ -177,6 +178,7 @@ class BringUp:
                 yield from self._must(states.CONTROL_WORD, 0, word, 2)
             looks += 1
             yield Ask(pause=LOOK_PERIOD)
+        self.status = raw
         self._rules.known_disabled()
         self._session.told.stopped()
 
@@ -437,12 +439,13 @@ class BringUp:
         if refusal:
             raise _differs(refusal)
         for subindex, value in self._timers() if transmit else ():
-            if (yield from self._read(at, subindex)) == value:
+            found = yield from self._read(at, subindex)
+            if found == value or found is None and not value:
                 continue
             refusal = yield from self._put(at, subindex, value, 2)
             if refusal and subindex == pdo.EVENT_TIMER:
                 raise _differs(refusal)
-            if refusal and (value or not self._synchronous):
+            if refusal:
                 self.tell(refusal)
         yield from self._must(at, pdo.COB_ID, wanted.identifier | kept, 4)
 

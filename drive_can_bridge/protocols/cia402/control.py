@@ -80,7 +80,7 @@ class DriveRules(TableRules):
         self.status = 0
         self.quick_stop_option: int | None = None
         self.velocity_zero = False
-        self.mode_bits = 0
+        self.mode_bits = states.INTERPOLATE if options.mode == 'ip' else 0
         self.halted = False
         self._lacks, self._why = lacks, why
         self._disable_word = DISABLE_WORDS[options.disable_word]
@@ -140,7 +140,6 @@ class DriveRules(TableRules):
         self.state, self.status = None, 0
         self.velocity_zero = self.halted = False
         self._quick_stop_unseen = self._last == states.QUICK_STOP
-        self.mode_bits = 0
 
     def known_disabled(self) -> None:
         """Take note that the drive was asked by SDO, and is not enabled."""

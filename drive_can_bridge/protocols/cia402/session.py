@@ -162,8 +162,6 @@ class Cia402Session(Session):
         self._bring_up = BringUp(self, self._node, self._rules)
         self.look_after(Looks(self._next_look, self._look), self._watch, self.exchange,
                         channel=self._channel)
-        if options.mode == 'ip':
-            self._rules.mode_bits = states.INTERPOLATE
         self._phase = Phase.IDLE
         self._look_at = math.inf        # when the set-up begins again
         self._nmt_at = -math.inf        # when the node was sent NMT because it is silent
@@ -257,6 +255,7 @@ class Cia402Session(Session):
         if outcome.found is Found.READY:
             self._differing, self._runs_told = '', False
             self._phase, self._cycling_since = Phase.CYCLIC, now
+            self._machine.status_received(self._bring_up.status, now)
             self.exchange.book.forget_asked()
             self.exchange.start(now)
             self.report.advice = sentences.cycles_unanswered()
@@ -450,6 +449,8 @@ class Cia402Session(Session):
                 self._mode_shown = int.from_bytes(reply.data[:1], 'little', signed=True)
                 self._mode_seen = self._mode_shown == wanted
             if self._mode_seen:
+                self._machine.status_received(self._rules.status, self._channel.now)
+                self.control_changed(self._channel.now)
                 return
             yield Ask(pause=LOOK_PERIOD)
 
@@ -483,8 +484,13 @@ class Cia402Session(Session):
     # -- control ----------------------------------------------------------------------------------
 
     def see_to_control_word(self, now: float) -> None:
-        if self.stage is not Stage.STOPPING:
-            self.exchange.hurry(now, setpoints=self.told.owed)
+        if self.stage is Stage.STOPPING:
+            return
+        exchange, control = self.exchange, self._machine
+        exchange.hurry(now, setpoints=self.told.owed)
+        if control.pending and control.word != exchange.word:   # one step of several
+            exchange.timer.no_later(max(now, exchange.timer.began_at
+                                        + exchange.timer.stop_spacing))
 
     def _control_refusal(self, action: ControlAction, refusal: Sentence) -> Sentence:
         emergency = self._node.emergency
