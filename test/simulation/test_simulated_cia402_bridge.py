@@ -1,0 +1,383 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+Sessions of a bridge and simulated drives of CiA 402 without a clock: what becomes of the motor.
+
+A frame takes 0.2 ms. Nothing here waits, and nothing depends on the machine.
+"""
+
+from collections.abc import Callable
+import math
+from typing import Any
+
+from builders import read, text_of, write
+from cia402_builders import BEGINNING, configuration, names
+import pytest
+
+from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
+from drive_can_bridge.core.events import Event, Noted, ProcessDataReceived, RequestCompleted
+from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.setpoints import CommandOutcome
+from drive_can_bridge.protocols.families import FAMILIES, make_sessions
+from drive_can_bridge.simulation.cia402 import SimulatedServoDrive
+from drive_can_bridge.simulation.cia402_pdos import Habits
+from drive_can_bridge.simulation.plant import Mechanics
+
+FRAME_TIME = 0.0002
+STANDS = BEGINNING / 10_000
+CSP = {'mode': 'csp', 'request': ('target_position',), 'response': ('actual_position',)}
+PV = {'mode': 'pv'}
+
+
+class Cable:
+    """
+    Bridge and drives at the two ends of a bus.
+
+    :param prepare: called with each drive before anybody hears of it.
+    :ivar sent: what the bridge has sent, with its time.
+    :ivar dead: the bridge has been killed: nothing of it runs any more.
+    """
+
+    def __init__(self, *drives: DriveConfiguration, habits: Habits | None = None,
+                 prepare: Callable[[SimulatedServoDrive], None] = lambda _: None,
+                 **mechanics: Any) -> None:
+        self.drives = [SimulatedServoDrive(each, mechanics=Mechanics(**mechanics))
+                       for each in drives]
+        for drive in self.drives:
+            if habits is not None:
+                drive.habits = habits
+            prepare(drive)
+        self.sessions = make_sessions(list(drives))
+        self._routes = [[claim.route for claim in FAMILIES['cia402'].claims(each)]
+                        for each in drives]
+        self.now = 0.0
+        self.dead = False
+        self.sent: list[tuple[float, str]] = []
+        self.events: list[Event] = []
+        self._under_way: list[tuple[float, bool, Frame]] = []
+        for drive in self.drives:
+            drive.handle_timer(0.0)
+        for session in self.sessions:
+            session.bus_up(0.0)
+            session.activate(0.0)
+        self._collect()
+
+    def run(self, seconds: float) -> None:
+        """Let time pass."""
+        until = self.now + seconds
+        for _ in range(200_000):
+            due = min(*(drive.next_timer() for drive in self.drives),
+                      *(at for at, _, _ in self._under_way), math.inf,
+                      *(() if self.dead else (each.next_timer() for each in self.sessions)))
+            if due > until:
+                self.now = until
+                for drive in self.drives:
+                    drive.plant.advance(until)
+                return
+            self.now = max(self.now, due)
+            arrived = [entry for entry in self._under_way if entry[0] <= self.now]
+            self._under_way = [entry for entry in self._under_way if entry[0] > self.now]
+            for _, to_drives, each in arrived:
+                self._deliver(each, to_drives)
+            for drive in self.drives:
+                if drive.next_timer() <= self.now:
+                    drive.handle_timer(self.now)
+            if not self.dead:
+                for session in self.sessions:
+                    session.handle_timer(self.now)
+            self._collect()
+        raise AssertionError(f'nothing goes on at {self.now}')
+
+    def _deliver(self, each: Frame, to_drives: bool) -> None:
+        if to_drives:
+            for drive in self.drives:
+                if any(route.matches(each) for route in drive.routes):
+                    drive.receive_frame(each, self.now)
+        elif not self.dead:
+            for session, routes in zip(self.sessions, self._routes, strict=True):
+                if any(route.matches(each) for route in routes):
+                    session.receive_frame(each, self.now)
+
+    def _collect(self) -> None:
+        while not self.dead:
+            frames = [each for session in self.sessions for each in session.take_frames()]
+            for session in self.sessions:
+                session.frames_left(self.now)
+            if not frames:
+                break
+            for place, each in enumerate(frames):
+                self.sent.append((round(self.now, 6), str(each)))
+                self._under_way.append((self.now + FRAME_TIME * (1 + place / 100), True, each))
+        for drive in self.drives:
+            for place, each in enumerate(drive.take_frames()):
+                self._under_way.append((self.now + FRAME_TIME * (1 + place / 100), False, each))
+        if not self.dead:
+            self.events += [event for session in self.sessions for event in session.take_events()]
+
+    # -- users ------------------------------------------------------------------------------------
+
+    def control(self, action: ControlAction, patience: float = 5.0) -> tuple[bool, str]:
+        """Ask the first drive for a control action; let time pass until it has its outcome."""
+        users, request = self.sessions[0].users, ControlRequest(action)
+        refusal = users.control_refusal(action)
+        if refusal:
+            return False, str(refusal)
+        users.submit(request, self.now)
+        self._collect()
+        limit = self.now + patience
+        while True:
+            for done in self.events:
+                if isinstance(done, ControlCompleted) and done.request is request:
+                    return done.success, str(done.message)
+            assert self.now < limit, 'no outcome'
+            self.run(0.01)
+
+    def outcome(self, request: Any) -> list[object]:
+        """Submit a request to the first drive; let time pass until it has its outcome."""
+        self.sessions[0].users.submit(request, self.now)
+        self._collect()
+        for _ in range(200):
+            for event in self.events:
+                if isinstance(event, RequestCompleted) and event.request is request:
+                    return [text_of(each) for each in event.outcomes]
+            self.run(0.01)
+        raise AssertionError('no outcome')
+
+    def command(self, value: float, seconds: float = 0.2) -> None:
+        """Have somebody publish a setpoint for the first drive for some time."""
+        for _ in range(max(round(seconds / 0.1), 1)):
+            outcome = self.sessions[0].users.command(0, value, self.now)
+            assert outcome in (CommandOutcome.ACCEPTED, CommandOutcome.ARMED), outcome
+            self._collect()
+            self.run(0.1)
+
+    def deactivate(self) -> None:
+        """End as SIGTERM does: every session stops, and the bus is closed when all have."""
+        for session in self.sessions:
+            session.deactivate(self.now)
+        self._collect()
+        for _ in range(1000):
+            if all(session.stopped for session in self.sessions):
+                break
+            self.run(0.01)
+        self.dead = True
+
+    def told(self) -> list[str]:
+        """Return what was noted for the log."""
+        return [str(event.text) for event in self.events if isinstance(event, Noted)]
+
+    @property
+    def speed(self) -> float:
+        """Revolutions per second of the first axis."""
+        return self.drives[0].plant.shaft.speed
+
+    @property
+    def samples(self) -> list[tuple[int, ...]]:
+        return [event.raws for event in self.events if isinstance(event, ProcessDataReceived)]
+
+
+def running(cable: Cable, speed: float = 600.0) -> Cable:
+    """Enable the first drive and let it turn: 600 rpm are 10 revolutions per second."""
+    cable.run(1.0)
+    assert cable.sessions[0].online
+    assert cable.control(ControlAction.ENABLE)[0]
+    cable.command(0.0)
+    cable.command(speed, 1.0)
+    assert cable.speed == pytest.approx(speed / 60.0, rel=1e-3)
+    return cable
+
+
+def slow(drive: SimulatedServoDrive) -> None:
+    """Have a slow-down ramp of 10 rev/s²: a second from 10 rev/s."""
+    drive.set_value('profile_deceleration', 600.0)
+
+
+# -- the way up -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('keys', [{}, CSP, PV, {**PV, 'transmission': 'event'}])
+def test_comes_online_without_power_and_enables_once_it_is_there(keys: dict[str, Any]) -> None:
+    cable = Cable(configuration(**keys), prepare=lambda drive: drive.fault('sto', 0.0))
+    cable.run(1.0)
+    assert cable.sessions[0].online, cable.told()
+    assert cable.samples
+    success, message = cable.control(ControlAction.ENABLE)
+    assert not success
+    assert 'switch on disabled' in message
+    cable.drives[0].fault('ok', cable.now)
+    cable.run(0.5)
+    assert cable.control(ControlAction.ENABLE) == (True, 'operation enabled')
+    assert cable.drives[0].plant.shaft.position == pytest.approx(STANDS, abs=1e-9)
+    assert not cable.drives[0].violations
+
+
+def test_an_axis_stays_where_it_is_whatever_happens() -> None:
+    cable = Cable(configuration(**CSP))
+    cable.run(1.0)
+    drive = cable.drives[0]
+    assert cable.control(ControlAction.ENABLE)[0]
+    cable.run(1.0)
+    drive.fault('trip', cable.now)
+    cable.run(0.5)
+    assert cable.control(ControlAction.RESET_FAULT)[0]
+    assert cable.control(ControlAction.ENABLE)[0]
+    drive.fault('silent', cable.now)
+    cable.run(1.0)
+    drive.fault('ok', cable.now)
+    cable.run(2.0)
+    assert cable.sessions[0].online
+    drive.fault('restart', cable.now)
+    cable.run(3.0)
+    assert cable.sessions[0].online
+    assert cable.control(ControlAction.ENABLE)[0]
+    for session in cable.sessions:
+        session.bus_down(cable.now, 'unplugged')
+    cable._collect()
+    cable.run(1.0)
+    for session in cable.sessions:
+        session.bus_up(cable.now)
+    cable._collect()
+    cable.run(3.0)
+    assert cable.sessions[0].online
+    # it missed the bridge for longer than it waits
+    assert cable.control(ControlAction.ENABLE) == (
+        False, 'the drive missed the bridge: reset the fault')
+    assert cable.control(ControlAction.RESET_FAULT)[0]
+    assert cable.control(ControlAction.ENABLE)[0]
+    cable.run(1.0)
+    # asserted on what it was told, and on where it stands
+    assert drive.plant.shaft.position == pytest.approx(STANDS, abs=1e-9)
+    targets = {text[8:16] for _, text in cable.sent if text.startswith('205#') and (
+        text[4:6] in ('07', '0F'))}
+    assert targets == {BEGINNING.to_bytes(4, 'little').hex().upper()}
+
+
+def test_two_axes_share_one_sync() -> None:
+    cable = Cable(configuration(**CSP), configuration(name='other', station=6))
+    cable.run(1.0)
+    assert all(session.online for session in cable.sessions)
+    cable.sent.clear()
+    cable.run(0.1)
+    syncs = [at for at, text in cable.sent if text == '080#']
+    assert len(syncs) == 10
+    for station in ('205#', '206#'):
+        assert len([1 for _, text in cable.sent if text.startswith(station)]) == 10
+
+
+@pytest.mark.parametrize(('habits', 'keys', 'online'), [
+    (Habits(fixed_mapping=True), {}, False),
+    (Habits(fixed_mapping=True), {'mapping': 'verify'}, True),
+    (Habits(types={254, 255}), {}, False),
+    (Habits(types={254}), {**PV, 'transmission': 'event'}, True),
+    (Habits(types={1, 255}), {}, True),
+    (Habits(no_remote=True), {}, True),
+    (Habits(mode_shown_early=False), {}, True)])
+def test_makers_differ(habits: Habits, keys: dict[str, Any], online: bool) -> None:
+    cable = Cable(configuration(**keys), habits=habits)
+    cable.run(2.0)
+    assert cable.sessions[0].online is online, cable.told()
+    if online:
+        assert cable.control(ControlAction.ENABLE)[0]
+        cable.command(0.0)
+        cable.command(60.0, 1.0)
+        assert cable.speed == pytest.approx(1.0, rel=1e-3)
+
+
+def test_objects_by_sdo() -> None:
+    cable = Cable(configuration())
+    cable.run(1.0)
+    velocity, code, option = names('profile_velocity', 'fault_code', 'quick_stop_option')
+    assert cable.outcome(read(velocity, code)) == [100_000, 0]
+    assert cable.outcome(write((option, 6))) == ['written']
+    assert cable.drives[0].value('quick_stop_option') == 6
+    refused, = cable.outcome(write((names('mode_shown')[0], 1)))
+    assert refused != 'written'
+
+
+# -- ways out, told by the motor ------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('keys', [{}, PV])
+def test_the_end_at_speed_brakes_by_ramp_and_does_not_coast(keys: dict[str, Any]) -> None:
+    cable = running(Cable(configuration(**keys), prepare=slow))
+    cable.drives[0].set_value('profile_deceleration', 1200.0)
+    began = cable.drives[0].plant.shaft.position
+    cable.deactivate()
+    # the setpoint goes neutral: csv stops at once, pv in 0.5 s by its ramp. Coasting takes 0.8 s
+    assert cable.speed == 0.0
+    assert cable.drives[0].plant.shaft.position - began < 10.0 * 0.5 / 2 + 0.5
+    cable.run(2.0)
+    assert not cable.drives[0].plant.operation.enabled
+    assert not cable.drives[0].plant.operation.faulted
+    assert cable.drives[0].read_object(0x1016, 1) == bytes(4)
+
+
+def test_a_killed_bridge_is_missed_and_the_drive_stops() -> None:
+    cable = running(Cable(configuration(**PV)))
+    assert cable.drives[0].read_object(0x1016, 1) == (0x7F << 16 | 600).to_bytes(4, 'little')
+    cable.dead = True
+    cable.run(0.39)
+    assert cable.speed == pytest.approx(10.0, rel=1e-3)
+    cable.run(0.61)
+    assert cable.speed == 0.0
+    assert cable.drives[0].value('fault_code') == 0x8130
+
+
+def test_a_bridge_that_lives_is_not_missed() -> None:
+    cable = running(Cable(configuration(**PV)))
+    cable.command(600.0, 5.0)
+    assert cable.speed == pytest.approx(10.0, rel=1e-3)
+    assert cable.drives[0].read_object(0x1016, 1) != bytes(4)
+
+
+@pytest.mark.parametrize(('option', 'message', 'state'), [
+    (2, '', 'switch on disabled'), (6, 'quick stop active, holds', 'quick stop active')])
+def test_quick_stop(option: int, message: str, state: str) -> None:
+    cable = Cable(configuration(**CSP), load=0.3,
+                  prepare=lambda drive: drive.set_value('quick_stop_option', option))
+    cable.run(1.0)
+    assert cable.control(ControlAction.ENABLE)[0]
+    cable.run(0.5)
+    shaft = cable.drives[0].plant.shaft
+    success, said = cable.control(ControlAction.QUICK_STOP)
+    assert success
+    assert message in said
+    held = shaft.position
+    cable.run(2.0)
+    # a vertical axis: where power goes, it falls
+    if option == 6:
+        assert shaft.position == held
+        assert cable.control(ControlAction.DISABLE)[0]
+        cable.run(1.0)
+    assert shaft.position < held - 1.0
+    assert not cable.drives[0].plant.operation.enabled
+
+
+def test_a_vertical_axis_is_lowered_by_nobody_but_the_loss_of_power() -> None:
+    cable = Cable(configuration(**CSP), load=0.3)
+    # not enabled it sinks, and whatever enables it holds it where it is then
+    cable.run(1.0)
+    shaft = cable.drives[0].plant.shaft
+    assert shaft.position < STANDS
+    assert cable.control(ControlAction.ENABLE)[0]
+    held = shaft.position
+    cable.run(2.0)
+    assert shaft.position == pytest.approx(held, abs=0.05)
+
+
+def test_disable_brakes_by_ramp_and_another_word_coasts() -> None:
+    cable = running(Cable(configuration(**PV), prepare=slow))
+    assert cable.control(ControlAction.DISABLE)[0]
+    assert cable.speed == 0.0
+    cable = running(Cable(configuration(**PV, disable_word='disable_voltage'), prepare=slow))
+    assert cable.control(ControlAction.DISABLE)[0]
+    assert cable.speed > 8.0
+
+
+def test_nothing_homes_by_itself() -> None:
+    cable = Cable(configuration(**CSP, homing=True))
+    cable.run(1.0)
+    cable.drives[0].set_value('homing_method', 17)
+    assert cable.control(ControlAction.ENABLE)[0]
+    cable.run(2.0)
+    assert cable.drives[0].plant.shaft.position == pytest.approx(STANDS, abs=1e-9)
