@@ -3,8 +3,8 @@
 Finding out by reads of objects how a drive of CiA 402 wants to be configured.
 
 ``mode``: 6502h says which there are. ``mapping``: PDOs that are as the file wants them already
-need no writing. ``disable_word``: 605Ch and 605Bh say what brakes. ``bridge_heartbeat``: without 1016h
-nobody watches the bridge.
+need no writing. ``disable_word``: 605Ch and 605Bh say what brakes. ``bridge_heartbeat``: without
+1016h nobody watches the bridge.
 """
 
 from collections.abc import Generator, Sequence
@@ -62,8 +62,8 @@ class Cia402Prober(Prober):
             if found != list(pdo.entries):
                 return Finding('mapping', 'configure', (
                     f'{place} holds {_entries_text(found)} and not {_entries_text(pdo.entries)}'))
-        return Finding('mapping', 'verify', 'all PDOs are mapped as the file wants them; configure '
-                                            'does no harm')
+        return Finding('mapping', 'verify', 'all PDOs are mapped as the file wants them; '
+                                            'configure does no harm')
 
     def _entries(self, pdo: Pdo) -> Generator[Question, Frame | None, list[int] | None]:
         place = pdo.communication + MAPPING_OFFSET
