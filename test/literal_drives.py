@@ -164,7 +164,7 @@ class ServoDrive:
         elif identifier == 0x80:
             return self._sync()
         elif identifier == 0x600 + self.node:
-            return [Frame(0x580 + self.node, self._sdo(data), False)]
+            return [] if data[0] == 0x80 else [Frame(0x580 + self.node, self._sdo(data), False)]
         elif identifier & 0x780 == 0x700:
             self.heard_bridge += 1
         elif self.operational:

@@ -444,6 +444,11 @@ def still_braking() -> str:
 
 
 @sentence
+def word_sent_last(word: int) -> str:
+    return f'told {word:04X}h'
+
+
+@sentence
 def no_homing() -> str:
     return 'this drive has no homing'
 

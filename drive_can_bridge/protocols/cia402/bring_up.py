@@ -11,9 +11,10 @@ Whatever nobody answers ends it; it begins anew then. What differs from the conf
 cannot be made to fit, is told in words, and the drive is not cycled.
 """
 
-from collections.abc import Generator, Iterable
+from collections.abc import Callable, Generator, Iterable
 from dataclasses import dataclass
 from enum import Enum
+import math
 from typing import Any
 
 from drive_can_bridge.core import sentences
@@ -83,6 +84,8 @@ class BringUp:
     :ivar watch: sub-index of 1016h by which the drive watches the bridge, written by us; None.
     :ivar options: what 605Ah, 605Bh, 605Ch say, by index; without those that the drive lacks.
     :ivar status: the status word that it began with.
+    :ivar heard: the drive has answered this time.
+    :ivar nmt_at: when it was sent NMT last.
     """
 
     def __init__(self, session: Session, node: Node, rules: DriveRules) -> None:
@@ -97,9 +100,17 @@ class BringUp:
         self.watch: int | None = None
         self.options: dict[int, int] = {}
         self.status = 0
+        self.heard = False
+        self.nmt_at = -math.inf
+        self._now: Callable[[], float] = lambda: self.nmt_at
 
-    def run(self) -> Script:
-        """Do it; returns an :class:`Outcome`."""
+    def run(self, now: Callable[[], float]) -> Script:
+        """
+        Do it; returns an :class:`Outcome`.
+
+        :param now: the time.
+        """
+        self._now, self.heard = now, False
         try:
             yield from self._stand_still()
             yield from self._learn()
@@ -121,6 +132,7 @@ class BringUp:
         reply = yield ask
         if reply.data is None and reply.abort is None:
             raise _End(Outcome(Found.SILENT))
+        self.heard = True
         return reply
 
     def _read(self, index: int, subindex: int = 0, *, signed: bool = False,
@@ -217,7 +229,14 @@ class BringUp:
     def _waits_for_start(self) -> bool:
         return self._node.state not in (None, NmtState.OPERATIONAL)
 
+    def wake(self, now: float) -> None:
+        """Have a node that answers nothing become pre-operational, if that is our business."""
+        self.nmt_at = now
+        if self._options.nmt_start:
+            self._nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
+
     def _nmt(self, command: NmtCommand) -> None:
+        self.nmt_at = max(self.nmt_at, self._now())
         self._session.outbox.put(network.encode_nmt(command, self._drive.station))
 
     def _find_axes(self) -> Script:

@@ -177,7 +177,8 @@ class DriveRules(TableRules):
     def remark(self, sending: ControlAction) -> Sentence:
         if sending is ControlAction.ENABLE or self.state not in (
                 State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE):
-            return sentences.together((self._lacks(), self._why()))
+            return sentences.together((
+                sentences.word_sent_last(self._last), self._lacks(), self._why()))
         return sentences.still_braking()
 
 

@@ -36,6 +36,7 @@ class Cia402(Family):
     control_built_in = True
     builtin_names = frozenset((STATUS_NAME,))
     widths = frozenset((8, 16, 32))
+    keeps_by = 'not stored: lost at power-off; to store all of it: x1010.1=0x65766173'
     #: a device may take its time: nothing is documented
     drive_defaults = {'parameter_timeout': 0.5}
     options_type = Cia402Options

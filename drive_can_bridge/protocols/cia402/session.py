@@ -40,7 +40,7 @@ from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.status_reports import Wording
 from drive_can_bridge.core.users import Users
 from drive_can_bridge.protocols.canopen import network, sdo
-from drive_can_bridge.protocols.canopen.network import NmtCommand, NmtState
+from drive_can_bridge.protocols.canopen.network import NmtState
 from drive_can_bridge.protocols.canopen.node import Change, Node, START_PERIOD, START_SPACING
 from drive_can_bridge.protocols.channel import Channel, Lane
 from drive_can_bridge.protocols.cia402 import states
@@ -169,7 +169,6 @@ class Cia402Session(Session):
                         self.exchange, channel=self._channel)
         self._phase = Phase.IDLE
         self._look_at = math.inf        # when the set-up begins again
-        self._nmt_at = -math.inf        # when the node was sent NMT because it is silent
         self._cycling_since = -math.inf
         self._stop_until = -math.inf
         self._differing = ''            # as it was told
@@ -197,7 +196,7 @@ class Cia402Session(Session):
         self._node.begin(now)
         if self.told.owed:
             self._stop_by_sdo(now)
-        self._set_up(now)
+        self._set_up_soon(START_SPACING, now)
 
     def prepare_stop(self, now: float) -> bool:
         self._channel.clear()
@@ -248,11 +247,22 @@ class Cia402Session(Session):
             if self._cycling:
                 self._silent(sentences.no_heartbeat(self._node.heartbeat_timeout), now)
 
+    def _set_up_soon(self, spacing: float, now: float) -> None:
+        """
+        Set the drive up, not too often: each time it is sent NMT.
+
+        :param spacing: s since the last NMT at least.
+        """
+        self._phase = Phase.SETTING_UP
+        self._look_at = max(now, self._bring_up.nmt_at + spacing)
+        if self._look_at <= now:
+            self._set_up(now)
+
     def _set_up(self, now: float) -> None:
         """Set the drive up, from the beginning."""
         self._phase, self._look_at = Phase.SETTING_UP, math.inf
         self._watch.handle_timer(now)   # it is to be heard before the drive is to watch it
-        self._channel.run(self._bring_up.run(), self._set_up_ended, now)
+        self._channel.run(self._bring_up.run(lambda: self._channel.now), self._set_up_ended, now)
 
     def _set_up_ended(self, outcome: Outcome) -> None:
         now = self._channel.now
@@ -279,12 +289,11 @@ class Cia402Session(Session):
                 self._runs_told = True
                 self.report.warn(outcome.text, may_run=True)
         else:
-            self._look_at = now
             self.report.advice = sentences.set_up_unanswered()
-            if self.configuration.options.nmt_start and now >= self._nmt_at + START_PERIOD:
-                self._nmt_at = now      # a node that was stopped answers nothing
-                self.outbox.put(network.encode_nmt(
-                    NmtCommand.ENTER_PRE_OPERATIONAL, self.configuration.station))
+            if not self._bring_up.heard and now >= self._bring_up.nmt_at + START_PERIOD:
+                self._bring_up.wake(now)    # a node that was stopped answers nothing
+            self._look_at = now if not self._bring_up.heard else max(
+                now, self._bring_up.nmt_at + START_PERIOD)
 
     # -- online and offline -----------------------------------------------------------------------
 
@@ -302,7 +311,8 @@ class Cia402Session(Session):
         """Have a drive that is lost stand still: it may be listening."""
         self.exchange.forget()
         if not self.online:
-            self.start_over(now)
+            self.exchange.stop()
+            self._set_up_soon(START_PERIOD, now)
             return
         self.lose(reason, now)
         self._phase = Phase.LEAVING
@@ -526,6 +536,7 @@ class Cia402Session(Session):
         """Write ``disable`` and neutral setpoints to their objects."""
         if self._stop.running:
             return
+        self._channel.make_room(now)
         writes = [each._replace(raw=self._machine.word) if each.is_word else each
                   for each in self._stop.writes()]
         self._stop.begin(write_until_answered(writes, self._stop.answer_time), now, again=again)

@@ -219,3 +219,40 @@ def test_nothing_is_sent_where_there_is_nothing_to_be_stopped() -> None:
     assert talk.session.next_timer() == float('inf')
 
 
+class TestNmt:
+
+    def test_at_most_once_a_second_to_a_drive_that_is_offline(self) -> None:
+        axis = Axis(parameter_timeout=0.05)
+        axis.deaf = True
+        axis.start()
+        axis.live(5.0)
+        sent = [at for at, text in axis.log if text == '000#8005']
+        assert 4 <= len(sent) <= 6
+        assert min(later - at for at, later in zip(sent, sent[1:])) >= 0.999
+
+    def test_nor_to_one_that_answers_sdo_and_sends_no_pdos(self) -> None:
+        axis = Axis()
+        responses = axis.drive.responses
+        axis.drive.responses = lambda *kinds: []    # type: ignore[method-assign]
+        axis.start()
+        axis.live(5.0)
+        sent = [at for at, text in axis.log if text == '000#0105']
+        assert 4 <= len(sent) <= 6
+        axis.drive.responses = responses            # type: ignore[method-assign]
+        axis.live(1.5)
+        assert axis.session.online
+
+    def test_nor_ten_times_a_second_to_one_that_starts_all_the_time(self) -> None:
+        axis = Axis().online()
+        for _ in range(200):
+            axis.says('705#00')
+            axis.live(0.01)
+        sent = axis.take()
+        assert sent.count('000#0105') <= sent.count('000#8005') <= 21
+
+    def test_none_without_nmt_start(self) -> None:
+        axis = Axis(nmt_start=False)
+        axis.deaf = True
+        axis.start()
+        axis.live(3.0)
+        assert not any(text.startswith('000#') for text in axis.take())
