@@ -17,7 +17,7 @@ FAMILY = FAMILIES['cia402']
 
 
 def wrong(mode: str = 'csv', **options: Any) -> dict[str, str]:
-    return {key: text for key, text in FAMILY.check(servo(mode, **options))}
+    return dict(FAMILY.check(servo(mode, **options)))
 
 
 def test_all_modes_are_fine() -> None:

@@ -20,7 +20,8 @@ WORD = parameter('word', None, index=0x2003, subindex=0, type=ParameterType.INT1
 LONG = parameter('long', None, index=0x2004, subindex=0, type=ParameterType.UINT32)
 ORDER = parameter('order', None, index=0x2005, subindex=0, type=ParameterType.UINT16, access=WO)
 LISTED = (*TABLE, NAME, METHOD, BYTE, FLAG, WORD, LONG, ORDER)
-OBJECTS = {(0x6098, 0): b'\xFF', (0x2001, 1): b'\x80', (0x2002, 0): b'\1', (0x2003, 0): b'\xFE\xFF',
+OBJECTS = {(0x6098, 0): b'\xFF', (0x2001, 1): b'\x80', (0x2002, 0): b'\1',
+           (0x2003, 0): b'\xFE\xFF',
            (0x2004, 0): b'\1\2\3\x84', (0x2005, 0): b'\0\0', (0x2006, 0): b'\x81'}
 
 
