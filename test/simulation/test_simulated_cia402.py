@@ -1,9 +1,9 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The simulated drive of CiA 402: objects, PDOs, states and modes, in literal frames and times."""
 
-import cia402_builders
-from cia402_builders import BEGINNING, Servo
 import pytest
+import servo_builders
+from servo_builders import BEGINNING, Servo
 
 from drive_can_bridge.core.errors import ConfigurationError, ValueRefused
 from drive_can_bridge.simulation.cia402 import SimulatedServoDrive
@@ -75,7 +75,7 @@ def test_keeps_what_was_stored_and_nothing_else() -> None:
 
 def test_wants_a_plant_of_its_own() -> None:
     with pytest.raises(ConfigurationError, match='ServoPlant'):
-        SimulatedServoDrive(cia402_builders.configuration(), plant=MotorPlant)
+        SimulatedServoDrive(servo_builders.configuration(), plant=MotorPlant)
 
 
 # -- PDOs -----------------------------------------------------------------------------------------

@@ -10,8 +10,8 @@ import math
 from typing import Any
 
 from builders import read, text_of, write
-from cia402_builders import BEGINNING, configuration, names
 import pytest
+from servo_builders import BEGINNING, configuration, names
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest

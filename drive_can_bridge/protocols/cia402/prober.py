@@ -3,8 +3,8 @@
 Finding out by reads of objects how a drive of CiA 402 wants to be configured.
 
 ``mode``: 6502h says which there are. ``mapping``: PDOs that are as the file wants them already
-need no writing. ``disable_word``: 605Ch and 605Bh say what brakes. ``bridge_heartbeat``: without 1016h
-nobody watches the bridge.
+need no writing. ``disable_word``: 605Ch and 605Bh say what brakes. ``bridge_heartbeat``: without
+1016h nobody watches the bridge.
 """
 
 from collections.abc import Generator, Sequence
@@ -47,7 +47,7 @@ class Cia402Prober(Prober):
     def _mode(self) -> Generator[Question, Frame | None, Finding]:
         offered = yield from self._value(MODES_OFFERED, 0)
         if offered is None:
-            return Finding('mode', None, 'no 6502h: the drive does not say which modes it has')
+            return Finding('mode', None, 'no 6502h: the drive does not say which it has')
         names = [name for name, mode in MODES.items() if offered >> mode.number - 1 & 1]
         told = f'6502h is {offered:08X}h: {", ".join(names) or "none of those known here"}'
         wanted = self.drive.options.mode
@@ -62,8 +62,8 @@ class Cia402Prober(Prober):
             if found != list(pdo.entries):
                 return Finding('mapping', 'configure', (
                     f'{place} holds {_entries_text(found)} and not {_entries_text(pdo.entries)}'))
-        return Finding('mapping', 'verify', 'all PDOs are mapped as the file wants them; configure '
-                                            'does no harm')
+        return Finding('mapping', 'verify', 'all PDOs are mapped as the file wants them; '
+                                            'configure does no harm')
 
     def _entries(self, pdo: Pdo) -> Generator[Question, Frame | None, list[int] | None]:
         place = pdo.communication + MAPPING_OFFSET
