@@ -147,8 +147,8 @@ class DriveOperation(Operation):
     def set_safe(self, safe: bool) -> None:
         """Have the input for safe torque off high or low. Low: power is off at once."""
         self.safe = safe
-        if not safe and not self.faulted:
-            self._enter(State.SWITCH_ON_DISABLED)
+        if not safe:
+            self._enter(State.FAULT if self.faulted else State.SWITCH_ON_DISABLED)
 
 
 class ServoPlant:

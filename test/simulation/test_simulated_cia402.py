@@ -569,3 +569,22 @@ def test_a_vertical_axis_falls_where_power_goes_and_not_where_it_stays() -> None
     assert servo.revolutions == held
 
 
+
+
+def test_it_does_not_matter_how_often_one_looks() -> None:
+    ends = []
+    for steps in (1, 7, 100):
+        servo = Servo(load=0.4)
+        servo.set_up(9)
+        servo.target = 50_000
+        servo.enable()
+        servo.run(0.5)
+        servo.word = 0x02
+        servo.cycle()
+        # brakes for 20 ms, then power goes, and it sinks
+        for step in range(steps):
+            servo.drive.plant.advance(servo.now + (step + 1) / steps)
+        ends.append((servo.revolutions, servo.speed))
+    assert ends[1] == pytest.approx(ends[0])
+    assert ends[2] == pytest.approx(ends[0])
+    assert ends[0][1] < -1.0
