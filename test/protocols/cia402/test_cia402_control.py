@@ -1,7 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Which control words a drive of CiA 402 is sent, in which state, and what is said of it."""
 
-from cia402_builders import Axis
+from servo_builders import Axis
 import pytest
 from saying import says
 

@@ -3,7 +3,7 @@
 
 from typing import Any
 
-from cia402_builders import Axis, POSITION, TORQUE, VELOCITY
+from servo_builders import Axis, POSITION, TORQUE, VELOCITY
 import pytest
 from saying import says
 

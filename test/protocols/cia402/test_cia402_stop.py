@@ -2,7 +2,7 @@
 """Whatever was told to run is told to stop: by cycles, by SDO, at the end and after losses."""
 
 from builders import Conversation
-from cia402_builders import Axis, servo
+from servo_builders import Axis, servo
 import pytest
 from saying import says
 
