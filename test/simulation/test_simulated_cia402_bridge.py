@@ -10,8 +10,8 @@ import math
 from typing import Any
 
 from builders import read, text_of, write
+from cia402_builders import BEGINNING, configuration, names
 import pytest
-from servo_builders import BEGINNING, configuration, names
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
@@ -20,7 +20,7 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.setpoints import CommandOutcome
 from drive_can_bridge.protocols.families import FAMILIES, make_sessions
 from drive_can_bridge.simulation.cia402 import SimulatedServoDrive
-from drive_can_bridge.simulation.cia402_pdos import Habits
+from drive_can_bridge.simulation.cia402_plant import Habits
 from drive_can_bridge.simulation.plant import Mechanics
 
 FRAME_TIME = 0.0002
