@@ -21,7 +21,7 @@ class TableRules:
     def __init__(self, table: ControlTable) -> None:
         self._words: dict[ControlAction, int] = {
             action: word for action in ControlAction
-            if (word := getattr(table, action.value)) is not None}
+            if (word := getattr(table, action.value, None)) is not None}
         self.known = frozenset(self._words)
 
     def word(self, sending: ControlAction, *, enabling: bool) -> int:

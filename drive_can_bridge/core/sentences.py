@@ -444,6 +444,56 @@ def still_braking() -> str:
 
 
 @sentence
+def no_homing() -> str:
+    return 'this drive has no homing'
+
+
+@sentence
+def homing() -> str:
+    return 'homing'
+
+
+@sentence
+def homing_under_way() -> str:
+    return 'homing is under way'
+
+
+@sentence
+def homing_needs_enabled() -> str:
+    return 'enable it first: only an enabled drive looks for its reference'
+
+
+@sentence
+def homing_needs_disarmed() -> str:
+    return 'it is armed: stop commanding it, until command_timeout has passed'
+
+
+@sentence
+def homing_timed_out(timeout: float, step: str) -> str:
+    return f'homing not ended in {timeout:g} s: stopped {step}'
+
+
+@sentence
+def homing_stopped(step: str) -> str:
+    return f'homing stopped {step}'
+
+
+@sentence
+def homing_failed() -> str:
+    return 'the drive reports a homing error (bit 13)'
+
+
+@sentence
+def mode_refused(mode: int) -> str:
+    return f'the drive does not change to mode {mode}'
+
+
+@sentence
+def homed() -> str:
+    return 'homed'
+
+
+@sentence
 def now_disable() -> str:
     return 'now disable'
 

@@ -83,6 +83,9 @@ class Users:
             return
         session = self._session
         refusal = self.control_refusal(request.action)
+        if request.action is ControlAction.HOME and not refusal:
+            session.home(request, now)
+            return
         if refusal:
             session.report.note(ControlCompleted(request, False, refusal))
             return

@@ -70,6 +70,7 @@ class DriveRules(TableRules):
     :ivar quick_stop_option: 605Ah; None: the drive has none.
     :ivar velocity_zero: 606Ch said so in *quick stop active*.
     :ivar mode_bits: what the mode adds to the enable word once the drive is enabled.
+    :ivar homing_bits: what is sent beside 000Fh in mode 6; None: the drive is in its own mode.
     :ivar halted: the drive was told to halt: its position is its own.
     """
 
@@ -81,6 +82,7 @@ class DriveRules(TableRules):
         self.quick_stop_option: int | None = None
         self.velocity_zero = False
         self.mode_bits = states.INTERPOLATE if options.mode == 'ip' else 0
+        self.homing_bits: int | None = None
         self.halted = False
         self._lacks, self._why = lacks, why
         self._disable_word = DISABLE_WORDS[options.disable_word]
@@ -108,6 +110,8 @@ class DriveRules(TableRules):
         return states.SHUTDOWN
 
     def _enabling(self) -> int:
+        if self.homing_bits is not None and self._last & _ENABLE_OPERATION:
+            return states.ENABLE | self.homing_bits
         if self.state is State.OPERATION_ENABLED:
             return self._enable_word | self.mode_bits
         if self.state is State.SWITCHED_ON:

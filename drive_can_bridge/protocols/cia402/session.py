@@ -24,7 +24,7 @@ import math
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.errors import RemoteProtocolError, Unasked
@@ -49,6 +49,8 @@ from drive_can_bridge.protocols.cia402.bring_up import BringUp, Found, LOOK_PERI
 from drive_can_bridge.protocols.cia402.channel import Ask, Reply, SdoChannel, SdoCourier
 from drive_can_bridge.protocols.cia402.control import control_table, DriveRules, hint
 from drive_can_bridge.protocols.cia402.family import request_pdos, response_pdos
+from drive_can_bridge.protocols.cia402.handover import Handover
+from drive_can_bridge.protocols.cia402.homing import Homing
 from drive_can_bridge.protocols.cia402.procedures import (
     cells, MAP, SdoAccess, write_until_answered,
 )
@@ -160,8 +162,11 @@ class Cia402Session(Session):
             heartbeat = BridgeHeartbeat(options.bridge_node, options.bridge_heartbeat)
         self._watch = Watch(self, heartbeat)
         self._bring_up = BringUp(self, self._node, self._rules)
-        self.look_after(Looks(self._next_look, self._look), self._watch, self.exchange,
-                        channel=self._channel)
+        self._handover = Handover(self.setpoints, self._rules) if options.mode == 'pp' else None
+        self._homing = Homing(self, control, self._rules, self._channel,
+                              MODES[options.mode].number)
+        self.look_after(Looks(self._next_look, self._look), self._watch, self._homing,
+                        self.exchange, channel=self._channel)
         self._phase = Phase.IDLE
         self._look_at = math.inf        # when the set-up begins again
         self._nmt_at = -math.inf        # when the node was sent NMT because it is silent
@@ -196,6 +201,7 @@ class Cia402Session(Session):
 
     def prepare_stop(self, now: float) -> bool:
         self._channel.clear()
+        self._homing.stop()
         self._stop.forget()
         self._look_at = math.inf
         return self.stage is not Stage.IDLE and (
@@ -303,6 +309,7 @@ class Cia402Session(Session):
         self.exchange.run_out(self.exchange.timer.due)
 
     def lost(self, now: float, *, was_online: bool) -> None:
+        self._homing.stop()
         self._forget_state()
         self._set.clear()
 
@@ -315,6 +322,8 @@ class Cia402Session(Session):
     # -- PDOs, sending ----------------------------------------------------------------------------
 
     def _encode(self, raws: list[int]) -> list[bytes]:
+        if self._handover is not None:
+            self._handover.carried(raws[0], raws[1:])
         payloads, at = [], 0
         for each in self._requests:
             count = len(each.parameters)
@@ -389,10 +398,13 @@ class Cia402Session(Session):
                 return
             self.be_online()
             self.told.answered()
+        if self._handover is not None:
+            self._handover.look(raws[0])
         self.gate.status(raws[0], now)
         self._look_at_state(now)
         self.control_changed(now)
         self.gate.measured(raws)
+        self._homing.sampled(raws[0], raws)
         self.report.note(ProcessDataReceived(tuple(raws), received_at))
         exchange.wait_out(now)
 
@@ -424,7 +436,8 @@ class Cia402Session(Session):
             self._pending_since, self._error_code = now, None
         if self._looking or self.stage is not Stage.RUNNING:
             return
-        if state is State.OPERATION_ENABLED and not self._mode_seen and not control.stopping:
+        if state is State.OPERATION_ENABLED and not self._mode_seen and not control.stopping and (
+                not self._homing.under_way):
             self._looking = True
             self._channel.run(self._look_at_mode(), self._looked, now)
         elif state is State.QUICK_STOP_ACTIVE and self._rules.stays and not self._rules.stands:
@@ -483,6 +496,13 @@ class Cia402Session(Session):
         return sentences.together((known, newest))
 
     # -- control ----------------------------------------------------------------------------------
+
+    def home(self, request: ControlRequest, now: float) -> None:
+        refusal = self._homing.refusal()
+        if refusal:
+            self.report.note(ControlCompleted(request, False, refusal))
+        else:
+            self._homing.begin(request, now)
 
     def see_to_control_word(self, now: float) -> None:
         if self.stage is Stage.STOPPING:
@@ -550,6 +570,10 @@ class Cia402Session(Session):
         if self._phase is Phase.DIFFERS and not self.defect:
             return DriveState.MAPPING_DIFFERS
         return super().state
+
+    @property
+    def busy(self) -> Sentence:
+        return sentences.homing() if self._homing.under_way else NOTHING
 
     @property
     def warning(self) -> Sentence:
