@@ -152,6 +152,7 @@ class ServoDrive:
                 self.objects[at + pdo, 2] = b'\xFF'
                 self.objects[at + pdo + 0x200, 0] = b'\0'
         self.objects.update(objects or {})
+        self._initial = dict(self.objects)
 
     def number(self, index: int, subindex: int = 0) -> int:
         return int.from_bytes(self.objects[index, subindex], 'little')
@@ -176,8 +177,7 @@ class ServoDrive:
 
     def restarts(self) -> list[Frame]:
         """Be switched off and on: disabled, and what was written of the PDOs is forgotten."""
-        fresh = ServoDrive(self.node)
-        self.objects.update({place: content for place, content in fresh.objects.items()
+        self.objects.update({place: content for place, content in self._initial.items()
                              if place[0] < 0x2000 or place[0] in (0x6060, 0x6061)})
         self.operational = False
         self.becomes(self.OFF)

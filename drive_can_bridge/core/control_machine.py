@@ -210,6 +210,7 @@ class ControlMachine:
         self.handle_timer(now)
         if self._reports.take(member, raw, counts=self._sent) and raw is not None:
             self._rules.reported(raw, behind=self._sent)
+            self._choose()      # what another word has to bring about is not confirmed yet
             self._watch_fault(raw)
             self._watch_enabled(raw)
             self._advance()

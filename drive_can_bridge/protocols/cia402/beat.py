@@ -99,6 +99,11 @@ class Beat:
         self.turns: list[Turn] = []
         self._hurried = self._pulling = False
 
+    @property
+    def running(self) -> bool:
+        """Some drive is in exchange, so that SYNC is sent."""
+        return any(turn.running for turn in self.turns)
+
     def next_due(self, at: float, turn: Turn, period: float) -> float:
         """Return when a drive that wants to begin then is due: with the others."""
         due = min((other.due for other in self.turns if other is not turn), default=math.inf)

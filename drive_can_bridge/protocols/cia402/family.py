@@ -178,9 +178,6 @@ class Cia402(Family):
                 if parameter.listed and parameter.index is None:
                     yield Complaint(listed, f"'{parameter.name}' has no index, allowed in a PDO "
                                             'are objects')
-                elif parameter.type is ParameterType.BOOL:
-                    yield Complaint(listed, f"'{parameter.name}' is a bool, allowed in a PDO are "
-                                            'types of 8, 16 and 32 bits')
                 if key == 'request_pdos' and parameter.index is not None:
                     place = parameter.index, parameter.subindex or 0
                     if place in taken:

@@ -263,7 +263,7 @@ class Cia402Session(Session):
             self._phase, self._cycling_since = Phase.CYCLIC, now
             self._machine.status_received(self._bring_up.status, now)
             self.exchange.book.forget_asked()
-            self.exchange.book.stale = 1    # it answers to the SYNC of others already
+            self.exchange.book.stale = self._beat.running   # it answers to the SYNC of others
             self.exchange.start(now)
             self.report.advice = sentences.cycles_unanswered()
         elif outcome.found is Found.DIFFERS:

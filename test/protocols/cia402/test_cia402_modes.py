@@ -195,7 +195,7 @@ class TestHoming:
         home(axis, 0.2)
         outcomes = axis.asks(ControlAction.DISABLE, 0.5)
         assert ('home', False, says('homing_stopped', step='on its way')) in outcomes
-        assert ('disable', True, 'switched on') in outcomes
+        assert ('disable', True, 'ready to switch on') in outcomes
         assert drive.number(0x6060) == number
         assert axis.session.busy == ''
         assert axis.asks(ControlAction.ENABLE) == [('enable', True, 'operation enabled')]
