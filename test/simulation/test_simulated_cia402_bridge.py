@@ -374,10 +374,86 @@ def test_disable_brakes_by_ramp_and_another_word_coasts() -> None:
     assert cable.speed > 8.0
 
 
-def test_nothing_homes_by_itself() -> None:
+@pytest.mark.parametrize(('method', 'offset', 'shown', 'moved'), [
+    (17, 0.0, 0, True), (17, -0.5, -5000, True), (37, 0.0, 0, False), (35, 2.0, 20_000, False)])
+def test_homing_by_request_only(method: int, offset: float, shown: int, moved: bool) -> None:
     cable = Cable(configuration(**CSP, homing=True))
+    drive = cable.drives[0]
     cable.run(1.0)
-    cable.drives[0].set_value('homing_method', 17)
+    drive.set_value('homing_method', method)
+    drive.set_value('home_offset', offset)
     assert cable.control(ControlAction.ENABLE)[0]
     cable.run(2.0)
-    assert cable.drives[0].plant.shaft.position == pytest.approx(STANDS, abs=1e-9)
+    assert drive.plant.shaft.position == pytest.approx(STANDS, abs=1e-9)
+    assert cable.control(ControlAction.HOME)[0]
+    # back in csp, where it is now, and still enabled
+    where = drive.plant.shaft.position
+    assert where == pytest.approx(0.0 if moved else STANDS, abs=1e-9)
+    assert cable.samples[-1][1] == shown
+    cable.run(1.0)
+    assert drive.plant.shaft.position == pytest.approx(where, abs=1e-9)
+    assert drive.value('mode_shown') == 8
+    assert drive.plant.operation.enabled
+    assert not drive.plant.operation.faulted
+
+
+def test_homing_that_fails_says_so_and_leaves_the_axis_in_its_mode() -> None:
+    cable = Cable(configuration(**CSP, homing=True), habits=Habits(home_switch=None))
+    drive = cable.drives[0]
+    cable.run(1.0)
+    drive.set_value('homing_method', 17)
+    assert cable.control(ControlAction.ENABLE)[0]
+    success, message = cable.control(ControlAction.HOME, 10.0)
+    assert not success
+    assert message
+    cable.run(0.5)
+    where = drive.plant.shaft.position
+    cable.run(1.0)
+    assert drive.plant.shaft.position == where
+    assert drive.value('mode_shown') == 8
+
+
+@pytest.mark.parametrize(('mode', 'setpoint', 'value', 'speed'), [
+    ('vl', 'vl_target_velocity', 600.0, 10.0), ('tq', 'target_torque', 8.0, 5.0),
+    ('cst', 'target_torque', 8.0, 5.0)])
+def test_modes_of_speed_and_torque(mode: str, setpoint: str, value: float, speed: float) -> None:
+    cable = Cable(configuration(mode=mode, request=(setpoint,)))
+    cable.run(1.0)
+    assert cable.control(ControlAction.ENABLE)[0]
+    cable.command(0.0)
+    assert cable.speed == 0.0
+    cable.command(value, 3.0)
+    assert cable.speed == pytest.approx(speed, rel=0.01)
+
+
+def test_vl_stands_still_without_its_bits() -> None:
+    cable = Cable(configuration(mode='vl', request=('vl_target_velocity',), ramp_bits=False))
+    cable.run(1.0)
+    assert cable.control(ControlAction.ENABLE)[0]
+    cable.command(0.0)
+    cable.command(600.0, 1.0)
+    assert cable.speed == 0.0
+
+
+@pytest.mark.parametrize(('mode', 'setpoint'), [
+    ('csp', 'target_position'), ('pp', 'target_position'), ('ip', 'interpolation_target')])
+def test_modes_of_position_go_where_they_are_told(mode: str, setpoint: str) -> None:
+    cable = Cable(configuration(mode=mode, request=(setpoint,), response=('actual_position',)))
+    shaft = cable.drives[0].plant.shaft
+    cable.run(1.0)
+    assert cable.control(ControlAction.ENABLE)[0]
+    cable.run(0.5)
+    assert shaft.position == pytest.approx(STANDS, abs=1e-9)
+    cable.command(STANDS)
+    for step in range(1, 11):
+        cable.command(STANDS + 0.1 * step, 0.1)
+    cable.command(STANDS + 1.0, 1.0)
+    assert shaft.position == pytest.approx(STANDS + 1.0, abs=2e-4)
+    assert cable.speed == 0.0
+    # the newest wins, and nobody follows any more once it is disabled
+    cable.command(STANDS, 0.1)
+    assert cable.control(ControlAction.DISABLE)[0]
+    where = shaft.position
+    cable.run(1.0)
+    assert shaft.position == pytest.approx(where, abs=1e-9)
+    assert not cable.drives[0].plant.operation.faulted
