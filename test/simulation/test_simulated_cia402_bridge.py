@@ -11,6 +11,7 @@ from typing import Any
 
 from builders import read, text_of, write
 from cia402_builders import BEGINNING, configuration, names
+from hypothesis import given, settings, strategies as st
 import pytest
 
 from drive_can_bridge.core.configuration import DriveConfiguration
@@ -457,3 +458,89 @@ def test_modes_of_position_go_where_they_are_told(mode: str, setpoint: str) -> N
     cable.run(1.0)
     assert shaft.position == pytest.approx(where, abs=1e-9)
     assert not cable.drives[0].plant.operation.faulted
+
+
+# -- anything -------------------------------------------------------------------------------------
+
+ANYTHING = ('trip', 'silent', 'late=0.03', 'drop=3', 'length=3', 'foreign', 'duplicate', 'sto',
+            'restart', 'power_cut=1', 'ok', 'refuse=mode', 'bus down', 'bus up', 'enable',
+            'disable', 'quick stop', 'reset', 'home', 'stall')
+ACTIONS = {'enable': ControlAction.ENABLE, 'disable': ControlAction.DISABLE,
+           'quick stop': ControlAction.QUICK_STOP, 'reset': ControlAction.RESET_FAULT,
+           'home': ControlAction.HOME}
+
+
+def happens(cable: Cable, what: str) -> None:
+    """Let something happen to the first drive, its bus or its users, who wait for nothing."""
+    session = cable.sessions[0]
+    if what in ACTIONS:
+        if not session.users.control_refusal(ACTIONS[what]):
+            session.users.submit(ControlRequest(ACTIONS[what]), cable.now)
+    elif what == 'bus down':
+        session.bus_down(cable.now, 'unplugged')
+    elif what == 'bus up':
+        session.bus_up(cable.now)
+    elif what == 'stall':
+        cable.now += 1.5
+        session.time_lost(cable.now)
+    else:
+        cable.drives[0].fault(what, cable.now)
+    cable._collect()
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.lists(st.tuples(st.sampled_from(ANYTHING), st.sampled_from((0.0, 0.013, 0.1, 0.7, 3.0))),
+                max_size=12), st.sampled_from(('csp', 'ip', 'pp')))
+def test_whatever_happens_no_axis_moves_by_our_doing_and_none_is_left_enabled(
+        story: list[tuple[str, float]], mode: str) -> None:
+    request = 'interpolation_target' if mode == 'ip' else 'target_position'
+    cable = Cable(configuration(mode=mode, request=(request,), response=('actual_position',),
+                                homing=True),
+                  prepare=lambda drive: drive.set_value('homing_method', 37))
+    drive = cable.drives[0]
+    cable.run(1.0)
+    for what, seconds in story:
+        happens(cable, what)
+        cable.run(seconds)
+    # on the spot is where homing takes place: nothing of this turns the shaft
+    assert drive.plant.shaft.position == pytest.approx(STANDS, abs=1e-6)
+    happens(cable, 'bus up')
+    happens(cable, 'ok')
+    cable.run(4.0)
+    assert cable.sessions[0].online
+    cable.deactivate()
+    assert drive.plant.shaft.position == pytest.approx(STANDS, abs=1e-6)
+    assert not drive.plant.operation.enabled
+    cable.run(2.0)
+    assert not drive.plant.operation.enabled
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.lists(st.tuples(st.sampled_from((*ANYTHING, 'neutral', 'fast', 'back')),
+                          st.sampled_from((0.0, 0.013, 0.1, 0.4, 2.0))), max_size=12),
+       st.sampled_from(('csv', 'pv', 'vl')), st.sampled_from(('end', 'kill')))
+def test_whatever_happens_what_ran_has_stopped_in_the_end(
+        story: list[tuple[str, float]], mode: str, end: str) -> None:
+    request = 'vl_target_velocity' if mode == 'vl' else 'target_velocity'
+    cable = Cable(configuration(mode=mode, request=(request,)))
+    drive, speeds = cable.drives[0], {'neutral': 0.0, 'fast': 600.0, 'back': -300.0}
+    cable.run(1.0)
+    assert cable.control(ControlAction.ENABLE)[0]
+    cable.command(0.0)
+    cable.command(600.0)
+    for what, seconds in story:
+        if what in speeds:
+            cable.sessions[0].users.command(0, speeds[what], cable.now)
+        else:
+            happens(cable, what)
+        cable.run(seconds)
+    if end == 'kill':
+        cable.dead = True
+    else:
+        cable.deactivate()
+    told = 'may still be running' in ' '.join(cable.told())
+    cable.run(2.0)
+    # who was not told to stop misses the bridge
+    assert not drive.plant.operation.enabled, (told, cable.told())
+    cable.run(5.0)
+    assert cable.speed == 0.0
