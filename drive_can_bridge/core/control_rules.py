@@ -52,7 +52,7 @@ class TableRules:
 
     @property
     def holds(self) -> Sentence:
-        """What is answered to a quick stop in which the drive stays for good; '' if it does not."""
+        """What is answered to a quick stop in which the drive stays; '' if it does not."""
         return NOTHING
 
     @property

@@ -213,7 +213,7 @@ class Cia402(Family):
                 f'{setpoint.type.value}, the setpoint of {name} is {mode.type.value}'))
         elif mode.position and not setpoint.neutral_from:
             yield Complaint(f'profile.parameters.{setpoint.name}.neutral_from', (
-                f"missing: a position has no value that is neutral everywhere; allowed in {name} "
+                f'missing: a position has no value that is neutral everywhere; allowed in {name} '
                 'is the name of the actual position, with an arming_tolerance'))
         if mode.interpolated and not (
                 drive.options.transmission == 'sync' and drive.period <= INTERPOLATION_MAX):

@@ -1,11 +1,11 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""
+r"""
 How a target reaches a drive in mode pp: by an edge of bit 4, which the drive acknowledges.
 
 .. code-block:: text
 
-    bit 4  ____/‾‾‾‾‾‾‾‾‾‾\\______    rises with a new target (bit 5: at once, whatever is under way)
-    bit 12 ________/‾‾‾‾‾‾‾‾‾‾\\__    acknowledged; the next target waits until it has fallen
+    bit 4  ____/‾‾‾‾‾‾‾‾‾\______    rises with a new target (bit 5: at once)
+    bit 12 ________/‾‾‾‾‾‾‾‾‾\__    acknowledged; the next target waits until it has fallen
 
 One after the other, the newest wins. When its commands cease, an axis that is on its way is halted
 (bit 8), until it is armed again: bit 8 falls in the word in which bit 4 rises.

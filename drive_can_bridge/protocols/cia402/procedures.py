@@ -92,7 +92,8 @@ class SdoAccess(Access[Parameter, Ask, Reply]):
             return refused(reply.abort)
         return self.retry.unanswered(1) if reply.sent else Failure(sentences.not_sent())
 
-    def _upload(self, parameter: Parameter) -> Generator[Ask, Reply, 'tuple[bytes, bool] | Failure']:
+    def _upload(self, parameter: Parameter,
+                ) -> Generator[Ask, Reply, 'tuple[bytes, bool] | Failure']:
         """Read an object of at most four bytes; tell whether the drive has said how many."""
         reply = yield Ask(parameter.index or 0, parameter.subindex or 0)
         if reply.abort is not None:

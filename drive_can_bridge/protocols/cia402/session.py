@@ -58,7 +58,7 @@ from drive_can_bridge.protocols.cia402.states import (
     CONTROL_PARAMETER, MODES, State, state_of, STATUS_PARAMETER,
 )
 from drive_can_bridge.protocols.cyclic_exchange import CYCLE, CyclicExchange
-from drive_can_bridge.protocols.safe_stop import ANSWER_TIME, SafeStop, STOP_ATTEMPTS, StatusRead
+from drive_can_bridge.protocols.safe_stop import ANSWER_TIME, SafeStop, StatusRead, STOP_ATTEMPTS
 from drive_can_bridge.protocols.stop_again import StopAgain
 
 #: s until a drive that differs, or runs on, is looked at again

@@ -136,7 +136,7 @@ class Axis:
         return [text for _, text in log]
 
     def words(self) -> list[str]:
-        """Return the control words that RPDO1 carried since the last call, repetitions left out."""
+        """Return the control words of RPDO1 since the last call, repetitions left out."""
         found: list[str] = []
         for text in self.take():
             if text.startswith('205#') and text[4:8] not in found[-1:]:

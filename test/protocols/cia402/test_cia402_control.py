@@ -1,9 +1,9 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Which control words a drive of CiA 402 is sent, in which state, and what is said of it."""
 
-from servo_builders import Axis
 import pytest
 from saying import says
+from servo_builders import Axis
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.drive_state import DriveState
@@ -28,8 +28,12 @@ class TestTheWay:
 
     def test_a_drive_that_needs_its_time_for_each_step(self) -> None:
         axis = Axis().online()
-        control, late = axis.drive._control, []
-        axis.drive._control = lambda word: (late.append(word), control(late[max(0, len(late) - 4)]))
+        control, late = axis.drive._control, list[int]()
+
+        def sluggish(word: int) -> None:
+            late.append(word)
+            control(late[max(0, len(late) - 4)])
+        axis.drive._control = sluggish      # type: ignore[method-assign]
         assert axis.asks(ENABLE, 0.5) == [('enable', True, 'operation enabled')]
         assert axis.words() == ['0700', '0F00']
 
@@ -70,7 +74,7 @@ class TestTheWay:
         """It counts as enabled, whatever the status on its way says."""
         axis = Axis().online()
         axis.deliver(axis.talk.asks(ENABLE, axis.now))
-        while '205#0F0000000000' not in (sent := axis.take()):
+        while '205#0F0000000000' not in axis.take():
             axis.live(0.001)
         axis.mute = True
         axis.deliver(axis.talk.asks(DISABLE, axis.now))
@@ -138,7 +142,8 @@ class TestWhatKeepsItFromEnabling:
         axis.says('085#3081110000000000')
         axis.live(0.1)
         assert axis.session.users.control_refusal(ENABLE) == says('bridge_missed')
-        assert axis.asks(ControlAction.RESET_FAULT) == [('reset_fault', True, 'ready to switch on')]
+        assert axis.asks(ControlAction.RESET_FAULT) == [
+            ('reset_fault', True, 'ready to switch on')]
         assert axis.asks(ENABLE) == [('enable', True, 'operation enabled')]
 
 

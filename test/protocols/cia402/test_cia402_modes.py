@@ -3,10 +3,10 @@
 
 from typing import Any
 
-from servo_builders import Axis, OBJECTS
 from literal_drives import ServoDrive
 import pytest
 from saying import says
+from servo_builders import Axis, OBJECTS
 
 from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.core.drive_state import DriveState

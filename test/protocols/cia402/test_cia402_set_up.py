@@ -3,9 +3,9 @@
 
 from typing import Any
 
-from servo_builders import Axis, POSITION, TORQUE, VELOCITY
 import pytest
 from saying import says
+from servo_builders import Axis, POSITION, TORQUE, VELOCITY
 
 from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import MappingDiffered, Noted

@@ -2,9 +2,9 @@
 """Whatever was told to run is told to stop: by cycles, by SDO, at the end and after losses."""
 
 from builders import Conversation
-from servo_builders import Axis, servo
 import pytest
 from saying import says
+from servo_builders import Axis, servo
 
 from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import Noted, StationLost

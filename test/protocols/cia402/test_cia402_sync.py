@@ -3,15 +3,13 @@
 
 from typing import Any
 
-from builders import frame
-from servo_builders import Axis, OBJECTS, servo
 from literal_drives import ServoDrive
+from servo_builders import Axis, OBJECTS, servo
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.core.events import ProcessDataReceived
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.families import make_sessions
 
 DELAY = 0.0002
