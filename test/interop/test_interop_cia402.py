@@ -151,6 +151,7 @@ def node(network: Any, servo: PlayedDrive) -> Any:
     remote.nmt.state = 'OPERATIONAL'
     network.sync.start(PERIOD)
     remote.rpdo[1].start(PERIOD)
+    wait_for(lambda: remote.statusword, 'a status word')
     return remote
 
 

@@ -12,7 +12,7 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.resources import profiles_directory
 from drive_can_bridge.simulation.cia402 import SimulatedServoDrive
-from drive_can_bridge.simulation.cia402_pdos import Habits
+from drive_can_bridge.simulation.cia402_plant import Habits
 from drive_can_bridge.simulation.plant import Mechanics
 
 NODE = 5

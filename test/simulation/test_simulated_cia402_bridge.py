@@ -11,6 +11,7 @@ from typing import Any
 
 from builders import read, text_of, write
 from cia402_builders import BEGINNING, configuration, names
+from hypothesis import given, settings, strategies as st
 import pytest
 
 from drive_can_bridge.core.configuration import DriveConfiguration
@@ -20,7 +21,7 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.setpoints import CommandOutcome
 from drive_can_bridge.protocols.families import FAMILIES, make_sessions
 from drive_can_bridge.simulation.cia402 import SimulatedServoDrive
-from drive_can_bridge.simulation.cia402_pdos import Habits
+from drive_can_bridge.simulation.cia402_plant import Habits
 from drive_can_bridge.simulation.plant import Mechanics
 
 FRAME_TIME = 0.0002
@@ -374,10 +375,172 @@ def test_disable_brakes_by_ramp_and_another_word_coasts() -> None:
     assert cable.speed > 8.0
 
 
-def test_nothing_homes_by_itself() -> None:
+@pytest.mark.parametrize(('method', 'offset', 'shown', 'moved'), [
+    (17, 0.0, 0, True), (17, -0.5, -5000, True), (37, 0.0, 0, False), (35, 2.0, 20_000, False)])
+def test_homing_by_request_only(method: int, offset: float, shown: int, moved: bool) -> None:
     cable = Cable(configuration(**CSP, homing=True))
+    drive = cable.drives[0]
     cable.run(1.0)
-    cable.drives[0].set_value('homing_method', 17)
+    drive.set_value('homing_method', method)
+    drive.set_value('home_offset', offset)
     assert cable.control(ControlAction.ENABLE)[0]
     cable.run(2.0)
-    assert cable.drives[0].plant.shaft.position == pytest.approx(STANDS, abs=1e-9)
+    assert drive.plant.shaft.position == pytest.approx(STANDS, abs=1e-9)
+    assert cable.control(ControlAction.HOME)[0]
+    # back in csp, where it is now, and still enabled
+    where = drive.plant.shaft.position
+    assert where == pytest.approx(0.0 if moved else STANDS, abs=1e-9)
+    assert cable.samples[-1][1] == shown
+    cable.run(1.0)
+    assert drive.plant.shaft.position == pytest.approx(where, abs=1e-9)
+    assert drive.value('mode_shown') == 8
+    assert drive.plant.operation.enabled
+    assert not drive.plant.operation.faulted
+
+
+def test_homing_that_fails_says_so_and_leaves_the_axis_in_its_mode() -> None:
+    cable = Cable(configuration(**CSP, homing=True), habits=Habits(home_switch=None))
+    drive = cable.drives[0]
+    cable.run(1.0)
+    drive.set_value('homing_method', 17)
+    assert cable.control(ControlAction.ENABLE)[0]
+    success, message = cable.control(ControlAction.HOME, 10.0)
+    assert not success
+    assert message
+    cable.run(0.5)
+    where = drive.plant.shaft.position
+    cable.run(1.0)
+    assert drive.plant.shaft.position == where
+    assert drive.value('mode_shown') == 8
+
+
+@pytest.mark.parametrize(('mode', 'setpoint', 'value', 'speed'), [
+    ('vl', 'vl_target_velocity', 600.0, 10.0), ('tq', 'target_torque', 8.0, 5.0),
+    ('cst', 'target_torque', 8.0, 5.0)])
+def test_modes_of_speed_and_torque(mode: str, setpoint: str, value: float, speed: float) -> None:
+    cable = Cable(configuration(mode=mode, request=(setpoint,)))
+    cable.run(1.0)
+    assert cable.control(ControlAction.ENABLE)[0]
+    cable.command(0.0)
+    assert cable.speed == 0.0
+    cable.command(value, 3.0)
+    assert cable.speed == pytest.approx(speed, rel=0.01)
+
+
+def test_vl_stands_still_without_its_bits() -> None:
+    cable = Cable(configuration(mode='vl', request=('vl_target_velocity',), ramp_bits=False))
+    cable.run(1.0)
+    assert cable.control(ControlAction.ENABLE)[0]
+    cable.command(0.0)
+    cable.command(600.0, 1.0)
+    assert cable.speed == 0.0
+
+
+@pytest.mark.parametrize(('mode', 'setpoint'), [
+    ('csp', 'target_position'), ('pp', 'target_position'), ('ip', 'interpolation_target')])
+def test_modes_of_position_go_where_they_are_told(mode: str, setpoint: str) -> None:
+    cable = Cable(configuration(mode=mode, request=(setpoint,), response=('actual_position',)))
+    shaft = cable.drives[0].plant.shaft
+    cable.run(1.0)
+    assert cable.control(ControlAction.ENABLE)[0]
+    cable.run(0.5)
+    assert shaft.position == pytest.approx(STANDS, abs=1e-9)
+    cable.command(STANDS)
+    for step in range(1, 11):
+        cable.command(STANDS + 0.1 * step, 0.1)
+    cable.command(STANDS + 1.0, 1.0)
+    assert shaft.position == pytest.approx(STANDS + 1.0, abs=2e-4)
+    assert cable.speed == 0.0
+    # the newest wins, and nobody follows any more once it is disabled
+    cable.command(STANDS, 0.1)
+    assert cable.control(ControlAction.DISABLE)[0]
+    where = shaft.position
+    cable.run(1.0)
+    assert shaft.position == pytest.approx(where, abs=1e-9)
+    assert not cable.drives[0].plant.operation.faulted
+
+
+# -- anything -------------------------------------------------------------------------------------
+
+ANYTHING = ('trip', 'silent', 'late=0.03', 'drop=3', 'length=3', 'foreign', 'duplicate', 'sto',
+            'restart', 'power_cut=1', 'ok', 'refuse=mode', 'bus down', 'bus up', 'enable',
+            'disable', 'quick stop', 'reset', 'home', 'stall')
+ACTIONS = {'enable': ControlAction.ENABLE, 'disable': ControlAction.DISABLE,
+           'quick stop': ControlAction.QUICK_STOP, 'reset': ControlAction.RESET_FAULT,
+           'home': ControlAction.HOME}
+
+
+def happens(cable: Cable, what: str) -> None:
+    """Let something happen to the first drive, its bus or its users, who wait for nothing."""
+    session = cable.sessions[0]
+    if what in ACTIONS:
+        if not session.users.control_refusal(ACTIONS[what]):
+            session.users.submit(ControlRequest(ACTIONS[what]), cable.now)
+    elif what == 'bus down':
+        session.bus_down(cable.now, 'unplugged')
+    elif what == 'bus up':
+        session.bus_up(cable.now)
+    elif what == 'stall':
+        cable.now += 1.5
+        session.time_lost(cable.now)
+    else:
+        cable.drives[0].fault(what, cable.now)
+    cable._collect()
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.lists(st.tuples(st.sampled_from(ANYTHING), st.sampled_from((0.0, 0.013, 0.1, 0.7, 3.0))),
+                max_size=12), st.sampled_from(('csp', 'ip', 'pp')))
+def test_whatever_happens_no_axis_moves_by_our_doing_and_none_is_left_enabled(
+        story: list[tuple[str, float]], mode: str) -> None:
+    request = 'interpolation_target' if mode == 'ip' else 'target_position'
+    cable = Cable(configuration(mode=mode, request=(request,), response=('actual_position',),
+                                homing=True),
+                  prepare=lambda drive: drive.set_value('homing_method', 37))
+    drive = cable.drives[0]
+    cable.run(1.0)
+    for what, seconds in story:
+        happens(cable, what)
+        cable.run(seconds)
+    # on the spot is where homing takes place: nothing of this turns the shaft
+    assert drive.plant.shaft.position == pytest.approx(STANDS, abs=1e-6)
+    happens(cable, 'bus up')
+    happens(cable, 'ok')
+    cable.run(4.0)
+    assert cable.sessions[0].online
+    cable.deactivate()
+    assert drive.plant.shaft.position == pytest.approx(STANDS, abs=1e-6)
+    assert not drive.plant.operation.enabled
+    cable.run(2.0)
+    assert not drive.plant.operation.enabled
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.lists(st.tuples(st.sampled_from((*ANYTHING, 'neutral', 'fast', 'back')),
+                          st.sampled_from((0.0, 0.013, 0.1, 0.4, 2.0))), max_size=12),
+       st.sampled_from(('csv', 'pv', 'vl')), st.sampled_from(('end', 'kill')))
+def test_whatever_happens_what_ran_has_stopped_in_the_end(
+        story: list[tuple[str, float]], mode: str, end: str) -> None:
+    request = 'vl_target_velocity' if mode == 'vl' else 'target_velocity'
+    cable = Cable(configuration(mode=mode, request=(request,)))
+    drive, speeds = cable.drives[0], {'neutral': 0.0, 'fast': 600.0, 'back': -300.0}
+    cable.run(1.0)
+    assert cable.control(ControlAction.ENABLE)[0]
+    cable.command(0.0)
+    cable.command(600.0)
+    for what, seconds in story:
+        if what in speeds:
+            cable.sessions[0].users.command(0, speeds[what], cable.now)
+        else:
+            happens(cable, what)
+        cable.run(seconds)
+    if end == 'kill':
+        cable.dead = True
+    else:
+        cable.deactivate()
+    told = 'may still be running' in ' '.join(cable.told())
+    cable.run(2.0)
+    # who was not told to stop misses the bridge
+    assert not drive.plant.operation.enabled, (told, cable.told())
+    cable.run(5.0)
+    assert cable.speed == 0.0

@@ -52,6 +52,7 @@ class Homing:
         self._request: ControlRequest | None = None
         self._step = Step.NONE
         self._deadline = math.inf
+        self._now = -math.inf           # of the last sample
         self._fresh = self._lowered = False
         self._failure = NOTHING
 
@@ -94,9 +95,9 @@ class Homing:
             self._answer(False, sentences.homing_stopped(self._step.value))
             self._finish()
 
-    def sampled(self, status: int, raws: Sequence[int]) -> None:
+    def sampled(self, status: int, raws: Sequence[int], now: float) -> None:
         """Take a sample, after its status word and what follows from that."""
-        step = self._step
+        step, self._now = self._step, now
         if step is Step.NONE:
             return
         if not self._machine.operating:
@@ -178,7 +179,8 @@ class Homing:
                     return NOTHING
                 yield Ask(pause=LOOK_PERIOD)
             return sentences.mode_refused(mode)
-        self._channel.run(look(), then, self._channel.now)
+        # PDOs do not pass through the channel: its own time may be that of long ago
+        self._channel.run(look(), then, self._now)
 
     def _answer(self, success: bool, message: Sentence) -> None:
         request, self._request = self._request, None

@@ -47,7 +47,7 @@ class Cia402Prober(Prober):
     def _mode(self) -> Generator[Question, Frame | None, Finding]:
         offered = yield from self._value(MODES_OFFERED, 0)
         if offered is None:
-            return Finding('mode', None, 'no 6502h: the drive does not say which modes it has')
+            return Finding('mode', None, 'no 6502h: the drive does not say which it has')
         names = [name for name, mode in MODES.items() if offered >> mode.number - 1 & 1]
         told = f'6502h is {offered:08X}h: {", ".join(names) or "none of those known here"}'
         wanted = self.drive.options.mode

@@ -414,7 +414,7 @@ class Cia402Session(Session):
         self._look_at_state(now)
         self.control_changed(now)
         self.gate.measured(raws)
-        self._homing.sampled(raws[0], raws)
+        self._homing.sampled(raws[0], raws, now)
         self.report.note(ProcessDataReceived(tuple(raws), received_at))
         exchange.wait_out(now)
 
