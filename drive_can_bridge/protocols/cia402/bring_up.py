@@ -21,6 +21,7 @@ from drive_can_bridge.core import sentences
 from drive_can_bridge.core.events import Noted
 from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.session import Session
+from drive_can_bridge.core.stop_duty import Happened
 from drive_can_bridge.protocols.canopen import abort_codes, network
 from drive_can_bridge.protocols.canopen.network import NmtCommand, NmtState
 from drive_can_bridge.protocols.canopen.node import Node, START_PAUSE
@@ -192,7 +193,7 @@ class BringUp:
             yield Ask(pause=LOOK_PERIOD)
         self.status = raw
         self._rules.known_disabled()
-        self._session.told.stopped()
+        self._session.duty.happened(Happened.STOPPED)
 
     def _learn(self) -> Script:
         """Read what the drive does at a stop."""

@@ -38,6 +38,7 @@ from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.status_reports import Wording
+from drive_can_bridge.core.stop_duty import CYCLE, Do, Happened
 from drive_can_bridge.core.users import Users
 from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.network import NmtState
@@ -57,7 +58,7 @@ from drive_can_bridge.protocols.cia402.procedures import (
 from drive_can_bridge.protocols.cia402.states import (
     CONTROL_PARAMETER, MODES, State, state_of, STATUS_PARAMETER,
 )
-from drive_can_bridge.protocols.cyclic_exchange import CYCLE, CyclicExchange
+from drive_can_bridge.protocols.cyclic_exchange import CyclicExchange
 from drive_can_bridge.protocols.safe_stop import ANSWER_TIME, SafeStop, StatusRead, STOP_ATTEMPTS
 from drive_can_bridge.protocols.stop_again import StopAgain
 
@@ -194,7 +195,7 @@ class Cia402Session(Session):
         self._forget_state()
         self._watch.in_use = True
         self._node.begin(now)
-        if self.told.owed:
+        if self.duty.happened(Happened.STARTED) is Do.STOP:
             self._stop_by_sdo(now)
         self._set_up_soon(START_SPACING, now)
 
@@ -203,14 +204,15 @@ class Cia402Session(Session):
         self._homing.stop()
         self._stop.forget()
         self._look_at = math.inf
+        owes = self.duty.happened(Happened.ENDS) is Do.STOP
         return self.stage is not Stage.IDLE and (
-            self._cycling or self.told.owed or self._bring_up.watch is not None)
+            self._cycling or owes or self._bring_up.watch is not None)
 
     def begin_stop(self, now: float) -> bool:
         self._stop_until = now + self.configuration.control_timeout
         if self._cycling:
             self.exchange.stop_soon(now)
-        elif self.told.owed:
+        elif self.duty.owed:
             self._stop_by_sdo(now)
         else:
             self._release(now)
@@ -300,7 +302,7 @@ class Cia402Session(Session):
     def _missed(self, reason: Sentence, now: float) -> None:
         if self._phase is Phase.LEAVING:
             if self.exchange.cycles_left == 0:
-                self.told.doubt()
+                self.duty.happened(Happened.SILENT)
                 self.start_over(now)
         elif reason:
             self._silent(reason, now)
@@ -407,7 +409,7 @@ class Cia402Session(Session):
                 self.start_over(now)
                 return
             self.be_online()
-            self.told.answered()
+            self.duty.happened(Happened.ANSWERED)
         if self._handover is not None:
             self._handover.look(raws[0])
         self.gate.status(raws[0], now)
@@ -518,7 +520,7 @@ class Cia402Session(Session):
         if self.stage is Stage.STOPPING:
             return
         exchange, control = self.exchange, self._machine
-        exchange.hurry(now, setpoints=self.told.owed)
+        exchange.hurry(now, setpoints=self.duty.owed)
         if control.pending and control.word != exchange.word:   # one step of several
             exchange.timer.no_later(max(now, exchange.timer.began_at
                                         + exchange.timer.stop_spacing))
@@ -558,13 +560,14 @@ class Cia402Session(Session):
             return
         self.exchange.doubt_the_end()
         if self._rules.state in _MOVING:
-            self.told.note(CYCLE, runs=True)
+            self.duty.channel(CYCLE, Happened.RUN_LEFT)
+            self.duty.happened(Happened.SILENT)     # of what it should have done
         self.exchange.stop()
         self._release(now)
 
     def _release(self, now: float) -> None:
         """Come to the end, as soon as the drive does not watch the bridge any more."""
-        if self.told.owed:      # then it is to stop by itself
+        if self.duty.owed:      # then it is to stop by itself
             self.stop_left()
             return
         self._channel.run(self._bring_up.release(self._stop.answer_time),
