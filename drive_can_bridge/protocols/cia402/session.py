@@ -151,7 +151,7 @@ class Cia402Session(Session):
         self._places = {each.identifier: place for place, each in enumerate(self._responses)}
         self._masters = {each.identifier for each in self._requests} | {
             sdo.REQUEST_BASE + drive.station}
-        self._set: dict[int, list[int]] = {}
+        self._set: dict[int, tuple[int, ...]] = {}      # the TPDOs of this exchange
         self._synchronous: bool = options.transmission == 'sync'
         self._beat = beat or Beat()
         self._turn = Turn(drive.period, self._beat, self) if self._synchronous else None
@@ -400,7 +400,7 @@ class Cia402Session(Session):
             self._set[place] = raws
             if len(self._set) < count:
                 return
-            raws = [raw for each in range(count) for raw in self._set[each]]
+            raws = tuple(raw for each in range(count) for raw in self._set[each])
             self._set.clear()
         exchange.answered(received_at)
         if not self._synchronous and self.exchange.timer.due < math.inf:
@@ -418,7 +418,7 @@ class Cia402Session(Session):
         self.control_changed(now)
         self.gate.measured(raws)
         self._homing.sampled(raws[0], raws, now)
-        self.report.note(ProcessDataReceived(tuple(raws), received_at))
+        self.report.note(ProcessDataReceived(raws, received_at))
         exchange.wait_out(now)
 
     def _take_heartbeat(self, state: NmtState, now: float) -> None:
