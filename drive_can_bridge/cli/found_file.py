@@ -15,6 +15,7 @@ from drive_can_bridge.protocols.scout import Sighting
 _KNOWN = {
     'cannord': ('inverter', 'nord_sk500e', ['frequency_setpoint'], ['actual_frequency']),
     'canopen_pkw': ('starter', 'tesys_t_ltmr', [], ['system_status_1']),
+    'cia402': ('axis', 'cia402_servo', ['target_velocity'], ['actual_velocity']),
 }
 _HEAD = """\
 # Found by drive_can scan. Look it over before a bridge runs with it: profiles are the shipped ones
@@ -64,6 +65,7 @@ def write_parameter_file(path: Path, bus: BusConfiguration, sightings: Sequence[
                   f'        profile: {json.dumps(profile)}',
                   f'        period: {period:g}', f'        cyclic_request: [{", ".join(request)}]',
                   f'        cyclic_response: [{", ".join(response)}]']
+        lines += [f'        mode: {keys["mode"]}'] if 'mode' in keys else []
     _write(path, lines)
     return written
 

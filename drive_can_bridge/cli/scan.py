@@ -169,7 +169,7 @@ def _show(args: Namespace, survey: Survey) -> None:
             print_json({'protocol': each.protocol, 'station': each.station,
                         'certainty': each.certainty.value, 'text': each.text})
         return
-    drives = {each.station for each in sightings if each.protocol == 'canopen_pkw'}
+    drives = {each.station for each in sightings if each.protocol in ('canopen_pkw', 'cia402')}
     rows = [(each.protocol, str(each.station), each.certainty.value, each.text)
             for each in sightings]
     rows += [('CANopen node', str(node), '–', text)

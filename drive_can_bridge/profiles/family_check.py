@@ -37,6 +37,6 @@ def _complaints(profile: Profile, family: Family, options: object) -> Iterator[C
         profile = replace(profile, control=None)
     drive = DriveConfiguration(name='drive', bus='bus', protocol=family.name, station=1,
                                profile=profile, options=options)
-    for complaint in family.check(drive):
+    for complaint in (*family.check_widths(drive), *family.check(drive)):
         if complaint.key.startswith(_OURS):
             yield complaint._replace(key=complaint.key.removeprefix(_OURS))
