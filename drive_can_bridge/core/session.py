@@ -34,7 +34,7 @@ from typing import Any
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.command_gate import CommandGate
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.control import ControlCompleted, ControlRequest
+from drive_can_bridge.core.control import ControlRequest
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import Event
@@ -99,6 +99,8 @@ class Session(ABC):
     """
 
     users: Users
+    #: it can look for its reference
+    homes = False
     _acyclic: AcyclicPart
 
     def __init__(self, drive: DriveConfiguration, control: ControlMachine | None, *,
@@ -349,7 +351,7 @@ class Session(ABC):
 
     def home(self, request: ControlRequest, now: float) -> None:
         """Have the axis look for its reference; answered by exactly one ``ControlCompleted``."""
-        self.report.note(ControlCompleted(request, False, sentences.no_homing()))
+        raise NotImplementedError   # nobody gets here but where ``homes`` is true
 
     def see_to_control_word(self, now: float) -> None:  # noqa: B027  optional
         """Have a control word sent that has changed."""

@@ -163,6 +163,7 @@ class Cia402Session(Session):
             heartbeat = BridgeHeartbeat(options.bridge_node, options.bridge_heartbeat)
         self._watch = Watch(self, heartbeat)
         self._bring_up = BringUp(self, self._node, self._rules)
+        self.homes = options.homing
         self._handover = Handover(self.setpoints, self._rules) if options.mode == 'pp' else None
         self._homing = Homing(self, control, self._rules, self._channel,
                               MODES[options.mode].number)
