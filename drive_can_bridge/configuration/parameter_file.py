@@ -252,8 +252,12 @@ def _as_rcl_merges(sections: Iterable[Section], own: Section) -> Tree:
 def _some_node(section: str) -> str:
     """Return the full name of a node that a section is for, in the root namespace if it can be."""
     *above, name = section.removeprefix('/').split('/')
-    spaces = [_NODE if token == '*' else token for token in above if token != '**']
-    return '/' + '/'.join([*spaces, _NODE if '*' in name else name])
+    return ''.join(f'/{_some_token(token)}' for token in (
+        *(token for token in above if token != '**'), name))
+
+
+def _some_token(pattern: str) -> str:
+    return _NODE if _is_for(pattern, f'/{_NODE}') else pattern.replace('*', 'x')
 
 
 def _lay_over(below: Tree, above: Tree) -> None:

@@ -72,6 +72,15 @@ def test_what_else_is_fine(tmp_path: Path, text: str | bytes) -> None:
     assert read(tmp_path, text) == ({'buses': {'m': {'interface': 'virtual'}}}, [])
 
 
+@pytest.mark.parametrize('name', ['/*drive_can_bridge', '/**drive_can_bridge', '/*x/drive_*'])
+def test_half_a_name_and_a_star(tmp_path: Path, name: str) -> None:
+    text = f'{name}:\n  ros__parameters: {{buses: {{m: {{interface: virtual}}}}}}\n'
+    data, problems = read(tmp_path, text)
+    assert data == {'buses': {'m': {'interface': 'virtual'}}}
+    assert problems == [f"f.yaml:2: {name}: '{name}' is no node name (rcl refuses the file), "
+                        'allowed is for example /**/drive_can_bridge']
+
+
 CASES = [
     # what rcl refuses
     ('    a: *x\n',
