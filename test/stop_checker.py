@@ -142,11 +142,14 @@ class Servo(ServoDrive):
         super().__init__(node, {(0x60FF, 0): bytes(4), **{
             (index, subindex): bytes.fromhex(content) for index, subindex, content in (
                 (0x1400, 2, '01'), (0x1600, 0, '02'), (0x1600, 1, '10004060'),
-                (0x1600, 2, '2000FF60'), (0x1800, 2, '01'), (0x1A00, 0, '01'),
+                (0x1600, 2, '2000FF60'), (0x1800, 2, '01'), (0x1800, 3, '0000'),
+                (0x1800, 5, '0000'), (0x1A00, 0, '01'),
                 (0x1A00, 1, '10004160'))}})
 
     def takes(self, sent: Frame) -> list[Frame]:
         answers = super().takes(sent)
+        if self.operational and sent.identifier == 0x200 + self.node:   # as its event timer would
+            answers += self.responses(255)
         self.registers[1] = int(self.state == self.ENABLED)
         self.registers[2] = self.number(0x60FF)
         return answers
@@ -221,13 +224,11 @@ def _cannord(members: int = 1) -> Kind:
         unseen=4 * PERIOD * members)
 
 
-def _servo(drives: int = 1, **options: Any) -> Kind:
+def _servo(**options: Any) -> Kind:
     return Kind(
-        lambda: [drive('cia402', name=f'axis_{station}', station=station, mode='pv',
-                       table=(TARGET,), request=(TARGET,), response=(), period=PERIOD,
-                       parameter_timeout=0.1, heartbeat_producer=0.0, heartbeat_timeout=0.0,
-                       **options)
-                 for station in range(1, drives + 1)],
+        lambda: [drive('cia402', mode='pv', table=(TARGET,), request=(TARGET,), response=(),
+                       period=PERIOD, parameter_timeout=0.1, heartbeat_producer=0.0,
+                       heartbeat_timeout=0.0, **options)],
         lambda moved, index: Servo(Motor({1: 0, 2: 0}, setpoint=2, word=1, moved=moved),
                                    index + 1))
 
@@ -249,6 +250,7 @@ KINDS: dict[str, Kind] = {
     'CiA 402': _servo(),
     'CiA 402, mapping assumed': _servo(mapping='assume'),
     'CiA 402, disabled by shutdown': _servo(disable_word='shutdown'),
+    'CiA 402, by event': _servo(transmission='event'),
     'CANnord': _cannord(),
     'CANnord, group of two': _cannord(2),
     'CANnord, group of four': _cannord(4),

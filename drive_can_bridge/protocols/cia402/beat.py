@@ -81,10 +81,8 @@ class Turn(CycleTimer):
 
     def begun(self, now: float, pause: float | None = None) -> float:
         error = super().begun(now, pause)
-        first = self._beat.first_of_round(self)
-        if first is not None and abs(first.due - self.due) < 0.5 * self._spacing:
-            self.due = first.due
         self.begun_round = True
+        self._beat.agree()
         return error
 
 
@@ -113,10 +111,12 @@ class Beat:
             due += period
         return due
 
-    def first_of_round(self, turn: Turn) -> Turn | None:
-        """Return another drive that has begun this round before; None: it is the first."""
-        return next((other for other in self.turns
-                     if other is not turn and other.running and other.begun_round), None)
+    def agree(self) -> None:
+        """Have all that have begun this round due together, however late each of them was."""
+        begun = [turn for turn in self.turns if turn.begun_round and turn.running]
+        soonest = min(turn.due for turn in begun)
+        for turn in begun:
+            turn.due = soonest
 
     def bring_forward(self, at: float) -> None:
         """Have a whole round begin then, unless it is due before."""

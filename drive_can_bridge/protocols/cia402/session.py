@@ -181,6 +181,7 @@ class Cia402Session(Session):
         """Know nothing of what the drive shows while it is enabled."""
         self._mode_shown: int | None = None
         self._mode_seen = self._looking = False
+        self._tells_velocity = True
         self._pending_since = math.inf
         self._error_code: int | None = None
 
@@ -202,6 +203,7 @@ class Cia402Session(Session):
 
     def prepare_stop(self, now: float) -> bool:
         self._channel.clear()
+        self._looking = False
         self._homing.stop()
         self._stop.forget()
         self._look_at = math.inf
@@ -447,15 +449,18 @@ class Cia402Session(Session):
             self._mode_seen = False
         if not control.pending:
             self._pending_since, self._error_code = now, None
-        if self._looking or self.stage is not Stage.RUNNING:
+        if self._looking:
             return
-        if state is State.OPERATION_ENABLED and not self._mode_seen and not control.stopping and (
-                not self._homing.under_way):
-            self._looking = True
-            self._channel.run(self._look_at_mode(), self._looked, now)
-        elif state is State.QUICK_STOP_ACTIVE and self._rules.stays and not self._rules.stands:
+        if state is State.QUICK_STOP_ACTIVE and self._rules.stays and (
+                not self._rules.stands and self._tells_velocity):
             self._looking = True
             self._channel.run(self._look_at_velocity(), self._looked, now)
+        elif self.stage is not Stage.RUNNING:
+            return      # at the end nothing else is asked
+        elif state is State.OPERATION_ENABLED and not self._mode_seen and (
+                not control.stopping and not self._homing.under_way):
+            self._looking = True
+            self._channel.run(self._look_at_mode(), self._looked, now)
         elif control.pending and self._error_code is None and (
                 now > self._pending_since + 0.5 * self.configuration.control_timeout):
             self._looking = True
@@ -486,6 +491,7 @@ class Cia402Session(Session):
         while self._rules.state is State.QUICK_STOP_ACTIVE and not self._rules.stands:
             reply = yield Ask(states.VELOCITY)
             if reply.abort is not None:
+                self._tells_velocity = False
                 return
             self._rules.velocity_zero = reply.data is not None and not any(reply.data)
             yield Ask(pause=LOOK_PERIOD)

@@ -231,3 +231,24 @@ class TestQuickStop:
         axis.live(0.3)
         assert axis.words() == ['0200', '0600']
         assert axis.session.state is DriveState.DISABLED
+
+    def test_one_that_holds_at_the_end_of_the_bridge(self) -> None:
+        axis = Axis(objects={(0x605A, 0): b'\x06\0', (0x606C, 0): b'\x10\0\0\0'}).enabled()
+        axis.drive.braking = 20
+        axis.deliver(axis.talk.asks(QUICK_STOP, axis.now))
+        axis.live(0.05)
+        axis.deliver(axis.talk.deactivate(axis.now))
+        axis.live(0.3)
+        assert axis.words() == ['0F00', '0200'][1:]
+        axis.drive.objects[0x606C, 0] = bytes(4)
+        axis.live(0.3)
+        assert axis.words()[:3] == ['0200', '0000', '0600']
+        assert axis.session.stopped
+
+    def test_one_that_holds_and_says_nothing_of_its_speed_is_not_asked_for_ever(self) -> None:
+        axis = Axis(objects={(0x605A, 0): b'\x06\0'}).enabled()
+        del axis.drive.objects[0x606C, 0]
+        axis.drive.braking = 20
+        axis.deliver(axis.talk.asks(QUICK_STOP, axis.now))
+        axis.live(0.5)
+        assert axis.take().count('605#406C600000000000') == 1

@@ -172,6 +172,26 @@ class TestRounds:
         one.live(2.0)
         assert all(session.statistics.missed == 0 for session in one.sessions)
 
+    def test_a_process_that_is_late_between_two_drives(self) -> None:
+        """One leaves a cycle out, the other does not: they stay in step all the same."""
+        one = bus()
+        one.start()
+        one.live(0.5)
+        one.rounds()
+        act, delays = one.sessions[0].handle_timer, [0.0149, 0.0151, 0.0049, 0.0051]
+
+        def slowly(now: float) -> None:
+            act(now)
+            if delays and round(one.now, 3) % 0.05 < 0.01:
+                one.now += delays.pop()
+        one.sessions[0].handle_timer = slowly       # type: ignore[method-assign]
+        one.live(1.0)
+        assert delays == []
+        assert {tuple(sorted(each)) for each in one.rounds()[-10:]} == {
+            ('080', '201', '202', '203')}
+        assert all(session.statistics.rejected == 0 for session in one.sessions)
+        assert len({session.next_timer() for session in one.sessions}) == 1
+
     def test_sync_that_the_bus_refuses_is_no_stop(self) -> None:
         axis = Axis().enabled()
         axis.talk.refusing = lambda text: text == '080#'
