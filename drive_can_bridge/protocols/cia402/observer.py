@@ -200,7 +200,8 @@ class NetworkObserver(DriveObserver):
     def __init__(self, drives: Sequence[DriveConfiguration], observers: Sequence[DriveObserver],
                  emit: Emit) -> None:
         super().__init__('', emit)
-        self.handlers |= NmtObserver({drive.station: drive.name for drive in drives}, emit).handlers
+        self.handlers |= NmtObserver(
+            {drive.station: drive.name for drive in drives}, emit).handlers
         self._drives = [each for each in observers if isinstance(each, Cia402Observer)]
         self.handlers[network.SYNC_IDENTIFIER] = self._take_sync
         self.handlers |= {network.HEARTBEAT_BASE + drive.options.bridge_node: self._take_bridge
