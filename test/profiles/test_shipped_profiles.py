@@ -9,7 +9,7 @@ import yaml
 
 from drive_can_bridge.core.profile import RestoreStep
 from drive_can_bridge.profiles.catalogue import check
-from drive_can_bridge.profiles.trust import PAGE, trust_page
+from drive_can_bridge.profiles.provenance import PAGE, trust_page
 from drive_can_bridge.protocols.canopen_pkw.object_map import object_of
 from drive_can_bridge.resources import profiles_directory, share_directory
 
@@ -53,7 +53,7 @@ def test_trust_is_in_keys_and_not_in_words(path: Path) -> None:
 
 
 def test_page_is_up_to_date() -> None:
-    """To write it anew: ``python3 -m drive_can_bridge.profiles.trust``."""
+    """To write it anew: ``python3 -m drive_can_bridge.profiles.provenance``."""
     page = (share_directory() / 'docs' / PAGE).read_text(encoding='utf-8')
     assert page == trust_page(profiles_directory())
 

@@ -3,7 +3,7 @@
 How far each entry of the shipped profiles can be trusted, as a page of the documentation.
 
 The page is made from the profiles; a test compares it. To write it anew:
-``python3 -m drive_can_bridge.profiles.trust``.
+``python3 -m drive_can_bridge.profiles.provenance``.
 """
 
 from collections.abc import Iterator
@@ -19,7 +19,7 @@ TRUST_WORDS: dict[bool | None, str] = {True: 'yes', False: 'no', None: ''}
 _HEAD = """\
 # How far the shipped profiles can be trusted
 
-Made from the profiles by `python3 -m drive_can_bridge.profiles.trust`; edit those, not this page.
+Made from the profiles by `python3 -m drive_can_bridge.profiles.provenance`; edit those, not this page.
 
 *Verified* means that address, type, scale and unit of an entry are backed by its source. *Open* is
 what of it nothing backs. A verified entry has been compared with what is written somewhere; none
