@@ -88,8 +88,9 @@ def _bridge(configuration: BridgeConfiguration) -> Iterator[DeclaredParameter]:
                                 'JSON of what is written around a restored backup: lists before '
                                 'and after of [name, bits, mask].', False)
         for key, option in FAMILIES[drive.protocol].options_schema.items():
-            yield DeclaredParameter(prefix + key, getattr(drive.options, key),
-                                    option['description'], False)
+            value = getattr(drive.options, key)
+            yield DeclaredParameter(prefix + key, list(value) if isinstance(value, tuple) else
+                                    value, option['description'], False)
         if drive.joint is not None:
             yield from _section(f'{prefix}joint.', 'joint', drive.joint)
 

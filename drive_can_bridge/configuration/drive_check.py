@@ -71,6 +71,7 @@ class DriveChecker:
             self._tree.suspicious((*self._path, 'period'), f'{drive.period:g} s from one exchange '
                                   f'to the next: it is in seconds, {drive.period:g} ms are '
                                   f'{drive.period / 1000:g}')
+        self._place(family.check_widths(drive), Tree.wrong)
         self._place(family.check(drive), Tree.wrong)
         self._place(family.warnings(drive), Tree.suspicious)
         drive = replace(drive, joint=check_joint(self._tree, drive))

@@ -56,9 +56,8 @@ class ParameterDirectory:
                           storage=next(entry for entry in _STORAGE if entry in storage),
                           protected=any(twin.protected for twin in twins))
             if not raw.width_known:
-                wide = any(twin.type.bits == 32 for twin in twins)
-                raw = replace(raw, width_known=True,
-                              type=ParameterType.UINT32 if wide else ParameterType.UINT16)
+                bits = max(twin.type.bits for twin in twins)
+                raw = replace(raw, width_known=True, type=ParameterType(f'uint{bits}'))
         return raw
 
     def twins(self, parameter: Parameter) -> list[Parameter]:

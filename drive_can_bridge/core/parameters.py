@@ -40,6 +40,8 @@ class ParameterType(Enum):
     """
 
     BOOL = 'bool'
+    INT8 = 'int8'
+    UINT8 = 'uint8'
     INT16 = 'int16'
     UINT16 = 'uint16'
     INT32 = 'int32'
@@ -47,7 +49,7 @@ class ParameterType(Enum):
 
     def __init__(self, name: str) -> None:
         # no properties: every word of every telegram asks for them
-        self.bits = 32 if name.endswith('32') else 16
+        self.bits = next((bits for bits in (8, 32) if name.endswith(str(bits))), 16)
         self.signed = name.startswith('int')
         if name == 'bool':
             self.raw_range = 0, 1

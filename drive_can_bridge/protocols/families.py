@@ -7,6 +7,7 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.cannord.family import Cannord
 from drive_can_bridge.protocols.canopen_pkw.family import CanopenPkw
+from drive_can_bridge.protocols.cia402.family import Cia402
 from drive_can_bridge.protocols.datamodel.extended_family import DataModelExtended
 from drive_can_bridge.protocols.datamodel.standard_family import DataModelStandard
 from drive_can_bridge.protocols.family import Family
@@ -16,6 +17,7 @@ FAMILIES: dict[str, Family] = {family.name: family for family in (
     DataModelStandard(),
     Cannord(),
     CanopenPkw(),
+    Cia402(),
 )}
 
 

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Route
-from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.observer import DriveObserver, Emit
 from drive_can_bridge.protocols.options import FamilyOptions, make_options, options_schema
@@ -85,6 +85,8 @@ class Family(ABC):
     control_built_in: bool = False
     #: names of what is built in and published like the parameters of a profile
     builtin_names: frozenset[str] = frozenset()
+    #: bits of the types that its parameters may have
+    widths: frozenset[int] = frozenset((16, 32))
     #: the keys that only this family has: a frozen dataclass
     options_type: type[Any] = FamilyOptions
     #: keys that all families have, but whose default is another one here
@@ -106,6 +108,15 @@ class Family(ABC):
     @abstractmethod
     def check(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         """Yield everything that this family cannot do with the drive as configured."""
+
+    def check_widths(self, drive: DriveConfiguration) -> Iterator[Complaint]:
+        """Yield what the profile has of types that this family does not."""
+        allowed = ', '.join(kind.value for kind in ParameterType if kind.bits in self.widths)
+        for name, parameter in drive.profile.parameters.items():
+            if parameter.type.bits not in self.widths:
+                yield Complaint(f'profile.parameters.{name}.type', (
+                    f'{parameter.type.value} does not exist in {self.name}, allowed are '
+                    f'{allowed}'))
 
     def check_names(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         """Yield what the profile calls like something that is built in."""

@@ -11,6 +11,8 @@ from dataclasses import dataclass, Field, field, fields
 from typing import Any, get_args, get_origin, Literal
 
 _TYPES = {bool: 'boolean', int: 'integer', float: 'number'}
+#: several of them, in order
+IntegerList = tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,16 +44,21 @@ def _schema(entry: 'Field[Any]') -> dict[str, Any]:
     schema: dict[str, Any] = dict([description])
     if get_origin(entry.type) is Literal:
         schema['enum'] = list(get_args(entry.type))
+        schema.update(limits)
+    elif entry.type == IntegerList:
+        schema.update(type='array', items={'type': 'integer', **dict(limits)})
     else:
         schema['type'] = _TYPES[entry.type]  # type: ignore[index]
-    schema.update(limits)
+        schema.update(limits)
     if entry.default is not None:
-        schema['default'] = entry.default
+        default = entry.default
+        schema['default'] = list(default) if isinstance(default, tuple) else default
     return schema
 
 
 def make_options(options: type[Any], given: Mapping[str, Any]) -> Any:
     """Make the options from values that fit the schema; an integer is accepted for a number."""
-    numbers = {entry.name for entry in fields(options) if entry.type is float}
-    return options(**{key: float(value) if key in numbers else value
+    makers = {entry.name: float if entry.type is float else tuple for entry in fields(options)
+              if entry.type in (float, IntegerList)}
+    return options(**{key: makers[key](value) if key in makers else value
                       for key, value in given.items()})

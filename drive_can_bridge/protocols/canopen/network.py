@@ -6,6 +6,7 @@ The little of CANopen that goes with the mailbox: NMT, boot-up, heartbeat, emerg
 frame         identifier data
 ============= ========== ====================================================================
 NMT command   000h       command, node (0: all nodes)
+SYNC          080h       none (one counter byte, where 1019h says so)
 emergency     080h+node  error code (low byte first), error register, 5 bytes of the maker
 PKW response  480h+node  transmit PDO4, 8 bytes (may be configured otherwise)
 PKW request   500h+node  receive PDO4, 8 bytes (may be configured otherwise)
@@ -166,6 +167,11 @@ def encode_nmt(command: NmtCommand, node: int) -> Frame:
     if node != 0:
         check_node(node)
     return Frame(NMT_IDENTIFIER, bytes((command, node)), False)
+
+
+def encode_sync() -> Frame:
+    """Encode a SYNC without a counter."""
+    return Frame(SYNC_IDENTIFIER, b'', False)
 
 
 def encode_heartbeat(node: int, state: NmtState) -> Frame:

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import re
 
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.parameters import Parameter, ParameterType
+from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.datamodel.extended import CYCLIC_PARAMETER, SLOTS
 from drive_can_bridge.protocols.datamodel.mapping import REQUEST_MAP_BASE, RESPONSE_MAP_BASE
 from drive_can_bridge.protocols.datamodel.options import NUMBER_MAX
@@ -85,9 +85,6 @@ def _check_profile(drive: DriveConfiguration, family: str) -> Iterator[Complaint
     shared = not _PROTOCOLS.issuperset(drive.profile.protocols)
     for name, parameter in drive.profile.parameters.items():
         place = f'profile.parameters.{name}'
-        if parameter.type in (ParameterType.INT32, ParameterType.UINT32):
-            yield Complaint(f'{place}.type', f'{parameter.type.value} does not exist in '
-                                             f'{family}, allowed are bool, int16, uint16')
         if parameter.number is None:
             yield Complaint(f'{place}.number', f'missing, allowed in {family} is '
                                                f'0 to {NUMBER_MAX}')

@@ -26,6 +26,7 @@ class DataModelExtended(Family):
 
     name = 'datamodel_extended'
     cyclic = True
+    widths = frozenset((16,))
     options_type = ExtendedOptions
 
     def check(self, drive: DriveConfiguration) -> Iterator[Complaint]:

@@ -19,6 +19,7 @@ class DataModelStandard(Family):
 
     name = 'datamodel_standard'
     cyclic = False
+    widths = frozenset((16,))
     options_type = StandardOptions
 
     def check(self, drive: DriveConfiguration) -> Iterator[Complaint]:

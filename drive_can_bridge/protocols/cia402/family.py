@@ -1,0 +1,262 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""The row of the family table for drives of CiA 402."""
+
+from collections.abc import Iterator, Sequence
+
+from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.frame import Route, STANDARD_IDENTIFIER_MAX, worst_bits
+from drive_can_bridge.core.parameters import Parameter, ParameterType
+from drive_can_bridge.core.session import Session
+from drive_can_bridge.protocols.canopen import network, sdo
+from drive_can_bridge.protocols.canopen.addressing import (
+    node_claims, object_of_name, reserved_claims, station_complaints,
+)
+from drive_can_bridge.protocols.cia402 import pdo
+from drive_can_bridge.protocols.cia402.options import Cia402Options
+from drive_can_bridge.protocols.cia402.states import (
+    CONTROL_PARAMETER, CONTROL_WORD, MODE, MODES, STATUS_NAME, STATUS_PARAMETER, STATUS_WORD,
+)
+from drive_can_bridge.protocols.family import Claim, Complaint, Family, Talk
+from drive_can_bridge.protocols.observer import DriveObserver, Emit
+
+#: s: longest period in which a drive that interpolates gets its setpoints
+INTERPOLATION_MAX = 0.02
+#: s: longest event timer, and longest time of a heartbeat consumer (16 bits of ms)
+TIMER_MAX = 65.535
+_SETPOINTS = {(mode.index, mode.subindex) for mode in MODES.values()}
+_LISTS = (('request_pdos', 'cyclic_request', CONTROL_PARAMETER),
+          ('response_pdos', 'cyclic_response', STATUS_PARAMETER))
+
+
+class Cia402(Family):
+    """CiA 402: control and status word built in, PDOs at SYNC or by event, parameters by SDO."""
+
+    name = 'cia402'
+    cyclic = True
+    control_built_in = True
+    builtin_names = frozenset((STATUS_NAME,))
+    widths = frozenset((8, 16, 32))
+    #: a device may take its time: nothing is documented
+    drive_defaults = {'parameter_timeout': 0.5}
+    options_type = Cia402Options
+
+    def check(self, drive: DriveConfiguration) -> Iterator[Complaint]:
+        yield from station_complaints(drive)
+        yield from self.check_names(drive)
+        yield from self._check_profile(drive)
+        yield from self._check_lists(drive)
+        yield from self._check_mode(drive)
+        yield from self._check_times(drive)
+
+    def warnings(self, drive: DriveConfiguration) -> Iterator[Complaint]:
+        options = drive.options
+        mode = MODES.get(options.mode)
+        if mode is None:
+            return
+        for parameter in drive.cyclic_request:
+            place = parameter.index, parameter.subindex or 0
+            if place in _SETPOINTS and place != (mode.index, mode.subindex):
+                yield Complaint('cyclic_request', f"'{parameter.name}' is the setpoint of another "
+                                                  f"mode than '{options.mode}'")
+        if not options.ramp_bits and options.mode != 'vl':
+            yield Complaint('ramp_bits', f"is for mode vl only, '{options.mode}' has no such bits")
+        if options.mode == 'pp' and drive.command_timeout > 0:
+            yield Complaint('command_timeout', (
+                f'{drive.command_timeout:g} s: in pp a target that is not published again within '
+                'it halts the axis on its way; publish it continuously, or set 0'))
+
+    def check_together(self, drives: Sequence[DriveConfiguration],
+                       ) -> Iterator[tuple[DriveConfiguration, Complaint]]:
+        """Yield in what drives of one bus contradict each other: SYNC, and who the bridge is."""
+        in_step = [drive for drive in drives if drive.options.transmission == 'sync']
+        for drive in in_step[1:]:
+            first = in_step[0]
+            if drive.period != first.period:
+                yield drive, Complaint('period', (
+                    f'{drive.period:g} s differs from {first.period:g} s of drive {first.name}, '
+                    'which hears the same SYNC; allowed is the same'))
+        stations = {drive.station: drive.name for drive in drives}
+        beating = [drive for drive in drives if drive.options.bridge_heartbeat > 0]
+        for drive in beating:
+            node, first = drive.options.bridge_node, beating[0]
+            if node != first.options.bridge_node:
+                yield drive, Complaint('bridge_node', (
+                    f'{node} differs from {first.options.bridge_node} of drive {first.name} on '
+                    'the same bus, allowed is the same'))
+            elif node in stations and drive is first:
+                yield drive, Complaint('bridge_node', (
+                    f'{node} is the station of drive {stations[node]}, allowed is a node-ID that '
+                    'no drive has'))
+
+    def claims(self, drive: DriveConfiguration) -> list[Claim]:
+        node, options = drive.station, drive.options
+        used = {each.identifier: f'receive PDO{each.number} of node {node}'
+                for each in request_pdos(drive)}
+        used |= {each.identifier: f'transmit PDO{each.number} of node {node}'
+                 for each in response_pdos(drive)}
+        used |= {sdo.REQUEST_BASE + node: f'SDO requests to node {node}',
+                 sdo.RESPONSE_BASE + node: f'SDO responses of node {node}'}
+        claims = node_claims(drive, used)
+        if options.transmission == 'sync':
+            claims.append(_shared(network.SYNC_IDENTIFIER, 'SYNC', 'SYNC'))
+        if options.bridge_heartbeat > 0:
+            claims.append(_shared(network.HEARTBEAT_BASE + options.bridge_node,
+                                  'heartbeats of the bridge', 'bridge heartbeat'))
+        return claims
+
+    def reserved(self, drive: DriveConfiguration) -> list[Claim]:
+        return reserved_claims(drive)
+
+    def bits_per_second(self, drive: DriveConfiguration) -> float:
+        """Return the worst-case load: PDOs and SYNC once a period, and the heartbeats."""
+        return self._own_load(drive) + self._shared_load([drive])
+
+    def loads(self, drives: Sequence[DriveConfiguration]) -> list[float]:
+        """Return the load of each drive; SYNC and the bridge's heartbeat are there once."""
+        share = self._shared_load(drives) / len(drives) if drives else 0.0
+        return [self._own_load(drive) + share for drive in drives]
+
+    def raw_parameter(self, drive: DriveConfiguration, name: str) -> Parameter | None:
+        """Resolve ``x<index>.<sub-index>``; the drive tells the width."""
+        place = object_of_name(name)
+        return None if place is None else Parameter(
+            name=name, type=ParameterType.UINT32, index=place[0], subindex=place[1], listed=False,
+            width_known=False)
+
+    def talk(self) -> Talk:
+        from drive_can_bridge.protocols.cia402.observer import Cia402Observer
+        from drive_can_bridge.protocols.cia402.prober import Cia402Prober
+        from drive_can_bridge.protocols.cia402.scout import Cia402Scout
+        from drive_can_bridge.protocols.cia402.session import Cia402Session
+        return Talk(Cia402Session, Cia402Observer, Cia402Scout, Cia402Prober)
+
+    def make_sessions(self, drives: Sequence[DriveConfiguration]) -> list[Session]:
+        """Make the sessions of one bus, which share SYNC and the heartbeat of the bridge."""
+        from drive_can_bridge.protocols.cia402.session import make_sessions
+        return make_sessions(drives)
+
+    def make_observers(self, drives: Sequence[DriveConfiguration], emit: Emit,
+                       ) -> list[DriveObserver]:
+        """Make what watches drives, and what is said to all nodes."""
+        from drive_can_bridge.protocols.cia402.observer import make_observers
+        return make_observers(drives, emit)
+
+    # -- parts ------------------------------------------------------------------------------------
+
+    def _own_load(self, drive: DriveConfiguration) -> float:
+        bits = sum(worst_bits(each.length, extended=False)
+                   for each in (*request_pdos(drive), *response_pdos(drive)))
+        beat: float = drive.options.heartbeat_producer
+        return bits / drive.period + (_HEARTBEAT / beat if beat > 0 else 0.0)
+
+    def _shared_load(self, drives: Sequence[DriveConfiguration]) -> float:
+        periods = [drive.period for drive in drives if drive.options.transmission == 'sync']
+        beats = [drive.options.bridge_heartbeat for drive in drives
+                 if drive.options.bridge_heartbeat > 0]
+        return ((_SYNC / min(periods) if periods else 0.0)
+                + (_HEARTBEAT / min(beats) if beats else 0.0))
+
+    def _check_profile(self, drive: DriveConfiguration) -> Iterator[Complaint]:
+        foreign = any(protocol != self.name for protocol in drive.profile.protocols)
+        for name, parameter in drive.profile.parameters.items():
+            place = f'profile.parameters.{name}'
+            if parameter.index is None:
+                if not foreign:
+                    yield Complaint(f'{place}.index', f'missing, allowed in {self.name} is an '
+                                                      'index, with a subindex unless that is 0')
+            elif parameter.number is not None and not foreign:
+                yield Complaint(f'{place}.number', f'{self.name} knows no numbers, allowed is '
+                                                   'index with subindex')
+
+    def _check_lists(self, drive: DriveConfiguration) -> Iterator[Complaint]:
+        taken: dict[tuple[int, int], str] = {
+            (CONTROL_WORD, 0): 'the control word, which the bridge sends by itself',
+            (MODE, 0): 'the mode, which the key mode gives'}
+        for key, listed, first in _LISTS:
+            parameters: tuple[Parameter, ...] = getattr(drive, listed)
+            for parameter in parameters:
+                if parameter.listed and parameter.index is None:
+                    yield Complaint(listed, f"'{parameter.name}' has no index, allowed in a PDO "
+                                            'are objects')
+                elif parameter.type is ParameterType.BOOL:
+                    yield Complaint(listed, f"'{parameter.name}' is a bool, allowed in a PDO are "
+                                            'types of 8, 16 and 32 bits')
+                if key == 'request_pdos' and parameter.index is not None:
+                    place = parameter.index, parameter.subindex or 0
+                    if place in taken:
+                        yield Complaint(listed, f"'{parameter.name}' is {taken[place]}, allowed "
+                                                'is to leave it out')
+                    taken.setdefault(place, f"the same object as '{parameter.name}'")
+                elif parameter.index == STATUS_WORD:
+                    yield Complaint(listed, f"'{parameter.name}' is the status word, which is "
+                                            'published by itself, allowed is to leave it out')
+            numbers = getattr(drive.options, key)
+            if len(set(numbers)) < len(numbers):
+                yield Complaint(key, 'a PDO stands twice, allowed is once')
+            needed = len(pdo.distribute([pdo.width(each) for each in (first, *parameters)]))
+            if needed > len(numbers):
+                yield Complaint(key, f'{len(numbers)} PDO{"s" * (len(numbers) != 1)} of 8 bytes '
+                                     f'cannot carry {listed}, needed are {needed}')
+
+    def _check_mode(self, drive: DriveConfiguration) -> Iterator[Complaint]:
+        name: str | None = drive.options.mode
+        if name is None:
+            yield Complaint('mode', f'missing, allowed is one of {", ".join(MODES)}')
+            return
+        mode = MODES[name]
+        setpoint = next((each for each in drive.cyclic_request if (
+            each.index, each.subindex or 0) == (mode.index, mode.subindex)), None)
+        if setpoint is None:
+            if all(each.listed for each in drive.cyclic_request):
+                yield Complaint('cyclic_request', (
+                    f"mode '{name}' has its setpoint in {mode.index:04X}h."
+                    f'{mode.subindex:02X}h, which is missing, allowed is to add it'))
+        elif setpoint.type is not mode.type:
+            yield Complaint(f'profile.parameters.{setpoint.name}.type', (
+                f'{setpoint.type.value}, the setpoint of {name} is {mode.type.value}'))
+        elif mode.position and not setpoint.neutral_from:
+            yield Complaint(f'profile.parameters.{setpoint.name}.neutral_from', (
+                f"missing: a position has no value that is neutral everywhere; allowed in {name} "
+                'is the name of the actual position, with an arming_tolerance'))
+        if mode.interpolated and not (
+                drive.options.transmission == 'sync' and drive.period <= INTERPOLATION_MAX):
+            yield Complaint('mode', f"'{name}' is interpolated by the drive from SYNC to SYNC, "
+                                    'allowed is transmission: sync with a period of at most '
+                                    f'{INTERPOLATION_MAX:g} s')
+
+    def _check_times(self, drive: DriveConfiguration) -> Iterator[Complaint]:
+        options, milliseconds = drive.options, 1000 * drive.period
+        if options.transmission == 'event' and (
+                abs(milliseconds - round(milliseconds)) > 1e-6 or drive.period > TIMER_MAX):
+            yield Complaint('period', f'{drive.period:g} s is no event timer, allowed with '
+                                      'transmission: event are whole milliseconds up to '
+                                      f'{TIMER_MAX:g} s')
+        if 0 < options.heartbeat_timeout <= options.heartbeat_producer:
+            yield Complaint('heartbeat_timeout', (
+                f'{options.heartbeat_timeout:g} s is not longer than heartbeat_producer '
+                f'({options.heartbeat_producer:g} s), allowed is more, or 0'))
+        for key in ('heartbeat_producer', 'bridge_heartbeat'):
+            if 0 < getattr(options, key) < 0.001:
+                yield Complaint(key, f'{getattr(options, key):g} s is too short, allowed is 0, or '
+                                     'at least 0.001 s')
+
+
+def request_pdos(drive: DriveConfiguration) -> list[pdo.Pdo]:
+    """Return the receive PDOs of a drive: the control word, then its setpoints."""
+    return pdo.request_pdos(drive.station, drive.options.request_pdos,
+                            (CONTROL_PARAMETER, *drive.cyclic_request))
+
+
+def response_pdos(drive: DriveConfiguration) -> list[pdo.Pdo]:
+    """Return the transmit PDOs of a drive: the status word, then its actual values."""
+    return pdo.response_pdos(drive.station, drive.options.response_pdos,
+                             (STATUS_PARAMETER, *drive.cyclic_response))
+
+
+_HEARTBEAT = worst_bits(1, extended=False)
+_SYNC = worst_bits(0, extended=False)
+
+
+def _shared(identifier: int, purpose: str, mark: str) -> Claim:
+    return Claim(Route(identifier, STANDARD_IDENTIFIER_MAX, False),
+                 f'{identifier:03X}h ({purpose})', mark, heard=False)
