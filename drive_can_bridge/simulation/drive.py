@@ -202,6 +202,9 @@ class SimulatedDrive(ABC):
             name = self._known(word)
             self.set_value(name, _value(self.registers.parameters[name], text), now)
             self._set_by_fault.add(name)
+        elif kind is FaultKind.STO:
+            self.allow_torque(False)
+            self._outbox.add(fault)
         elif kind is FaultKind.CUT_AT:
             self._cut_at = self.registers.settings_written + fault.argument
         elif kind in _POWER_CUTS:
@@ -270,6 +273,15 @@ class SimulatedDrive(ABC):
         """Fail by itself; the cause lasts for some seconds. See :meth:`.Operation.trip`."""
         self.plant.operation.trip(duration, code)
         self.plant.advance(now)
+
+    def allow_torque(self, allowed: bool) -> None:
+        """
+        Have the input for safe torque off high (allowed) or low.
+
+        :raises ValueRefused: this drive has none.
+        """
+        if not allowed:
+            raise ValueRefused(f'{self.name} has no input for safe torque off')
 
     def power_lost(self, *, forget: bool) -> None:  # noqa: B027  optional hook
         """Forget what a family keeps outside the registers."""
@@ -347,6 +359,7 @@ class SimulatedDrive(ABC):
         for name in self._set_by_fault:
             self.registers.release(name)
         self._set_by_fault.clear()
+        self.allow_torque(True)
         self.plant.operation.repair()
         if self._deaf_until == math.inf:
             self.lose_power(now, now + BOOT_TIME)

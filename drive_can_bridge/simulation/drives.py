@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.simulation.cannord import SimulatedCannordInverter
 from drive_can_bridge.simulation.canopen_pkw import SimulatedPkwDrive
+from drive_can_bridge.simulation.cia402 import SimulatedServoDrive
 from drive_can_bridge.simulation.datamodel import SimulatedDataModelDrive
 from drive_can_bridge.simulation.drive import EEPROM_TIME, SimulatedDrive
 from drive_can_bridge.simulation.plant import Mechanics, PlantFactory
@@ -13,6 +14,7 @@ from drive_can_bridge.simulation.plant import Mechanics, PlantFactory
 SIMULATED_DRIVES: Mapping[str, type[SimulatedDrive]] = {
     'cannord': SimulatedCannordInverter,
     'canopen_pkw': SimulatedPkwDrive,
+    'cia402': SimulatedServoDrive,
     'datamodel_extended': SimulatedDataModelDrive,
     'datamodel_standard': SimulatedDataModelDrive,
 }

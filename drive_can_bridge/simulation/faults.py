@@ -56,6 +56,7 @@ class FaultKind(Enum):
            'actual value stays there until ok', _pair)
     TRIP = ('trip[=SECONDS]', 'fault of the drive itself; cannot be reset before the seconds are '
             'over', _seconds)
+    STO = 'sto', 'no torque: the input for safe torque off is low, until ok'
     RESTART = ('restart[=SECONDS]', 'power is lost and back; deaf for 0.5 s, or as long as it '
                'says', _seconds)
     POWER_CUT = 'power_cut[=SECONDS]', 'the same for 5 s, or as long as it says', _seconds

@@ -179,6 +179,12 @@ class Registers:
         parameter = self.parameters[name]
         self._raw[name] = nearest_raw(parameter, value, parameter.raw_limits)
 
+    def store_all(self) -> None:
+        """Keep all that may be written without power, as it is now."""
+        for name, parameter in self.parameters.items():
+            if parameter.writable:
+                self._kept[name] = self._raw[name]
+
     def reset(self, name: str) -> None:
         """Give a register back what a new drive has in it."""
         self._kept.pop(name, None)

@@ -40,6 +40,10 @@ _STATES: dict[int, NmtState] = {
     NmtCommand.ENTER_PRE_OPERATIONAL: NmtState.PRE_OPERATIONAL}
 
 
+def _maker_emergency(code: int) -> Emergency:
+    return Emergency(TRIP_EMERGENCY, TRIP_ERROR_REGISTER, code.to_bytes(5, 'little'))
+
+
 class CanopenNode(Companion):
     """
     The node of a drive.
@@ -47,18 +51,24 @@ class CanopenNode(Companion):
     :param objects: those that are registers.
     :param constants: returns the content of the family's other, read-only objects, by address.
     :param trip_code: the maker's code of a trip that has none of its own.
+    :param heartbeat: ms between heartbeats after power came on; None: as they are watched.
+    :param make_emergency: makes the message of a trip from its code.
+    :param segmented_writes: takes them by SDO.
     :ivar state: boot-up: without power, or still starting.
     """
 
     def __init__(self, drive: SimulatedDrive, objects: Objects, *,
-                 constants: Callable[[], Contents], trip_code: int) -> None:
+                 constants: Callable[[], Contents], trip_code: int, heartbeat: int | None = None,
+                 make_emergency: Callable[[int], Emergency] = _maker_emergency,
+                 segmented_writes: bool = False) -> None:
         self._drive = drive
         self._objects, self._constants, self._trip_code = objects, constants, trip_code
         self.number = drive.configuration.station
         watched: float = drive.configuration.options.heartbeat_timeout
-        self._default_heartbeat = round(
+        self._default_heartbeat = heartbeat if heartbeat is not None else round(
             1000.0 * watched / HEARTBEATS_WATCHED) if watched else HEARTBEAT
-        self._server = SdoServer(self)
+        self._make_emergency = make_emergency
+        self._server = SdoServer(self, segmented_writes=segmented_writes)
         self._now = -math.inf
         self._looks_at = math.inf
         # the boot-up frame leaves as soon as somebody looks
@@ -120,8 +130,7 @@ class CanopenNode(Companion):
         operation = self._drive.plant.operation
         self._looks_at = now + TICK if operation.enabled else math.inf
         code = int(operation.fault_code(self._trip_code))
-        error = Emergency(TRIP_EMERGENCY, TRIP_ERROR_REGISTER, code.to_bytes(5, 'little'),
-                          ) if operation.faulted else _NO_ERROR
+        error = self._make_emergency(code) if operation.faulted else _NO_ERROR
         if self._communicates and error.code != self._error.code:
             self._error = error
             self._drive.send(network.encode_emergency(self.number, error))

@@ -1,9 +1,8 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-An SDO server (CiA 301): reads of any length, expedited writes.
+An SDO server (CiA 301): reads of any length, writes in one frame or, where wanted, by segments.
 
-Block transfer is refused, and so are segmented writes: no object here is longer than four bytes
-and may be written.
+Block transfer is refused.
 """
 
 from typing import Protocol
@@ -16,10 +15,13 @@ EXPEDITED_MAX = 4
 SEGMENT_MAX = 7
 
 #: command specifiers, bits 7 to 5 of the first byte
-DOWNLOAD, UPLOAD, UPLOAD_SEGMENT, ABORT = 1, 2, 3, 4
+DOWNLOAD_SEGMENT, DOWNLOAD, UPLOAD, UPLOAD_SEGMENT, ABORT = range(5)
 #: bits of the first byte
-EXPEDITED, SIZE_GIVEN, TOGGLE = 0x02, 0x01, 0x10
+EXPEDITED, SIZE_GIVEN, TOGGLE, LAST = 0x02, 0x01, 0x10, 0x01
 RESPONSE_UPLOAD, RESPONSE_DOWNLOAD, RESPONSE_ABORT = 0x40, 0x60, 0x80
+RESPONSE_SEGMENT = 0x20
+#: bytes that a segmented write may have
+WRITE_MAX = 1024
 TYPE_TOO_LONG, TYPE_TOO_SHORT = 0x06070012, 0x06070013
 #: abort codes of what registers refuse
 CODES = {
@@ -42,16 +44,24 @@ class Objects(Protocol):
 
 
 class SdoServer:
-    """Answers the requests of one client."""
+    """
+    Answers the requests of one client.
 
-    def __init__(self, objects: Objects) -> None:
+    :param segmented_writes: takes them.
+    """
+
+    def __init__(self, objects: Objects, *, segmented_writes: bool = False) -> None:
         self._objects = objects
+        self._segmented_writes = segmented_writes
         self._address = b'\0\0\0'
-        self._rest = b''
         self._toggle = 0
+        self.reset()
 
     def reset(self) -> None:
+        """Forget the transfer under way."""
         self._rest = b''
+        self._written: bytes | None = None      # so far
+        self._announced = 0
 
     def answer(self, request: bytes) -> bytes | None:
         """Return the response to a request; None: there is none."""
@@ -61,16 +71,23 @@ class SdoServer:
         try:
             if command == UPLOAD_SEGMENT:
                 return self._upload_segment(head)
+            if command == DOWNLOAD_SEGMENT:
+                return self._download_segment(head, request)
             self.reset()
             if command == ABORT:
                 return None
             self._address = request[1:4]
-            place = int.from_bytes(self._address[:2], 'little'), self._address[2]
+            place = self._place
             if command == UPLOAD:
                 return self._upload(self._objects.read_object(*place))
             if command == DOWNLOAD and head & EXPEDITED:
                 unused = head >> 2 & 0x03 if head & SIZE_GIVEN else 0
                 self._objects.write_object(*place, request[4:LENGTH - unused])
+                return self._response(RESPONSE_DOWNLOAD)
+            if command == DOWNLOAD and self._segmented_writes:
+                self._written, self._toggle = b'', 0
+                self._announced = int.from_bytes(request[4:], 'little') if (
+                    head & SIZE_GIVEN) else 0
                 return self._response(RESPONSE_DOWNLOAD)
             raise Refused(abort_codes.UNKNOWN_COMMAND)
         except Refused as error:
@@ -79,6 +96,27 @@ class SdoServer:
 
     def _response(self, head: int, data: bytes = b'') -> bytes:
         return bytes((head,)) + self._address + data.ljust(LENGTH - 4, b'\0')
+
+    @property
+    def _place(self) -> tuple[int, int]:
+        return int.from_bytes(self._address[:2], 'little'), self._address[2]
+
+    def _download_segment(self, head: int, request: bytes) -> bytes:
+        if self._written is None:
+            raise Refused(abort_codes.UNKNOWN_COMMAND)
+        if head & TOGGLE != self._toggle:
+            raise Refused(abort_codes.TOGGLE_NOT_ALTERNATED)
+        data = self._written = self._written + request[1:LENGTH - (head >> 1 & 0x07)]
+        if len(data) > (self._announced or WRITE_MAX):
+            raise Refused(TYPE_TOO_LONG)
+        if head & LAST:
+            if len(data) < self._announced:
+                raise Refused(TYPE_TOO_SHORT)
+            self.reset()
+            self._objects.write_object(*self._place, data)
+        response = bytes((RESPONSE_SEGMENT | self._toggle,)).ljust(LENGTH, b'\0')
+        self._toggle ^= TOGGLE
+        return response
 
     def _upload(self, data: bytes) -> bytes:
         if len(data) <= EXPEDITED_MAX:
@@ -93,7 +131,8 @@ class SdoServer:
         if head & TOGGLE != self._toggle:
             raise Refused(abort_codes.TOGGLE_NOT_ALTERNATED)
         segment, self._rest = self._rest[:SEGMENT_MAX], self._rest[SEGMENT_MAX:]
-        response = bytes((self._toggle | SEGMENT_MAX - len(segment) << 1 | (not self._rest),))
+        response = bytes((
+            self._toggle | SEGMENT_MAX - len(segment) << 1 | LAST * (not self._rest),))
         self._toggle ^= TOGGLE
         return response + segment.ljust(SEGMENT_MAX, b'\0')
 

@@ -1,0 +1,271 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+A simulated servo drive of CiA 402 on CANopen.
+
+Its PDOs are in :mod:`~.cia402_pdos`, its objects in :mod:`~.cia402_objects`, state machine and axis
+in :mod:`~.cia402_plant`. It begins as it leaves the factory, with the control word in RPDO1 and the
+status word in TPDO1; with ``mapping: verify`` or ``assume`` as configured, since somebody must have
+set it up. It watches a master's heartbeat (1016h) from the first one on, and does then what 6007h
+says.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+import math
+
+from drive_can_bridge.core.errors import ConfigurationError
+from drive_can_bridge.core.frame import Frame, Route, STANDARD_IDENTIFIER_MAX
+from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.protocols.canopen import abort_codes, network
+from drive_can_bridge.protocols.canopen.network import Emergency, NmtState
+from drive_can_bridge.protocols.cia402 import pdo as pdo_codec, states
+from drive_can_bridge.simulation.canopen.node import CanopenNode, Contents
+from drive_can_bridge.simulation.canopen.sdo import checked_length
+from drive_can_bridge.simulation.cia402_objects import (
+    bytes_of, ObjectDictionary, own_parameters,
+)
+from drive_can_bridge.simulation.cia402_pdos import Factory, Habits, Pdo, Pdos
+from drive_can_bridge.simulation.cia402_plant import ServoPlant
+from drive_can_bridge.simulation.drive import Ignored, SimulatedDrive
+from drive_can_bridge.simulation.plant import PlantFactory
+from drive_can_bridge.simulation.registers import Refused
+
+DEVICE_NAME = b'simulated CiA 402 servo drive'
+#: servo drive (additional information 2) of profile 402
+DEVICE_TYPE = 0x00020192
+STORE, CONSUMER, SAVE = 0x1010, 0x1016, b'save'
+CONSUMERS = 2
+NOT_STORED = 0x08000020
+WRONG_LENGTH = Emergency(0x8210, 0x11)
+#: bits of the error register by the first digit of a code: CiA 301
+_REGISTER_BITS = {1: 0x01, 2: 0x02, 3: 0x04, 4: 0x08, 8: 0x10}
+
+
+class SimulatedServoDrive(SimulatedDrive):
+    """
+    One drive. See the base class.
+
+    :ivar habits: what differs between makers; may be replaced before it is set up.
+    """
+
+    plant: ServoPlant
+    table: ObjectDictionary
+
+    def set_up(self) -> None:
+        if not isinstance(self.plant, ServoPlant):
+            raise ConfigurationError([f'{self.name}: a drive of CiA 402 needs a ServoPlant'])
+        self.table = ObjectDictionary(self.registers)
+        self.pdos = Pdos(self.configuration.station, self.table, self._factory())
+        self.habits = Habits()
+        self._consumers = [0] * CONSUMERS
+        self._stored_consumers = list(self._consumers)
+        self._node_state = NmtState.BOOT_UP
+        self._wrong_length = False
+        self.power_lost(forget=False)
+        self.node = self.companion = CanopenNode(
+            self, self, constants=self._constants, trip_code=self.plant.trip_code, heartbeat=0,
+            make_emergency=_emergency, segmented_writes=True)
+
+    @property
+    def habits(self) -> Habits:
+        return self._habits
+
+    @habits.setter
+    def habits(self, habits: Habits) -> None:
+        self._habits = self.pdos.habits = habits
+        self.plant.habits = self.plant.machine.habits = habits
+
+    def allow_torque(self, allowed: bool) -> None:
+        self.plant.machine.set_safe(allowed)
+
+    def _factory(self) -> Factory:
+        """Return what is mapped at first."""
+        configuration, options = self.configuration, self.configuration.options
+        request, response = [states.CONTROL_PARAMETER], [states.STATUS_PARAMETER]
+        if options.mapping == 'configure':
+            return Factory({1: [_entry(request[0])]}, {1: [_entry(response[0])]}, 255)
+        request += configuration.cyclic_request
+        response += configuration.cyclic_response
+        receive, transmit = ({pdo.number: list(pdo.entries) for pdo in pdos} for pdos in (
+            pdo_codec.request_pdos(configuration.station, options.request_pdos, request),
+            pdo_codec.response_pdos(configuration.station, options.response_pdos, response)))
+        return Factory(receive, transmit, 1 if options.transmission == 'sync' else 255)
+
+    def find_routes(self) -> list[Route]:
+        """Return the predefined set of the node, SYNC, and the heartbeats of all others."""
+        pdos = [base + 0x100 * number + self.configuration.station
+                for base in (0x180, 0x200) for number in range(4)]
+        return [*CanopenNode.routes(self.configuration.station, *pdos, network.SYNC_IDENTIFIER),
+                Route(network.HEARTBEAT_BASE, STANDARD_IDENTIFIER_MAX & ~network.NODE_MAX, False)]
+
+    def own_parameters(self) -> Mapping[str, Parameter]:
+        return own_parameters(self.configuration)
+
+    def choose_plant(self) -> PlantFactory:
+        return ServoPlant
+
+    def power_lost(self, *, forget: bool) -> None:
+        """Have what was stored; a master is watched anew from its first heartbeat on."""
+        self.pdos.begin(factory=forget)
+        self._consumers = [0] * CONSUMERS if forget else list(self._stored_consumers)
+        self._heard: list[float] = [math.inf] * CONSUMERS
+
+    # -- frames -----------------------------------------------------------------------------------
+
+    def receive_frame(self, frame: Frame, now: float) -> None:
+        super().receive_frame(frame, now)
+        self._serve(now)
+
+    def receive(self, frame: Frame, now: float) -> bool:
+        identifier, data, extended = frame
+        if extended or self.node.state is NmtState.BOOT_UP:
+            return False
+        if identifier == self.table.raw(0x1005) & STANDARD_IDENTIFIER_MAX:
+            self._synchronise(now)
+            return True
+        node = identifier - network.HEARTBEAT_BASE
+        if 0 < node <= network.NODE_MAX and node != self.node.number:
+            self._hear(node, now)
+            return True
+        for pdo in self.pdos.receive:
+            if pdo.identifier == identifier:
+                self._take(pdo, data, now)
+                return True
+        # PDOs that are not valid belong to the node nevertheless
+        return identifier - self.node.number in (0x200, 0x300, 0x400, 0x500)
+
+    def _take(self, pdo: Pdo, data: bytes, now: float) -> None:
+        if self.node.state is not NmtState.OPERATIONAL:
+            raise Ignored('PDO while the node is not operational')
+        if (len(data) < pdo.length) is not self._wrong_length:
+            self._wrong_length = not self._wrong_length
+            self.send(network.encode_emergency(self.node.number, WRONG_LENGTH._replace(
+                code=WRONG_LENGTH.code if self._wrong_length else network.NO_ERROR)))
+        if self._wrong_length:
+            raise Ignored('PDO shorter than its mapping')
+        self.requests += 1
+        if pdo.type <= 240:
+            pdo.pending = data
+        else:
+            self._apply(pdo, data, now)
+
+    def _apply(self, pdo: Pdo, data: bytes, now: float) -> None:
+        word: int | None = None
+        for cell, raw in self.pdos.cells(pdo, data):
+            if cell.index == states.CONTROL_WORD:
+                self.registers.put(cell.name, raw)
+                word = raw
+            else:
+                self.registers.write(cell.name, self.registers.clamped(cell.name, raw))
+        # it is about what came with it
+        if word is not None:
+            self.plant.control(word)
+        self.plant.advance(now)
+
+    def _synchronise(self, now: float) -> None:
+        if self.node.state is not NmtState.OPERATIONAL:
+            return
+        for pdo in self.pdos.receive:
+            if pdo.pending is not None:
+                data, pdo.pending = pdo.pending, None
+                self._apply(pdo, data, now)
+        for pdo in self.pdos.transmit:
+            if self.pdos.synchronised(pdo):
+                self.answer(self.pdos.frame(pdo, now), now)
+
+    def foreign_frames(self, answer: Frame) -> Sequence[Iterable[Frame]]:
+        """Return the answer of an absent node, and its 29-bit twin."""
+        base = answer.identifier - self.node.number
+        return ((answer._replace(identifier=base + node) for node in range(
+            1, network.NODE_MAX + 1) if node != self.node.number),
+            (answer._replace(extended=True),))
+
+    # -- time -------------------------------------------------------------------------------------
+
+    def next_timer(self) -> float:
+        return min(super().next_timer(), *self._deadlines(), min(
+            map(self.pdos.due, self.pdos.transmit))
+            if self.node.state is NmtState.OPERATIONAL else math.inf)
+
+    def handle_timer(self, now: float) -> None:
+        super().handle_timer(now)
+        self._serve(now)
+
+    def _serve(self, now: float) -> None:
+        """See to what follows from time and from the state of the node."""
+        before, self._node_state = self._node_state, self.node.state
+        operational = self._node_state is NmtState.OPERATIONAL
+        if operational and before is not NmtState.OPERATIONAL:
+            for pdo in (*self.pdos.receive, *self.pdos.transmit):
+                pdo.pending = pdo.sent = None
+                pdo.syncs = 0
+        elif self._node_state is NmtState.STOPPED and before is NmtState.OPERATIONAL:
+            self.plant.machine.connection_lost()
+        for place, deadline in enumerate(self._deadlines()):
+            if deadline <= now:
+                self._heard[place] = math.inf
+                self._notices.append(f'{self.name}: no heartbeat of node '
+                                     f'{self._consumers[place] >> 16 & 0x7F}')
+                self.plant.machine.connection_lost()
+        self.plant.advance(now)
+        self.node.look(now)
+        for pdo in self.pdos.transmit if operational else ():
+            if self.pdos.due(pdo) <= now:
+                self.answer(self.pdos.frame(pdo, now), now)
+
+    def _hear(self, node: int, now: float) -> None:
+        for place, value in enumerate(self._consumers):
+            if value >> 16 & 0x7F == node and value & 0xFFFF:
+                self._heard[place] = now
+
+    def _deadlines(self) -> list[float]:
+        return [heard + (value & 0xFFFF) / 1000.0
+                for heard, value in zip(self._heard, self._consumers, strict=True)]
+
+    # -- objects ----------------------------------------------------------------------------------
+
+    def read_object(self, index: int, subindex: int) -> bytes:
+        found = self.pdos.find(index)
+        if found is not None:
+            return self.pdos.read(*found, subindex)
+        if index == CONSUMER and subindex <= CONSUMERS:
+            return (bytes((CONSUMERS,)) if subindex == 0
+                    else self._consumers[subindex - 1].to_bytes(4, 'little'))
+        if index == STORE and subindex <= 1:
+            return bytes((1,)).ljust(4 if subindex else 1, b'\0')
+        return self.table.read_object(index, subindex)
+
+    def write_object(self, index: int, subindex: int, data: bytes) -> None:
+        found = self.pdos.find(index)
+        if found is not None:
+            self.pdos.write(*found, subindex, data)
+        elif index == CONSUMER and 0 < subindex <= CONSUMERS:
+            self._consumers[subindex - 1] = int.from_bytes(checked_length(data, 4), 'little')
+            self._heard[subindex - 1] = math.inf
+        elif index == STORE and subindex == 1:
+            if checked_length(data, 4) != SAVE:
+                raise Refused(NOT_STORED)
+            self.registers.store_all()
+            self.pdos.store()
+            self._stored_consumers = list(self._consumers)
+        elif index in (CONSUMER, STORE):
+            raise Refused(abort_codes.NO_SUCH_SUBINDEX if subindex else
+                          abort_codes.WRITE_OF_READ_ONLY)
+        else:
+            self.table.write_object(index, subindex, data)
+
+    def _constants(self) -> Contents:
+        identity = (0, 0x402, 1, self.node.number)
+        return {(0x1000, 0): DEVICE_TYPE.to_bytes(4, 'little'), (0x1008, 0): DEVICE_NAME,
+                (0x1018, 0): bytes((4,)),
+                **{(0x1018, 1 + place): value.to_bytes(4, 'little')
+                   for place, value in enumerate(identity)}}
+
+
+def _entry(parameter: Parameter) -> int:
+    return pdo_codec.mapping_entry(parameter.index or 0, parameter.subindex or 0,
+                                   bytes_of(parameter))
+
+
+def _emergency(code: int) -> Emergency:
+    """Make the emergency of an error code: 603Fh has the same."""
+    return Emergency(code, 0x01 | _REGISTER_BITS.get(code >> 12, 0x80))

@@ -1,0 +1,260 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+PDOs of a simulated drive: their objects (1400h to 1BFFh), the rules of their mapping, and traffic.
+
+A mapping is changed as CANopenNode and the manuals of Festo and Nanotec want it: only while bit 31
+of the COB-ID is set, entries only while their number is 0; the number says whether all fit.
+"""
+
+from collections.abc import Collection
+from copy import deepcopy
+from dataclasses import dataclass, field
+import math
+from typing import NamedTuple
+
+from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.protocols.canopen import abort_codes
+from drive_can_bridge.simulation.canopen.sdo import checked_length
+from drive_can_bridge.simulation.cia402_objects import bytes_of, ObjectDictionary
+from drive_can_bridge.simulation.registers import Refused
+
+COUNT, ENTRIES_MAX, BITS_MAX = 4, 8, 64
+INVALID, NO_REMOTE, EXTENDED = 1 << 31, 1 << 30, 1 << 29
+NOT_MAPPABLE, TOO_LONG = 0x06040041, 0x06040042
+ACCESS, TOO_HIGH = 0x06010000, 0x06090031
+#: below are objects that no PDO carries
+_MAPPABLE_FROM = 0x2000
+#: content of the communication parameters by sub-index: bytes
+_WIDTHS = {1: 4, 2: 1, 3: 2, 5: 2}
+
+
+@dataclass(frozen=True)
+class Habits:
+    """
+    What differs between makers.
+
+    :param types: transmission types that PDOs take.
+    :param fixed_mapping: mappings cannot be written.
+    :param no_remote: TPDOs want bit 30 of their COB-ID.
+    :param mode_shown_early: 6061h shows a new mode at once; else in operation enabled only.
+    :param leaves_quick_stop: 000Fh leads from quick stop active (605Ah 5 to 8) back to operation.
+    :param stand_bit: bit 10 tells in quick stop active that the axis stands.
+    :param ramp_bits: vl turns only with bits 4 to 6 of the control word.
+    :param home_switch: where the switch is, in revolutions from where the axis was made; None: it
+        is not found within two.
+    """
+
+    types: Collection[int] = frozenset((*range(241), 254, 255))
+    fixed_mapping: bool = False
+    no_remote: bool = False
+    mode_shown_early: bool = True
+    leaves_quick_stop: bool = True
+    stand_bit: bool = True
+    ramp_bits: bool = True
+    home_switch: float | None = 0.0
+
+
+@dataclass
+class Pdo:
+    """
+    One PDO.
+
+    :ivar pending: what an RPDO brought, until the SYNC.
+    :ivar sent_at: when a TPDO left last; ``sent``: with what.
+    """
+
+    transmit: bool
+    cob_id: int
+    type: int = 255
+    inhibit: int = 0
+    event: int = 0
+    count: int = 0
+    entries: list[int] = field(default_factory=lambda: [0] * ENTRIES_MAX)
+    pending: bytes | None = None
+    syncs: int = 0
+    sent: bytes | None = None
+    sent_at: float = -math.inf
+
+    @property
+    def identifier(self) -> int | None:
+        """Where it travels; None: it does not."""
+        return None if self.cob_id & INVALID or not self.count else self.cob_id & 0x7FF
+
+    @property
+    def mapped(self) -> list[int]:
+        return self.entries[:self.count]
+
+    @property
+    def length(self) -> int:
+        """How many bytes it has."""
+        return sum(entry & 0xFF for entry in self.mapped) // 8
+
+
+class Factory(NamedTuple):
+    """
+    What PDOs carry from the factory: entries by number.
+
+    :param type: of transmission.
+    """
+
+    receive: dict[int, list[int]]
+    transmit: dict[int, list[int]]
+    type: int
+
+
+class Pdos:
+    """
+    All PDOs of one drive.
+
+    :param factory: what is mapped when it leaves the factory.
+    """
+
+    def __init__(self, node: int, objects: ObjectDictionary, factory: Factory) -> None:
+        self._objects = objects
+        self.habits = Habits()
+        self._node, self._factory = node, factory
+        self._stored: tuple[list[Pdo], list[Pdo]] | None = None
+        self.begin()
+
+    def store(self) -> None:
+        """Keep the set-up without power."""
+        self._stored = deepcopy((self.receive, self.transmit))
+
+    def begin(self, *, factory: bool = False) -> None:
+        """Have what was stored, else what the factory put in."""
+        if factory:
+            self._stored = None
+        if self._stored is not None:
+            self.receive, self.transmit = deepcopy(self._stored)
+            return
+        self.receive = [Pdo(False, 0x200 + 0x100 * n + self._node) for n in range(COUNT)]
+        self.transmit = [Pdo(True, 0x40000180 + 0x100 * n + self._node) for n in range(COUNT)]
+        for pdos, made in ((self.receive, self._factory.receive),
+                           (self.transmit, self._factory.transmit)):
+            for number, entries in made.items():
+                pdo = pdos[number - 1]
+                pdo.count, pdo.type = len(entries), self._factory.type
+                pdo.entries[:len(entries)] = entries
+
+    # -- objects ----------------------------------------------------------------------------------
+
+    def find(self, index: int) -> tuple[Pdo, bool] | None:
+        """Return the PDO that an object is of, and whether it is its mapping; None: of none."""
+        for base, pdos in ((0x1400, self.receive), (0x1800, self.transmit)):
+            for mapping in (False, True):
+                number = index - base - 0x200 * mapping
+                if 0 <= number < COUNT:
+                    return pdos[number], mapping
+        return None
+
+    def read(self, pdo: Pdo, mapping: bool, subindex: int) -> bytes:
+        if mapping:
+            if subindex == 0:
+                return bytes((pdo.count,))
+            if subindex <= ENTRIES_MAX:
+                return pdo.entries[subindex - 1].to_bytes(4, 'little')
+            raise Refused(abort_codes.NO_SUCH_SUBINDEX)
+        contents = {0: 5 if pdo.transmit else 2, 1: pdo.cob_id, 2: pdo.type}
+        if pdo.transmit:
+            contents |= {3: pdo.inhibit, 5: pdo.event}
+        if subindex not in contents:
+            raise Refused(abort_codes.NO_SUCH_SUBINDEX)
+        return contents[subindex].to_bytes(_WIDTHS.get(subindex, 1), 'little')
+
+    def write(self, pdo: Pdo, mapping: bool, subindex: int, data: bytes) -> None:
+        """Write one of its objects. :raises Refused: against the rules."""
+        self.read(pdo, mapping, subindex)      # it exists
+        if mapping:
+            self._map(pdo, subindex, data)
+            return
+        if subindex == 0:
+            raise Refused(abort_codes.WRITE_OF_READ_ONLY)
+        value = int.from_bytes(checked_length(data, _WIDTHS[subindex]), 'little')
+        valid = not pdo.cob_id & INVALID
+        if subindex == 1:
+            if (value & EXTENDED or self.habits.no_remote and pdo.transmit
+                    and not value & NO_REMOTE or valid and not value & INVALID
+                    and value != pdo.cob_id):
+                raise Refused(abort_codes.VALUE_OUT_OF_RANGE)
+            pdo.cob_id = value
+            pdo.pending, pdo.sent, pdo.syncs = None, None, 0
+        elif subindex == 2:
+            if value not in self.habits.types:
+                raise Refused(abort_codes.VALUE_OUT_OF_RANGE)
+            pdo.type = value
+        elif subindex == 3:
+            if valid:
+                raise Refused(abort_codes.DEVICE_STATE)
+            pdo.inhibit = value
+        else:
+            pdo.event = value
+
+    def _map(self, pdo: Pdo, subindex: int, data: bytes) -> None:
+        if self.habits.fixed_mapping or not pdo.cob_id & INVALID or subindex and pdo.count:
+            raise Refused(ACCESS)
+        if subindex:
+            entry = int.from_bytes(checked_length(data, 4), 'little')
+            if entry:
+                self._mappable(pdo, entry)
+            pdo.entries[subindex - 1] = entry
+            return
+        count = checked_length(data, 1)[0]
+        if count > ENTRIES_MAX:
+            raise Refused(TOO_HIGH)
+        for entry in pdo.entries[:count]:
+            self._mappable(pdo, entry)
+        if sum(entry & 0xFF for entry in pdo.entries[:count]) > BITS_MAX:
+            raise Refused(TOO_LONG)
+        pdo.count = count
+
+    def _mappable(self, pdo: Pdo, entry: int) -> Parameter:
+        cell = self._objects.cells.get((entry >> 16, entry >> 8 & 0xFF))
+        if (cell is None or entry >> 16 < _MAPPABLE_FROM or entry & 0xFF != 8 * bytes_of(cell)
+                or not (cell.readable if pdo.transmit else cell.writable)):
+            raise Refused(NOT_MAPPABLE)
+        return cell
+
+    # -- traffic ----------------------------------------------------------------------------------
+
+    def cells(self, pdo: Pdo, data: bytes) -> list[tuple[Parameter, int]]:
+        """Return what an RPDO says: parameters and raw integers."""
+        found, at = [], 0
+        for entry in pdo.mapped:
+            cell = self._mappable(pdo, entry)
+            end = at + bytes_of(cell)
+            found.append((cell, cell.raw_from_word(int.from_bytes(data[at:end], 'little'))))
+            at = end
+        return found
+
+    def frame(self, pdo: Pdo, now: float) -> Frame:
+        """Make a TPDO of what its objects hold now."""
+        pdo.sent = self.content(pdo)
+        pdo.sent_at = now
+        return Frame(pdo.cob_id & 0x7FF, pdo.sent, False)
+
+    def content(self, pdo: Pdo) -> bytes:
+        return b''.join(self._objects.content(self._objects.cells[entry >> 16, entry >> 8 & 0xFF])
+                        for entry in pdo.mapped)
+
+    def synchronised(self, pdo: Pdo) -> bool:
+        """Count a SYNC, and tell whether this TPDO leaves with it."""
+        if pdo.identifier is None or pdo.type > 240:
+            return False
+        if pdo.type == 0:
+            return self.content(pdo) != pdo.sent
+        pdo.syncs += 1
+        if pdo.syncs < pdo.type:
+            return False
+        pdo.syncs = 0
+        return True
+
+    def due(self, pdo: Pdo) -> float:
+        """Return when a TPDO leaves by itself."""
+        if pdo.identifier is None or pdo.type < 254:
+            return math.inf
+        inhibited = pdo.sent_at + pdo.inhibit / 10_000.0
+        if pdo.sent is None:
+            return -math.inf
+        timed = pdo.sent_at + pdo.event / 1000.0 if pdo.event else math.inf
+        return min(max(timed, inhibited), inhibited if self.content(pdo) != pdo.sent else math.inf)

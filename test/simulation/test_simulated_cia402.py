@@ -1,0 +1,576 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""The simulated drive of CiA 402: objects, PDOs, states and modes, in literal frames and times."""
+
+from cia402_builders import NODE, Servo
+import pytest
+
+from drive_can_bridge.core.errors import ConfigurationError, ValueRefused
+from drive_can_bridge.simulation.cia402 import SimulatedServoDrive
+from drive_can_bridge.simulation.cia402_pdos import Habits
+from drive_can_bridge.simulation.motor_plant import MotorPlant
+
+import cia402_builders
+
+#: 1.2345 revolutions of 10,000 increments: where a new axis stands
+BEGINNING = 12_345
+
+
+# -- objects --------------------------------------------------------------------------------------
+
+
+def test_objects_as_manuals_print_them() -> None:
+    servo = Servo()
+    assert servo.ask('605#4000100000000000') == ['585#4300100092010200']
+    assert servo.ask('605#4041600000000000') == ['585#4B41600050020000']
+    assert servo.ask('605#4061600000000000') == ['585#4F61600000000000']
+    assert servo.ask('605#2F60600009000000') == ['585#6060600000000000']
+    assert servo.ask('605#4061600000000000') == ['585#4F61600009000000']
+    # by segments: a name, and back a number that would have fitted one frame
+    assert servo.ask('605#4008100000000000') == ['585#410810001D000000']
+    assert servo.ask('605#6000000000000000') == ['585#0073696D756C6174']
+    assert servo.ask('605#6000000000000000') == ['585#8008100000000305']
+    assert servo.ask('605#21FF600004000000') == ['585#60FF600000000000']
+    assert servo.ask('605#07E803000000AAAA') == ['585#2000000000000000']
+    assert servo.read(0x60FF) == 1000
+
+
+@pytest.mark.parametrize(('request_', 'code'), [
+    ('4000500000000000', 0x06020000), ('4099600700000000', 0x06090011),
+    ('4010100100000000', None), ('2B41600006000000', 0x06010002),
+    ('2F40600006000000', 0x06070013), ('2360600006000000', 0x06070012),
+    ('2F60600005000000', 0x06090030), ('2310100100000000', 0x08000020),
+    ('2310100273617665', 0x06090011), ('2F16100001000000', 0x06010002),
+    ('4099600000000000', None), ('2F99600002000000', 0x06010002),
+    ('A041600000000000', 0x05040001), ('6000000000000000', 0x05040001)])
+def test_refuses_in_the_codes_of_cia_301(request_: str, code: int | None) -> None:
+    servo = Servo()
+    answer, = servo.ask(f'605#{request_}')
+    assert (answer[4:6] == '80') is (code is not None)
+    if code is not None:
+        assert int.from_bytes(bytes.fromhex(answer[-8:]), 'little') == code
+
+
+def test_a_segmented_write_that_does_not_fit_changes_nothing() -> None:
+    servo = Servo()
+    assert servo.ask('605#21FF600008000000') == ['585#60FF600000000000']
+    assert servo.ask('605#00E8030000000000') == ['585#2000000000000000']
+    assert servo.ask('605#1D00000000000000') == ['585#80FF600012000706']
+    assert servo.read(0x60FF) == 0
+    servo.ask('605#21FF600004000000')
+    assert servo.ask('605#15E8030000000000') == ['585#80FF600000000305']
+    servo.ask('605#21FF600004000000')
+    assert servo.ask('605#0BE8030000000000') == ['585#80FF600013000706']
+
+
+def test_keeps_what_was_stored_and_nothing_else() -> None:
+    servo = Servo()
+    servo.write(0x6081, 0, 1000, 4)
+    servo.set_up(9)
+    servo.write(0x1010, 1, 0x65766173, 4)
+    servo.write(0x6083, 0, 77, 4)
+    servo.drive.fault('restart', 1.0)
+    assert servo.at(1.5) == ['705#00']
+    assert servo.read(0x6081) == 1000
+    assert servo.read(0x6083) != 77
+    assert servo.read(0x1600, 2) == 0x60FF0020
+    servo.drive.fault('forget', 2.0)
+    servo.at(2.5)
+    assert servo.read(0x1600, 0) == 1
+
+
+def test_wants_a_plant_of_its_own() -> None:
+    with pytest.raises(ConfigurationError, match='ServoPlant'):
+        SimulatedServoDrive(cia402_builders.configuration(), plant=MotorPlant)
+
+
+# -- PDOs -----------------------------------------------------------------------------------------
+
+
+def test_a_mapping_is_changed_in_the_order_of_the_standard_only() -> None:
+    servo = Servo()
+    # valid: neither entries nor their number, nor another identifier
+    assert servo.refused(0x1A00, 0, 0, 1) == 0x06010000
+    assert servo.refused(0x1A00, 1, 0x60640020, 4) == 0x06010000
+    assert servo.refused(0x1800, 1, 0x40000186, 4) == 0x06090030
+    assert servo.read(0x1800, 1) == 0x40000185
+    servo.write(0x1800, 1, 0xC0000185, 4)
+    # entries only while their number is 0
+    assert servo.refused(0x1A00, 1, 0x60640020, 4) == 0x06010000
+    servo.write(0x1A00, 0, 0, 1)
+    assert servo.refused(0x1A00, 1, 0x60640010, 4) == 0x06040041     # half of it
+    assert servo.refused(0x1A00, 1, 0x10180120, 4) == 0x06040041     # no process data
+    assert servo.refused(0x1A00, 1, 0x50000010, 4) == 0x06040041     # does not exist
+    for place in (1, 2, 3):
+        servo.write(0x1A00, place, 0x60640020, 4)
+    assert servo.refused(0x1A00, 0, 3, 1) == 0x06040042
+    assert servo.refused(0x1A00, 0, 9, 1) == 0x06090031
+    servo.write(0x1A00, 0, 2, 1)
+    servo.write(0x1800, 2, 1, 1)
+    servo.write(0x1800, 1, 0x40000185, 4)
+    assert servo.ask('000#0105') == []
+    assert servo.ask('080#') == [f'185#{BEGINNING.to_bytes(4, "little").hex().upper() * 2}']
+
+
+def test_what_is_received_has_to_be_writable() -> None:
+    servo = Servo()
+    servo.write(0x1400, 1, 0x80000205, 4)
+    servo.write(0x1600, 0, 0, 1)
+    assert servo.refused(0x1600, 1, 0x60640020, 4) == 0x06040041
+    servo.write(0x1600, 1, 0x607A0020, 4)
+
+
+@pytest.mark.parametrize(('habits', 'index', 'subindex', 'value', 'size', 'code'), [
+    (Habits(fixed_mapping=True), 0x1A01, 0, 0, 1, 0x06010000),
+    (Habits(types={254, 255}), 0x1801, 2, 1, 1, 0x06090030),
+    (Habits(types={1, 255}), 0x1401, 2, 254, 1, 0x06090030),
+    (Habits(no_remote=True), 0x1801, 1, 0x285, 4, 0x06090030)])
+def test_makers_differ(habits: Habits, index: int, subindex: int, value: int, size: int,
+                       code: int) -> None:
+    servo = Servo(habits=habits)
+    if index == 0x1801:
+        servo.write(index, 1, 0xC0000285, 4)
+    assert servo.refused(index, subindex, value, size) == code
+    servo = Servo()
+    servo.write(index & ~0x200 if index >= 0x1A00 else index, 1, 0x80000285, 4)
+    servo.write(index, subindex, value, size)
+
+
+def test_an_rpdo_of_type_1_counts_from_the_sync_on() -> None:
+    servo = Servo()
+    servo.set_up(9)
+    assert servo.ask('205#060000000000') == []
+    assert servo.read(0x6040) == 0
+    answer, = servo.ask('080#')
+    assert answer.startswith('185#3102')
+    assert servo.read(0x6040) == 6
+    # every second SYNC
+    servo.write(0x1800, 2, 2, 1)
+    assert [len(servo.ask('080#')) for _ in range(4)] == [0, 1, 0, 1]
+
+
+def test_an_rpdo_that_is_too_short_is_an_emergency_until_the_next_good_one() -> None:
+    servo = Servo()
+    servo.set_up(9)
+    assert servo.ask('205#0600') == ['085#1082110000000000']
+    assert servo.ask('205#0600') == []
+    assert servo.ask('205#060000000000') == ['085#0000110000000000']
+    assert servo.drive.violations == {'PDO shorter than its mapping (ignored)': 2}
+
+
+def test_tpdos_by_event_and_timer() -> None:
+    servo = Servo()
+    # the status word is in TPDO1 from the factory, on change
+    assert servo.ask('000#0105') == ['185#5002']
+    assert servo.ask('205#0600', 0.1) == ['185#3102']
+    assert servo.at(0.2) == []
+    servo.ask('000#8005')
+    servo.write(0x1800, 1, 0xC0000185, 4)
+    servo.write(0x1800, 3, 50, 2)
+    servo.write(0x1800, 1, 0x40000185, 4)
+    servo.write(0x1800, 5, 20, 2)
+    assert servo.ask('000#0105') == ['185#3102']
+    # not before 5 ms have passed, and else every 20 ms
+    assert servo.ask('205#0700', 0.201) == []
+    assert servo.drive.next_timer() == pytest.approx(0.205)
+    assert servo.at(servo.drive.next_timer()) == ['185#3302']
+    assert servo.drive.next_timer() == pytest.approx(0.225)
+    assert servo.at(servo.drive.next_timer()) == ['185#3302']
+    # PDOs stop with the node
+    servo.ask('000#8005')
+    assert servo.at(0.3) == []
+    assert servo.ask('205#0600') == []
+
+
+def test_mapped_as_configured_where_nobody_configures() -> None:
+    servo = Servo(mapping='verify')
+    assert [servo.read(0x1600, n) for n in range(3)] == [2, 0x60400010, 0x60FF0020]
+    assert [servo.read(0x1A00, n) for n in range(3)] == [2, 0x60410010, 0x606C0020]
+    assert servo.read(0x1400, 2) == servo.read(0x1800, 2) == 1
+
+
+def test_a_second_node_with_its_number_is_seen() -> None:
+    servo = Servo()
+    servo.ask('705#05')
+    servo.ask('185#5002')
+    assert servo.drive.violations == {'frame that only this drive may send': 2}
+
+
+# -- states ---------------------------------------------------------------------------------------
+
+
+def test_walks_one_state_at_a_time() -> None:
+    servo = Servo()
+    servo.set_up(9)
+    for word, state in (
+            (0x0F, 0x40), (0x07, 0x40), (0x06, 0x21), (0x0F, 0x23), (0x0F, 0x27), (0x07, 0x23),
+            (0x06, 0x21), (0x07, 0x23), (0x00, 0x40), (0x06, 0x21), (0x02, 0x40)):
+        servo.word = word
+        status, _ = servo.cycle()
+        assert status & (0x4F if state == 0x40 else 0x6F) == state, f'{word:02X}'
+
+
+def test_a_fault_is_reset_by_a_rising_edge_once_its_cause_is_gone() -> None:
+    servo = Servo()
+    servo.set_up(9)
+    servo.target = 100_000
+    servo.enable()
+    servo.run(0.5)
+    servo.drive.fault('trip=1', servo.now)
+    # 10 rev/s by the quick-stop ramp of 250 rev/s²: 40 ms in fault reaction active
+    assert servo.sent() == ['085#1023030000000000']
+    assert servo.cycle()[0] & 0x4F == 0x0F
+    assert servo.run(0.1)[0] & 0x4F == 0x08
+    assert (servo.read(0x603F), servo.read(0x1001), servo.speed) == (0x2310, 3, 0.0)
+    servo.word = 0x80
+    assert servo.run(0.1)[0] & 0x4F == 0x08
+    servo.word = 0
+    servo.run(1.0)
+    servo.word = 0x80
+    assert servo.cycle()[0] & 0x4F == 0x40
+    assert servo.read(0x603F) == 0
+    servo.word = 0
+    servo.cycle()
+    servo.enable()
+
+
+def test_sto_low_lets_no_torque_be() -> None:
+    servo = Servo()
+    servo.drive.fault('sto', 0.0)
+    assert servo.drive.faults_text == 'sto'
+    servo.set_up(9)
+    for word in (6, 7, 0x0F):
+        servo.word = word
+        assert servo.run(0.05)[0] == 0x0240         # no voltage: bit 4
+    assert servo.read(0x60FD) & 8 == 0
+    servo.drive.fault('ok', servo.now)
+    assert servo.cycle()[0] == 0x0250
+    servo.target = 10_000
+    servo.enable()
+    servo.run(0.5)
+    assert servo.speed == 1.0
+    # and at speed: it coasts
+    servo.drive.fault('sto', servo.now)
+    assert servo.cycle()[0] & 0x4F == 0x40
+    assert 0.5 < servo.speed < 1.0
+
+
+def test_only_drives_that_have_an_input_lose_torque_by_it() -> None:
+    import simulation_builders
+    with pytest.raises(ValueRefused, match='no input for safe torque off'):
+        simulation_builders.drive().fault('sto', 0.0)
+
+
+# -- modes ----------------------------------------------------------------------------------------
+
+
+def test_csp_follows_and_stays_where_it_is() -> None:
+    servo = Servo()
+    servo.set_up(8)
+    servo.target = BEGINNING
+    servo.enable()
+    status, position = servo.run(0.2)
+    assert (status & 0x1000, position) == (0x1000, BEGINNING)
+    for _ in range(100):
+        servo.target += 50
+        servo.cycle()
+    assert servo.read(0x606C) == pytest.approx(5000, abs=1)
+    assert servo.run(0.05)[1] == BEGINNING + 5000
+    assert servo.speed == 0.0
+
+
+def test_a_step_in_csp_is_a_fault() -> None:
+    servo = Servo()
+    servo.set_up(8)
+    servo.target = 0
+    servo.write(0x6065, 0, 5000, 4)
+    servo.enable()
+    assert servo.run(0.1)[0] & 0x4F == 0x0F
+    assert servo.run(0.2)[0] & 0x4F == 0x08
+    assert servo.read(0x603F) == 0x8611
+    # it went for it: whoever enables with a wrong target moves the axis
+    assert servo.read(0x6064) != BEGINNING
+
+
+def test_pp_takes_targets_by_bit_4() -> None:
+    servo = Servo()
+    servo.set_up(1)
+    servo.target = 50_000
+    servo.enable()
+    assert servo.run(0.5) == (0x0637, BEGINNING)
+    servo.word |= 0x10
+    assert servo.cycle()[0] & 0x1000
+    # acknowledged until bit 4 falls; the next one waits for this one
+    servo.word &= ~0x10
+    assert not servo.cycle()[0] & 0x1000
+    servo.target = 40_000
+    servo.word |= 0x10
+    assert servo.cycle()[0] & 0x1000
+    assert max(servo.cycle()[1] for _ in range(200)) > 49_000
+    assert servo.run(1.0) == (0x1637, 40_000)
+    # at once
+    servo.word &= ~0x10
+    servo.cycle()
+    servo.target, servo.word = 90_000, servo.word | 0x30
+    servo.run(0.2)
+    servo.word &= ~0x10
+    servo.cycle()
+    servo.target, servo.word = 30_000, servo.word | 0x10
+    assert max(servo.cycle()[1] for _ in range(200)) < 80_000
+    assert servo.run(1.0)[1] == 30_000
+    # halt
+    servo.word &= ~0x10
+    servo.cycle()
+    servo.target, servo.word = 90_000, servo.word | 0x10
+    servo.run(0.2)
+    servo.word |= 0x100
+    where = servo.run(0.5)[1]
+    assert servo.run(0.5) == (servo.cycle()[0], where)
+    servo.word &= ~0x100
+    assert servo.run(2.0)[1] == 90_000
+
+
+def test_pv_and_vl_have_ramps_and_vl_wants_its_bits() -> None:
+    servo = Servo()
+    servo.set_up(3)
+    servo.target = 100_000
+    servo.enable()
+    servo.run(0.1)
+    assert servo.speed == pytest.approx(5.0, abs=1.0)       # 50 rev/s²
+    servo.run(0.5)
+    assert servo.speed == 10.0
+    servo = Servo()
+    servo.set_up(2)
+    servo.target = 600
+    servo.enable()
+    servo.run(1.0)
+    assert servo.speed == 0.0
+    servo.word = 0x7F
+    servo.run(1.0)
+    assert servo.speed == pytest.approx(10.0)
+    assert servo.read(0x6044) == 600
+    servo = Servo(habits=Habits(ramp_bits=False))
+    servo.set_up(2)
+    servo.target = 600
+    servo.enable()
+    servo.run(1.0)
+    assert servo.speed == pytest.approx(10.0)
+
+
+def test_ip_wants_bit_4_and_cst_pulls() -> None:
+    servo = Servo()
+    servo.set_up(7)
+    servo.target = BEGINNING + 100
+    servo.enable()
+    assert servo.run(0.2) == (0x0237, BEGINNING)
+    servo.word |= 0x10
+    servo.target = BEGINNING + 200
+    assert servo.run(0.2) == (0x1237, BEGINNING + 200)
+    servo = Servo()
+    servo.set_up(10)
+    servo.target = 200
+    servo.enable()
+    servo.run(0.5)
+    assert 0.0 < servo.speed < 50.0
+    assert servo.drive.value('actual_torque') == pytest.approx(20.0, abs=0.1)
+
+
+def test_a_new_mode_is_shown_only_in_operation_on_some_drives() -> None:
+    servo = Servo(habits=Habits(mode_shown_early=False))
+    servo.set_up(9)
+    assert servo.read(0x6061) == 0
+    servo.enable()
+    assert servo.read(0x6061) == 9
+
+
+@pytest.mark.parametrize(('method', 'status', 'position'), [
+    (35, 0x1637, 0), (37, 0x1637, 0), (17, 0x1637, 0), (33, 0x1637, 0), (0, 0x2237, BEGINNING)])
+def test_homing(method: int, status: int, position: int) -> None:
+    servo = Servo()
+    servo.set_up(6)
+    servo.write(0x6098, 0, method, 1)
+    servo.enable()
+    assert servo.run(0.5) == (0x0237, BEGINNING)            # not by itself
+    servo.word |= 0x10
+    assert servo.run(3.0) == (status, position)
+    assert servo.speed == 0.0
+
+
+def test_homing_to_an_offset_and_without_a_switch() -> None:
+    servo = Servo()
+    servo.set_up(6)
+    servo.write(0x607C, 0, -500, 4)
+    servo.write(0x6098, 0, 17, 1)
+    servo.enable()
+    servo.word |= 0x10
+    assert servo.run(3.0)[1] == -500
+    assert servo.revolutions == 0.0
+    servo = Servo(habits=Habits(home_switch=None))
+    servo.set_up(6)
+    servo.write(0x6098, 0, 17, 1)
+    servo.enable()
+    servo.word |= 0x10
+    assert servo.run(3.0)[0] & 0x3000 == 0x2000
+    assert servo.read(0x6064) == BEGINNING - 20_000 & 0xFFFFFFFF
+    # and taken back in the middle
+    servo.word &= ~0x10
+    servo.cycle()
+    servo.word |= 0x10
+    servo.run(0.1)
+    servo.word &= ~0x10
+    assert servo.run(0.5) == (servo.cycle()[0], servo.cycle()[1])
+
+
+# -- ways out, told by the motor ------------------------------------------------------------------
+
+
+def running(mode: int = 9, **options: float) -> Servo:
+    """Return a drive at 10 revolutions per second."""
+    servo = Servo(**options)
+    servo.set_up(mode)
+    servo.write(0x6084, 0, 100_000, 4)          # 10 rev/s²: 1 s
+    servo.target = 100_000
+    servo.enable()
+    servo.run(1.0)
+    assert servo.speed == 10.0
+    return servo
+
+
+@pytest.mark.parametrize('mode', [9, 3])
+def test_disable_operation_brakes_by_ramp_and_shutdown_coasts(mode: int) -> None:
+    servo = running(mode)
+    servo.word = 0x07
+    # 605Ch = 1: enabled until it stands
+    assert servo.run(0.5)[0] & 0x6F == 0x27
+    assert servo.speed == pytest.approx(5.0, abs=0.2)
+    assert servo.run(0.6)[0] & 0x6F == 0x23
+    assert servo.speed == 0.0
+    servo = running(mode)
+    servo.word = 0x06
+    # 605Bh = 0: no torque at once; 12.5 rev/s² are those of friction
+    assert servo.cycle()[0] & 0x6F == 0x21
+    servo.run(0.5)
+    assert servo.speed == pytest.approx(10.0 - 0.5 * 12.5, abs=0.3)
+    assert servo.read(0x6077) == 0
+    # the same word in the middle of the ramp of the other ends it
+    servo = running(mode)
+    servo.word = 0x07
+    servo.run(0.2)
+    servo.word = 0x06
+    assert servo.cycle()[0] & 0x6F == 0x21
+    assert servo.speed > 7.0
+
+
+@pytest.mark.parametrize(('option', 'seconds', 'state'), [
+    (0, 0.0, 0x40), (1, 1.0, 0x40), (2, 0.04, 0x40), (3, 0.01, 0x40), (5, 1.0, 0x07),
+    (6, 0.04, 0x07), (7, 0.01, 0x07)])
+def test_quick_stop(option: int, seconds: float, state: int) -> None:
+    servo = running()
+    servo.write(0x605A, 0, option, 2)
+    servo.word = 0x02
+    status, began = servo.cycle()
+    if not option:
+        assert status & 0x4F == 0x40
+        assert servo.speed > 9.0
+        return
+    if seconds > 0.03:
+        assert status & 0x6F == 0x07
+        assert not status & 0x400
+    status, end = servo.run(seconds + 0.02)
+    assert (status & (0x4F if state == 0x40 else 0x6F), servo.speed) == (state, 0.0)
+    assert bool(status & 0x400) is (state == 0x07)
+    assert end - began == pytest.approx(100_000 * seconds / 2, abs=1100)
+    # 0006h is no way out of it
+    servo.word = 0x06
+    assert servo.cycle()[0] & 0x6F == (0x07 if state == 0x07 else 0x21)
+    servo.word = 0x0F
+    assert servo.cycle()[0] & 0x6F == (0x27 if state == 0x07 else 0x23)
+
+
+def test_some_drives_leave_quick_stop_by_0000h_only() -> None:
+    servo = Servo(habits=Habits(leaves_quick_stop=False, stand_bit=False))
+    servo.set_up(9)
+    servo.write(0x605A, 0, 6, 2)
+    servo.enable()
+    servo.word = 0x02
+    assert servo.run(0.1)[0] == 0x0217
+    servo.word = 0x0F
+    assert servo.cycle()[0] == 0x0217
+    servo.word = 0x00
+    assert servo.cycle()[0] & 0x4F == 0x40
+
+
+def watched(option: int, **options: float) -> Servo:
+    """Return a drive at speed that watches node 127 for 600 ms, and has heard it once."""
+    servo = running(**options)
+    servo.write(0x6007, 0, option, 2)
+    servo.write(0x1016, 1, 0x007F0258, 4)
+    # nobody is missed who was never heard
+    servo.run(1.0)
+    assert servo.speed == 10.0
+    assert servo.ask('77F#05') == []
+    return servo
+
+
+@pytest.mark.parametrize(('option', 'state', 'speed'), [
+    (0, 0x27, 10.0), (1, 0x08, 0.0), (2, 0x40, 5.0), (3, 0x40, 0.0)])
+def test_the_bridge_is_missed(option: int, state: int, speed: float) -> None:
+    servo = watched(option)
+    heard = servo.now
+    servo.run(0.59)
+    assert servo.speed == 10.0
+    assert servo.drive.next_timer() <= heard + 0.6
+    sent = servo.at(heard + 0.6)
+    assert (sent == ['085#3081110000000000']) is (option == 1)
+    status, _ = servo.run(0.4)
+    assert status & (0x6F if state == 0x27 else 0x4F) == state
+    assert servo.speed == pytest.approx(speed, abs=0.2)
+    assert servo.read(0x603F) == (0x8130 if option == 1 else 0)
+    assert servo.drive.take_notices()[-1] == 'axis: no heartbeat of node 127'
+
+
+def test_a_bridge_that_goes_on_is_not_missed_nor_one_that_is_not_watched_any_more() -> None:
+    servo = watched(1)
+    for _ in range(5):
+        servo.run(0.5)
+        servo.ask('77F#05')
+    servo.write(0x1016, 1, 0, 4)
+    servo.run(2.0)
+    assert servo.speed == 10.0
+
+
+def test_the_node_stopped_is_a_lost_connection() -> None:
+    servo = running()
+    servo.ask('000#0205')
+    assert servo.drive.plant.operation.faulted
+
+
+def test_a_vertical_axis_falls_where_power_goes_and_not_where_it_stays() -> None:
+    servo = Servo(load=0.4)
+    servo.set_up(9)
+    servo.enable()
+    servo.run(1.0)
+    assert servo.read(0x6064) - BEGINNING == pytest.approx(0, abs=150)     # the first cycles
+    held = servo.revolutions
+    servo.run(1.0)
+    assert servo.revolutions == held
+    # quick stop that stays holds it, one that ends lets it go
+    servo.write(0x605A, 0, 6, 2)
+    servo.word = 0x02
+    servo.run(1.0)
+    assert servo.revolutions == held
+    servo.word = 0x0F
+    servo.cycle()
+    servo.write(0x605A, 0, 2, 2)
+    servo.word = 0x02
+    servo.run(1.0)
+    assert servo.revolutions < held - 1.0
+    # unless a brake closes
+    servo = Servo(load=0.4, brake=1)
+    servo.set_up(9)
+    servo.enable()
+    held = servo.revolutions
+    servo.word = 0
+    servo.run(1.0)
+    assert servo.revolutions == held
+
+
