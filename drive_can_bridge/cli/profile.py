@@ -13,10 +13,11 @@ from drive_can_bridge.cli.whole_file import differs, write_whole
 from drive_can_bridge.configuration.problems import Problem
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.profiles.build import Built
-from drive_can_bridge.profiles.catalogue import available, check, Checked, description, find
+from drive_can_bridge.profiles.catalogue import (
+    available, check, Checked, description, find, VERIFIED_WORDS,
+)
 from drive_can_bridge.profiles.csv_import import COLUMNS, WrongColumns
 from drive_can_bridge.profiles.importing import columns_from_option, import_file, WrongOption
-from drive_can_bridge.profiles.provenance import TRUST_WORDS
 from drive_can_bridge.protocols.families import FAMILIES
 
 _HELP = {
@@ -86,9 +87,9 @@ def define(parser: ArgumentParser) -> None:
         'Make a profile from an EDS or DCF file (needs the Python library canopen), or from a\n'
         'table in a CSV file. What cannot be used is named with its line, the rest is imported.')
     made['import'].epilog = (
-        f'Columns: {", ".join(COLUMNS)}.\nHeadings in English, German and Italian are guessed; --columns '
-        'says it where that is not enough:\n  --columns number=Nr,name=Bezeichnung,"scale=Faktor, '
-        'intern",unit=')
+        f'Columns: {", ".join(COLUMNS)}.\nHeadings in English, German and Italian are guessed; '
+        '--columns says it where that is not enough:\n  --columns number=Nr,name=Bezeichnung,'
+        '"scale=Faktor, intern",unit=')
 
 
 def _add_options(parser: ArgumentParser, action: str = '') -> None:
@@ -177,7 +178,7 @@ def _row(name: str, parameter: Parameter) -> tuple[str, ...]:
     return (name, parameter.address, parameter.type.value, scale + offset, parameter.unit,
             parameter.access.value + (' protected' if parameter.protected else ''),
             parameter.storage.value if parameter.storage else '',
-            parameter.range_text if bounded else '', TRUST_WORDS[parameter.verified],
+            parameter.range_text if bounded else '', VERIFIED_WORDS[parameter.verified],
             parameter.description)
 
 

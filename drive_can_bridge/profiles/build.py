@@ -16,7 +16,7 @@ from drive_can_bridge.configuration.yaml_nodes import SIZE_MAX
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.profiles.catalogue import family_complaints
 from drive_can_bridge.profiles.names import name_of, unique
-from drive_can_bridge.profiles.text import comment, entry_lines, one_line, scalar
+from drive_can_bridge.profiles.text import block, comment, entry_lines, one_line, scalar
 from drive_can_bridge.protocols.families import FAMILIES
 
 #: identity object of CiA 301: vendor, product, revision, serial number
@@ -75,6 +75,7 @@ class Found:
     :param protocols: that the drive speaks; none: the file does not say.
     :param left_out: entries that are not in the profile.
     :param notes: about the file: what its columns were taken for, and what is odd.
+    :param sections: of the profile, beside its parameters; they name standard objects.
     """
 
     description: str = ''
@@ -82,6 +83,7 @@ class Found:
     drafts: list[Draft] = field(default_factory=list)
     left_out: list[LeftOut] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    sections: dict[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -242,6 +244,7 @@ def _text(named: dict[str, Draft], found: Found, source: str, description: str,
     if identity:
         lines += [*comment('Object 1018h tells one device from another.'),
                   f'identity: [{", ".join(identity)}]', '']
+    lines += [each for key, value in found.sections.items() for each in block(key, value)]
     lines += ['parameters:', '']
     for name, draft in named.items():
         where = ', '.join(filter(None, (f'file, line {draft.line}', draft.section)))

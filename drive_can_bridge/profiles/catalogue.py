@@ -17,6 +17,8 @@ from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.protocols.family import Complaint, Family
 from drive_can_bridge.resources import profiles_directory
 
+#: how an entry's key ``verified`` is shown
+VERIFIED_WORDS: dict[bool | None, str] = {True: 'yes', False: 'no', None: ''}
 _OURS = 'profile.'
 #: a key of a family that changes what it needs of an entry: any value will do
 _CHOICES = {'canopen_pkw': ('addressing', ('register', 'canopen'))}
@@ -149,6 +151,6 @@ def _complaints(profile: Profile, family: Family, options: object) -> Iterator[C
         profile = replace(profile, control=None)
     drive = DriveConfiguration(name='drive', bus='bus', protocol=family.name, station=1,
                                profile=profile, options=options)
-    for complaint in family.check(drive):
+    for complaint in (*family.check_widths(drive), *family.check(drive)):
         if complaint.key.startswith(_OURS):
             yield complaint._replace(key=complaint.key.removeprefix(_OURS))

@@ -82,8 +82,9 @@ COLUMNS: dict[str, str] = {
 _BY_HEADING = {word: column for column, words in COLUMNS.items() for word in words.split('|')}
 #: words of headings that say nothing where another one is known
 _FILLERS = frozenset(
-    'parameter param par para parametro value wert valore valori val data daten dati dato of the di del '
-    'dez dec dezimal hex setting adjustment limit location phys physikalische engineering'.split())
+    'parameter param par para parametro value wert valore valori val data daten dati dato of the '
+    'di del dez dec dezimal hex setting adjustment limit location phys physikalische '
+    'engineering'.split())
 #: headings that may stand for numbers as well as for names; the cells tell
 _AMBIGUOUS = frozenset(('parameter', 'param', 'par', 'parametro', 'p'))
 _NUMERIC = ('scale', 'divisor', 'offset', 'minimum', 'maximum',
@@ -235,8 +236,12 @@ class Table:
             for column in columns:
                 if column not in given:
                     self.columns.setdefault(column, place)
-        if 'index' not in given:
-            self._settle_index()
+        # beside a number an "Index" is that of an array
+        place = self.columns.get('index', 0)
+        if 'number' in self.columns and 'index' not in given and _plain_heading(
+                Row(0, self.headings).cell(place)) in ('index', 'idx', 'indice'):
+            del self.columns['index']
+            self.columns.setdefault('subindex', place)
         if not {'number', 'index'} & set(self.columns):
             shown = ', '.join(filter(None, self.headings))
             what = f'its headings are: {shown}' if shown else 'no row looks like headings'
@@ -281,21 +286,6 @@ class Table:
         cells = [row.cell(place) for row in self.rows if row.cell(place)]
         return sum(bool(re.search('[0-9]', cell)) and len(cell) <= 12
                    for cell in cells) > len(cells) / 2
-
-    def _settle_index(self) -> None:
-        """Tell an index of CANopen from the index of an array: the former begins at 1000h."""
-        values = []
-        for row in self.rows:
-            try:
-                values.append(integer(re.split('[:.]', self.cell(row, 'index'))[0],
-                                      hexadecimal=True))
-            except Unusable:
-                continue
-        place = self.columns.get('index')
-        if place is not None and sum(value >= 0x1000 for value in values) <= len(values) / 2:
-            del self.columns['index']
-            self.columns.setdefault(
-                'subindex' if 'number' in self.columns else 'number', place)
 
 
 def _head(rows: Sequence[Row], given: Sequence[str]) -> Row | None:
@@ -414,6 +404,9 @@ class _RowReader:
         if index:
             found['index'] = integer(index, hexadecimal=True)
             found['subindex'] = integer(subindex or '0', hexadecimal=True)
+            if found['index'] < 0x1000:
+                raise Unusable(f"'{index}' is no index of CANopen, which begin at 1000h; if it is "
+                               'a number, say --columns number=HEADING,index=')
         if not found:
             raise Unusable('has no number')
         element = ''.join(_parts(self._cell('subindex'))) or element
@@ -473,15 +466,10 @@ class _RowReader:
         scale, offset = entry.get('scale', 1.0), entry.get('offset', 0.0)
         if self._cell('type'):
             kind = word_of('type', _TYPES, self._cell('type'))
-            if not kind.endswith('t8') or self._bytes_stay:
-                return kind
-            # eight bits fit sixteen
-            ends = sorted(rounded(raw * scale + offset)
-                          for raw in ((0, 255) if kind == 'uint8' else (-128, 127)))
-            limits.setdefault('maximum', ends[1])
-            if kind == 'int8':
-                limits.setdefault('minimum', ends[0])
-            return kind.replace('8', '16')
+            if kind == 'uint8' and not self._bytes_stay:    # eight bits fit sixteen
+                limits.setdefault('maximum', rounded(255 * scale + offset))
+                return 'uint16'
+            return kind
         raws = [(limit - offset) / scale for limit in limits.values()]
         for fits in (ParameterType.UINT16, ParameterType.INT16, ParameterType.UINT32,
                      ParameterType.INT32):

@@ -5,6 +5,10 @@ From an EDS or DCF file to the entries of a profile, through the library ``canop
 What a section means is the library's business: types, limits with their signs, compact arrays. It
 takes a file as a whole or not at all, and knows no lines. So the file is taken apart here, and
 handed over object by object: a broken section costs that entry and no other.
+
+What a drive of CiA 402 has of the standard is called as in the shipped profile ``cia402_servo``,
+and has its bits, values and units; the units that are every maker's own are taken from the file
+where it says them, and are raw otherwise.
 """
 
 from collections.abc import Sequence
@@ -17,11 +21,12 @@ from types import ModuleType
 from typing import Any
 
 from drive_can_bridge.profiles.build import Draft, Found, ImportFailed, LeftOut, Unusable
+from drive_can_bridge.profiles.catalogue import check, Checked
 from drive_can_bridge.profiles.csv_import import access_of
 from drive_can_bridge.profiles.names import unit
 from drive_can_bridge.profiles.numerals import rounded
 from drive_can_bridge.profiles.text import one_line
-from drive_can_bridge.resources import command_that_brings
+from drive_can_bridge.resources import command_that_brings, profiles_directory
 
 #: how the library needs these keys to be written
 _SPELLINGS = {key.lower(): key for key in (
@@ -38,6 +43,18 @@ _TYPES = {
     0x07: 'uint32', 0x08: 'REAL32', 0x09: 'VISIBLE_STRING', 0x0A: 'OCTET_STRING',
     0x0B: 'UNICODE_STRING', 0x0C: 'TIME_OF_DAY', 0x0D: 'TIME_DIFFERENCE', 0x0F: 'DOMAIN',
     0x10: 'INTEGER24', 0x11: 'REAL64', 0x15: 'INTEGER64', 0x16: 'UNSIGNED24', 0x1B: 'UNSIGNED64'}
+#: CiA 402: control word and status word, which are built in
+_BUILT_IN = (0x6040, 0x6041)
+#: profile of the objects that CiA 402 knows; entries of it that are not verified have units of
+#: every maker's own, and are placeholders there
+_STANDARD = 'cia402_servo'
+#: what those entries have in common with the one that they stand for
+_MEANING = ('bits', 'values', 'neutral', 'neutral_from', 'limit', 'protected')
+#: numerators and denominators of 60A8h and 60A9h (bits 23 to 8; above them a power of ten) in the
+#: notation of CiA 303-2, as in the files of maxon's EPOS4: unit, and how many of it
+_SI_UNITS = {0xB400: ('rev', 1.0), 0xB500: ('inc', 1.0), 0x4100: ('deg', 1.0),
+             0x1000: ('rad', 1.0), 0xB447: ('rpm', 1.0), 0xB403: ('rpm', 60.0),
+             0xB503: ('inc/s', 1.0), 0x4103: ('deg/s', 1.0), 0x1003: ('rad/s', 1.0)}
 #: everything that the library raises about a section that makes no sense
 _ERRORS = (ValueError, KeyError, AttributeError, TypeError, configparser.Error)
 
@@ -114,7 +131,8 @@ def read_eds(text: str, protocols: Sequence[str] = ()) -> Found:
     """
     Read what an EDS or DCF file offers.
 
-    :param protocols: that the drive speaks; none: cia402 where the file has what that needs.
+    :param protocols: that the drive speaks; none: cia402 where the file has its control word and
+        status word, else canopen_pkw.
     :raises ImportFailed: it is none, or the library is missing.
     """
     library = canopen_library()
@@ -125,7 +143,10 @@ def read_eds(text: str, protocols: Sequence[str] = ()) -> Found:
         raise ImportFailed('is no EDS or DCF file: it has no section of an object, like [1000]')
     info = sections.get('deviceinfo', Section('', 0))
     found.description = one_line(f'{info.get("VendorName")} {info.get("ProductName")}')
-    reader = _ObjectReader(library, sections, found, bytes_stay=tuple(protocols) == ('cia402',))
+    controlled = {f'{index:04x}' for index in _BUILT_IN} <= sections.keys()
+    found.protocols = ('cia402' if controlled else 'canopen_pkw',)
+    standard = (tuple(protocols) or found.protocols) == ('cia402',)
+    reader = _ObjectReader(library, sections, found, bytes_stay=standard)
     for index in indices:
         reader.read(index)
     for name in ('mandatoryobjects', 'optionalobjects', 'manufacturerobjects'):
@@ -137,6 +158,9 @@ def read_eds(text: str, protocols: Sequence[str] = ()) -> Found:
     if reader.counts:
         found.notes.append(f'{reader.counts} sub-indices 0 left out: they hold the number of '
                            'entries')
+    if standard:
+        _standardise(found, {index: _si_unit(sections.get(index, info))
+                             for index in ('60a8', '60a9')})
     return found
 
 
@@ -280,3 +304,79 @@ def _limits(section: Section, variable: Any, scale: float) -> dict[str, float]:
     if variable.min is not None and variable.max is not None and variable.min > variable.max:
         raise Unusable(f'LowLimit {variable.min} is above HighLimit {variable.max}')
     return found
+
+
+# -- CiA 402 --------------------------------------------------------------------------------------
+
+
+def _si_unit(section: Section) -> tuple[str, float] | None:
+    """Return the unit that 60A8h or 60A9h names in the file, and how many of it a step is."""
+    text = section.get('ParameterValue') or section.get('DefaultValue')
+    try:
+        value = int(text, 0)
+    except ValueError:
+        return None
+    name, count = _SI_UNITS.get(value >> 8 & 0xFFFF, ('', 0.0))
+    exponent = value >> 24 & 0xFF
+    return (name, count * 10.0 ** (exponent - (exponent & 0x80) * 2)) if name else None
+
+
+def _standardise(found: Found, units: dict[str, tuple[str, float] | None]) -> None:
+    """Call standard objects by their names, and say what is known of them."""
+    shipped = check(profiles_directory() / f'{_STANDARD}.yaml')
+    known = {(entry['index'], entry['subindex']): name for name, entry in shipped.entries.items()}
+    found.drafts = [draft for draft in found.drafts if draft.entry['index'] not in _BUILT_IN]
+    for draft in found.drafts:
+        draft.name = known.get((draft.entry['index'], draft.entry['subindex']), '')
+    names = {draft.name for draft in found.drafts}
+    raw = [draft for draft in found.drafts if not _complete(draft, shipped, units, names)]
+    standard = [draft.name for draft in raw if draft.name]
+    others = sum(not draft.name and draft.entry['index'] not in _COMMUNICATION for draft in raw)
+    found.notes.append(f'CiA 402: {len(names - {""})} standard objects have the names of the '
+                       f'profile {_STANDARD}; control word and status word are built in')
+    if standard:
+        found.notes.append(f'raw, because their unit is the maker\'s own: {", ".join(standard)}; '
+                           'scale and unit stand in the manual')
+    if others:
+        found.notes.append(f'{others} objects of the maker have no unit in the file: they are raw')
+    if 'store_parameters' in names:
+        found.sections['restore'] = shipped.loaded.tree.data['restore']
+    if 'fault_code' in names:
+        found.sections['fault'] = shipped.loaded.tree.data['fault']
+
+
+def _complete(draft: Draft, shipped: Checked, units: dict[str, tuple[str, float] | None],
+              names: set[str]) -> bool:
+    """Add to an entry what the standard says of it; return whether its unit is known."""
+    entry, known = draft.entry, shipped.entries.get(draft.name, {})
+    if entry['access'] != 'ro':
+        entry['storage'] = 'ram'    # until 1010h stores it
+    if known.get('access') == 'wo':
+        entry['access'] = 'wo'
+    entry.update({key: known[key] for key in _MEANING if key in known})
+    scale, name = known.get('scale', 1.0), known.get('unit', '')
+    if 'unit' in entry or not name:
+        has_unit = 'unit' in entry or bool(draft.name)
+        name, factor = entry.get('unit', ''), 1.0
+    elif known['verified']:
+        has_unit, factor = True, scale
+    else:
+        said = units['60a9' if name == 'rpm' else '60a8'] if name in ('rev', 'rpm') else None
+        has_unit, (name, factor) = said is not None, said or ('', 1.0)
+        draft.remarks.append(
+            "raw: its unit is the maker's own, and the file does not say it" if said is None else
+            f'scale and unit as {"60A9h" if name.endswith(("rpm", "/s")) else "60A8h"} stands in '
+            'the file')
+    if name:
+        entry['unit'] = name
+        for key in ('minimum', 'maximum'):
+            if key in entry:
+                entry[key] = rounded(entry[key] * factor)
+        if factor != 1.0:
+            entry['scale'] = rounded(entry.get('scale', 1.0) * factor)
+    if known.get('neutral_from') in names:
+        entry['arming_tolerance'] = rounded(known['arming_tolerance'] / scale
+                                            * entry.get('scale', 1.0))
+    elif entry.pop('neutral_from', None) is not None:
+        draft.remarks.append(f'neutral_from left out: the file has no {known["neutral_from"]}')
+    return has_unit

@@ -89,3 +89,11 @@ def comment(text: str, indent: str = '') -> list[str]:
     return textwrap.wrap(one_line(text), WIDTH, initial_indent=f'{indent}# ',
                          subsequent_indent=f'{indent}# ', break_long_words=False,
                          break_on_hyphens=False) or [f'{indent}#']
+
+
+def block(key: object, value: Any, indent: str = '') -> list[str]:
+    """Write nested mappings as YAML, a line a value."""
+    if not isinstance(value, Mapping):
+        return [f'{indent}{key}: {scalar(value)}']
+    lines = [line for name, each in value.items() for line in block(name, each, f'{indent}  ')]
+    return [f'{indent}{key}:', *lines, *[''] * (not indent)]

@@ -265,7 +265,8 @@ class TestProtocols:
         assert bring_in(tmp_path, self.TABLE).profile.protocols == ('cannord', 'canopen_pkw')
         assert bring_in(tmp_path, 'Nr;Name\n3000;a\n').profile.protocols == (
             'datamodel_extended', 'datamodel_standard', 'canopen_pkw')
-        assert bring_in(tmp_path, 'Index;Name\n2004h;a\n').profile.protocols == ('canopen_pkw',)
+        assert bring_in(tmp_path, 'Index;Name\n2004h;a\n').profile.protocols == (
+            'canopen_pkw', 'cia402')
         assert bring_in(tmp_path, 'Nr;Name\n102.1;a\n').profile.protocols == ('cannord',)
 
     def test_what_the_given_one_cannot_carry_is_left_out(self, tmp_path: Path) -> None:

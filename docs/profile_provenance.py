@@ -3,23 +3,21 @@
 How far each entry of the shipped profiles can be trusted, as a page of the documentation.
 
 The page is made from the profiles; a test compares it. To write it anew:
-``python3 -m drive_can_bridge.profiles.provenance``.
+``.venv/bin/python docs/profile_provenance.py``.
 """
 
 from collections.abc import Iterator
 from pathlib import Path
 
-from drive_can_bridge.profiles.catalogue import check, Checked
+from drive_can_bridge.profiles.catalogue import check, Checked, VERIFIED_WORDS
 from drive_can_bridge.resources import profiles_directory, share_directory
 
 PAGE = 'profile_trust.md'
-#: how an entry's key ``verified`` is shown
-TRUST_WORDS: dict[bool | None, str] = {True: 'yes', False: 'no', None: ''}
 
 _HEAD = """\
 # How far the shipped profiles can be trusted
 
-Made from the profiles by `python3 -m drive_can_bridge.profiles.provenance`; edit those, not this page.
+Made from the profiles by `docs/profile_provenance.py`; edit those, not this page.
 
 *Verified* means that address, type, scale and unit of an entry are backed by its source. *Open* is
 what of it nothing backs. A verified entry has been compared with what is written somewhere; none
@@ -48,7 +46,7 @@ def _section(checked: Checked) -> Iterator[str]:
     yield '|---|---|---|---|---|'
     for name, entry in checked.entries.items():
         parameter = profile.parameters[name]
-        yield f'| `{name}` | {parameter.address} | {TRUST_WORDS[parameter.verified]} ' \
+        yield f'| `{name}` | {parameter.address} | {VERIFIED_WORDS[parameter.verified]} ' \
               f'| {_cell(entry.get("open", ""))} | {_cell(entry.get("source", ""))} |'
     yield ''
     yield '| source | what it is |'
