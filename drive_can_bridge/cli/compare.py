@@ -13,11 +13,10 @@ from drive_can_bridge.backup.comparison import (
 from drive_can_bridge.backup.document import Backup
 from drive_can_bridge.backup.reader import read_backup
 from drive_can_bridge.cli.command import complain, say, WrongUsage
-from drive_can_bridge.cli.completion import complete_drives
 from drive_can_bridge.cli.drives import (
-    add_words, chosen_one, opened, read_all, source_of, unread,
+    add_words, chosen_one, complete_drives, opened, read_all, source_of, unread,
 )
-from drive_can_bridge.cli.tables import print_json, print_table
+from drive_can_bridge.cli.output import print_json, print_table
 from drive_can_bridge.client.drive import Drive, Drives
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.configuration.profiles import ProfileStore

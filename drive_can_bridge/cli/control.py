@@ -53,7 +53,7 @@ def _namespace(text: str) -> str:
 
 
 def _complete(prefix: str, parsed_args: Namespace, **more: object) -> list[str]:
-    from drive_can_bridge.cli.completion import complete_drives
+    from drive_can_bridge.cli.drives import complete_drives
     return complete_drives(prefix, parsed_args, **more)
 
 
@@ -139,7 +139,7 @@ def _show(args: Namespace, answers: Sequence[Any]) -> int:
     for answer in sorted(answers, key=lambda each: each.ok):
         name = answer.name.lstrip('/')
         if args.json:
-            from drive_can_bridge.cli.tables import print_json
+            from drive_can_bridge.cli.output import print_json
             print_json({'bridge' if answer.bridge else 'drive': name, 'ok': answer.ok,
                         'message': answer.text})
         else:

@@ -10,7 +10,7 @@ import sys
 
 from drive_can_bridge.cli.arguments import add_params_file, add_seconds
 from drive_can_bridge.cli.command import complain, FAILED, WrongUsage
-from drive_can_bridge.cli.listening import Taps
+from drive_can_bridge.cli.record import Taps
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.errors import DriveCanError

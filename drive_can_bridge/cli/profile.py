@@ -6,10 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from drive_can_bridge.cli.arguments import output_path
-from drive_can_bridge.cli.command import complain, FAILED, say, WrongUsage
-from drive_can_bridge.cli.questions import agreed
-from drive_can_bridge.cli.tables import print_json, print_table
-from drive_can_bridge.cli.whole_file import differs, write_whole
+from drive_can_bridge.cli.atomic_write import differs, write_atomically
+from drive_can_bridge.cli.command import agreed, complain, FAILED, say, WrongUsage
+from drive_can_bridge.cli.output import print_json, print_table
 from drive_can_bridge.configuration.problems import Problem
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.profiles.build import Built
@@ -262,7 +261,7 @@ def _import(args: Namespace) -> int:
             f'{args.output} exists and holds something else. Overwrite it?', yes=args.yes,
             otherwise='Nothing was written', yes_means='overwrites it'):
         return FAILED
-    write_whole(args.output, data)
+    write_atomically(args.output, data)
     if args.json:
         print_json({
             'file': str(args.file), 'output': str(args.output), 'entries': built.entries,

@@ -13,14 +13,13 @@ from drive_can_bridge.backup.plan import (
 from drive_can_bridge.backup.reader import read_backup
 from drive_can_bridge.backup.restore import NotAsInFile, Restorer, RestoreResult
 from drive_can_bridge.backup.settings import is_setting
-from drive_can_bridge.cli.command import complain, FAILED, say, WrongUsage
-from drive_can_bridge.cli.completion import complete_drives
-from drive_can_bridge.cli.drives import (
-    add_words, chosen_one, opened, read_all, source_of, unread,
+from drive_can_bridge.cli.command import (
+    agreed, complain, FAILED, must_be_answerable, say, WrongUsage,
 )
-from drive_can_bridge.cli.progress import Bar
-from drive_can_bridge.cli.questions import agreed, must_be_answerable
-from drive_can_bridge.cli.tables import print_json, print_table
+from drive_can_bridge.cli.drives import (
+    add_words, chosen_one, complete_drives, opened, read_all, source_of, unread,
+)
+from drive_can_bridge.cli.output import Bar, print_json, print_table
 from drive_can_bridge.client.drive import Drive, Enabled, Source
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.parameters import Parameter, Storage, Value

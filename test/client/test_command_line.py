@@ -7,11 +7,10 @@ import sys
 
 import pytest
 
-from drive_can_bridge.cli import completion_script
+from drive_can_bridge.cli import completion as completion_script
 from drive_can_bridge.cli.arguments import above_zero, bitrate, of_drive, PARAMS_FILE, whole
 from drive_can_bridge.cli.command import WrongUsage
-from drive_can_bridge.cli.help import EXAMPLES, SUBCOMMANDS
-from drive_can_bridge.cli.main import main, understood
+from drive_can_bridge.cli.main import EXAMPLES, main, SUBCOMMANDS, understood
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.text import column_lines
 
