@@ -7,8 +7,7 @@ from datetime import datetime, timezone
 import os
 from pathlib import Path
 
-from drive_can_bridge.backup.document import head_of, written
-from drive_can_bridge.backup.settings import settings_of
+from drive_can_bridge.backup.document import head_of, settings_of, written
 from drive_can_bridge.cli.arguments import output
 from drive_can_bridge.cli.atomic_write import differs, write_atomically
 from drive_can_bridge.cli.command import agreed, complain, FAILED, say, WrongUsage

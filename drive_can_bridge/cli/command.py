@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-What all subcommands have in common: exit codes, wrong usage, and lines for whoever reads them.
+What all subcommands have in common: exit codes, wrong usage, and lines for people.
 
 A subcommand is a module of its name with ``define(parser)`` and ``run(args) -> exit code``.
 Whatever it raises, :mod:`.main` says in one line.

@@ -15,8 +15,8 @@ from typing import Any
 from drive_can_bridge.cli.arguments import namespace
 from drive_can_bridge.cli.command import complain, what_is_missing, WrongUsage
 from drive_can_bridge.cli.output import Bar, waiting
+from drive_can_bridge.client import find_source
 from drive_can_bridge.client.drive import Drive, Drives, ReadOutcome, Source
-from drive_can_bridge.client.opening import find_source
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.errors import DriveCanError, WhichBridge
 

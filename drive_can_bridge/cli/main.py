@@ -127,7 +127,7 @@ MODULES = dict.fromkeys(('stop', 'enable', 'disable', 'reset'), 'control')
 ENDLESS = ('simulate', 'demo', 'record', 'monitor', 'panel')
 #: options that make a subcommand one of these
 ENDLESS_OPTIONS = ('--live', '--watch')
-#: only shows things: whoever reads no further has seen enough
+#: only shows things: a reader who stops has seen enough
 SHOWING = ('validate', 'decode', 'profile')
 #: exit codes of what could not be done, where 1 says something else
 TROUBLE = {'compare': 2}
@@ -163,7 +163,7 @@ def main(argv: Sequence[str] | None = None, clock: Clock | None = None) -> int:
         sys.stdout.flush()
         return code
     except BrokenPipeError:
-        # Whoever read our output has gone. Python flushes once more on its way out: into nothing.
+        # The reader of our output has gone. Python flushes once more on its way out: into nothing.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         if code is None:    # it was not done yet
             code = 0 if wanted in SHOWING else failed

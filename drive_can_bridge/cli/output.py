@@ -3,8 +3,8 @@
 Tables and progress bars for people, and JSON for programs.
 
 In a terminal a table fits its width and has a little colour (not with ``NO_COLOR``). What goes to
-a pipe or a file is plain text in columns, neither cut nor wrapped. Bars are on standard error, in a
-terminal only.
+a pipe or a file is plain text in columns, neither cut nor wrapped. Bars are on standard error, in
+a terminal only.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -108,7 +108,7 @@ class Bar:
             self._progress.stop()
 
     def step(self, _: object = None) -> None:
-        """Take note of a step."""
+        """Count a step."""
         self._done += 1
         if self._progress is None:
             if self._now() - self._began < PATIENCE or not sys.stderr.isatty():

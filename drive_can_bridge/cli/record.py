@@ -18,9 +18,8 @@ from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.frame import bits_on_bus, STUFFING
 from drive_can_bridge.core.record import Record, RecordKind
 from drive_can_bridge.exchange.one_master import END_FIRST, Ownership
-from drive_can_bridge.trace.channels import labels
 from drive_can_bridge.trace.files import (
-    check_writable, LOSSES, TraceWriter, UnknownFormat, WRITABLE,
+    check_writable, labels, LOSSES, TraceWriter, UnknownFormat, WRITABLE,
 )
 from drive_can_bridge.transport.tap import QUEUE_MAX, Tap
 

@@ -7,7 +7,7 @@ import csv
 from pathlib import Path
 import re
 
-from drive_can_bridge.configuration.regular_file import read_regular
+from drive_can_bridge.configuration.yaml_nodes import read_regular
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.profiles.build import build_profile, Built, ImportFailed
 from drive_can_bridge.profiles.csv_import import COLUMNS, read_table
