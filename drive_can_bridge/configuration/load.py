@@ -138,7 +138,7 @@ def _look_for_directories(tree: Tree, directories: list[str]) -> None:
 
 
 def _sentence(tree: Tree, path: Path, value: Any, keyword: str) -> str | None:
-    """Say what needs to know more than the schema does, see :data:`schema_check.Override`."""
+    """Say what needs to know more than the schema does, see :data:`.schema.Override`."""
     if path[:1] != ('drives',) or len(path) != 3 or keyword not in (
             'enum', 'type', 'additionalProperties'):
         return None
