@@ -111,3 +111,178 @@ class PkwNode:
 
     def _answer(self, data: bytes) -> Frame:
         return Frame(0x480 + self.node, data, False)
+
+
+class ServoDrive:
+    """
+    CiA 402, any node: objects that are bytes, and what NMT, SDO, SYNC, PDOs do with them.
+
+    It changes its state by the control word at once, sees RPDOs of type 1 at SYNC, and is
+    pre-operational when it is switched on. What it does not let others write is in ``fixed``.
+
+    :ivar objects: (index, sub-index) -> content, low byte first.
+    :ivar state: the bits of the status word that tell it.
+    :ivar told: the control words that it was sent, in order, without repetitions.
+    """
+
+    OFF, READY, ON, ENABLED, QUICK_STOP, FAULT = 0x40, 0x21, 0x23, 0x27, 0x07, 0x08
+
+    def __init__(self, node: int, objects: dict[tuple[int, int], bytes] | None = None) -> None:
+        self.node = node
+        self.operational = False
+        self.state = self.OFF
+        self.powered = True             # no safe torque off
+        self.told: list[int] = []
+        self.fixed: dict[tuple[int, int], int] = {}     # (index, sub-index) -> abort code
+        self.braking = 0                # SYNCs until a quick stop has ended
+        self.ramp = 0                   # SYNCs that it takes to disable operation
+        self.heard_bridge = 0
+        self._staged: list[tuple[int, bytes]] = []
+        self.objects = {
+            (0x1000, 0): bytes.fromhex('92010200'), (0x1005, 0): bytes.fromhex('80000000'),
+            (0x1006, 0): bytes(4), (0x1016, 0): b'\1', (0x1016, 1): bytes(4),
+            (0x1017, 0): bytes(2), (0x605A, 0): b'\2\0', (0x605C, 0): b'\1\0',
+            (0x6007, 0): b'\1\0', (0x6040, 0): bytes(2), (0x6041, 0): b'\x50\2',
+            (0x6060, 0): b'\0', (0x6061, 0): b'\0', (0x6502, 0): bytes.fromhex('FF030000'),
+            (0x603F, 0): bytes(2), (0x606C, 0): bytes(4)}
+        for pdo in range(4):
+            for first, at in ((0x200, 0x1400), (0x180, 0x1800)):
+                identifier = first + 0x100 * pdo + node | (0x80000000 if pdo else 0)
+                self.objects[at + pdo, 1] = identifier.to_bytes(4, 'little')
+                self.objects[at + pdo, 2] = b'\xFF'
+                self.objects[at + pdo + 0x200, 0] = b'\0'
+        self.objects.update(objects or {})
+        self._initial = dict(self.objects)
+
+    def number(self, index: int, subindex: int = 0) -> int:
+        return int.from_bytes(self.objects[index, subindex], 'little')
+
+    def takes(self, sent: Frame) -> list[Frame]:
+        identifier, data, _ = sent
+        if identifier == 0 and data[1] in (0, self.node):
+            self.operational = data[0] == 1
+        elif identifier == 0x80:
+            return self._sync()
+        elif identifier == 0x600 + self.node:
+            return [] if data[0] == 0x80 else [Frame(0x580 + self.node, self._sdo(data), False)]
+        elif identifier & 0x780 == 0x700:
+            self.heard_bridge += 1
+        elif self.operational:
+            for pdo in range(4):
+                if self.number(0x1400 + pdo, 1) == identifier:
+                    self._staged.append((pdo, data))
+                    if self.number(0x1400 + pdo, 2) > 240:
+                        self._apply()
+        return []
+
+    def restarts(self) -> list[Frame]:
+        """Be switched off and on: disabled, and what was written of the PDOs is forgotten."""
+        self.objects.update({place: content for place, content in self._initial.items()
+                             if place[0] < 0x2000 or place[0] in (0x6060, 0x6061)})
+        self.operational = False
+        self.becomes(self.OFF)
+        self._staged.clear()
+        return [Frame(0x700 + self.node, b'\0', False)]
+
+    # -- PDOs -------------------------------------------------------------------------------------
+
+    def mapped(self, at: int) -> list[tuple[int, int, int]]:
+        """Return (index, sub-index, bytes) of what is mapped."""
+        entries = [self.number(at, place) for place in range(1, self.number(at) + 1)]
+        return [(entry >> 16, entry >> 8 & 0xFF, (entry & 0xFF) // 8) for entry in entries]
+
+    def _apply(self) -> None:
+        for pdo, data in self._staged:
+            for index, subindex, length in self.mapped(0x1600 + pdo):
+                self.write(index, subindex, data[:length])
+                data = data[length:]
+        self._staged.clear()
+
+    def _sync(self) -> list[Frame]:
+        if not self.operational:
+            return []
+        self._apply()
+        self.runs_down()
+        return self.responses(1)
+
+    def responses(self, *kinds: int) -> list[Frame]:
+        """Return the TPDOs of these transmission types."""
+        found = []
+        for pdo in range(4):
+            identifier = self.number(0x1800 + pdo, 1)
+            if not identifier & 0x80000000 and self.number(0x1800 + pdo, 2) in kinds:
+                found.append(Frame(identifier & 0x7FF, b''.join(
+                    self.objects[index, subindex]
+                    for index, subindex, _ in self.mapped(0x1A00 + pdo)), False))
+        return found
+
+    # -- objects ----------------------------------------------------------------------------------
+
+    def _sdo(self, data: bytes) -> bytes:
+        index, subindex = int.from_bytes(data[1:3], 'little'), data[3]
+        code = 0
+        if (index, subindex) not in self.objects and not (
+                0x1600 <= index < 0x1604 or 0x1A00 <= index < 0x1A04):
+            code = 0x06020000
+        elif data[0] == 0x40:
+            found = self.objects.get((index, subindex), bytes(4))
+            return bytes((0x4F - (len(found) - 1 << 2),)) + data[1:4] + found.ljust(4, b'\0')
+        else:
+            code = self.fixed.get((index, subindex), 0)
+            if not code:
+                self.write(index, subindex, data[4:8 - (data[0] >> 2 & 3)])
+        return bytes((0x80 if code else 0x60,)) + data[1:4] + code.to_bytes(4, 'little')
+
+    def write(self, index: int, subindex: int, content: bytes) -> None:
+        self.objects[index, subindex] = content
+        if index == 0x6060 and (0x6061, 0) in self.objects:
+            self.objects[0x6061, 0] = content
+        if index == 0x6040:
+            self._control(int.from_bytes(content, 'little'))
+
+    # -- states -----------------------------------------------------------------------------------
+
+    def becomes(self, state: int) -> None:
+        self.state = state
+        self.objects[0x6041, 0] = (state | 0x200 | (0x10 if self.powered else 0)).to_bytes(
+            2, 'little')
+
+    def runs_down(self) -> None:
+        """Let a quick stop, or a ramp, get on."""
+        if self.ramp and self.told[-1:] == [0x07] and self.state == self.ENABLED:
+            self.ramp -= 1
+            if not self.ramp:
+                self.becomes(self.ON)
+        if self.state == self.QUICK_STOP and self.braking:
+            self.braking -= 1
+            if not self.braking and self.number(0x605A) < 5:
+                self.becomes(self.OFF)
+
+    def _control(self, word: int) -> None:
+        before = self.told[-1] if self.told else 0
+        if word != before or not self.told:
+            self.told.append(word)
+        state, command = self.state, word & 0x0F
+        if state == self.FAULT:
+            if word & 0x80 and not before & 0x80:
+                self.becomes(self.OFF)
+        elif not command & 0x02:
+            self.becomes(self.OFF)
+        elif not command & 0x04:
+            if state == self.ENABLED:
+                self.braking = self.braking or 1
+                self.becomes(self.QUICK_STOP)
+            elif state != self.QUICK_STOP:
+                self.becomes(self.OFF)
+        elif state == self.QUICK_STOP:
+            pass
+        elif command == 0x06:
+            self.becomes(self.READY if self.powered or state != self.OFF else self.OFF)
+        elif command == 0x07 and state == self.ENABLED and self.ramp:
+            pass
+        elif command == 0x07 and state in (self.READY, self.ENABLED):
+            self.becomes(self.ON)
+        elif command == 0x0F and state in (self.READY, self.ON):
+            self.becomes(self.ENABLED if state == self.ON else self.ON)
+        else:
+            self.becomes(state)     # what has changed of the power shows

@@ -33,9 +33,9 @@ import time
 from typing import Any
 
 from builders import (
-    ACTUAL, CONTROL, CURRENT, drive, frame, INT16, parameter, RAM, RO, SPEED, STATUS, WORD,
+    ACTUAL, CONTROL, CURRENT, drive, frame, INT16, INT32, parameter, RAM, RO, SPEED, STATUS, WORD,
 )
-from literal_drives import ExtendedDrive, PkwNode, StandardDrive
+from literal_drives import ExtendedDrive, PkwNode, ServoDrive, StandardDrive
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
@@ -69,6 +69,8 @@ TESYS_CONTROL = ControlTable(
     parameter='control_register_1', disable=0, enable=1, reset_fault=8,
     status_parameter='system_status_1', ready=StatusPattern(1, 1),
     enabled=StatusPattern(0x80, 0x80), fault=StatusPattern(4, 4))
+TARGET = parameter('target_velocity', None, index=0x60FF, subindex=0, type=INT32, scale=0.1,
+                   unit='rpm')
 FREQUENCY = parameter('frequency_setpoint', None, type=INT16, scale=0.1, unit='Hz')
 
 
@@ -130,6 +132,31 @@ class Inverter:
         if sent.identifier != self.alone:
             return []
         return [frame(f'{self.alone + 1:03X}#{"37" if self.registers.runs else "31"}0B0000')]
+
+
+class Servo(ServoDrive):
+    """CiA 402: runs while its operation is enabled; register 2 is its target velocity."""
+
+    def __init__(self, motor: Motor, node: int) -> None:
+        self.registers = motor
+        super().__init__(node, {(0x60FF, 0): bytes(4), **{
+            (index, subindex): bytes.fromhex(content) for index, subindex, content in (
+                (0x1400, 2, '01'), (0x1600, 0, '02'), (0x1600, 1, '10004060'),
+                (0x1600, 2, '2000FF60'), (0x1800, 2, '01'), (0x1800, 3, '0000'),
+                (0x1800, 5, '0000'), (0x1A00, 0, '01'),
+                (0x1A00, 1, '10004160'))}})
+
+    def takes(self, sent: Frame) -> list[Frame]:
+        answers = super().takes(sent)
+        if self.operational and sent.identifier == 0x200 + self.node:   # as its event timer would
+            answers += self.responses(255)
+        self.registers[1] = int(self.state == self.ENABLED)
+        self.registers[2] = self.number(0x60FF)
+        return answers
+
+    def restarts(self) -> list[Frame]:
+        self.objects[0x60FF, 0] = bytes(4)
+        return super().restarts()
 
 
 @dataclass(frozen=True)
@@ -197,6 +224,15 @@ def _cannord(members: int = 1) -> Kind:
         unseen=4 * PERIOD * members)
 
 
+def _servo(**options: Any) -> Kind:
+    return Kind(
+        lambda: [drive('cia402', mode='pv', table=(TARGET,), request=(TARGET,), response=(),
+                       period=PERIOD, parameter_timeout=0.1, heartbeat_producer=0.0,
+                       heartbeat_timeout=0.0, **options)],
+        lambda moved, index: Servo(Motor({1: 0, 2: 0}, setpoint=2, word=1, moved=moved),
+                                   index + 1))
+
+
 KINDS: dict[str, Kind] = {
     '29 bit, word by number': _extended(),
     '29 bit, word in its slot': _extended(slot=True),
@@ -211,6 +247,10 @@ KINDS: dict[str, Kind] = {
     'PKW, word by number': _pkw(),
     'PKW, word with its setpoints': _pkw(slot=True),
     'PKW, no word': _pkw(control=False),
+    'CiA 402': _servo(),
+    'CiA 402, mapping assumed': _servo(mapping='assume'),
+    'CiA 402, disabled by shutdown': _servo(disable_word='shutdown'),
+    'CiA 402, by event': _servo(transmission='event'),
     'CANnord': _cannord(),
     'CANnord, group of two': _cannord(2),
     'CANnord, group of four': _cannord(4),
@@ -476,11 +516,12 @@ class World:
         if self.unseen == 0.0 or self.control:
             self.ends_unless_unseen()
         for partner in self.partners:
-            if isinstance(partner.device, PkwNode):
+            if isinstance(partner.device, (PkwNode, ServoDrive)):
                 partner.device.restarts()
                 if not self.mute and not self.deaf and self.bus:
                     heapq.heappush(self.coming, (
-                        self.now + 0.001, next(self.number), partner.index, '705#00'))
+                        self.now + 0.001, next(self.number), partner.index,
+                        f'{0x700 + partner.device.node:03X}#00'))
 
     def ends_unless_unseen(self) -> None:
         """Take note of a restart; a call that waits for its answer goes on."""

@@ -150,6 +150,7 @@ class Survey:
 _KNOWN = {
     'cannord': ('inverter', 'nord_sk500e', ['frequency_setpoint'], ['actual_frequency']),
     'canopen_pkw': ('starter', 'tesys_t_ltmr', [], ['system_status_1']),
+    'cia402': ('axis', 'cia402_servo', ['target_velocity'], ['actual_velocity']),
 }
 _HEAD = """\
 # Found by drive_can scan. Look it over before a bridge runs with it: profiles are the shipped ones
@@ -199,6 +200,7 @@ def write_parameter_file(path: Path, bus: BusConfiguration, sightings: Sequence[
                   f'        profile: {json.dumps(profile)}',
                   f'        period: {period:g}', f'        cyclic_request: [{", ".join(request)}]',
                   f'        cyclic_response: [{", ".join(response)}]']
+        lines += [f'        mode: {keys["mode"]}'] if 'mode' in keys else []
     _write(path, lines)
     return written
 
@@ -366,7 +368,7 @@ def _show(args: Namespace, survey: Survey) -> None:
             print_json({'protocol': each.protocol, 'station': each.station,
                         'certainty': each.certainty.value, 'text': each.text})
         return
-    drives = {each.station for each in sightings if each.protocol == 'canopen_pkw'}
+    drives = {each.station for each in sightings if each.protocol in ('canopen_pkw', 'cia402')}
     rows = [(each.protocol, str(each.station), each.certainty.value, each.text)
             for each in sightings]
     rows += [('CANopen node', str(node), '–', text)

@@ -10,8 +10,11 @@ from drive_can_bridge.cli.drives import add_words, complete_words, opened, sourc
 from drive_can_bridge.cli.output import Bar, print_json, print_table
 from drive_can_bridge.client.drive import Drive, Drives, WriteOutcome
 from drive_can_bridge.configuration.scalars import read_scalar
-from drive_can_bridge.core.parameters import Parameter, Value, ValueKind
+from drive_can_bridge.core.parameters import Parameter, Storage, Value, ValueKind
+from drive_can_bridge.protocols.families import FAMILIES
 
+#: CANopen object that stores parameters when it is written
+STORE = 0x1010
 _HEADINGS = ('drive', 'name', 'value', 'unit', 'number', 'storage', 'result')
 #: of the names that a value may have
 _NAMES_SHOWN = 12
@@ -143,3 +146,15 @@ def _show(args: Namespace, drives: Drives, wanted: dict[str, str],
             result if outcome.ok else f'not written: {result}'))
     if rows:
         print_table(_HEADINGS, rows, numbers=('value',))
+    lost = dict.fromkeys(FAMILIES[drive.facts.protocol].keeps_by
+                         for drive, outcome in outcomes if _is_lost(outcome))
+    for text in lost:
+        if text and not args.json:
+            print(text)
+
+
+def _is_lost(outcome: WriteOutcome) -> bool:
+    """Tell whether a value was written that the drive may not keep."""
+    parameter = outcome.parameter
+    return outcome.ok and parameter is not None and parameter.index != STORE and (
+        parameter.storage is not Storage.EEPROM)

@@ -30,6 +30,7 @@ RESERVED = frozenset((
     'online', 'response', 'request', 'command', 'joint_state', 'joint_command',
     'get_parameters', 'set_parameters', 'set_parameters_atomically', 'list_parameters',
     'describe_parameters', 'get_parameter_types', 'enable', 'reset_fault', 'quick_stop',
+    'home',
 ))
 #: what the values of a parameter's keys become
 _MADE: dict[str, Callable[[Any], Any]] = {

@@ -117,7 +117,7 @@ class CommandGate:
             return
         control = self._control
         # once the word may have started the drive, only a status as new as the position tells
-        free = control is not None and control.off and (
+        free = control is not None and control.loose and (
             control.at_rest and self._presence.active or self._status_in_sample)
         if self._setpoints.measure(raws, driven=not free):
             self._allow()

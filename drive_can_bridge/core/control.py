@@ -69,6 +69,8 @@ class ControlAction(Enum):
     DISABLE = 'disable'
     QUICK_STOP = 'quick_stop'
     RESET_FAULT = 'reset_fault'
+    #: no word of a profile: a sequence of its own, where a family has one
+    HOME = 'home'
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -13,6 +13,7 @@ import math
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.core.control_operation import Answers, Operation
+from drive_can_bridge.core.control_rules import TableRules
 from drive_can_bridge.core.control_steps import (
     Meeting, MEETINGS, Seen, STEPS, Then,
 )
@@ -42,6 +43,8 @@ class ControlMachine:
     :param members: names of the drives, where several share the control word.
     :param unheard: says which of them may run without answering any more; '' if none.
     :param wording: what the family knows of status words.
+    :param rules: which word serves what is wanted; None: the table says it.
+    :ivar word: control word to send now.
     :ivar table: the words and conditions.
     :ivar fault_text: which fault it is, if somebody knows.
     :ivar take_completed: returns the outcomes since the last call; asked after every frame.
@@ -49,18 +52,18 @@ class ControlMachine:
 
     def __init__(self, table: ControlTable, *, timeout: float, pulse: int = RESET_CYCLES,
                  members: Sequence[str] = (), unheard: Callable[[], Sentence] = lambda: NOTHING,
-                 wording: Wording | None = None) -> None:
+                 wording: Wording | None = None, rules: TableRules | None = None) -> None:
         self.table = self._table = table
         self._timeout = timeout
         self._pulse = pulse
         self._pulses_left = 0
-        self._words: dict[ControlAction, int] = {
-            action: word for action in ControlAction
-            if (word := getattr(table, action.value)) is not None}
+        self._rules = rules or TableRules(table)
+        self._known = self._rules.known
         self._reports = StatusReports(table, members)
         self._unheard = unheard
         self._wording = wording
         self._sending = ControlAction.DISABLE   # by name: two words may have the same bits
+        self.word = self._rules.word(self._sending, enabling=False)
         self._sent = self._again = False        # the current word left; is to leave once more
         self._fault: bool | None = None         # None: not known
         self.fault_text = ''
@@ -74,14 +77,14 @@ class ControlMachine:
     # -- what the session and diagnostics look at -------------------------------------------------
 
     @property
-    def word(self) -> int:
-        """Control word to send now."""
-        return self._words[self._sending]
-
-    @property
     def at_rest(self) -> bool:
         """The current word tells the drive to stand still: it has the bits of ``disable``."""
-        return self.word == self._words[ControlAction.DISABLE]
+        return self._rules.rests(self.word)
+
+    @property
+    def loose(self) -> bool:
+        """Nothing drives the axis, by what the drive reports, enabled though it may be."""
+        return self.off or self._rules.loose
 
     @property
     def stopping(self) -> bool:
@@ -153,9 +156,9 @@ class ControlMachine:
         """Take a request; its outcome may be there when this returns."""
         self.handle_timer(now)
         action = request.action
-        if action is ControlAction.QUICK_STOP and action not in self._words:
+        if action is ControlAction.QUICK_STOP and action not in self._known:
             action = ControlAction.DISABLE
-        if action not in self._words and self._nothing_to_do(action):
+        if action not in self._known and self._nothing_to_do(action):
             self._answers.complete(
                 request, True, sentences.state_reached(self.state))
             return
@@ -178,6 +181,7 @@ class ControlMachine:
                 self._send(ControlAction.QUICK_STOP)
             elif action is not ControlAction.ENABLE:    # of an enabled drive: nothing to do
                 self._send(ControlAction.DISABLE)
+        self._choose()
         self._again = action in _STOPS and self.unconfirmed
         if not under_way.requests and self._table.enabled is not None:
             under_way.deadline = now + self._timeout
@@ -193,6 +197,7 @@ class ControlMachine:
         more does not count.
         """
         self._sent, self._again = True, False   # before the timer, which may change the word
+        self._rules.left(self.word)
         if self.pulsing:
             self._pulses_left -= 1
         self.handle_timer(now)
@@ -207,9 +212,12 @@ class ControlMachine:
         """
         self.handle_timer(now)
         if self._reports.take(member, raw, counts=self._sent) and raw is not None:
+            self._rules.reported(raw, behind=self._sent)
+            self._choose()      # what another word has to bring about is not confirmed yet
             self._watch_fault(raw)
             self._watch_enabled(raw)
             self._advance()
+            self._choose()
             self._watch_disabled(now)
 
     def member_found(self, name: str) -> None:
@@ -245,7 +253,7 @@ class ControlMachine:
         text = stuck_text(
             self._reports, self._table, self._wording, self.state, self._timeout, self._sending,
             self.word, sent=self._sent, pulsed=under_way.pulsed,
-            acknowledged=self._pulse < RESET_CYCLES)
+            acknowledged=self._pulse < RESET_CYCLES, more=self._rules.remark(self._sending))
         if self._sending is ControlAction.QUICK_STOP and self._reports.says(self._table.braking):
             under_way.deadline = now + self._timeout    # `disable` would end the braking
             self._answers.answer(under_way, False, text)
@@ -274,6 +282,8 @@ class ControlMachine:
         self._reports.forget_answers()
         if lost:
             self._reports.forget()
+            self._rules.forget()
+            self._choose()
         self._disregard.forget()
         self._fault = self._fault or None   # a known one stands until the drive says otherwise
 
@@ -287,14 +297,14 @@ class ControlMachine:
 
     def _refusal(self, action: ControlAction) -> Sentence | None:
         """Return why a request cannot be taken, in words."""
-        if action not in self._words:
+        if action not in self._known:
             return sentences.no_reset_word()
         if action is ControlAction.ENABLE and self._reports.missing:
             return sentences.members_offline(self._reports.missing)
         if action is ControlAction.ENABLE and self._fault:
             return sentences.reset_first(self.fault_text)
         under_way = self._operation
-        if under_way is None or (
+        if under_way is None or under_way.held or (
                 MEETINGS[action, under_way.action] is not Meeting.REFUSED
                 or self._nothing_to_do(action)):
             return None
@@ -309,6 +319,10 @@ class ControlMachine:
                         and all(self._sees(each, under_way) for each in step.when)):
                     self._take(step.then, under_way)
                     return
+            if self._sending is ControlAction.QUICK_STOP and self._reports.answered and (
+                    holds := self._rules.holds):
+                under_way.held = True
+                self._answers.answer(under_way, True, holds)
 
     def _sees(self, wanted: Seen, under_way: Operation) -> bool:
         table = self._table
@@ -318,7 +332,7 @@ class ControlMachine:
             case Seen.READY:
                 return self._confirmed(table.ready, True)
             case Seen.ENABLED:
-                return self._confirmed(table.enabled, True)
+                return self._confirmed(table.enabled, True) and not self._rules.lacking
             case Seen.OFF:
                 return self._confirmed_off()
             case Seen.RESETTABLE:
@@ -409,12 +423,20 @@ class ControlMachine:
 
     def _send(self, action: ControlAction) -> None:
         """Make the word of this name the current one."""
-        if self._words[action] != self.word:
+        self._sending = action
+        self._reached = self._reached and action is ControlAction.ENABLE
+        self._choose()
+
+    def _choose(self) -> None:
+        """Take the word that serves what is wanted; another one has yet to leave."""
+        under_way = self._operation
+        word = self._rules.word(self._sending, enabling=under_way is not None and (
+            under_way.action is ControlAction.ENABLE))
+        if word != self.word:
+            self.word = word
             self._sent = False
             self._reports.forget_answers()
             self._disregard.forget()
-        self._sending = action
-        self._reached = self._reached and action is ControlAction.ENABLE
 
     def _end(self, success: bool, message: Sentence, *, stays: bool = False) -> None:
         """Answer what is under way, if anything; unless its word stays, ``disable`` follows."""

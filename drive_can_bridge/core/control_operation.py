@@ -16,12 +16,14 @@ class Operation:
     :ivar requests: those that wait for it; a quick stop for which there is no word waits for
         ``disable``.
     :ivar pulsed: the reset word has left as often as it has to.
+    :ivar held: it is answered, and only keeps its word: whatever else is wanted may end it.
     """
 
     action: ControlAction
     deadline: float
     requests: list[ControlRequest] = field(default_factory=list)
     pulsed: bool = False
+    held: bool = False
 
 
 class Answers:

@@ -4,7 +4,7 @@
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.profile import ControlTable
-from drive_can_bridge.core.sentences import Sentence
+from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.status_reports import StatusReports, Wording
 
 
@@ -39,13 +39,14 @@ def state_text(reports: StatusReports, table: ControlTable, wording: Wording | N
 
 def stuck_text(reports: StatusReports, table: ControlTable, wording: Wording | None, state: str,
                timeout: float, sending: ControlAction, word: int, *, sent: bool, pulsed: bool,
-               acknowledged: bool) -> Sentence:
+               acknowledged: bool, more: Sentence = NOTHING) -> Sentence:
     """
     Say that nothing was confirmed in time, and as much as is known of the reason.
 
     :param sending: what the current control word is for.
     :param pulsed: the pulse that resets a fault has left.
     :param acknowledged: ``sent`` says that the drive has acknowledged the word.
+    :param more: what the family knows.
     """
     if pulsed and reports.answered:
         return sentences.fault_present(timeout, reports.text)
@@ -63,7 +64,7 @@ def stuck_text(reports: StatusReports, table: ControlTable, wording: Wording | N
     elif wording is not None and reports.telling is not None:
         hint = wording.hint(reports.telling)
         remarks += [hint] if hint else []
-    return sentences.stuck(timeout, state, reports.text, remarks)
+    return sentences.stuck(timeout, state, reports.text, [*remarks, more] if more else remarks)
 
 
 def success_text(table: ControlTable, sending: ControlAction, state: str) -> Sentence:

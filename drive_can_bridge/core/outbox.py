@@ -54,6 +54,12 @@ class Outbox:
             if left is not None:
                 left(place not in refused, now)
 
+    def take_over(self, other: 'Outbox') -> None:
+        """Have the frames sent that wait elsewhere, behind those that wait here."""
+        self._frames += other._frames
+        self._left += other._left
+        other.clear()
+
     def clear(self) -> None:
         """Forget frames that nobody has fetched; whoever made them is about to forget, too."""
         self._frames.clear()

@@ -8,7 +8,7 @@ addresses (words of its memory, by whatever marks them), and what shares a cell 
 word, a setpoint or a map is the bridge's own.
 """
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from enum import Enum
 
 from drive_can_bridge.core import sentences
@@ -47,18 +47,20 @@ class Roles:
     :param cells: what a parameter addresses.
     :param maps: what tells the drive how cyclic telegrams are to be read.
     :param cyclic_refusal: why a setpoint is not written by request.
+    :param built_in: what the bridge controls a drive by, whatever profiles call it.
     :param refusal: why a parameter that is nobody's cannot be written for other reasons.
     """
 
     def __init__(self, drive: DriveConfiguration, *, controlled: bool,
                  cells: Callable[[Parameter], Cells] = by_number, maps: Cells = frozenset(),
                  cyclic_refusal: Callable[[Parameter], Sentence] = publish_it,
-                 refusal: Callable[[Parameter], Sentence] = lambda parameter: NOTHING) -> None:
+                 refusal: Callable[[Parameter], Sentence] = lambda parameter: NOTHING,
+                 built_in: Sequence[Parameter] = ()) -> None:
         self.cells = cells
         self._cyclic_refusal = cyclic_refusal
         self._further_refusal = refusal
         control = control_word(drive, controlled=controlled)
-        own = [] if control is None else [(Role.CONTROL, control)]
+        own = [(Role.CONTROL, each) for each in (*built_in, control) if each is not None]
         own += [(Role.CYCLIC, parameter) for parameter in drive.cyclic_request
                 if parameter is not control]
         self._own = [(role, parameter, cells(parameter)) for role, parameter in own]

@@ -148,6 +148,22 @@ def read_back_differs(found: str, wanted: str) -> str:
 
 
 @sentence
+def other_length(length: int, listed: str) -> str:
+    return f'the drive answers with {_counted(length, "byte")}, the profile says {listed}'
+
+
+@sentence
+def too_long(length: int) -> str:
+    return f'{_counted(length, "byte")}: only objects of 1 to 4 bytes are numbers'
+
+
+@sentence
+def width_unknown() -> str:
+    return ('how many bits it has, nobody knows: it cannot be read, and is not in the profile; '
+            'add it there')
+
+
+@sentence
 def not_in_one_frame(fits: str) -> str:
     return f'cannot be written in one frame, nothing was written: {fits}'
 
@@ -382,6 +398,37 @@ def no_status_since(word: int) -> str:
 
 
 @sentence
+def local_control() -> str:
+    return 'the drive is not under remote control: look at what gives it its commands'
+
+
+@sentence
+def quick_stop_holds(state: str) -> str:
+    return f'{state}, holds'
+
+
+@sentence
+def error_code(code: int) -> str:
+    return f'error code (603Fh) {code:04X}h'
+
+
+@sentence
+def bridge_missed() -> str:
+    return 'the drive missed the bridge: reset the fault'
+
+
+@sentence
+def mode_differs(mode: str, number: int, shown: int | None) -> str:
+    return (f'6061h shows {"nothing" if shown is None else f"mode {shown}"} yet instead of '
+            f'{number} ({mode})')
+
+
+@sentence
+def mode_not_shown() -> str:
+    return 'it has no 6061h: nobody knows whether it is in its mode'
+
+
+@sentence
 def word_not_followed(word: int) -> str:
     return f'it does not follow control word {word:04X}h'
 
@@ -389,6 +436,66 @@ def word_not_followed(word: int) -> str:
 @sentence
 def word_stays() -> str:
     return 'the word stays'
+
+
+@sentence
+def still_braking() -> str:
+    return 'still braking: the word stays'
+
+
+@sentence
+def word_sent_last(word: int) -> str:
+    return f'told {word:04X}h'
+
+
+@sentence
+def no_homing() -> str:
+    return 'this drive has no homing'
+
+
+@sentence
+def homing() -> str:
+    return 'homing'
+
+
+@sentence
+def homing_under_way() -> str:
+    return 'homing is under way'
+
+
+@sentence
+def homing_needs_enabled() -> str:
+    return 'enable it first: only an enabled drive looks for its reference'
+
+
+@sentence
+def homing_needs_disarmed() -> str:
+    return 'it is armed: stop commanding it, until command_timeout has passed'
+
+
+@sentence
+def homing_timed_out(timeout: float, step: str) -> str:
+    return f'homing not ended in {timeout:g} s: stopped {step}'
+
+
+@sentence
+def homing_stopped(step: str) -> str:
+    return f'homing stopped {step}'
+
+
+@sentence
+def homing_failed() -> str:
+    return 'the drive reports a homing error (bit 13)'
+
+
+@sentence
+def mode_refused(mode: int) -> str:
+    return f'the drive does not change to mode {mode}'
+
+
+@sentence
+def homed() -> str:
+    return 'homed'
 
 
 @sentence
@@ -547,6 +654,21 @@ def looked_for() -> str:
 
 
 @sentence
+def set_up_unanswered() -> str:
+    return 'no answer to SDO: drive silent, wrong station or bit rate'
+
+
+@sentence
+def found_enabled(state: str) -> str:
+    return f'found in state {state}: it is disabled before anything else'
+
+
+@sentence
+def found_running(state: str) -> str:
+    return f'told to stop by SDO, and still in state {state}: it is not cycled'
+
+
+@sentence
 def bus_is_down(bus: str, reason: str) -> str:
     return f'bus {bus} is down'     # why is told once, at the bus
 
@@ -635,6 +757,37 @@ def restarted_waiting() -> str:
 @sentence
 def mapping_differs(how: str) -> str:
     return f'mapping differs: {how}'
+
+
+@sentence
+def object_refused(what: str, why: str) -> str:
+    return f'{what} refused by the drive: {why}'
+
+
+@sentence
+def object_differs(what: str, found: str, wanted: str) -> str:
+    return f'{what} is {found} instead of {wanted}'
+
+
+@sentence
+def no_such_pdo(kind: str, number: int) -> str:
+    return f'the drive has no {kind}{number}'
+
+
+@sentence
+def not_pre_operational(difference: str) -> str:
+    return (f'{difference}; it is not written, because the node is not known to be '
+            f'pre-operational and nmt_start is false')
+
+
+@sentence
+def mode_not_offered(mode: str, number: int, offered: int) -> str:
+    return f'mode {mode} ({number}) is none of those that 6502h offers ({offered:08X}h)'
+
+
+@sentence
+def interpolation_time_left(period: float) -> str:
+    return f'a period of {period:g} s cannot be written to 60C2h exactly: it is left as it is'
 
 
 @sentence
@@ -748,6 +901,33 @@ def emergency_lasts(text: str) -> str:
 @sentence
 def emergency_over() -> str:
     return 'emergency over: the node reports no error any more'
+
+
+@sentence
+def no_heartbeat_producer() -> str:
+    return 'it takes no heartbeat time (1017h): its heartbeat is not watched'
+
+
+@sentence
+def nothing_stops() -> str:
+    return 'nothing stops this drive when the bridge dies'
+
+
+@sentence
+def watch_unknown() -> str:
+    return 'whether anything stops this drive when the bridge dies is not known (mapping: assume)'
+
+
+@sentence
+def watch_too_short(what: str, limit: int, interval: float) -> str:
+    return (f'{what} watches the bridge for {limit} ms, less than two intervals of its heartbeat '
+            f'({interval:g} s)')
+
+
+@sentence
+def watch_stays(what: str) -> str:
+    return (f'{what} watches the bridge and is left as it is (mapping: verify): an ordered stop '
+            f'ends in a fault of the drive')
 
 
 @sentence

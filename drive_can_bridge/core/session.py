@@ -34,6 +34,7 @@ from typing import Any
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.command_gate import CommandGate
 from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.control import ControlRequest
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import Event
@@ -98,6 +99,8 @@ class Session(ABC):
     """
 
     users: Users
+    #: it can look for its reference
+    homes = False
     _acyclic: AcyclicPart
 
     def __init__(self, drive: DriveConfiguration, control: ControlMachine | None, *,
@@ -346,6 +349,10 @@ class Session(ABC):
     def hand_out_neutral(self, now: float) -> None:  # noqa: B027  where there may be no control
         """Have all setpoints sent at once, neutral as they are: a drive without a control word."""
 
+    def home(self, request: ControlRequest, now: float) -> None:
+        """Have the axis look for its reference; answered by exactly one ``ControlCompleted``."""
+        raise NotImplementedError   # nobody gets here but where ``homes`` is true
+
     def see_to_control_word(self, now: float) -> None:  # noqa: B027  optional
         """Have a control word sent that has changed."""
 
@@ -433,6 +440,11 @@ class Session(ABC):
     @property
     def warning(self) -> Sentence:
         """Why all is not well although the drive is online, and what to do; '' otherwise."""
+        return NOTHING
+
+    @property
+    def busy(self) -> Sentence:
+        """What the drive is about that nobody commands, and nothing arms meanwhile; '' if not."""
         return NOTHING
 
     def facts(self) -> dict[str, str]:

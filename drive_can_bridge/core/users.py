@@ -83,6 +83,9 @@ class Users:
             return
         session = self._session
         refusal = self.control_refusal(request.action)
+        if request.action is ControlAction.HOME and not refusal:
+            session.home(request, now)
+            return
         if refusal:
             session.report.note(ControlCompleted(request, False, refusal))
             return
@@ -127,6 +130,8 @@ class Users:
     def control_refusal(self, action: ControlAction) -> Sentence:
         """Say why a control action cannot be asked for now; '' if it can."""
         session = self._session
+        if action is ControlAction.HOME and not session.homes:
+            return sentences.no_homing()
         if session.control is None and action is not ControlAction.QUICK_STOP:
             refusal = sentences.no_control_section()
         elif self._absence:

@@ -22,9 +22,11 @@ from typing import Any, Generic, TypeVar
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.stop_duty import CYCLE, Do, Happened
+from drive_can_bridge.protocols.cycle_timer import CycleTimer
 from drive_can_bridge.protocols.exchange_book import ExchangeBook
 
 #: cyclic frames with neutral setpoints that are sent before a drive is left alone
@@ -61,6 +63,7 @@ class CyclicExchange(Generic[TelegramT]):
     :param unheard: tells whether somebody who ran may not have heard the stop; None: the drive
         has answered none of its cycles.
     :param heeded: an answer to a cycle shows that what the drive was told by it has arrived.
+    :param timer: says when cycles are due, where others are in step; None: one of its own.
     :ivar book: counts the cycles, and the answers.
     :ivar timer: when the next cycle is due.
     :ivar word: the control word of the last cycle.
@@ -78,9 +81,10 @@ class CyclicExchange(Generic[TelegramT]):
                  left: Callable[[], None] | None = None,
                  in_turn: bool = False,
                  audience: 'Callable[[], Iterable[CyclicExchange[Any]]] | None' = None,
-                 unheard: Callable[[], bool] | None = None, heeded: bool = True) -> None:
-        self.book = ExchangeBook(session.configuration, session.statistics)
-        self.timer = self.book.timer
+                 unheard: Callable[[], bool] | None = None, heeded: bool = True,
+                 timer: CycleTimer | None = None) -> None:
+        self.book = ExchangeBook(session.configuration, session.statistics, timer)
+        self.timer: CycleTimer = self.book.timer
         self.word: int | None = None
         self.cycles_left = -1
         self.again = self.insisting = self.runs = False
@@ -190,6 +194,11 @@ class CyclicExchange(Generic[TelegramT]):
         """
         self._frames_out += 1
         self._session.outbox.put(frame, partial(self._left, to) if to else self._alone_left)
+
+    def await_frame(self) -> Left:
+        """Count a frame to the cycle that somebody else hands out, and tells what became of."""
+        self._frames_out += 1
+        return self._alone_left
 
     def _alone_left(self, sent: bool, now: float) -> None:
         self._left((self,), sent, now)

@@ -37,6 +37,7 @@ class ExchangeBook:
     """
     Count the exchanges of one drive.
 
+    :param timer: says when they are due; None: one of its own.
     :ivar timer: when the next one is due.
     :ivar began_at: when the last one began.
     :ivar missed_in_row: how many went unanswered since the last answer.
@@ -50,8 +51,9 @@ class ExchangeBook:
         '_asked', '_horizon', '_limit', '_period', '_runs', '_statistics', 'awaiting', 'began_at',
         'missed_in_row', 'overdue', 'stale', 'stop_shown', 'timer')
 
-    def __init__(self, drive: DriveConfiguration, statistics: DriveStatistics) -> None:
-        self.timer = CycleTimer(drive.period)
+    def __init__(self, drive: DriveConfiguration, statistics: DriveStatistics,
+                 timer: CycleTimer | None = None) -> None:
+        self.timer = timer or CycleTimer(drive.period)
         self.began_at = -math.inf
         self.missed_in_row = 0
         self.awaiting = False

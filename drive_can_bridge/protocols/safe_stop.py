@@ -44,6 +44,7 @@ class SafeStop(Generic[StepT, ReplyT]):
 
     :param ended: called when it has run its course.
     :param status: the word to be read in the end; None: there is none, or it comes by itself.
+    :param word: the control word, where no profile has it.
     :param read: (word, s to wait for the answer): reads it once; None: no answer.
     :ivar running: it is under way.
     :ivar again_at: when one that was told again had run its course, the last time.
@@ -51,14 +52,15 @@ class SafeStop(Generic[StepT, ReplyT]):
 
     def __init__(self, session: Session, channel: Channel[StepT, ReplyT],
                  ended: Callable[[], None], status: Parameter | None,
-                 read: Callable[[Parameter, float], StatusRead[StepT, ReplyT]]) -> None:
+                 read: Callable[[Parameter, float], StatusRead[StepT, ReplyT]],
+                 word: Parameter | None = None) -> None:
         self.running = False
         self.again_at = -math.inf
         self._status, self._read = status, read
         self._session = session
         self._channel = channel
         self._ended = ended
-        self._word = control_word(
+        self._word = word or control_word(
             session.configuration, controlled=session.control is not None)
         self._owed = False          # there was something to be stopped when it began
         self._insisting = self._again = False

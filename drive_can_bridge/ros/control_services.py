@@ -1,5 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""``~/quick_stop`` of a drive; ``~/enable`` and ``~/reset_fault`` if it has a control word."""
+"""``~/quick_stop`` of a drive; what its control word, and homing, add to that."""
 
 from collections.abc import Callable
 from typing import Any
@@ -16,12 +16,13 @@ Submit = Callable[[ControlRequest], Question[ControlCompleted]]
 
 
 def control_services(node: Node, thread: ServiceThread, submit: Submit, *,
-                     controlled: bool) -> CoroutineServices:
+                     controlled: bool, homing: bool = False) -> CoroutineServices:
     """
     Return the control services of a drive.
 
     :param thread: serves them, and those of other drives, but nothing else.
     :param controlled: it has a control word.
+    :param homing: it can be asked to look for its reference.
     """
     def serving(wanted: Callable[[Any], ControlAction]) -> Serve:
         async def callback(request: Any, response: Any) -> Any:
@@ -35,4 +36,6 @@ def control_services(node: Node, thread: ServiceThread, submit: Submit, *,
         services['enable'] = SetBool, serving(
             lambda request: ControlAction.ENABLE if request.data else ControlAction.DISABLE)
         services['reset_fault'] = Trigger, serving(lambda _: ControlAction.RESET_FAULT)
+    if homing:
+        services['home'] = Trigger, serving(lambda _: ControlAction.HOME)
     return CoroutineServices(node, thread, services)

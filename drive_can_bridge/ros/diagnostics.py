@@ -233,6 +233,8 @@ class DriveReporter:
 
     def _how_to_arm(self) -> Sentence:
         drive, session = self._drive, self._drive.session
+        if session.busy:
+            return session.busy
         name = drive.node.get_fully_qualified_name()
         wanted = []
         for setpoint in session.setpoints.waiting:

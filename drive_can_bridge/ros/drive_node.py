@@ -141,7 +141,8 @@ class DriveNode(DriveListener):
             active=lambda: session.active, restore=drive.profile.restore,
             failed=self._parameter_failed).services)
         self._services.append(control_services(
-            self.node, control_thread, submit, controlled=session.control is not None))
+            self.node, control_thread, submit, controlled=session.control is not None,
+            homing=getattr(drive.options, 'homing', False)))
 
     @property
     def name(self) -> str:

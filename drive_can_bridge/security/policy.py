@@ -82,7 +82,8 @@ def drive_names(drive: DriveConfiguration) -> NodeNames:
         taken.append('joint_command')
     return NodeNames(
         drive.name, shown=tuple(shown), taken=tuple(taken), asked=READING,
-        obeyed=(*WRITING, 'quick_stop', *(CONTROL if session.control is not None else ())))
+        obeyed=(*WRITING, 'quick_stop', *(CONTROL if session.control is not None else ()),
+                *(('home',) if getattr(drive.options, 'homing', False) else ())))
 
 
 VERSION = '0.2.0'

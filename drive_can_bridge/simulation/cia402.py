@@ -2,11 +2,11 @@
 """
 A simulated servo drive of CiA 402 on CANopen.
 
-Its PDOs are in :mod:`~.cia402_pdos`, its objects in :mod:`~.cia402_objects`, state machine and axis
-in :mod:`~.cia402_plant`. It begins as it leaves the factory, with the control word in RPDO1 and the
-status word in TPDO1; with ``mapping: verify`` or ``assume`` as configured, since somebody must have
-set it up. It watches a master's heartbeat (1016h) from the first one on, and does then what 6007h
-says.
+Its objects are in :mod:`~.cia402_objects`, state machine and axis in :mod:`~.cia402_plant`; what
+it has because it is a node, in :mod:`~.canopen`. It begins as it leaves the factory, with the
+control word in RPDO1 and the status word in TPDO1; with ``mapping: verify`` or ``assume`` as
+configured, since somebody must have set it up. It watches a master's heartbeat (1016h) from the
+first one on, and where that is missing does what 6007h says.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -18,13 +18,13 @@ from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.canopen import abort_codes, network
 from drive_can_bridge.protocols.canopen.network import Emergency, NmtState
 from drive_can_bridge.protocols.cia402 import pdo as pdo_codec, states
+from drive_can_bridge.simulation.canopen import consumer
+from drive_can_bridge.simulation.canopen.dictionary import bytes_of, ObjectDictionary
 from drive_can_bridge.simulation.canopen.node import CanopenNode, Contents
+from drive_can_bridge.simulation.canopen.pdos import Factory, Pdo, Pdos
 from drive_can_bridge.simulation.canopen.sdo import checked_length
-from drive_can_bridge.simulation.cia402_objects import (
-    bytes_of, ObjectDictionary, own_parameters,
-)
-from drive_can_bridge.simulation.cia402_pdos import Factory, Habits, Pdo, Pdos
-from drive_can_bridge.simulation.cia402_plant import ServoPlant
+from drive_can_bridge.simulation.cia402_objects import own_parameters
+from drive_can_bridge.simulation.cia402_plant import Habits, ServoPlant
 from drive_can_bridge.simulation.drive import Ignored, SimulatedDrive
 from drive_can_bridge.simulation.plant import PlantFactory
 from drive_can_bridge.simulation.registers import Refused
@@ -32,7 +32,7 @@ from drive_can_bridge.simulation.registers import Refused
 DEVICE_NAME = b'simulated CiA 402 servo drive'
 #: servo drive (additional information 2) of profile 402
 DEVICE_TYPE = 0x00020192
-STORE, CONSUMER, SAVE = 0x1010, 0x1016, b'save'
+STORE, SAVE = 0x1010, b'save'
 CONSUMERS = 2
 NOT_STORED = 0x08000020
 WRONG_LENGTH = Emergency(0x8210, 0x11)
@@ -56,8 +56,7 @@ class SimulatedServoDrive(SimulatedDrive):
         self.table = ObjectDictionary(self.registers)
         self.pdos = Pdos(self.configuration.station, self.table, self._factory())
         self.habits = Habits()
-        self._consumers = [0] * CONSUMERS
-        self._stored_consumers = list(self._consumers)
+        self._consumer = consumer.HeartbeatConsumer(CONSUMERS)
         self._node_state = NmtState.BOOT_UP
         self._wrong_length = False
         self.power_lost(forget=False)
@@ -106,8 +105,7 @@ class SimulatedServoDrive(SimulatedDrive):
     def power_lost(self, *, forget: bool) -> None:
         """Have what was stored; a master is watched anew from its first heartbeat on."""
         self.pdos.begin(factory=forget)
-        self._consumers = [0] * CONSUMERS if forget else list(self._stored_consumers)
-        self._heard: list[float] = [math.inf] * CONSUMERS
+        self._consumer.begin()
 
     # -- frames -----------------------------------------------------------------------------------
 
@@ -124,7 +122,7 @@ class SimulatedServoDrive(SimulatedDrive):
             return True
         node = identifier - network.HEARTBEAT_BASE
         if 0 < node <= network.NODE_MAX and node != self.node.number:
-            self._hear(node, now)
+            self._consumer.hear(node, now)
             return True
         for pdo in self.pdos.receive:
             if pdo.identifier == identifier:
@@ -182,7 +180,7 @@ class SimulatedServoDrive(SimulatedDrive):
     # -- time -------------------------------------------------------------------------------------
 
     def next_timer(self) -> float:
-        return min(super().next_timer(), *self._deadlines(), min(
+        return min(super().next_timer(), self._consumer.next_timer(), min(
             map(self.pdos.due, self.pdos.transmit))
             if self.node.state is NmtState.OPERATIONAL else math.inf)
 
@@ -200,26 +198,14 @@ class SimulatedServoDrive(SimulatedDrive):
                 pdo.syncs = 0
         elif self._node_state is NmtState.STOPPED and before is NmtState.OPERATIONAL:
             self.plant.machine.connection_lost()
-        for place, deadline in enumerate(self._deadlines()):
-            if deadline <= now:
-                self._heard[place] = math.inf
-                self._notices.append(f'{self.name}: no heartbeat of node '
-                                     f'{self._consumers[place] >> 16 & 0x7F}')
-                self.plant.machine.connection_lost()
+        for node in self._consumer.missed(now):
+            self._notices.append(f'{self.name}: no heartbeat of node {node}')
+            self.plant.machine.connection_lost()
         self.plant.advance(now)
         self.node.look(now)
         for pdo in self.pdos.transmit if operational else ():
             if self.pdos.due(pdo) <= now:
                 self.answer(self.pdos.frame(pdo, now), now)
-
-    def _hear(self, node: int, now: float) -> None:
-        for place, value in enumerate(self._consumers):
-            if value >> 16 & 0x7F == node and value & 0xFFFF:
-                self._heard[place] = now
-
-    def _deadlines(self) -> list[float]:
-        return [heard + (value & 0xFFFF) / 1000.0
-                for heard, value in zip(self._heard, self._consumers, strict=True)]
 
     # -- objects ----------------------------------------------------------------------------------
 
@@ -227,9 +213,8 @@ class SimulatedServoDrive(SimulatedDrive):
         found = self.pdos.find(index)
         if found is not None:
             return self.pdos.read(*found, subindex)
-        if index == CONSUMER and subindex <= CONSUMERS:
-            return (bytes((CONSUMERS,)) if subindex == 0
-                    else self._consumers[subindex - 1].to_bytes(4, 'little'))
+        if index == consumer.INDEX:
+            return self._consumer.read(subindex)
         if index == STORE and subindex <= 1:
             return bytes((1,)).ljust(4 if subindex else 1, b'\0')
         return self.table.read_object(index, subindex)
@@ -238,16 +223,15 @@ class SimulatedServoDrive(SimulatedDrive):
         found = self.pdos.find(index)
         if found is not None:
             self.pdos.write(*found, subindex, data)
-        elif index == CONSUMER and 0 < subindex <= CONSUMERS:
-            self._consumers[subindex - 1] = int.from_bytes(checked_length(data, 4), 'little')
-            self._heard[subindex - 1] = math.inf
+        elif index == consumer.INDEX:
+            self._consumer.write(subindex, data)
         elif index == STORE and subindex == 1:
             if checked_length(data, 4) != SAVE:
                 raise Refused(NOT_STORED)
             self.registers.store_all()
             self.pdos.store()
-            self._stored_consumers = list(self._consumers)
-        elif index in (CONSUMER, STORE):
+            self._consumer.store()
+        elif index == STORE:
             raise Refused(abort_codes.NO_SUCH_SUBINDEX if subindex else
                           abort_codes.WRITE_OF_READ_ONLY)
         else:

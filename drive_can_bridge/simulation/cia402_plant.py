@@ -1,12 +1,13 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-The inside of a simulated drive of CiA 402: its state machine, its modes, and the axis that it moves.
+The inside of a simulated drive of CiA 402: its state machine, its modes, and the axis it moves.
 
-The axis is counted in revolutions, and what objects say of it in the units that the profile has for
-them; without one an increment is 1/10,000 of a revolution, and speeds are increments per second.
+The axis is counted in revolutions, and what objects say of it in the units that the profile has
+for them; without one an increment is 1/10,000 of a revolution, and speeds are increments per s.
 """
 
 from collections.abc import Callable, Collection
+from dataclasses import dataclass
 import math
 import random
 
@@ -14,8 +15,9 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.cia402 import states
 from drive_can_bridge.simulation import names, scales
-from drive_can_bridge.simulation.cia402_objects import own_parameters, Place, STANDARD
-from drive_can_bridge.simulation.cia402_pdos import Habits
+from drive_can_bridge.simulation.canopen.dictionary import Place
+from drive_can_bridge.simulation.canopen.pdos import PdoHabits
+from drive_can_bridge.simulation.cia402_objects import own_parameters, STANDARD
 from drive_can_bridge.simulation.control import FAULTS, Machine, Operation, State
 from drive_can_bridge.simulation.motor import (
     FRICTION_TORQUE, INERTIA_TORQUE, LOAD_TORQUE, Motor, Rates, Travel,
@@ -51,6 +53,26 @@ _SPEEDS = (0x606B, 0x606C, 0x607F, 0x6081, 0x6099, 0x60FF)
 _ACCELERATIONS = (0x6083, 0x6084, 0x6085, 0x609A)
 _PER_SPEED = {'rpm': 1 / 60, 'rev/s': 1.0, 'rad/s': 0.5 / math.pi, 'deg/s': 1 / 360}
 _PER_WAY = {'rev': 1.0, 'rad': 0.5 / math.pi, 'deg': 1 / 360, '°': 1 / 360}
+
+
+@dataclass(frozen=True)
+class Habits(PdoHabits):
+    """
+    What else differs between makers.
+
+    :param mode_shown_early: 6061h shows a new mode at once; else in operation enabled only.
+    :param leaves_quick_stop: 000Fh leads from quick stop active (605Ah 5 to 8) back to operation.
+    :param stand_bit: bit 10 tells in quick stop active that the axis stands.
+    :param ramp_bits: vl turns only with bits 4 to 6 of the control word.
+    :param home_switch: where the switch is, in revolutions from where the axis was made; None: it
+        is not found within two.
+    """
+
+    mode_shown_early: bool = True
+    leaves_quick_stop: bool = True
+    stand_bit: bool = True
+    ramp_bits: bool = True
+    home_switch: float | None = 0.0
 
 
 class DriveOperation(Operation):
@@ -147,8 +169,8 @@ class DriveOperation(Operation):
     def set_safe(self, safe: bool) -> None:
         """Have the input for safe torque off high or low. Low: power is off at once."""
         self.safe = safe
-        if not safe and not self.faulted:
-            self._enter(State.SWITCH_ON_DISABLED)
+        if not safe:
+            self._enter(State.FAULT if self.faulted else State.SWITCH_ON_DISABLED)
 
 
 class ServoPlant:
@@ -276,7 +298,7 @@ class ServoPlant:
     def _mode(self) -> int:
         return self.raw(states.MODE)
 
-    # -- what the control word does -------------------------------------------------------------------
+    # -- what the control word does ---------------------------------------------------------------
 
     def control(self, word: int) -> None:
         """Take a control word."""

@@ -41,7 +41,7 @@ CASES = [
       'allowed is ro']),
     ('type: uint16', 'type: unit16',
      ["table.yaml:5: parameters.limit.type: 'unit16' is unknown (did you mean 'uint16'?), "
-      'allowed is bool, int16, uint16, int32 or uint32']),
+      'allowed is bool, int8, uint8, int16, uint16, int32 or uint32']),
     ('type: uint16', 'scale: 0',
      ['table.yaml:5: parameters.limit.scale: 0 is useless, allowed is any other number']),
     ('type: uint16', 'scale: .nan',

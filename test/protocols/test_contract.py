@@ -8,6 +8,7 @@ tests stay as they are.
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 import math
 from typing import Any
 
@@ -15,7 +16,7 @@ from builders import (
     ACTUAL, Conversation, CURRENT, DAMPING, drive, frame, GAIN, LIMIT, ORDER, RAMP, read, SPEED,
     STATUS, TABLE, text_of, write,
 )
-from literal_drives import ExtendedDrive, PkwNode, StandardDrive
+from literal_drives import ExtendedDrive, PkwNode, ServoDrive, StandardDrive
 import pytest
 from saying import says
 
@@ -53,7 +54,7 @@ class Partner(ABC):
     idle = DriveState.NOT_ARMED
     words: Mapping[str, int] = {}
 
-    device: ExtendedDrive | StandardDrive | PkwNode
+    device: ExtendedDrive | StandardDrive | PkwNode | ServoDrive
 
     def __init__(self, **options: Any) -> None:
         self.configuration = self.configure(**options)
@@ -230,7 +231,74 @@ class PkwPartner(Partner):
         return [int.from_bytes(bytes.fromhex(sent[12:16]), 'little')]
 
 
+class Cia402Partner(Partner):
+    """CiA 402 in mode vl, node 1; other parameters are manufacturer's objects of 16 bits."""
+
+    sample = (0x0231, 1000, 250)
+    unknown = 'refused by the drive: 06020000h (no such register or object)'
+    idle = DriveState.DISABLED
+    words = {'disable': 0x0006, 'enable': 0x007F}
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
+        self.device: ServoDrive = RegisterServo(self.registers)
+
+    @staticmethod
+    def own(parameter: Parameter) -> Parameter:
+        return replace(parameter, number=None, subindex=0, index=0x6042 if (
+            parameter.number == 50) else 0x2000 + (parameter.number or 0))
+
+    @staticmethod
+    def raw_name(number: int) -> str:
+        return f'x{0x6042 if number == 50 else 0x2000 + number:04x}.00'
+
+    def enable(self) -> None:
+        self.deliver(self.talk.asks(ControlAction.ENABLE, self.now))
+        self.live(max(0.1, 6 * self.configuration.period))
+        assert self.talk.control_outcomes() == [('enable', True, 'operation enabled')]
+
+    def configure(self, **options: Any) -> DriveConfiguration:
+        options = {
+            'request': (SPEED,), 'response': (ACTUAL, CURRENT), 'table': TABLE, 'mode': 'vl',
+            'request_pdos': (1, 2, 3), 'response_pdos': (1, 2), **options}
+        for key in ('request', 'response', 'table'):
+            options[key] = tuple(map(self.own, options[key]))
+        return drive('cia402', **options)
+
+    def setpoints(self, sent: str) -> list[int]:
+        if not sent.startswith('201#'):
+            return []
+        return [int.from_bytes(bytes.fromhex(sent[8:12]), 'little')]
+
+
+class RegisterServo(ServoDrive):
+    """A servo drive whose objects of 16 bits are the registers of a partner."""
+
+    def __init__(self, registers: dict[int, int]) -> None:
+        self.registers = registers
+        super().__init__(1, {self._place(number): raw.to_bytes(2, 'little')
+                             for number, raw in registers.items()})
+
+    @staticmethod
+    def _place(number: int) -> tuple[int, int]:
+        return (0x6042 if number == 50 else 0x2000 + number), 0
+
+    def takes(self, sent: Frame) -> list[Frame]:
+        for place in [place for place in self.objects if 0x2000 <= place[0] < 0x3000]:
+            del self.objects[place]
+        for number, raw in self.registers.items():
+            self.objects[self._place(number)] = raw.to_bytes(2, 'little')
+        return super().takes(sent)
+
+    def write(self, index: int, subindex: int, content: bytes) -> None:
+        super().write(index, subindex, content)
+        for number in self.registers:
+            if (index, subindex) == self._place(number):
+                self.registers[number] = int.from_bytes(content, 'little')
+
+
 PARTNERS: dict[str, type[Partner]] = {
+    'cia402': Cia402Partner,
     'cannord': CannordPartner,
     'canopen_pkw': PkwPartner,
     'datamodel_extended': ExtendedPartner,

@@ -17,7 +17,7 @@ from drive_can_bridge.core.profile import FaultTable
 CODE = parameter('fault_code', 217, access=RO)
 CODES = ((7, 'overcurrent'), (9, 'hot'))
 #: those whose status word is a parameter; CANnord has its own test below
-NAMES = sorted(set(PARTNERS) - {'cannord'})
+NAMES = sorted(name for name, partner in PARTNERS.items() if not partner.words)
 
 
 def meet(name: str, *, control: Any = CONTROL, mapped: bool = False, bit: Any = None,

@@ -6,6 +6,7 @@ What comes later than two time-outs after the request cannot be told from a new 
 """
 
 from abc import abstractmethod
+from dataclasses import replace
 import heapq
 from pathlib import Path
 import random
@@ -28,6 +29,9 @@ SPEED = parameter('speed', 200, access=RO)
 ACTUAL = parameter('actual', None, type=INT16, access=RO)
 REGISTERS = tuple(parameter(f'register_{number}', number, storage=RAM if number < 42 else EEPROM)
                   for number in (30, 31, 40, 42))
+#: the same as objects
+OBJECTS = tuple(replace(each, index=0x2000 + (each.number or 0), subindex=0)
+                for each in (SPEED, *REGISTERS))
 
 
 class Partner:
@@ -114,7 +118,36 @@ class NordPartner(Partner):
                              + self.value(number).to_bytes(2, 'little'), False))
 
 
-KINDS = {'cannord': NordPartner, 'datamodel_extended': DataModelPartner}
+class ServoPartner(Partner):
+    """Node 1 of CiA 402: registers are objects from 2000h on."""
+
+    drive = builders.drive(
+        'cia402', mode='pv', mapping='assume', request=(), table=OBJECTS, response=(OBJECTS[0],),
+        parameter_timeout=TIMEOUT, parameter_retries=1, missed_limit=1000,
+        heartbeat_producer=0.0, heartbeat_timeout=0.0)
+
+    def hear(self, frame: Frame, now: float) -> None:
+        if frame.identifier == 0x080:
+            self.answer(Frame(0x181, bytes.fromhex('50020000'), False), now + 0.001)
+        if frame.identifier != 0x601:
+            return
+        command, index = frame.data[0], int.from_bytes(frame.data[1:3], 'little')
+        if not 0x2000 <= index < 0x3000:
+            answer = {0x6041: '4B41600050020000', 0x6060: '6060600000000000'}.get(index)
+            data = bytes.fromhex(answer) if answer else (
+                b'\x80' + frame.data[1:4] + bytes.fromhex('00000206'))
+            self.answer(Frame(0x581, data, False), now + 0.001)
+            return
+        if command == 0x2B:
+            self.write(index - 0x2000, int.from_bytes(frame.data[4:6], 'little'), now)
+            self.late(now, Frame(0x581, b'\x60' + frame.data[1:4] + bytes(4), False))
+        else:
+            assert command == 0x40
+            value = self.value(index - 0x2000).to_bytes(2, 'little')
+            self.late(now, Frame(0x581, b'\x4B' + frame.data[1:4] + value + bytes(2), False))
+
+
+KINDS = {'cannord': NordPartner, 'cia402': ServoPartner, 'datamodel_extended': DataModelPartner}
 #: where the same is shown of families whose answers say less of what they answer
 ELSEWHERE = {'canopen_pkw': 'canopen_pkw/test_pkw_round.py',
              'datamodel_standard': 'datamodel/test_standard_late.py'}
@@ -131,6 +164,7 @@ def test_no_read_ever_gives_what_was_overwritten(kind: type[Partner], seed: int)
     chance = random.Random(seed)
     partner = kind(chance)
     session = Conversation(kind.drive).session
+    registers = list(kind.drive.profile.parameters.values())[1:]
     now = 10.0
     session.bus_up(now)
     session.activate(now)
@@ -148,9 +182,9 @@ def test_no_read_ever_gives_what_was_overwritten(kind: type[Partner], seed: int)
         if asked < REQUESTS and len(submitted) < 2 and chance.random() < 0.5:
             asked += 1
             request: Request = (
-                WriteRequest(((chance.choice(REGISTERS), next(values)),), False)
+                WriteRequest(((chance.choice(registers), next(values)),), False)
                 if chance.random() < 0.5 else
-                ReadRequest(tuple(chance.sample(REGISTERS, chance.randint(1, 2)))))
+                ReadRequest(tuple(chance.sample(registers, chance.randint(1, 2)))))
             submitted[id(request)] = now
             session.users.submit(request, now)
         for frame in session.take_frames():

@@ -42,7 +42,7 @@ class TestInEveryState:
         partner = meet(name, control=control)
         assert partner.registers[51] == 1000
         waiting = partner.talk.session.setpoints.waiting
-        assert [setpoint.parameter for setpoint in waiting] == [SPEED]
+        assert [setpoint.parameter for setpoint in waiting] == [partner.own(SPEED)]
 
     def test_commands_are_taken_while_nothing_is_armed_or_enabled(self, name: str,
                                                                   control: Any) -> None:

@@ -14,7 +14,7 @@ from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.setpoints import CommandOutcome
 
 TORQUE = replace(LIMIT, neutral=100.0, limit=True)
-NAMES = sorted(set(PARTNERS) - {'cannord'})     # whose control word is built in
+NAMES = sorted(name for name, partner in PARTNERS.items() if not partner.words)     # not built in
 
 
 def meet(name: str, **options: Any) -> Partner:

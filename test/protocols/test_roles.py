@@ -24,6 +24,8 @@ STATUS_ALIAS = parameter('speed', 209, access=RO)           # of the actual spee
 WIDE_WORD = parameter('wide_word', 52, type=ParameterType.UINT32)
 WIDE_BEFORE = parameter('wide_before', 51, type=INT32)      # 51 and 52
 WIDE_SPEED = parameter('wide_speed', 49, type=INT32)        # 49 and 50
+#: keys that a family cannot do without
+MORE = {'cia402': {'mode': 'vl'}}
 DATAMODEL = ('datamodel_extended', 'datamodel_standard')
 
 
@@ -51,7 +53,7 @@ def test_another_name_of_a_setpoint(family: str) -> None:
     partner = PARTNERS[family]
     table = [partner.own(each) for each in (*TABLE, ALIAS, STATUS_ALIAS)]
     one, = make_sessions([drive(family, table=table, request=table[:1],
-                                response=(partner.own(ACTUAL),))])
+                                response=(partner.own(ACTUAL),), **MORE.get(family, {}))])
     for name in ('speed_setpoint', 'jog', partner.raw_name(50)):
         assert one.users.write_refusal(raw(one, name)) == CYCLIC, name
         assert one.roles.role(raw(one, name)) is Role.CYCLIC, name
@@ -120,6 +122,24 @@ def test_maps(family: str) -> None:
             says('mapping_parameter'))
         one.active = False
     assert one.roles.role(raw(one, 'p121')) is one.roles.role(raw(one, 'p130')) is None
+
+
+def test_what_a_servo_is_controlled_and_mapped_by() -> None:
+    word = Parameter('word', index=0x6040, subindex=0)
+    timer = Parameter('timer', index=0x1800, subindex=5)
+    one = session('cia402', word, timer, mode='vl')
+    for name in ('word', 'x6040.0', 'x6060.00'):
+        assert one.users.write_refusal(raw(one, name)) == 'use ~/enable', name
+        assert one.roles.role(raw(one, name)) is Role.CONTROL, name
+    maps = ('timer', 'x1400.1', 'x1bff.2', 'x1005.0', 'x1006.0', 'x1016.1', 'x1017.0', 'x60c2.2')
+    for name in maps:
+        assert one.roles.role(raw(one, name)) is Role.MAP, name
+        assert one.users.write_refusal(raw(one, name)) == '', name
+    one.active = True
+    for name in maps:
+        assert one.users.write_refusal(raw(one, name)) == says('mapping_parameter'), name
+    assert one.users.write_refusal(raw(one, 'x13ff.1')) == ''
+    assert one.users.write_refusal(raw(one, 'x1c00.1')) == ''
 
 
 def test_process_data_without_a_number() -> None:

@@ -164,6 +164,23 @@ PKW_MORE = """
   wide: {number: 600, type: int32, access: rw, storage: ram}
   ratio: {number: 652, index: 0x2007, subindex: 0x03, type: uint16, access: rw, storage: eeprom}
 """
+#: the same as objects of CiA 402 in mode vl
+OBJECTS = """
+  speed_setpoint:
+    {index: 0x6042, type: int16, scale: 0.1, unit: rpm, access: rw, storage: ram, minimum: -3000,
+     maximum: 3000, neutral: 0, description: Speed reference}
+  mode: {index: 0x2151, type: uint16, access: rw, storage: ram, maximum: 9}
+  brake: {index: 0x2152, type: bool, access: rw, storage: ram}
+  actual_speed: {index: 0x6044, type: int16, scale: 0.1, unit: rpm, access: ro}
+  counts: {index: 0x2210, type: uint16, access: ro}
+  braked: {index: 0x2211, type: bool, access: ro}
+  wide: {index: 0x2600, type: int32, access: rw, storage: ram}
+"""
+OBJECTS_EVERYWHERE = re.sub(r'number: (\d)', r'index: 0x2\1', SAME_EVERYWHERE)
+SERVO_BITS = (
+    'ready_to_switch_on', 'switched_on', 'enabled', 'fault', 'voltage_enabled', 'no_quick_stop',
+    'switch_on_disabled', 'warning', 'bit_8', 'remote', 'target_reached', 'internal_limit',
+    'bit_12', 'bit_13', 'bit_14', 'bit_15')
 UNACKNOWLEDGED = 'sent; this protocol does not acknowledge writes'
 NO_ANSWER = 'no answer in 0.2 s, 3 attempts'
 RAW = {'p102': ('ramp_time', 150), 'p110': ('gain', 7), 'p111': ('damping', 0x10000 - 5),
@@ -205,4 +222,18 @@ FAMILIES = [
         atomic={'gain': 3, 'damping': -3}, scattered={'gain': 4, 'far_away': 4},
         scattered_reason='adjacent', diagnostics=frozenset(['nmt_state', 'emergency']),
         missed_limit=6),
+    Facts(
+        'cia402', OBJECTS, status_mapped=False, bits=SERVO_BITS, more=OBJECTS_EVERYWHERE,
+        keys={'cyclic_response': ['actual_speed', 'counts', 'braked'], 'mode': 'vl',
+              'request_pdos': [1, 2], 'response_pdos': [1, 2]},
+        address=lambda name: f'{name[1:5].upper()}h.{int(name[6:], 16):02X}h',
+        states=('operation enabled', 'ready to switch on'), word=0x007F,
+        raw={'x2102.0': ('ramp_time', 150), 'x2110.0': ('gain', 7),
+             'x2111.0': ('damping', 0x10000 - 5), 'x2112.0': ('flag', 1),
+             'x2600.0': ('wide', (1 << 32) - 100_000)},
+        no_names=('p110', 'p110.1', 'x2007'),
+        absent=('x2115.0', 'refused by the drive: 06020000h (no such register or object)'),
+        atomic={'gain': 3}, scattered={'gain': 4, 'damping': 4},
+        scattered_reason='carries one object',
+        diagnostics=frozenset(['nmt_state', 'emergency', 'stops_by'])),
 ]

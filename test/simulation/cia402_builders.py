@@ -12,10 +12,12 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.resources import profiles_directory
 from drive_can_bridge.simulation.cia402 import SimulatedServoDrive
-from drive_can_bridge.simulation.cia402_pdos import Habits
+from drive_can_bridge.simulation.cia402_plant import Habits
 from drive_can_bridge.simulation.plant import Mechanics
 
 NODE = 5
+#: 1.2345 revolutions of 10,000 increments: where a new axis stands
+BEGINNING = 12_345
 SERVO = read_profile(profiles_directory() / 'cia402_servo.yaml').profile
 #: what a mode's target is, and how it travels: index, sub-index, struct's letter
 TARGETS = {1: (0x607A, 0, 'i'), 2: (0x6042, 0, 'h'), 3: (0x60FF, 0, 'i'), 4: (0x6071, 0, 'h'),

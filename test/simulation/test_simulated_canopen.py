@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-What a further CANopen family needs in the simulation: rules of its control word, objects, a PDO.
+What a further CANopen family needs in the simulation: rules of its control word, and a PDO.
 
 The drive here is one of CiA 402: control word 6040h, status word 6041h, both and a speed in PDO1.
 """
@@ -13,15 +13,13 @@ import pytest
 
 from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.core.parameters import Parameter, ParameterType
-from drive_can_bridge.protocols.canopen import abort_codes
 from drive_can_bridge.protocols.canopen.network import NmtState
+from drive_can_bridge.simulation.canopen.dictionary import ObjectDictionary
 from drive_can_bridge.simulation.canopen.node import CanopenNode, Contents
-from drive_can_bridge.simulation.canopen.sdo import checked_length, CODES
 from drive_can_bridge.simulation.control import FAULTS, Machine, Operation, Rule, State
 from drive_can_bridge.simulation.drive import SimulatedDrive
 from drive_can_bridge.simulation.motor_plant import MotorPlant
 from drive_can_bridge.simulation.plant import PlantFactory
-from drive_can_bridge.simulation.registers import Refused, Registers
 
 OFF, READY, ON, ENABLED, STOPPING = (
     State.SWITCH_ON_DISABLED, State.READY_TO_SWITCH_ON, State.SWITCHED_ON,
@@ -48,44 +46,13 @@ SPEED, ACTUAL, LIMIT = (
         ('actual_speed', 0x6044, {'access': builders.RO}), ('speed_limit', 0x6080, {})))
 
 
-class Objects:
-    """The registers by index and sub-index, as many bytes as their types have."""
-
-    def __init__(self, registers: Registers) -> None:
-        self._registers = registers
-        self._cells = {(each.index, each.subindex): each for each in registers.parameters.values()}
-
-    def name_of(self, raw: Parameter) -> str | None:
-        cell = self._cells.get((raw.index, raw.subindex))
-        return None if cell is None else cell.name
-
-    def read_object(self, index: int, subindex: int) -> bytes:
-        cell = self._cell(index, subindex)
-        word = cell.word_from_raw(self._registers.raw(cell.name))
-        return word.to_bytes(cell.type.bits // 8, 'little')
-
-    def write_object(self, index: int, subindex: int, data: bytes) -> None:
-        cell = self._cell(index, subindex)
-        data = checked_length(data, cell.type.bits // 8)
-        raw = cell.raw_from_word(int.from_bytes(data, 'little'))
-        refusal = self._registers.refusal({cell.name: raw})
-        if refusal is not None:
-            raise Refused(CODES[refusal])
-        self._registers.write(cell.name, raw)
-
-    def _cell(self, index: int, subindex: int) -> Parameter:
-        if (index, subindex) not in self._cells:
-            raise Refused(abort_codes.NO_SUCH_OBJECT)
-        return self._cells[index, subindex]
-
-
 class Cia402Drive(SimulatedDrive):
     """Answers each RPDO1 with its TPDO1."""
 
-    table: Objects
+    table: ObjectDictionary
 
     def set_up(self) -> None:
-        self.table = Objects(self.registers)
+        self.table = ObjectDictionary(self.registers)
         self.node = self.companion = CanopenNode(
             self, self.table, constants=self.constants, trip_code=0)
 

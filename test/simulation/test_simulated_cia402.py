@@ -1,19 +1,16 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The simulated drive of CiA 402: objects, PDOs, states and modes, in literal frames and times."""
 
-from cia402_builders import NODE, Servo
+from typing import Any
+
+import cia402_builders
+from cia402_builders import BEGINNING, Servo
 import pytest
 
 from drive_can_bridge.core.errors import ConfigurationError, ValueRefused
 from drive_can_bridge.simulation.cia402 import SimulatedServoDrive
-from drive_can_bridge.simulation.cia402_pdos import Habits
+from drive_can_bridge.simulation.cia402_plant import Habits
 from drive_can_bridge.simulation.motor_plant import MotorPlant
-
-import cia402_builders
-
-#: 1.2345 revolutions of 10,000 increments: where a new axis stands
-BEGINNING = 12_345
-
 
 # -- objects --------------------------------------------------------------------------------------
 
@@ -423,7 +420,7 @@ def test_homing_to_an_offset_and_without_a_switch() -> None:
 # -- ways out, told by the motor ------------------------------------------------------------------
 
 
-def running(mode: int = 9, **options: float) -> Servo:
+def running(mode: int = 9, **options: Any) -> Servo:
     """Return a drive at 10 revolutions per second."""
     servo = Servo(**options)
     servo.set_up(mode)
@@ -499,7 +496,7 @@ def test_some_drives_leave_quick_stop_by_0000h_only() -> None:
     assert servo.cycle()[0] & 0x4F == 0x40
 
 
-def watched(option: int, **options: float) -> Servo:
+def watched(option: int, **options: Any) -> Servo:
     """Return a drive at speed that watches node 127 for 600 ms, and has heard it once."""
     servo = running(**options)
     servo.write(0x6007, 0, option, 2)
@@ -574,3 +571,22 @@ def test_a_vertical_axis_falls_where_power_goes_and_not_where_it_stays() -> None
     assert servo.revolutions == held
 
 
+
+
+def test_it_does_not_matter_how_often_one_looks() -> None:
+    ends = []
+    for steps in (1, 7, 100):
+        servo = Servo(load=0.4)
+        servo.set_up(9)
+        servo.target = 50_000
+        servo.enable()
+        servo.run(0.5)
+        servo.word = 0x02
+        servo.cycle()
+        # brakes for 20 ms, then power goes, and it sinks
+        for step in range(steps):
+            servo.drive.plant.advance(servo.now + (step + 1) / steps)
+        ends.append((servo.revolutions, servo.speed))
+    assert ends[1] == pytest.approx(ends[0])
+    assert ends[2] == pytest.approx(ends[0])
+    assert ends[0][1] < -1.0

@@ -73,6 +73,7 @@ def configured(file: str, name: str, **options: Any) -> DriveConfiguration:
 
 INVERTER = configured('cannord.yaml', 'conveyor')
 STARTER = configured('tesys.yaml', 'pump')
+AXIS = configured('cia402.yaml', 'slide')
 LIFT = configured('datamodel_standard.yaml', 'lift')
 ELEVEN = configured('datamodel_standard.yaml', 'conveyor')
 
@@ -406,6 +407,40 @@ def test_simulated_datamodel(drive: DriveConfiguration, offset: int, told: int) 
         assert found['cyclic_response'].value == [each.name for each in drive.cyclic_response]
     else:
         assert not found
+
+
+def test_simulated_servo_as_it_leaves_the_factory_and_as_configured() -> None:
+    bench = Bench(simulated(AXIS))
+    found = bench.probe(AXIS)
+    assert values(found) == {'mode': 'csp', 'mapping': 'configure',
+                             'disable_word': 'disable_operation', 'bridge_heartbeat': 0.2}
+    assert found['mapping'].reason == (
+        '1600h holds 6040h.00h 16 bits and not 6040h.00h 16 bits, 607Ah.00h 32 bits')
+    assert found['disable_word'].reason == '605Ch is 1, 605Bh is 0: 0007h brakes by ramp'
+    verified = configured('cia402.yaml', 'slide', mapping='verify')
+    assert Bench(simulated(verified)).probe(AXIS)['mapping'].value == 'verify'
+
+
+def test_a_servo_that_lacks_the_mode_and_coasts() -> None:
+    def prepare(drive: SimulatedDrive) -> None:
+        for name, value in (('supported_modes', 0x2D), ('disable_option', 0),
+                            ('shutdown_option', 1), ('abort_connection_option', 0)):
+            drive.set_value(name, value)
+
+    found = Bench(simulated(AXIS, prepare)).probe(AXIS)
+    assert values(found) == {'mode': None, 'mapping': 'configure', 'disable_word': 'shutdown',
+                             'bridge_heartbeat': 0.2}
+    assert found['mode'].reason == '6502h is 0000002Dh: pp, pv, tq'
+    assert found['bridge_heartbeat'].reason.endswith('misses the bridge; write 6007h')
+
+
+def test_a_node_that_says_nothing_and_one_that_has_nothing() -> None:
+    assert set(values(Bench(lambda frame: []).probe(AXIS)).values()) == {None}
+    bench = Bench(lambda frame: [Frame(0x581, b'\x80' + frame.data[1:4] + bytes.fromhex(
+        '00000206'), False)])
+    assert values(bench.probe(AXIS)) == {'mode': None, 'mapping': None, 'disable_word': None,
+                                         'bridge_heartbeat': 0.0}
+    assert {frame.data[0] for frame in bench.sent} == {0x40}
 
 
 # -- nobody is moved ------------------------------------------------------------------------------

@@ -81,7 +81,7 @@ def fresh(devices: tuple[Device, ...]) -> tuple[Device, ...]:
 
 
 def test_which_families_are_asked_without_being_named() -> None:
-    assert SAFE == ['datamodel_extended', 'canopen_pkw']
+    assert SAFE == ['datamodel_extended', 'canopen_pkw', 'cia402']
 
 
 @pytest.mark.parametrize('protocol', SAFE)
@@ -234,6 +234,53 @@ def test_a_mailbox_that_another_master_asks_for() -> None:
     assert [sighting.certainty for sighting in scout.sightings.values()] == [Certainty.CERTAIN]
     # whatever it is, it is there: nothing is asked that it might take for a command
     assert list(scouted('canopen_pkw', pair[1]).nodes) == [5]
+
+
+@pytest.mark.parametrize('protocol', ['canopen_pkw', 'cia402'])
+def test_a_drive_of_cia_402_says_so_whoever_asked(protocol: str) -> None:
+    objects = {'001000': '92010200', '181001': '05550000', '181002': '02040000'}
+
+    def answers(frame: Frame) -> Frame | None:
+        content = objects.get(frame.data[1:4].hex())
+        if frame.identifier != 0x606:
+            return None
+        return Frame(0x586, bytes.fromhex('80') + frame.data[1:4] + bytes.fromhex('00000206')
+                     if content is None else
+                     b'\x43' + frame.data[1:4] + bytes.fromhex(content), False)
+
+    bench = Bench(Device('node 6', lambda frame: False, answers))
+    survey = bench.survey()
+    survey.ask(protocol)
+    asked = len(bench.sent)
+    survey.ask('cia402')
+    sighting, = survey.sightings
+    assert sighting == ('cia402', 6, 'device type 00020192h (servo drive of CiA 402), '
+                        'vendor 5505h, product 402h', Certainty.CERTAIN)
+    # what is known is not asked again
+    assert not [frame for _, frame in bench.sent[asked:] if frame.identifier == 0x606 and (
+        frame.data[1:4].hex() == '001000')]
+    assert not survey.master
+    assert survey.scouts['cia402'].settings(6) == {'mode': 'pv'}
+
+
+def test_a_servo_that_another_master_drives() -> None:
+    cycle = ((0.0, '205#0F0000000000'), (0.0, '080#'), (0.001, '185#371200000000'))
+    assert heard('cia402', *cycle, *cycle) == []
+    scout = scouted('cia402', *cycle, *cycle, *cycle)
+    assert list(scout.sightings.values()) == [(
+        'cia402', 5, 'status word 1237h (operation enabled), answered with SYNC',
+        Certainty.LIKELY)]
+    assert scout.master == 'process data for node 5'
+    # without SYNC, and with words that are none
+    assert heard('cia402', *(cycle[0], cycle[2]) * 9) == []
+    assert heard('cia402', *((0.0, '205#7F0400000000'), *cycle[1:]) * 9) == []
+    assert heard('cia402', *(*cycle[:2], (0.0, '185#7F0000000000')) * 9) == []
+
+
+def test_a_node_of_another_profile_is_no_drive() -> None:
+    scout = scouted('cia402', (0.0, '605#4000100000000000'), (0.01, '585#4300100091010200'),
+                    (0.1, '585#8000100000000206'), (0.2, '585#43'))
+    assert not scout.sightings
 
 
 def test_a_slow_answer_to_a_question_of_ours_is_one() -> None:

@@ -156,3 +156,39 @@ def decode_upload(data: bytes) -> Uploaded:
         raise RemoteProtocolError(f'SDO command {data[0]:02X}h is no answer to an upload')
     return Uploaded(answer.object, int.from_bytes(answer.data, 'little')
                     if answer.kind is Kind.DATA else None)
+
+
+class Requested(NamedTuple):
+    """
+    A request of a client, for who looks on.
+
+    :param object: index and sub-index; None: a segment of the transfer before.
+    :param data: what is written; None: it reads.
+    :param abort: the code of a transfer given up; None: it is none.
+    """
+
+    object: tuple[int, int] | None
+    data: bytes | None = None
+    abort: int | None = None
+
+
+def decode_request(data: bytes) -> Requested:
+    """
+    Decode a request: uploads, downloads in one frame, segments, aborts.
+
+    :raises RemoteProtocolError: it is none of them.
+    """
+    if len(data) != LENGTH:
+        raise RemoteProtocolError(f'SDO with {len(data)} data bytes instead of {LENGTH}')
+    head, index, subindex, value = _LAYOUT.unpack(data)
+    place, specifier = (index, subindex), head & _SPECIFIER
+    if head == _ABORT:
+        return Requested(place, abort=value)
+    if specifier == UPLOAD:
+        return Requested(place)
+    if specifier == _DOWNLOAD:
+        unused = head >> 2 & 0x03 if head & _SIZED else 0
+        return Requested(place, data[4:LENGTH - unused] if head & _EXPEDITED else b'')
+    if specifier in (_SEGMENT, 0):
+        return Requested(None)
+    raise RemoteProtocolError(f'SDO command {head:02X}h is no request that is known here')

@@ -36,6 +36,7 @@ class Cia402(Family):
     control_built_in = True
     builtin_names = frozenset((STATUS_NAME,))
     widths = frozenset((8, 16, 32))
+    keeps_by = 'not stored: lost at power-off; to store all of it: x1010.1=0x65766173'
     #: a device may take its time: nothing is documented
     drive_defaults = {'parameter_timeout': 0.5}
     options_type = Cia402Options
@@ -178,9 +179,6 @@ class Cia402(Family):
                 if parameter.listed and parameter.index is None:
                     yield Complaint(listed, f"'{parameter.name}' has no index, allowed in a PDO "
                                             'are objects')
-                elif parameter.type is ParameterType.BOOL:
-                    yield Complaint(listed, f"'{parameter.name}' is a bool, allowed in a PDO are "
-                                            'types of 8, 16 and 32 bits')
                 if key == 'request_pdos' and parameter.index is not None:
                     place = parameter.index, parameter.subindex or 0
                     if place in taken:
@@ -216,7 +214,7 @@ class Cia402(Family):
                 f'{setpoint.type.value}, the setpoint of {name} is {mode.type.value}'))
         elif mode.position and not setpoint.neutral_from:
             yield Complaint(f'profile.parameters.{setpoint.name}.neutral_from', (
-                f"missing: a position has no value that is neutral everywhere; allowed in {name} "
+                f'missing: a position has no value that is neutral everywhere; allowed in {name} '
                 'is the name of the actual position, with an arming_tolerance'))
         if mode.interpolated and not (
                 drive.options.transmission == 'sync' and drive.period <= INTERPOLATION_MAX):

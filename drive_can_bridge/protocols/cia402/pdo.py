@@ -9,7 +9,9 @@ not exist, bit 30 that it takes no remote frames, bit 29 that the identifier has
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from dataclasses import dataclass
+from functools import cached_property
+import struct
 
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.parameters import Parameter, ParameterType
@@ -22,6 +24,8 @@ RPDO_COMMUNICATION, TPDO_COMMUNICATION, MAPPING_OFFSET = 0x1400, 0x1800, 0x200
 COB_ID, TRANSMISSION, INHIBIT_TIME, EVENT_TIMER = 1, 2, 3, 5
 INVALID, NO_REMOTE, LONG_IDENTIFIER = 1 << 31, 1 << 30, 1 << 29
 SYNCHRONOUS, EVENT_PROFILE, EVENT_MAKER = 1, 255, 254
+#: bytes of a number -> its code for struct, without and with sign
+_CODES = {1: 'Bb', 2: 'Hh', 4: 'Ii'}
 
 
 def width(parameter: Parameter) -> int:
@@ -69,7 +73,8 @@ def distribute(lengths: Sequence[int]) -> list[list[int]]:
     return pdos
 
 
-class Pdo(NamedTuple):
+@dataclass(frozen=True)
+class Pdo:
     """
     One PDO as it shall be.
 
@@ -84,10 +89,15 @@ class Pdo(NamedTuple):
     communication: int
     parameters: tuple[Parameter, ...]
 
+    @cached_property
+    def _layout(self) -> struct.Struct:
+        return struct.Struct('<' + ''.join(
+            _CODES[width(each)][each.type.signed] for each in self.parameters))
+
     @property
     def length(self) -> int:
         """How many bytes it has."""
-        return sum(map(width, self.parameters))
+        return self._layout.size
 
     @property
     def entries(self) -> tuple[int, ...]:
@@ -97,24 +107,19 @@ class Pdo(NamedTuple):
 
     def pack(self, raws: Sequence[int]) -> bytes:
         """Return the bytes of raw integers."""
-        return b''.join([each.word_from_raw(raw).to_bytes(width(each), 'little')
-                         for each, raw in zip(self.parameters, raws)])
+        return self._layout.pack(*raws)
 
-    def unpack(self, data: bytes) -> list[int]:
+    def unpack(self, data: bytes) -> tuple[int, ...]:
         """
         Return the raw integers in it.
 
         :raises RemoteProtocolError: it is shorter than its mapping; longer is no harm.
         """
-        if len(data) < self.length:
+        try:
+            return self._layout.unpack_from(data)
+        except struct.error:
             raise RemoteProtocolError(f'PDO {self.number} with {len(data)} data bytes instead of '
-                                      f'{self.length}')
-        raws, at = [], 0
-        for each in self.parameters:
-            end = at + width(each)
-            raws.append(each.raw_from_word(int.from_bytes(data[at:end], 'little')))
-            at = end
-        return raws
+                                      f'{self.length}') from None
 
 
 def request_pdos(node: int, numbers: Sequence[int],

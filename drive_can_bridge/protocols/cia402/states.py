@@ -16,8 +16,8 @@ control word        value what it does
 Beside them bit 8 halts, and bits 4 to 6 mean something else in each mode (:data:`MODES`).
 """
 
+from dataclasses import dataclass
 from enum import Enum
-from typing import NamedTuple
 
 from drive_can_bridge.core.parameters import Access, Parameter, ParameterType
 
@@ -104,7 +104,8 @@ def state_of(status: int) -> State:
     return _STATES[status & _MASK]
 
 
-class Mode(NamedTuple):
+@dataclass(frozen=True)
+class Mode:
     """
     A mode of operation.
 

@@ -15,14 +15,14 @@ from typing import NamedTuple
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.canopen import abort_codes
+from drive_can_bridge.simulation.canopen.dictionary import bytes_of, ObjectDictionary, TOO_HIGH
 from drive_can_bridge.simulation.canopen.sdo import checked_length
-from drive_can_bridge.simulation.cia402_objects import bytes_of, ObjectDictionary
 from drive_can_bridge.simulation.registers import Refused
 
 COUNT, ENTRIES_MAX, BITS_MAX = 4, 8, 64
 INVALID, NO_REMOTE, EXTENDED = 1 << 31, 1 << 30, 1 << 29
 NOT_MAPPABLE, TOO_LONG = 0x06040041, 0x06040042
-ACCESS, TOO_HIGH = 0x06010000, 0x06090031
+ACCESS = 0x06010000
 #: below are objects that no PDO carries
 _MAPPABLE_FROM = 0x2000
 #: content of the communication parameters by sub-index: bytes
@@ -30,29 +30,18 @@ _WIDTHS = {1: 4, 2: 1, 3: 2, 5: 2}
 
 
 @dataclass(frozen=True)
-class Habits:
+class PdoHabits:
     """
     What differs between makers.
 
     :param types: transmission types that PDOs take.
     :param fixed_mapping: mappings cannot be written.
     :param no_remote: TPDOs want bit 30 of their COB-ID.
-    :param mode_shown_early: 6061h shows a new mode at once; else in operation enabled only.
-    :param leaves_quick_stop: 000Fh leads from quick stop active (605Ah 5 to 8) back to operation.
-    :param stand_bit: bit 10 tells in quick stop active that the axis stands.
-    :param ramp_bits: vl turns only with bits 4 to 6 of the control word.
-    :param home_switch: where the switch is, in revolutions from where the axis was made; None: it
-        is not found within two.
     """
 
     types: Collection[int] = frozenset((*range(241), 254, 255))
     fixed_mapping: bool = False
     no_remote: bool = False
-    mode_shown_early: bool = True
-    leaves_quick_stop: bool = True
-    stand_bit: bool = True
-    ramp_bits: bool = True
-    home_switch: float | None = 0.0
 
 
 @dataclass
@@ -112,7 +101,7 @@ class Pdos:
 
     def __init__(self, node: int, objects: ObjectDictionary, factory: Factory) -> None:
         self._objects = objects
-        self.habits = Habits()
+        self.habits = PdoHabits()
         self._node, self._factory = node, factory
         self._stored: tuple[list[Pdo], list[Pdo]] | None = None
         self.begin()

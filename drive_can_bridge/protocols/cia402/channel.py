@@ -1,0 +1,185 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The acyclic channel to one drive: SDO, one transfer at a time, matched by object.
+
+An answer says which object it is about, so that only the late answer to a transfer of the same
+object could be mistaken for that to another one.
+"""
+
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from drive_can_bridge.core.errors import RemoteProtocolError, Unasked
+from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.outbox import Left
+from drive_can_bridge.core.retry import RetryPolicy
+from drive_can_bridge.protocols.canopen import sdo
+from drive_can_bridge.protocols.canopen.sdo import Kind
+from drive_can_bridge.protocols.channel import Channel
+from drive_can_bridge.protocols.courier import Courier
+
+#: bytes of an object that are read at most
+LENGTH_MAX = 256
+_TIMED_OUT, _TOO_LONG = 0x05040000, 0x05040005
+
+
+@dataclass(frozen=True)
+class Ask:
+    """
+    A transfer.
+
+    :param data: what is written; None: the object is read.
+    :param attempts: how often it is tried; None: a read as configured, a write once.
+    :param timeout: s to wait for the answer; None: as configured.
+    :param pause: s in which nothing is asked; then it is no transfer.
+    """
+
+    index: int = 0
+    subindex: int = 0
+    data: bytes | None = None
+    attempts: int | None = None
+    timeout: float | None = None
+    pause: float = 0.0
+
+
+class Reply(NamedTuple):
+    """
+    What became of a transfer.
+
+    :param data: what was read; empty after a write; None: nobody answered, or a refusal.
+    :param abort: the code of a refusal.
+    :param sent: False for a write that the bus refused.
+    :param sized: the drive has told how long the object is.
+    """
+
+    data: bytes | None = None
+    abort: int | None = None
+    sent: bool = True
+    sized: bool = True
+
+
+SILENT, NOT_SENT, DONE = Reply(), Reply(sent=False), Reply(b'')
+
+
+class SdoCourier(Courier[Ask, Reply]):
+    """
+    Does one transfer at a time.
+
+    :param send: takes a frame, and who is told whether it left.
+    """
+
+    def __init__(self, node: int, send: Callable[[Frame, Left | None], None],
+                 retry: RetryPolicy) -> None:
+        super().__init__(retry)
+        self._node = node
+        self._send = send
+        self._toggle = 0
+        self._collected: bytearray | None = None    # of an object that takes segments
+
+    def begin(self, step: Ask, now: float) -> None:
+        self._collected = None
+        if step.pause:
+            self.silent = DONE
+            self.expect(step, now + step.pause)
+            return
+        self.silent = SILENT
+        self.expect(step, now + (self.retry.timeout if step.timeout is None else step.timeout))
+
+        def left(sent: bool, then: float) -> None:
+            # a read that the bus refused is repeated when its time is over
+            if not sent and step.data is not None:
+                self.end(step, NOT_SENT, then)
+        frame = sdo.encode_upload(self._node, step.index, step.subindex) if step.data is None \
+            else sdo.encode_download(self._node, step.index, step.subindex, step.data)
+        self._send(frame, left)
+
+    def receive(self, answer: bytes, now: float) -> Reply | bool:
+        found, step = self.decode(answer), self.step
+        if found.kind is Kind.SEGMENT:
+            return self._take_segment(found, now)
+        if step is None or not _belongs(found, step):
+            raise Unasked(f'SDO response {answer.hex(" ").upper()} that nobody asked for')
+        if found.kind is Kind.LONG:
+            self._collected, self._toggle = bytearray(), 0
+            self._ask_segment(now)
+            return True
+        self.finish()
+        if found.kind is Kind.ABORT:
+            return Reply(abort=found.number)
+        return Reply(found.data, sized=found.last)
+
+    def decode(self, answer: bytes) -> sdo.Answer:
+        """
+        Decode a response.
+
+        :raises RemoteProtocolError: it is none.
+        """
+        return sdo.decode_answer(answer, segments=self._collected is not None)
+
+    def answers(self, answer: bytes, step: Ask) -> bool:
+        """Tell whether a response may be that to a transfer that was given up."""
+        return _belongs(sdo.decode_answer(answer), step)
+
+    def _take_segment(self, found: sdo.Answer, now: float) -> Reply | bool:
+        if self._collected is None or found.toggle != self._toggle:
+            raise RemoteProtocolError('SDO segment out of turn')
+        self._collected += found.data
+        self._toggle ^= 0x10
+        if not found.last:
+            if len(self._collected) > LENGTH_MAX:
+                self._give_up(_TOO_LONG)
+                self.finish()
+                return Reply(abort=_TOO_LONG)
+            self._ask_segment(now)
+            return True
+        data = bytes(self._collected)
+        self.finish()
+        return Reply(data)
+
+    def _ask_segment(self, now: float) -> None:
+        self.deadline = now + self.retry.timeout
+        self._send(sdo.encode_segment(self._node, self._toggle), None)
+
+    def _give_up(self, code: int) -> None:
+        step = self.step
+        if step is not None:
+            self._send(sdo.encode_abort(self._node, step.index, step.subindex, code), None)
+
+    def handle_timer(self, now: float) -> Reply | bool:
+        if self._collected is not None and self.busy and now >= self.deadline:
+            self._give_up(_TIMED_OUT)   # the drive waits for the next segment
+        return super().handle_timer(now)
+
+    def finish(self) -> None:
+        super().finish()
+        self._collected = None
+
+    def attempts(self, step: Ask) -> int:
+        if step.attempts is not None or step.pause:
+            return step.attempts or 1
+        return self.retry.attempts if step.data is None else 1
+
+    def unanswered(self, step: Ask, reply: Reply) -> bool:
+        return reply is SILENT
+
+    def abandon(self, until: float) -> None:
+        self.deadline = min(self.deadline, until)
+
+    def key(self, step: Ask) -> Hashable | None:
+        return None if step.pause else (step.index, step.subindex)
+
+
+SdoChannel = Channel[Ask, Reply]
+
+
+def _belongs(found: sdo.Answer, step: Ask) -> bool:
+    if step.pause:
+        return False
+    place = step.index, step.subindex
+    if found.kind is Kind.ABORT:    # of a command that it does not know, some say no object
+        return found.object in (place, (0, 0))
+    wanted = (Kind.DATA, Kind.LONG) if step.data is None else (Kind.WRITTEN,)
+    return found.object == place and found.kind in wanted
+
+

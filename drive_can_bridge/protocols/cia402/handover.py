@@ -1,0 +1,56 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+r"""
+How a target reaches a drive in mode pp: by an edge of bit 4, which the drive acknowledges.
+
+.. code-block:: text
+
+    bit 4  ____/‾‾‾‾‾‾‾‾‾\______    rises with a new target (bit 5: at once)
+    bit 12 ________/‾‾‾‾‾‾‾‾‾\__    acknowledged; the next target waits until it has fallen
+
+One after the other, the newest wins. When its commands cease, an axis that is on its way is halted
+(bit 8), until it is armed again: bit 8 falls in the word in which bit 4 rises.
+"""
+
+from drive_can_bridge.core.setpoints import Setpoints
+from drive_can_bridge.protocols.cia402 import states
+from drive_can_bridge.protocols.cia402.control import DriveRules
+from drive_can_bridge.protocols.cia402.states import MODES, State, state_of
+
+
+class Handover:
+    """
+    The targets of one drive.
+
+    :param rules: get the bits of the control word.
+    """
+
+    def __init__(self, setpoints: Setpoints, rules: DriveRules) -> None:
+        mode = MODES['pp']
+        self._place = next(place for place, each in enumerate(setpoints.items) if (
+            each.parameter.index, each.parameter.subindex or 0) == (mode.index, mode.subindex))
+        self._setpoint = setpoints.items[self._place]
+        self._rules = rules
+        self._handed: int | None = None     # the drive was given this one
+        self._rising = False                # bit 4 has yet to travel
+
+    def look(self, status: int) -> None:
+        """Take a status word, before the next control word is chosen."""
+        rules, setpoint = self._rules, self._setpoint
+        if state_of(status) is not State.OPERATION_ENABLED:
+            self._handed, self._rising = None, False
+            rules.mode_bits, rules.halted = 0, False
+            return
+        acknowledged = bool(status & states.BIT_12)
+        if rules.mode_bits & states.NEW_SETPOINT:
+            if acknowledged or not setpoint.armed:
+                rules.mode_bits = 0
+        elif setpoint.armed and setpoint.raw != self._handed and not acknowledged:
+            rules.mode_bits, self._rising = states.NEW_SETPOINT | states.AT_ONCE, True
+        if not setpoint.armed and self._handed is not None:
+            rules.mode_bits, self._handed, self._rising = states.HALT, None, False
+        rules.halted = rules.mode_bits == states.HALT
+
+    def carried(self, word: int, setpoints: list[int]) -> None:
+        """Take note of a telegram that was made: the edge hands over what is in it."""
+        if self._rising and word & states.NEW_SETPOINT:
+            self._handed, self._rising = setpoints[self._place], False

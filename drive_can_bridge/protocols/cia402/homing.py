@@ -1,0 +1,194 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+``~/home``: into mode 6, start, wait, and back to the mode.
+
+Each step is seen before the next one: a control word in an answered cycle, a mode in 6061h, the
+end in the status word. Nothing arms meanwhile. Whatever stops the drive stops this too; the mode
+is written back then as soon as the drive is disabled.
+"""
+
+from collections.abc import Callable, Generator, Sequence
+from enum import Enum
+import math
+
+from drive_can_bridge.core import sentences
+from drive_can_bridge.core.control import ControlCompleted, ControlRequest
+from drive_can_bridge.core.control_machine import ControlMachine
+from drive_can_bridge.core.sentences import NOTHING, Sentence
+from drive_can_bridge.core.session import Session
+from drive_can_bridge.protocols.cia402 import states
+from drive_can_bridge.protocols.cia402.bring_up import LOOK_PERIOD
+from drive_can_bridge.protocols.cia402.channel import Ask, Reply, SdoChannel
+from drive_can_bridge.protocols.cia402.control import DriveRules
+from drive_can_bridge.protocols.cia402.states import State
+
+_DONE = states.BIT_12 | states.TARGET_REACHED
+
+
+class Step(Enum):
+    """How far it has come."""
+
+    NONE = 'not under way'
+    LOWERING = 'before mode 6'
+    ENTERING = 'changing to mode 6'
+    RUNNING = 'on its way'
+    LATCHING = 'behind its end'
+    HOLDING = 'before going back to the mode'
+    LEAVING = 'going back to the mode'
+
+
+class Homing:
+    """
+    The homing of one drive.
+
+    :param mode: number of the mode to go back to.
+    """
+
+    def __init__(self, session: Session, machine: ControlMachine, rules: DriveRules,
+                 channel: SdoChannel, mode: int) -> None:
+        self._session, self._machine, self._rules = session, machine, rules
+        self._channel, self._mode = channel, mode
+        self._timeout: float = session.configuration.options.homing_timeout
+        self._request: ControlRequest | None = None
+        self._step = Step.NONE
+        self._deadline = math.inf
+        self._now = -math.inf           # of the last sample
+        self._fresh = self._lowered = False
+        self._failure = NOTHING
+
+    @property
+    def under_way(self) -> bool:
+        """Nothing arms, and the mode is not the drive's own."""
+        return self._step is not Step.NONE
+
+    def refusal(self) -> Sentence:
+        """Say why it cannot begin now; '' if it can."""
+        if self.under_way:
+            return sentences.homing_under_way()
+        if not self._machine.operating:
+            return sentences.homing_needs_enabled()
+        if any(each.armed and not each.parameter.limit for each in self._session.setpoints.items):
+            return sentences.homing_needs_disarmed()
+        return NOTHING
+
+    def begin(self, request: ControlRequest, now: float) -> None:
+        """Begin; answered by exactly one ``ControlCompleted``."""
+        self._request, self._failure = request, NOTHING
+        self._session.gate.hold(True)
+        self._rules.homing_bits = 0
+        self._deadline = now + self._timeout
+        self._go(Step.LOWERING)
+
+    def next_timer(self) -> float:
+        """Return when it has lasted too long."""
+        return self._deadline
+
+    def handle_timer(self, now: float) -> None:
+        """End what lasts too long."""
+        if now >= self._deadline:
+            self._deadline = math.inf
+            self._end(sentences.homing_timed_out(self._timeout, self._step.value))
+
+    def stop(self) -> None:
+        """Forget it: the channel was cleared, or the drive is lost."""
+        if self.under_way:
+            self._answer(False, sentences.homing_stopped(self._step.value))
+            self._finish()
+
+    def sampled(self, status: int, raws: Sequence[int], now: float) -> None:
+        """Take a sample, after its status word and what follows from that."""
+        step, self._now = self._step, now
+        if step is Step.NONE:
+            return
+        if not self._machine.operating:
+            self._interrupted(status)
+            return
+        behind = self._fresh and not self._machine.word_due
+        self._fresh = not self._machine.word_due
+        if step is Step.LOWERING and behind:
+            self._lowered = not status & states.BIT_12
+            self._go(Step.ENTERING)
+            self._change(states.HOMING_MODE, self._entered)
+        elif step is Step.RUNNING:
+            self._look(status, behind)
+        elif step is Step.LATCHING:
+            self._session.setpoints.measure(raws, driven=False)
+            self._go(Step.HOLDING)
+        elif step is Step.HOLDING and behind:
+            self._go(Step.LEAVING)
+            self._change(self._mode, self._left)
+
+    # -- steps ------------------------------------------------------------------------------------
+
+    def _go(self, step: Step) -> None:
+        self._step, self._fresh = step, False
+
+    def _look(self, status: int, behind: bool) -> None:
+        if not status & states.BIT_12:
+            self._lowered = True
+        if not behind:
+            return
+        if status & states.BIT_13:
+            self._end(sentences.homing_failed())
+        elif self._lowered and status & _DONE == _DONE:
+            self._end(NOTHING)
+
+    def _entered(self, failure: Sentence) -> None:
+        if self._step is not Step.ENTERING:
+            return
+        if failure:
+            self._end(failure)
+            return
+        self._rules.homing_bits = states.START
+        self._go(Step.RUNNING)
+
+    def _end(self, failure: Sentence) -> None:
+        """Come to the end of the motion: bit 4 falls, and the position is latched anew."""
+        self._failure, self._deadline = failure, math.inf
+        self._rules.homing_bits = 0
+        self._go(Step.LATCHING)
+
+    def _left(self, failure: Sentence) -> None:
+        if self._step is not Step.LEAVING:
+            return
+        if failure:
+            self._machine.drop(failure)     # in whatever mode it is, it is not driven
+        failure = failure or self._failure
+        self._answer(not failure, failure or sentences.homed())
+        self._finish()
+
+    def _interrupted(self, status: int) -> None:
+        """Go back to the mode of a drive that was stopped, as soon as it is disabled."""
+        if self._request is not None:
+            self._answer(False, sentences.homing_stopped(self._step.value))
+        self._rules.homing_bits = 0
+        self._deadline = math.inf
+        if states.state_of(status) is not State.OPERATION_ENABLED and (
+                self._step is not Step.LEAVING):
+            self._go(Step.LEAVING)
+            self._change(self._mode, lambda failure: self._finish())
+
+    def _change(self, mode: int, then: Callable[[Sentence], None]) -> None:
+        def look() -> Generator[Ask, Reply, Sentence]:
+            reply = yield Ask(states.MODE, 0, mode.to_bytes(1, 'little'))
+            if reply.data is None:
+                return sentences.mode_refused(mode)
+            for _ in range(int(self._session.configuration.control_timeout / LOOK_PERIOD)):
+                shown = yield Ask(states.MODE_SHOWN)
+                if shown.abort is not None or shown.data and shown.data[0] == mode:
+                    return NOTHING
+                yield Ask(pause=LOOK_PERIOD)
+            return sentences.mode_refused(mode)
+        # PDOs do not pass through the channel: its own time may be that of long ago
+        self._channel.run(look(), then, self._now)
+
+    def _answer(self, success: bool, message: Sentence) -> None:
+        request, self._request = self._request, None
+        if request is not None:
+            self._session.report.note(ControlCompleted(request, success, message))
+
+    def _finish(self) -> None:
+        self._rules.homing_bits = None
+        self._deadline = math.inf
+        self._go(Step.NONE)
+        self._session.gate.hold(False)

@@ -1,0 +1,135 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+Parameters of users by SDO, and the stop.
+
+Every generator here is for :class:`.channel.SdoChannel`. What is written goes to the drive's RAM;
+it is acknowledged, and not read back.
+"""
+
+from collections.abc import Generator, Sequence
+
+from drive_can_bridge.core import sentences
+from drive_can_bridge.core.parameters import Parameter, ParameterType
+from drive_can_bridge.core.requests import Failure, Outcome, Outcomes, Written
+from drive_can_bridge.core.retry import RetryPolicy
+from drive_can_bridge.core.roles import Cells
+from drive_can_bridge.core.sentences import Sentence
+from drive_can_bridge.protocols.access import Access, Found, Item
+from drive_can_bridge.protocols.canopen import abort_codes
+from drive_can_bridge.protocols.canopen.sdo import EXPEDITED_MAX
+from drive_can_bridge.protocols.cia402.channel import Ask, Reply, SdoChannel
+from drive_can_bridge.protocols.cia402.pdo import width
+from drive_can_bridge.protocols.placement import OneByOne
+from drive_can_bridge.protocols.safe_stop import STOP_ATTEMPTS, StopWrite
+
+NOT_ATOMIC = sentences.not_in_one_frame('an SDO carries one object')
+#: what says how a drive exchanges: identifiers and mapping of PDOs, SYNC, heartbeats,
+#: interpolation time
+MAP = 'communication'
+_MAPS = frozenset((0x1005, 0x1006, 0x1016, 0x1017, 0x60C2))
+_PDOS = range(0x1400, 0x1C00)
+
+
+def cells(parameter: Parameter) -> Cells:
+    """Return what a parameter addresses."""
+    index = parameter.index
+    if index is None:
+        return frozenset()
+    if index in _MAPS or index in _PDOS:
+        return frozenset(((index, parameter.subindex or 0), MAP))
+    return frozenset(((index, parameter.subindex or 0),))
+
+
+def refused(code: int) -> Failure:
+    """Say that a drive refused a transfer."""
+    return Failure(sentences.refused_by_drive(code, abort_codes.describe(code)))
+
+
+class SdoAccess(Access[Parameter, Ask, Reply]):
+    """Parameters by index and sub-index, one a transfer."""
+
+    def __init__(self, channel: SdoChannel, retry: RetryPolicy) -> None:
+        super().__init__(channel, retry, OneByOne())
+
+    def read(self, span: Parameter) -> Generator[Ask, Reply, Found]:
+        found = yield from self._upload(span)
+        if isinstance(found, Failure):
+            return found
+        data, sized = found
+        wanted = width(span)
+        if not _own_width(span):
+            return (int.from_bytes(data, 'little'),)
+        if sized and len(data) != wanted and span.type is not ParameterType.BOOL:
+            return Failure(sentences.other_length(len(data), span.type.value))
+        return (int.from_bytes(data[:wanted], 'little'),)
+
+    def write(self, items: Sequence[Item]) -> Generator[Ask, Reply, Outcomes]:
+        (parameter, raw), = items
+        return ((yield from self._write(parameter, raw)),)
+
+    def misfit(self, items: Sequence[Item]) -> Sentence:
+        return NOT_ATOMIC
+
+    # -- parts ------------------------------------------------------------------------------------
+
+    def _write(self, parameter: Parameter, raw: int) -> Generator[Ask, Reply, Outcome]:
+        """Write one parameter; of one whose width only the drive knows, it is asked first."""
+        length = width(parameter)
+        if not _own_width(parameter):
+            found = yield from self._upload(parameter)
+            if isinstance(found, Failure):
+                known = found.reason.fields.get('number') == abort_codes.READ_OF_WRITE_ONLY
+                return Failure(sentences.width_unknown()) if known else found
+            length = len(found[0])
+            low, high = -1 << 8 * length - 1, (1 << 8 * length) - 1
+            if not low <= raw <= high:
+                return Failure(sentences.not_in_bits(raw, 8 * length, low, high))
+        data = (raw & (1 << 8 * length) - 1).to_bytes(length, 'little')
+        reply = yield Ask(parameter.index or 0, parameter.subindex or 0, data)
+        if reply.data is not None:
+            return Written()
+        if reply.abort is not None:
+            return refused(reply.abort)
+        return self.retry.unanswered(1) if reply.sent else Failure(sentences.not_sent())
+
+    def _upload(self, parameter: Parameter,
+                ) -> Generator[Ask, Reply, 'tuple[bytes, bool] | Failure']:
+        """Read an object of at most four bytes; tell whether the drive has said how many."""
+        reply = yield Ask(parameter.index or 0, parameter.subindex or 0)
+        if reply.abort is not None:
+            return refused(reply.abort)
+        if reply.data is None:
+            return self.retry.unanswered()
+        if not 1 <= len(reply.data) <= EXPEDITED_MAX:
+            return Failure(sentences.too_long(len(reply.data)))
+        return reply.data, reply.sized
+
+
+def _own_width(parameter: Parameter) -> bool:
+    """Tell whether a profile says how wide a parameter is; the drive knows for raw names."""
+    return parameter.listed
+
+
+StopProcedure = Generator[Ask, Reply, list[Sentence]]
+
+
+def write_until_answered(writes: Sequence[StopWrite], timeout: float) -> StopProcedure:
+    """
+    Tell a drive to stand still, each thing until it is acknowledged or was tried three times.
+
+    :param timeout: s for each attempt.
+    :return: what failed, in words.
+    """
+    failed: list[Sentence] = []
+    for parameter, raw, is_word in writes:
+        name = f'{parameter.name} {raw:04X}h' if is_word else parameter.name
+        data = parameter.word_from_raw(raw).to_bytes(width(parameter), 'little')
+        reply = yield Ask(parameter.index or 0, parameter.subindex or 0, data,
+                          attempts=STOP_ATTEMPTS, timeout=timeout)
+        if reply.abort is not None:
+            failed.append(sentences.write_refused(name, refused(reply.abort).reason))
+        elif not reply.sent:
+            failed.append(sentences.write_not_taken(name))
+        elif reply.data is None:
+            failed.append(sentences.write_not_acknowledged(name, STOP_ATTEMPTS))
+    return failed

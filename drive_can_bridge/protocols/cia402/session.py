@@ -1,0 +1,633 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The conversation with one drive of CiA 402.
+
+.. code-block:: text
+
+    IDLE ──activate, bus up──► SETTING UP ──ready──► CYCLIC ──missed_limit──► LEAVING
+      ▲                         ▲  │ ▲                 │ boot-up, heartbeat      │
+      │                         │  └─┼──differs──► DIFFERS (looks again in 1 s)  │
+      └──deactivate / bus down──┘    └────────3 neutral cycles, then silence─────┘
+
+Before the first PDO a drive is set up by SDO (:mod:`.bring_up`), and so it is after every loss:
+a node that has started anew has forgotten what was written. That it has power is not needed.
+
+Whatever was told to run is told to stop: by cycles while PDOs flow, otherwise by SDO, which no
+mapping can misroute. At the end, stop cycles go on until the drive says that it is disabled, or
+for ``control_timeout``; then it watches the bridge no more.
+"""
+
+from collections.abc import Callable, Generator, Sequence
+from enum import Enum
+from functools import partial
+import math
+
+from drive_can_bridge.core import sentences
+from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
+from drive_can_bridge.core.control_machine import ControlMachine
+from drive_can_bridge.core.drive_state import DriveState
+from drive_can_bridge.core.errors import RemoteProtocolError, Unasked
+from drive_can_bridge.core.events import (
+    ForeignMasterSeen, MappingDiffered, Noted, ProcessDataReceived,
+)
+from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.parameters import Parameter, ParameterType
+from drive_can_bridge.core.process_image import ProcessImage
+from drive_can_bridge.core.roles import Roles
+from drive_can_bridge.core.sentences import NOTHING, Sentence
+from drive_can_bridge.core.session import Session, Stage
+from drive_can_bridge.core.status_reports import Wording
+from drive_can_bridge.core.stop_duty import CYCLE, Do, Happened
+from drive_can_bridge.core.users import Users
+from drive_can_bridge.protocols.canopen import network, sdo
+from drive_can_bridge.protocols.canopen.network import NmtState
+from drive_can_bridge.protocols.canopen.node import Change, Node, START_PERIOD, START_SPACING
+from drive_can_bridge.protocols.channel import Channel, Lane
+from drive_can_bridge.protocols.cia402 import states
+from drive_can_bridge.protocols.cia402.beat import Beat, BridgeHeartbeat, smallest, Turn
+from drive_can_bridge.protocols.cia402.bring_up import BringUp, Found, LOOK_PERIOD, Outcome
+from drive_can_bridge.protocols.cia402.channel import Ask, Reply, SdoChannel, SdoCourier
+from drive_can_bridge.protocols.cia402.control import control_table, DriveRules, hint
+from drive_can_bridge.protocols.cia402.family import request_pdos, response_pdos
+from drive_can_bridge.protocols.cia402.handover import Handover
+from drive_can_bridge.protocols.cia402.homing import Homing
+from drive_can_bridge.protocols.cia402.procedures import (
+    cells, MAP, SdoAccess, write_until_answered,
+)
+from drive_can_bridge.protocols.cia402.states import (
+    CONTROL_PARAMETER, MODES, State, state_of, STATUS_PARAMETER,
+)
+from drive_can_bridge.protocols.cyclic_exchange import CyclicExchange
+from drive_can_bridge.protocols.safe_stop import ANSWER_TIME, SafeStop, StatusRead, STOP_ATTEMPTS
+from drive_can_bridge.protocols.stop_again import StopAgain
+
+#: s until a drive that differs, or runs on, is looked at again
+LOOK_AGAIN = 1.0
+#: periods without a complete set of TPDOs that are a missed exchange, where the drive has the pace
+EVENT_PERIODS = 1.5
+#: emergency code of a node that has missed the heartbeats of another
+HEARTBEAT_ERROR = 0x8130
+_MODE_PARAMETER = Parameter(name='mode', type=ParameterType.INT8, index=states.MODE, subindex=0)
+_MOVING = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTION)
+
+
+class Phase(Enum):
+    """How far the session has come with its drive."""
+
+    IDLE = 'idle'
+    SETTING_UP = 'setting up'
+    DIFFERS = 'differs'
+    CYCLIC = 'cycling'
+    LEAVING = 'last neutral cycles'
+
+
+class Watch:
+    """The part of a session that sends the heartbeat of the bridge, while it is in use."""
+
+    def __init__(self, session: Session, beat: BridgeHeartbeat | None) -> None:
+        self._session, self._beat = session, beat
+        self.in_use = False
+
+    def handle_timer(self, now: float) -> None:
+        """Send a heartbeat, if one is due."""
+        if self.in_use and self._beat is not None:
+            self._beat.beat(self._session.outbox, now)
+
+    def next_timer(self) -> float:
+        """Return when one is due."""
+        return self._beat.next_timer() if self.in_use and self._beat is not None else math.inf
+
+    def stop(self) -> None:
+        """Send none any more."""
+        self.in_use = False
+
+
+class Looks:
+    """The part of a session that is two of its methods."""
+
+    def __init__(self, due: Callable[[], float], act: Callable[[float], None]) -> None:
+        self.next_timer, self.handle_timer = due, act
+
+    def stop(self) -> None:
+        """Leave it to the session."""
+
+
+class Cia402Session(Session):
+    """
+    Set-up, PDOs, and parameters by SDO of one drive.
+
+    :param beat: the rounds of its bus; None: it is alone there.
+    :param heartbeat: that of the bridge on its bus; None: there is none.
+    :ivar exchange: its cycles.
+    """
+
+    def __init__(self, drive: DriveConfiguration, beat: Beat | None = None,
+                 heartbeat: BridgeHeartbeat | None = None) -> None:
+        options = drive.options
+        table = control_table(options)
+        self._rules = DriveRules(table, options, lacks=self._mode_lacking, why=self._why)
+        control = ControlMachine(
+            table, timeout=drive.control_timeout, rules=self._rules,
+            wording=Wording(lambda status: state_of(status).value, hint))
+        self._machine = control
+        super().__init__(
+            drive, control, image=ProcessImage.of(
+                drive, controlled=True, word=(CONTROL_PARAMETER,), status=(STATUS_PARAMETER,)),
+            roles=Roles(drive, controlled=True, cells=cells, maps=frozenset((MAP,)),
+                        built_in=(CONTROL_PARAMETER, _MODE_PARAMETER)))
+        self._node = Node(drive.station, nmt_start=False,
+                          heartbeat_timeout=options.heartbeat_timeout)
+        self._courier = SdoCourier(drive.station, self.outbox.put, self.retry)
+        self._channel: SdoChannel = Channel(self._courier)
+        self.users = Users(self, SdoAccess(self._channel, self.retry),
+                           control_refusal=self._control_refusal)
+        self._stop: SafeStop[Ask, Reply] = SafeStop(
+            self, self._channel, self._stop_by_sdo_ended, None, self._read_status,
+            word=CONTROL_PARAMETER)
+        self._again = StopAgain(self, self._channel, self._stop, partial(
+            self._stop_by_sdo, again=True))
+        self._requests, self._responses = request_pdos(drive), response_pdos(drive)
+        self._places = {each.identifier: place for place, each in enumerate(self._responses)}
+        self._masters = {each.identifier for each in self._requests} | {
+            sdo.REQUEST_BASE + drive.station}
+        self._set: dict[int, tuple[int, ...]] = {}      # the TPDOs of this exchange
+        self._synchronous: bool = options.transmission == 'sync'
+        self._beat = beat or Beat()
+        self._turn = Turn(drive.period, self._beat, self) if self._synchronous else None
+        self.exchange: CyclicExchange[list[bytes]] = CyclicExchange(
+            self, self._encode, self._send_cycle, slot=0, silence='no complete set of PDOs',
+            missed=self._missed, ended=self._last_cycle_left, settled=self._set.clear,
+            in_turn=not self._synchronous, timer=self._turn)
+        if heartbeat is None and options.bridge_heartbeat > 0.0:
+            heartbeat = BridgeHeartbeat(options.bridge_node, options.bridge_heartbeat)
+        self._watch = Watch(self, heartbeat)
+        self._bring_up = BringUp(self, self._node, self._rules)
+        self.homes = options.homing
+        self._handover = Handover(self.setpoints, self._rules) if options.mode == 'pp' else None
+        self._homing = Homing(self, control, self._rules, self._channel,
+                              MODES[options.mode].number)
+        self.look_after(Looks(self._next_look, self._look), self._watch, self._homing,
+                        self.exchange, channel=self._channel)
+        self._phase = Phase.IDLE
+        self._look_at = math.inf        # when the set-up begins again
+        self._cycling_since = -math.inf
+        self._stop_until = -math.inf
+        self._differing = ''            # as it was told
+        self._runs_told = False
+        self._forget_state()
+
+    def _forget_state(self) -> None:
+        """Know nothing of what the drive shows while it is enabled."""
+        self._mode_shown: int | None = None
+        self._mode_seen = self._looking = False
+        self._tells_velocity = True
+        self._pending_since = math.inf
+        self._error_code: int | None = None
+
+    # -- life cycle -------------------------------------------------------------------------------
+
+    @property
+    def _cycling(self) -> bool:
+        return self._phase in (Phase.CYCLIC, Phase.LEAVING)
+
+    def begin(self, now: float) -> None:
+        self.exchange.stop()
+        self._channel.cancel(Lane.OWN)
+        self._forget_state()
+        self._watch.in_use = True
+        self._node.begin(now)
+        if self.duty.happened(Happened.STARTED) is Do.STOP:
+            self._stop_by_sdo(now)
+        self._set_up_soon(START_SPACING, now)
+
+    def prepare_stop(self, now: float) -> bool:
+        self._channel.clear()
+        self._looking = False
+        self._homing.stop()
+        self._stop.forget()
+        self._look_at = math.inf
+        owes = self.duty.happened(Happened.ENDS) is Do.STOP
+        return self.stage is not Stage.IDLE and (
+            self._cycling or owes or self._bring_up.watch is not None)
+
+    def begin_stop(self, now: float) -> bool:
+        self._stop_until = now + self.configuration.control_timeout
+        if self._cycling:
+            self.exchange.stop_soon(now)
+        elif self.duty.owed:
+            self._stop_by_sdo(now)
+        else:
+            self._release(now)
+        return True
+
+    @property
+    def longest_stop(self) -> float:
+        writes = STOP_ATTEMPTS * (len(self.setpoints.items) + 1) + (
+            self.configuration.parameter_retries + 1)
+        return (self.exchange.longest_stop + self.configuration.control_timeout
+                + writes * self._stop.answer_time + ANSWER_TIME)
+
+    def fall_silent(self) -> None:
+        super().fall_silent()
+        self._stop.forget()
+        self._phase, self._look_at = Phase.IDLE, math.inf
+        self._set.clear()
+
+    def bus_down(self, now: float, reason: str) -> None:
+        self._node.forget()
+        super().bus_down(now, reason)
+
+    # -- setting up -------------------------------------------------------------------------------
+
+    def _next_look(self) -> float:
+        """Return when the set-up begins again, or something is overdue of the node."""
+        node = self._node.next_timer() if self.stage is Stage.RUNNING else math.inf
+        return min(self._look_at, node)
+
+    def _look(self, now: float) -> None:
+        if now >= self._look_at:
+            self._set_up(now)
+        if self.stage is Stage.RUNNING and self._node.handle_timer(now) is Change.HEARTBEAT_LOST:
+            if self._cycling:
+                self._silent(sentences.no_heartbeat(self._node.heartbeat_timeout), now)
+
+    def _set_up_soon(self, spacing: float, now: float) -> None:
+        """
+        Set the drive up, not too often: each time it is sent NMT.
+
+        :param spacing: s since the last NMT at least.
+        """
+        self._phase = Phase.SETTING_UP
+        self._look_at = max(now, self._bring_up.nmt_at + spacing)
+        if self._look_at <= now:
+            self._set_up(now)
+
+    def _set_up(self, now: float) -> None:
+        """Set the drive up, from the beginning."""
+        self._phase, self._look_at = Phase.SETTING_UP, math.inf
+        self._watch.handle_timer(now)   # it is to be heard before the drive is to watch it
+        self._channel.run(self._bring_up.run(lambda: self._channel.now), self._set_up_ended, now)
+
+    def _set_up_ended(self, outcome: Outcome) -> None:
+        now = self._channel.now
+        if self.stage is not Stage.RUNNING:
+            return
+        if outcome.found is Found.READY:
+            self._differing, self._runs_told = '', False
+            self._phase, self._cycling_since = Phase.CYCLIC, now
+            self._machine.status_received(self._bring_up.status, now)
+            self.exchange.book.forget_asked()
+            self.exchange.book.stale = self._beat.running   # it answers to the SYNC of others
+            self.exchange.start(now)
+            self.report.advice = sentences.cycles_unanswered()
+        elif outcome.found is Found.DIFFERS:
+            self._phase, self._look_at = Phase.DIFFERS, now + LOOK_AGAIN
+            self.report.advice = sentences.mapping_differs(outcome.text)
+            if outcome.text != self._differing:
+                self._differing = outcome.text
+                self.report.note(MappingDiffered(outcome.text))
+        elif outcome.found is Found.RUNS:
+            self._look_at = now + LOOK_AGAIN
+            self.report.advice = outcome.text
+            if not self._runs_told:
+                self._runs_told = True
+                self.report.warn(outcome.text, may_run=True)
+        else:
+            self.report.advice = sentences.set_up_unanswered()
+            if not self._bring_up.heard and now >= self._bring_up.nmt_at + START_PERIOD:
+                self._bring_up.wake(now)    # a node that was stopped answers nothing
+            self._look_at = now if not self._bring_up.heard else max(
+                now, self._bring_up.nmt_at + START_PERIOD)
+
+    # -- online and offline -----------------------------------------------------------------------
+
+    def _missed(self, reason: Sentence, now: float) -> None:
+        if self._phase is Phase.LEAVING:
+            if self.exchange.cycles_left == 0:
+                self.duty.happened(Happened.SILENT)
+                self.start_over(now)
+        elif reason:
+            self._silent(reason, now)
+        elif not self._synchronous:
+            self._expect_set(now)
+
+    def _silent(self, reason: Sentence, now: float) -> None:
+        """Have a drive that is lost stand still: it may be listening."""
+        self.exchange.forget()
+        if not self.online:
+            self.exchange.stop()
+            self._set_up_soon(START_PERIOD, now)
+            return
+        self.lose(reason, now)
+        self._phase = Phase.LEAVING
+        self.exchange.run_out(self.exchange.timer.due)
+
+    def lost(self, now: float, *, was_online: bool) -> None:
+        self._homing.stop()
+        self._forget_state()
+        self._set.clear()
+
+    def _close(self, reason: Sentence, now: float) -> None:
+        """Handle a node that takes no PDOs: it is set up from the beginning."""
+        self.lose(reason, now)
+        self.start_over(now)
+        self.report.advice = reason
+
+    # -- PDOs, sending ----------------------------------------------------------------------------
+
+    def _encode(self, raws: list[int]) -> list[bytes]:
+        if self._handover is not None:
+            self._handover.carried(raws[0], raws[1:])
+        payloads, at = [], 0
+        for each in self._requests:
+            count = len(each.parameters)
+            payloads.append(each.pack(raws[at:at + count]))
+            at += count
+        return payloads
+
+    def _send_cycle(self, payloads: list[bytes], now: float) -> None:
+        exchange = self.exchange
+        for each, payload in zip(self._requests, payloads):
+            exchange.put(Frame(each.identifier, payload, False))
+        if self._turn is not None:
+            exchange.expect_answer(now)
+            self._beat.begun(self._turn, now, exchange.await_frame())
+        elif not exchange.book.awaiting:
+            self._expect_set(now)
+
+    def _expect_set(self, now: float) -> None:
+        self.exchange.expect_answer(now, now + EVENT_PERIODS * self.configuration.period)
+
+    # -- frames from the drive --------------------------------------------------------------------
+
+    def receive_frame(self, frame: Frame, now: float, age: float = 0.0) -> None:
+        identifier, data, extended = frame
+        if extended:
+            return
+        place = self._places.get(identifier)
+        try:
+            if place is not None:
+                self._receive_pdo(place, data, now, now - age)
+            elif identifier == sdo.RESPONSE_BASE + self.configuration.station:
+                self._again.heard(now)
+                self._channel.receive(data, now)
+            elif identifier in self._masters:
+                self.report.note(ForeignMasterSeen(sentences.other_master_asks_node(
+                    self.configuration.station, str(frame))))
+            elif identifier == network.HEARTBEAT_BASE + self.configuration.station:
+                self._take_heartbeat(network.decode_heartbeat(data), now)
+            elif identifier == network.EMERGENCY_BASE + self.configuration.station:
+                text = self._node.receive_emergency(network.decode_emergency(data))
+                if text:
+                    self.report.note(Noted(text, warning=self._node.emergency is not None))
+        except Unasked as error:
+            self.report.unasked(sentences.malformed(str(error)), self._channel.late(
+                now - age, partial(self._courier.answers, data)), now)
+        except RemoteProtocolError as error:
+            self.report.reject(sentences.malformed(str(error)))
+
+    def _receive_pdo(self, place: int, data: bytes, now: float, received_at: float) -> None:
+        """Take one PDO of a set. The fast path of the reader."""
+        exchange, count = self.exchange, len(self._responses)
+        if not self._cycling:
+            exchange.book.take_stale()
+            return
+        if self._synchronous and not exchange.wanted:
+            if place == count - 1 and not exchange.expects('transmit PDO', now, received_at):
+                exchange.wait_out(now)
+            return
+        raws = self._responses[place].unpack(data)
+        if count > 1:
+            self._set[place] = raws
+            if len(self._set) < count:
+                return
+            raws = tuple(raw for each in range(count) for raw in self._set[each])
+            self._set.clear()
+        exchange.answered(received_at)
+        if not self._synchronous and self.exchange.timer.due < math.inf:
+            self._expect_set(now)
+        if not self.online and self.stage is Stage.RUNNING:
+            if self._phase is Phase.LEAVING:    # it is back
+                self.start_over(now)
+                return
+            self.be_online()
+            self.duty.happened(Happened.ANSWERED)
+        if self._handover is not None:
+            self._handover.look(raws[0])
+        self.gate.status(raws[0], now)
+        self._look_at_state(now)
+        self.control_changed(now)
+        self.gate.measured(raws)
+        self._homing.sampled(raws[0], raws, now)
+        self.report.note(ProcessDataReceived(raws, received_at))
+        exchange.wait_out(now)
+
+    def _take_heartbeat(self, state: NmtState, now: float) -> None:
+        change = self._node.receive_heartbeat(state, now, active=False)
+        if self.stage is not Stage.RUNNING:
+            return
+        if change is Change.RESTARTED:
+            self.report.note(Noted(sentences.booted()))
+            reason = sentences.device_restarted()
+            self.users.fail_all(sentences.no_answer_because(reason))
+            self._channel.clear()
+            self._stop.forget()
+            self._close(reason, now)
+        elif state is not NmtState.OPERATIONAL and self._phase is Phase.CYCLIC and (
+                now > self._cycling_since + START_SPACING):
+            self._close(sentences.node_state(state.text), now)
+        else:
+            self._again.heard(now, hurry=True)
+
+    # -- what follows from the state --------------------------------------------------------------
+
+    def _look_at_state(self, now: float) -> None:
+        """Ask for what the status word does not say, where something depends on it."""
+        state, control = self._rules.state, self._machine
+        if state is not State.OPERATION_ENABLED:
+            self._mode_seen = False
+        if not control.pending:
+            self._pending_since, self._error_code = now, None
+        if self._looking:
+            return
+        if state is State.QUICK_STOP_ACTIVE and self._rules.stays and (
+                not self._rules.stands and self._tells_velocity):
+            self._looking = True
+            self._channel.run(self._look_at_velocity(), self._looked, now)
+        elif self.stage is not Stage.RUNNING:
+            return      # at the end nothing else is asked
+        elif state is State.OPERATION_ENABLED and not self._mode_seen and (
+                not control.stopping and not self._homing.under_way):
+            self._looking = True
+            self._channel.run(self._look_at_mode(), self._looked, now)
+        elif control.pending and self._error_code is None and (
+                now > self._pending_since + 0.5 * self.configuration.control_timeout):
+            self._looking = True
+            self._channel.run(self._look_at_error(), self._looked, now)
+
+    def _looked(self, _: None) -> None:
+        self._looking = False
+
+    def _look_at_mode(self) -> Generator[Ask, Reply, None]:
+        """Read 6061h until it shows the mode."""
+        wanted = MODES[self.configuration.options.mode].number
+        while self._rules.state is State.OPERATION_ENABLED:
+            reply = yield Ask(states.MODE_SHOWN)
+            if reply.abort is not None:
+                self._bring_up.tell(sentences.mode_not_shown())
+                self._mode_seen = True
+            elif reply.data:
+                self._mode_shown = int.from_bytes(reply.data[:1], 'little', signed=True)
+                self._mode_seen = self._mode_shown == wanted
+            if self._mode_seen:
+                self._machine.status_received(self._rules.status, self._channel.now)
+                self.control_changed(self._channel.now)
+                return
+            yield Ask(pause=LOOK_PERIOD)
+
+    def _look_at_velocity(self) -> Generator[Ask, Reply, None]:
+        """Read 606Ch until a drive that stays in its quick stop stands."""
+        while self._rules.state is State.QUICK_STOP_ACTIVE and not self._rules.stands:
+            reply = yield Ask(states.VELOCITY)
+            if reply.abort is not None:
+                self._tells_velocity = False
+                return
+            self._rules.velocity_zero = reply.data is not None and not any(reply.data)
+            yield Ask(pause=LOOK_PERIOD)
+
+    def _look_at_error(self) -> Generator[Ask, Reply, None]:
+        """Read 603Fh: why the drive is not enabled."""
+        reply = yield Ask(states.ERROR_CODE)
+        self._error_code = -1 if reply.data is None else int.from_bytes(reply.data, 'little')
+
+    def _mode_lacking(self) -> Sentence:
+        if self._mode_seen or self._rules.state is not State.OPERATION_ENABLED:
+            return NOTHING
+        name = self.configuration.options.mode
+        return sentences.mode_differs(name, MODES[name].number, self._mode_shown)
+
+    def _why(self) -> Sentence:
+        """Say what else the drive says of why it is not enabled."""
+        code, emergency = self._error_code, self._node.emergency
+        known = sentences.error_code(code) if code is not None and code >= 0 else NOTHING
+        newest = NOTHING if emergency is None else sentences.emergency(emergency.text)
+        return sentences.together((known, newest))
+
+    # -- control ----------------------------------------------------------------------------------
+
+    def home(self, request: ControlRequest, now: float) -> None:
+        refusal = self._homing.refusal()
+        if refusal:
+            self.report.note(ControlCompleted(request, False, refusal))
+        else:
+            self._homing.begin(request, now)
+
+    def see_to_control_word(self, now: float) -> None:
+        if self.stage is Stage.STOPPING:
+            return
+        exchange, control = self.exchange, self._machine
+        exchange.hurry(now, setpoints=self.duty.owed)
+        if control.pending and control.word != exchange.word:   # one step of several
+            exchange.timer.no_later(max(now, exchange.timer.began_at
+                                        + exchange.timer.stop_spacing))
+
+    def _control_refusal(self, action: ControlAction, refusal: Sentence) -> Sentence:
+        emergency = self._node.emergency
+        if refusal or action is not ControlAction.ENABLE or not self._machine.fault:
+            return refusal
+        missed = emergency is not None and emergency.code == HEARTBEAT_ERROR
+        return sentences.bridge_missed() if missed else NOTHING
+
+    # -- the stop ---------------------------------------------------------------------------------
+
+    def _stop_by_sdo(self, now: float, *, again: bool = False) -> None:
+        """Write ``disable`` and neutral setpoints to their objects."""
+        if self._stop.running:
+            return
+        self._channel.make_room(now)
+        writes = [each._replace(raw=self._machine.word) if each.is_word else each
+                  for each in self._stop.writes()]
+        self._stop.begin(write_until_answered(writes, self._stop.answer_time), now, again=again)
+
+    def _read_status(self, status: Parameter, timeout: float) -> StatusRead[Ask, Reply]:
+        reply = yield Ask(states.STATUS_WORD, timeout=timeout, attempts=1)
+        return None if reply.data is None else int.from_bytes(reply.data, 'little')
+
+    def _stop_by_sdo_ended(self) -> None:
+        if self.stage is Stage.STOPPING and not self._cycling:
+            self._release(self._channel.now)
+
+    def _last_cycle_left(self, now: float) -> None:
+        if self.stage is not Stage.STOPPING:
+            return
+        if now < self._stop_until and not self.exchange.book.missed_in_row and (
+                self._rules.state in _MOVING or self._rules.state and self._machine.word_due):
+            self.exchange.cycles_left = 1   # it still brakes, or 0006h has not left
+            return
+        self.exchange.doubt_the_end()
+        if self._rules.state in _MOVING:
+            self.duty.channel(CYCLE, Happened.RUN_LEFT)
+            self.duty.happened(Happened.SILENT)     # of what it should have done
+        self.exchange.stop()
+        self._release(now)
+
+    def _release(self, now: float) -> None:
+        """Come to the end, as soon as the drive does not watch the bridge any more."""
+        if self.duty.owed:      # then it is to stop by itself
+            self.stop_left()
+            return
+        self._channel.run(self._bring_up.release(self._stop.answer_time),
+                          lambda _: self.stop_left(), now, Lane.STOP)
+
+    # -- state ------------------------------------------------------------------------------------
+
+    @property
+    def unshown(self) -> bool:
+        return super().unshown and not self.exchange.book.stop_shown
+
+    @property
+    def state(self) -> DriveState:
+        if self._phase is Phase.DIFFERS and not self.defect:
+            return DriveState.MAPPING_DIFFERS
+        return super().state
+
+    @property
+    def busy(self) -> Sentence:
+        return sentences.homing() if self._homing.under_way else NOTHING
+
+    @property
+    def warning(self) -> Sentence:
+        return sentences.together((self._node.ailing, self._node.missing))
+
+    def facts(self) -> dict[str, str]:
+        return {**self._node.facts(), 'stops_by': stops_by(self._bring_up.options)}
+
+
+def stops_by(options: dict[int, int]) -> str:
+    """Say what quick stop and disable do on a drive, by its 605Ah, 605Bh, 605Ch."""
+    known = [(name, index, meanings) for name, index, meanings in _STOPS if index in options]
+    return '; '.join(
+        f'{name}: {meanings.get(options[index], "as the manual says")} '
+        f'({index:04X}h = {options[index]})' for name, index, meanings in known) or 'not known'
+
+
+_HOW = {0: 'power off, it coasts', 1: 'slow-down ramp', 2: 'quick-stop ramp', 3: 'current limit',
+        4: 'voltage limit', 5: 'slow-down ramp, then holds', 6: 'quick-stop ramp, then holds',
+        7: 'current limit, then holds', 8: 'voltage limit, then holds'}
+_RAMP_OR_NOT = {0: 'power off, it coasts', 1: 'slow-down ramp, then power off'}
+_STOPS = (('quick stop', states.QUICK_STOP_OPTION, _HOW),
+          ('disable operation', states.DISABLE_OPTION,
+           {**_RAMP_OR_NOT, 1: 'slow-down ramp'}),
+          ('shutdown', states.SHUTDOWN_OPTION, _RAMP_OR_NOT))
+
+
+def make_sessions(drives: Sequence[DriveConfiguration]) -> list[Session]:
+    """Make the sessions of one bus, in the same order: one SYNC, and one heartbeat for all."""
+    beat = Beat()
+    interval = smallest([drive.options.bridge_heartbeat for drive in drives])
+    heartbeat = BridgeHeartbeat(
+        next(drive.options.bridge_node for drive in drives if drive.options.bridge_heartbeat > 0),
+        interval) if interval else None
+    return [Cia402Session(drive, beat, heartbeat if drive.options.bridge_heartbeat > 0 else None)
+            for drive in drives]

@@ -1,0 +1,144 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""A servo drive, node 5, in csv or csp, with its bus; frames as candump writes them."""
+
+from typing import Any
+
+from builders import Conversation, drive, frame, INT16, INT32, parameter, RAM, RO
+from literal_drives import ServoDrive
+
+from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.parameters import ParameterType
+
+VELOCITY_TARGET = parameter('target_velocity', None, index=0x60FF, subindex=0, type=INT32,
+                            scale=0.1, unit='rpm', minimum=-3000.0, maximum=3000.0, storage=RAM)
+POSITION = parameter('position', None, index=0x6064, subindex=0, type=INT32, access=RO)
+TARGET = parameter('target_position', None, index=0x607A, subindex=0, type=INT32, storage=RAM,
+                   neutral_from='position', arming_tolerance=10.0)
+VELOCITY = parameter('velocity', None, index=0x606C, subindex=0, type=INT32, scale=0.1,
+                     unit='rpm', access=RO)
+TORQUE = parameter('torque', None, index=0x6077, subindex=0, type=INT16, access=RO)
+TORQUE_TARGET = parameter('target_torque', None, index=0x6071, subindex=0, type=INT16)
+SPEED_VL = parameter('target_speed', None, index=0x6042, subindex=0, type=INT16)
+IP_TARGET = parameter('interpolation', None, index=0x60C1, subindex=1, type=INT32,
+                      neutral_from='position', arming_tolerance=10.0)
+MODES_OF = parameter('mode_shown', None, index=0x6061, subindex=0, type=ParameterType.INT8,
+                     access=RO)
+RAMP = parameter('acceleration', None, index=0x6083, subindex=0, type=ParameterType.UINT32)
+MODE_TARGETS = {'csv': VELOCITY_TARGET, 'pv': VELOCITY_TARGET, 'csp': TARGET, 'pp': TARGET,
+                'tq': TORQUE_TARGET, 'cst': TORQUE_TARGET, 'vl': SPEED_VL, 'ip': IP_TARGET}
+TABLE = (VELOCITY_TARGET, POSITION, TARGET, VELOCITY, TORQUE, TORQUE_TARGET, SPEED_VL, IP_TARGET,
+         MODES_OF, RAMP)
+PERIOD = 0.01
+OBJECTS = {(0x6064, 0): (1000).to_bytes(4, 'little'), (0x60FF, 0): bytes(4),
+           (0x607A, 0): bytes(4), (0x6077, 0): bytes(2), (0x6071, 0): bytes(2),
+           (0x6042, 0): bytes(2), (0x60C1, 1): bytes(4), (0x6083, 0): bytes(4)}
+
+
+def servo(mode: str = 'csv', **options: Any) -> DriveConfiguration:
+    """Configure a drive with the setpoint of its mode, and its position."""
+    options.setdefault('request', (MODE_TARGETS[mode],))
+    options.setdefault('response', (POSITION,))
+    options.setdefault('table', TABLE)
+    options.setdefault('station', 5)
+    options.setdefault('period', PERIOD)
+    options.setdefault('name', 'axis')
+    return drive('cia402', mode=mode, **options)
+
+
+class Axis:
+    """
+    A session and the drive at the other end of the bus, with a heartbeat each 0.1 s.
+
+    :ivar log: what was sent, and when.
+    :ivar mute: nothing of what the drive says arrives.
+    :ivar deaf: nothing of what it is told arrives.
+    """
+
+    DELAY = 0.0002
+
+    def __init__(self, mode: str = 'csv', objects: dict[tuple[int, int], bytes] | None = None,
+                 **options: Any) -> None:
+        self.talk = Conversation(servo(mode, **options))
+        self.session = self.talk.session
+        self.drive = ServoDrive(5, {**OBJECTS, **(objects or {})})
+        self.now = 10.0
+        self.beat_at = 10.05
+        self.log: list[tuple[float, str]] = []
+        self.mute = self.deaf = False
+
+    def deliver(self, sent: list[str]) -> None:
+        for text in sent:
+            self.log.append((round(self.now, 6), text))
+            answers = [] if self.deaf else self.drive.takes(frame(text))
+            for answer in answers if not self.mute else ():
+                self.now += self.DELAY
+                self.deliver(self.talk.hears(str(answer), self.now))
+
+    def says(self, text: str) -> None:
+        """Have the drive say something by itself."""
+        self.deliver(self.talk.hears(text, self.now))
+
+    def live(self, duration: float) -> None:
+        """Let time pass, every timer in time."""
+        end = self.now + duration
+        for _ in range(100_000):
+            due = self.session.next_timer()
+            if min(due, self.beat_at) > end:
+                self.now = max(self.now, end)
+                return
+            if self.beat_at <= due:
+                self.now = max(self.now, self.beat_at)
+                self.beat_at += 0.1
+                if self.drive.number(0x1017) and not self.mute:
+                    self.says('705#05' if self.drive.operational else '705#7F')
+                continue
+            self.now = max(self.now, due)
+            self.deliver(self.talk.at(self.now))
+        raise AssertionError('the timer spins')
+
+    def start(self) -> None:
+        """Activate, and let it come online."""
+        self.deliver(self.talk.bus_up(self.now))
+        self.deliver(self.talk.activate(self.now))
+        self.live(0.3)
+
+    def online(self) -> 'Axis':
+        """Be online, with nothing in the log."""
+        self.start()
+        assert self.session.online, self.session.offline_advice
+        self.take()
+        self.talk.events()
+        return self
+
+    def enabled(self) -> 'Axis':
+        """Be enabled and not armed."""
+        self.online()
+        assert self.asks(ControlAction.ENABLE) == [('enable', True, 'operation enabled')]
+        self.take()
+        self.talk.events()
+        return self
+
+    def asks(self, action: ControlAction, wait: float = 0.3) -> list[tuple[str, bool, str]]:
+        """Ask for something, wait, and return what was answered."""
+        self.deliver(self.talk.asks(action, self.now))
+        self.live(wait)
+        return self.talk.control_outcomes()
+
+    def commands(self, *values: float) -> None:
+        """Give the only setpoint these values, one after the other."""
+        for value in values:
+            self.talk.commands(0, value, self.now)
+
+    def take(self) -> list[str]:
+        """Return the frames sent since the last call."""
+        log, self.log = self.log, []
+        return [text for _, text in log]
+
+    def words(self) -> list[str]:
+        """Return the control words of RPDO1 since the last call, repetitions left out."""
+        found: list[str] = []
+        for text in self.take():
+            if text.startswith('205#') and text[4:8] not in found[-1:]:
+                found.append(text[4:8])
+        return found

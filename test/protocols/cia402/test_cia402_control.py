@@ -1,0 +1,254 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Which control words a drive of CiA 402 is sent, in which state, and what is said of it."""
+
+import pytest
+from saying import says
+from servo_builders import Axis
+
+from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.drive_state import DriveState
+from drive_can_bridge.core.events import Noted
+
+ENABLE, DISABLE, QUICK_STOP = (
+    ControlAction.ENABLE, ControlAction.DISABLE, ControlAction.QUICK_STOP)
+
+
+def warnings(axis: Axis) -> list[str]:
+    return [note.text for note in axis.talk.events(Noted) if note.warning]
+
+
+class TestTheWay:
+
+    def test_up_each_step_is_seen_before_the_next_word(self) -> None:
+        axis = Axis().online()
+        assert axis.session.state is DriveState.DISABLED
+        assert axis.asks(ENABLE) == [('enable', True, 'operation enabled')]
+        assert axis.words() == ['0700', '0F00']
+        assert axis.drive.told[-3:] == [0x06, 0x07, 0x0F]
+
+    def test_a_drive_that_needs_its_time_for_each_step(self) -> None:
+        axis = Axis().online()
+        control, late = axis.drive._control, list[int]()
+
+        def sluggish(word: int) -> None:
+            late.append(word)
+            control(late[max(0, len(late) - 4)])
+        axis.drive._control = sluggish      # type: ignore[method-assign]
+        assert axis.asks(ENABLE, 0.5) == [('enable', True, 'operation enabled')]
+        assert axis.words() == ['0700', '0F00']
+
+    @pytest.mark.parametrize(('option', 'words'), [
+        ('disable_operation', ['0700', '0600']), ('shutdown', ['0600']),
+        ('disable_voltage', ['0000'])])
+    def test_down(self, option: str, words: list[str]) -> None:
+        axis = Axis(disable_word=option).enabled()
+        (_, success, _), = axis.asks(DISABLE)
+        assert success
+        assert axis.words() == words
+        assert axis.drive.state in (axis.drive.READY, axis.drive.OFF)
+
+    def test_up_with_disable_voltage_goes_by_shutdown_too(self) -> None:
+        axis = Axis(disable_word='disable_voltage').online()
+        assert axis.asks(ENABLE) == [('enable', True, 'operation enabled')]
+        assert axis.words() == ['0600', '0700', '0F00']
+
+    def test_vl_with_its_ramp_bits_and_without(self) -> None:
+        axis = Axis('vl').online()
+        axis.asks(ENABLE)
+        assert axis.words() == ['0700', '7F00']
+        axis = Axis('vl', ramp_bits=False).online()
+        axis.asks(ENABLE)
+        assert axis.words() == ['0700', '0F00']
+
+    def test_ip_interpolates_once_it_is_enabled(self) -> None:
+        axis = Axis('ip').online()
+        axis.asks(ENABLE)
+        log = [text for text in axis.take() if text.startswith('205#')]
+        first = next(text for text in log if text.startswith('205#1F00'))
+        assert first == '205#1F00E8030000'      # with the latched position
+        assert log.index(first) > log.index('205#0F00E8030000')
+        axis.asks(DISABLE)
+        assert axis.words() == ['0700', '0600']
+
+    def test_disabled_right_behind_the_first_enable_word(self) -> None:
+        """It counts as enabled, whatever the status on its way says."""
+        axis = Axis().online()
+        axis.deliver(axis.talk.asks(ENABLE, axis.now))
+        while '205#0F0000000000' not in axis.take():
+            axis.live(0.001)
+        axis.mute = True
+        axis.deliver(axis.talk.asks(DISABLE, axis.now))
+        axis.live(0.015)
+        assert axis.words() == ['0700']
+
+
+class TestWhatKeepsItFromEnabling:
+
+    def test_safe_torque_off_at_boot_is_online_and_says_why(self) -> None:
+        axis = Axis()
+        axis.drive.powered = False
+        axis.drive.becomes(axis.drive.OFF)
+        axis.drive.objects[0x603F, 0] = b'\x10\x33'
+        axis.online()
+        assert axis.session.state is DriveState.DISABLED
+        axis.says('085#1033010000000000')
+        (_, success, why), = axis.asks(ENABLE, 3.0)
+        assert not success
+        for part in ('stuck in state switch on disabled', '0240h', '3310h', 'voltage is disabled',
+                     'emergency'):
+            assert part in why, part
+        axis.drive.powered = True
+        assert axis.asks(ENABLE) == [('enable', True, 'operation enabled')]
+
+    def test_a_mode_that_6061h_does_not_show_is_no_enable(self) -> None:
+        axis = Axis()
+        axis.online()
+        axis.drive.objects[0x6061, 0] = b'\1'
+        axis.deliver(axis.talk.asks(ENABLE, axis.now))
+        axis.live(0.5)
+        axis.commands(0.0, 100.0)
+        axis.live(0.1)
+        assert not any(text.startswith('205#0F00') and text != '205#0F0000000000'
+                       for text in axis.take())
+        axis.live(2.0)
+        (_, success, why), = axis.talk.control_outcomes()
+        assert not success
+        assert '6061h shows mode 1 yet instead of 9 (csv)' in why
+        assert axis.drive.state == axis.drive.READY
+
+    def test_a_mode_that_shows_only_when_enabled(self) -> None:
+        axis = Axis()
+        axis.online()
+        axis.drive.objects[0x6061, 0] = b'\0'
+        axis.deliver(axis.talk.asks(ENABLE, axis.now))
+        axis.live(0.2)
+        assert axis.talk.control_outcomes() == []
+        axis.drive.objects[0x6061, 0] = b'\x09'
+        axis.live(0.1)
+        assert axis.talk.control_outcomes() == [('enable', True, 'operation enabled')]
+
+    def test_no_6061h_is_told_once(self) -> None:
+        axis = Axis()
+        del axis.drive.objects[0x6061, 0]
+        axis.online()
+        for _ in range(2):
+            assert axis.asks(ENABLE) == [('enable', True, 'operation enabled')]
+            axis.asks(DISABLE)
+        assert warnings(axis).count(says('mode_not_shown')) == 1
+
+    def test_a_fault_by_the_missed_bridge(self) -> None:
+        axis = Axis().online()
+        axis.drive.becomes(axis.drive.FAULT)
+        axis.says('085#3081110000000000')
+        axis.live(0.1)
+        assert axis.session.users.control_refusal(ENABLE) == says('bridge_missed')
+        assert axis.asks(ControlAction.RESET_FAULT) == [
+            ('reset_fault', True, 'ready to switch on')]
+        assert axis.asks(ENABLE) == [('enable', True, 'operation enabled')]
+
+
+class TestQuickStop:
+
+    def test_one_that_ends_by_itself_keeps_its_word_until_it_has(self) -> None:
+        axis = Axis().enabled()
+        axis.drive.braking = 20
+        axis.deliver(axis.talk.asks(QUICK_STOP, axis.now))
+        axis.live(0.15)
+        assert axis.words() == ['0200']
+        assert axis.talk.control_outcomes() == []
+        axis.live(0.1)
+        assert axis.words() == ['0200', '0600']
+        assert [(success, message) for _, success, message in axis.talk.control_outcomes()] == [
+            (True, 'switch on disabled')]
+
+    def test_one_that_takes_longer_than_people_wait(self) -> None:
+        axis = Axis(control_timeout=0.5).enabled()
+        axis.drive.braking = 100
+        (_, success, why), = axis.asks(QUICK_STOP, 0.7)
+        assert not success
+        assert 'still braking' in why
+        axis.live(0.4)
+        assert axis.words() == ['0200', '0600']
+
+    @pytest.mark.parametrize('by_bit', [True, False])
+    def test_one_that_holds(self, by_bit: bool) -> None:
+        axis = Axis(objects={(0x605A, 0): b'\x06\0', (0x606C, 0): b'\x10\0\0\0'}).enabled()
+        axis.drive.braking = 20
+        axis.deliver(axis.talk.asks(QUICK_STOP, axis.now))
+        axis.live(0.15)
+        assert axis.talk.control_outcomes() == []
+        if by_bit:
+            axis.drive.objects[0x6041, 0] = b'\x07\x06'
+        else:
+            axis.drive.objects[0x606C, 0] = bytes(4)
+        axis.live(0.1)
+        assert axis.talk.control_outcomes() == [
+            ('quick_stop', True, says('quick_stop_holds', state='quick stop active'))]
+        axis.live(5.0)
+        assert axis.words() == ['0200']
+        assert axis.asks(ENABLE) == [('enable', True, 'operation enabled')]
+        assert axis.words() == ['0000', '0600', '0700', '0F00']
+
+    def test_one_that_holds_and_is_disabled(self) -> None:
+        axis = Axis(objects={(0x605A, 0): b'\x06\0'}).enabled()
+        assert [success for _, success, _ in axis.asks(QUICK_STOP)] == [True]
+        assert [success for _, success, _ in axis.asks(DISABLE)] == [True]
+        assert axis.words() == ['0200', '0000', '0600']
+
+    def test_a_disable_meanwhile_goes_on_with_the_quick_stop(self) -> None:
+        axis = Axis().enabled()
+        axis.drive.braking = 30
+        axis.deliver(axis.talk.asks(QUICK_STOP, axis.now))
+        axis.live(0.02)
+        axis.deliver(axis.talk.asks(DISABLE, axis.now))
+        axis.live(0.15)
+        assert axis.words() == ['0200']
+        axis.live(0.3)
+        assert axis.words() == ['0200', '0600']
+
+    def test_nothing_else_goes_out_until_a_status_behind_it_was_seen(self) -> None:
+        axis = Axis().enabled()
+        axis.deliver(axis.talk.asks(QUICK_STOP, axis.now))
+        axis.live(0.0095)
+        axis.mute = True
+        axis.live(0.01)
+        axis.deliver(axis.talk.asks(DISABLE, axis.now))
+        axis.take()
+        axis.live(0.025)
+        assert axis.words() == ['0200']
+
+    def test_of_a_drive_that_is_not_enabled(self) -> None:
+        axis = Axis().online()
+        assert axis.asks(QUICK_STOP) == [('quick_stop', True, 'ready to switch on')]
+        assert axis.words() == ['0600']
+
+    def test_one_that_the_drive_began_by_itself(self) -> None:
+        axis = Axis().enabled()
+        axis.drive.braking = 20
+        axis.drive.becomes(axis.drive.QUICK_STOP)
+        axis.live(0.15)
+        assert axis.words() == ['0F00', '0200']
+        axis.live(0.3)
+        assert axis.words() == ['0200', '0600']
+        assert axis.session.state is DriveState.DISABLED
+
+    def test_one_that_holds_at_the_end_of_the_bridge(self) -> None:
+        axis = Axis(objects={(0x605A, 0): b'\x06\0', (0x606C, 0): b'\x10\0\0\0'}).enabled()
+        axis.drive.braking = 20
+        axis.deliver(axis.talk.asks(QUICK_STOP, axis.now))
+        axis.live(0.05)
+        axis.deliver(axis.talk.deactivate(axis.now))
+        axis.live(0.3)
+        assert axis.words() == ['0F00', '0200'][1:]
+        axis.drive.objects[0x606C, 0] = bytes(4)
+        axis.live(0.3)
+        assert axis.words()[:3] == ['0200', '0000', '0600']
+        assert axis.session.stopped
+
+    def test_one_that_holds_and_says_nothing_of_its_speed_is_not_asked_for_ever(self) -> None:
+        axis = Axis(objects={(0x605A, 0): b'\x06\0'}).enabled()
+        del axis.drive.objects[0x606C, 0]
+        axis.drive.braking = 20
+        axis.deliver(axis.talk.asks(QUICK_STOP, axis.now))
+        axis.live(0.5)
+        assert axis.take().count('605#406C600000000000') == 1

@@ -1,0 +1,225 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Targets that are handed over (pp), and homing."""
+
+from typing import Any
+
+from literal_drives import ServoDrive
+import pytest
+from saying import says
+from servo_builders import Axis, OBJECTS
+
+from drive_can_bridge.core.control import ControlAction, ControlRequest
+from drive_can_bridge.core.drive_state import DriveState
+from drive_can_bridge.core.setpoints import CommandOutcome
+
+
+class PositionDrive(ServoDrive):
+    """
+    Takes a target with the rising edge of bit 4, and homes in mode 6 with it.
+
+    :ivar targets: those that it took.
+    :ivar homing: SYNCs until it has found its reference; -1: never; -2: with an error.
+    """
+
+    def __init__(self, node: int, objects: dict[tuple[int, int], bytes] | None = None) -> None:
+        super().__init__(node, objects)
+        self.targets: list[int] = []
+        self.homing = 5
+        self.found = 0
+        self._left = 0
+        self._before = 0
+
+    def _control(self, word: int) -> None:
+        super()._control(word)
+        edge, self._before = word & ~self._before, word
+        if self.state == self.ENABLED and self.number(0x6060) == 1:
+            if edge & 0x10 and not self.bits & 0x1000:
+                self.targets.append(self.number(0x607A))
+            self.bits = 0x1000 if word & 0x10 else 0
+        elif self.number(0x6060) == 6:
+            if edge & 0x10:
+                self.bits, self._left = 0, self.homing
+            elif not word & 0x10:
+                self._left = 0
+        else:
+            self.bits = 0
+        self.becomes(self.state)
+
+    bits = 0
+
+    def becomes(self, state: int) -> None:
+        super().becomes(state)
+        content = int.from_bytes(self.objects[0x6041, 0], 'little') | self.bits
+        self.objects[0x6041, 0] = content.to_bytes(2, 'little')
+
+    def runs_down(self) -> None:
+        super().runs_down()
+        if self._left == -2:
+            self.bits = 0x2000
+        elif self._left > 0:
+            self._left -= 1
+            if not self._left:
+                self.found += 1
+                self.bits = 0x1400
+                self.objects[0x6064, 0] = (7).to_bytes(4, 'little')
+        self.becomes(self.state)
+
+
+def meet(mode: str = 'pp', **options: Any) -> tuple[Axis, PositionDrive]:
+    axis = Axis(mode, **options)
+    drive = axis.drive = PositionDrive(5, OBJECTS)
+    axis.enabled()
+    return axis, drive
+
+
+class TestHandover:
+
+    def test_one_after_the_other_and_the_newest_wins(self) -> None:
+        axis, drive = meet()
+        assert drive.targets == []
+        axis.commands(1000.0, 2000.0)
+        axis.live(0.03)
+        assert drive.targets == [2000]
+        axis.commands(3000.0, 4000.0, 5000.0)
+        axis.live(0.06)
+        assert drive.targets == [2000, 5000]
+        assert axis.words() == ['0F00', '3F00', '0F00', '3F00', '0F00']
+
+    def test_a_drive_that_acknowledges_late(self) -> None:
+        axis, drive = meet()
+        seen = drive.becomes
+        drive.becomes = lambda state: None      # type: ignore[method-assign]
+        axis.commands(1000.0, 2000.0)
+        axis.live(0.05)
+        axis.commands(3000.0)
+        axis.live(0.05)
+        assert axis.words() == ['0F00', '3F00']
+        drive.becomes = seen    # type: ignore[method-assign]
+        drive.becomes(drive.state)
+        axis.live(0.1)
+        assert axis.words() == ['3F00', '0F00', '3F00', '0F00']
+        assert drive.targets == [2000, 3000]
+
+    def test_halted_when_commands_cease_until_it_is_armed_again(self) -> None:
+        axis, drive = meet()
+        axis.commands(1000.0, 2000.0)
+        axis.live(0.4)
+        axis.words()
+        axis.live(0.2)
+        assert axis.words() == ['0F00', '0F01']
+        drive.objects[0x6064, 0] = (1500).to_bytes(4, 'little')     # it runs out
+        axis.live(0.05)
+        assert axis.take()[-2] == '205#0F01DC050000'
+        assert axis.talk.commands(0, 2000.0, axis.now) is CommandOutcome.NOT_ARMED
+        assert axis.talk.commands(0, 1505.0, axis.now) is CommandOutcome.ARMED
+        axis.live(0.02)
+        assert axis.words()[0] in ('0F01', '3F00')
+        axis.live(0.03)
+        assert drive.targets == [2000, 1505]
+        assert axis.drive.told[-3:] == [0x010F, 0x3F, 0x0F]
+
+    def test_nothing_is_handed_over_that_nobody_commanded(self) -> None:
+        axis, drive = meet()
+        axis.live(1.0)
+        assert drive.targets == []
+        axis.asks(ControlAction.DISABLE)
+        axis.asks(ControlAction.ENABLE)
+        axis.live(1.0)
+        assert drive.targets == []
+
+    def test_disabled_on_its_way(self) -> None:
+        axis, drive = meet()
+        axis.commands(1000.0, 2000.0)
+        axis.live(0.02)
+        axis.asks(ControlAction.DISABLE)
+        assert axis.words()[-2:] == ['0700', '0600']
+        axis.asks(ControlAction.ENABLE)
+        axis.live(0.5)
+        assert drive.targets == [2000]
+
+
+def home(axis: Axis, wait: float = 0.6) -> list[tuple[str, bool, str]]:
+    axis.talk.now = axis.now
+    axis.session.users.submit(ControlRequest(ControlAction.HOME), axis.now)
+    axis.deliver(axis.talk.sent())
+    axis.live(wait)
+    return axis.talk.control_outcomes()
+
+
+@pytest.mark.parametrize(('mode', 'number'), [('csp', 8), ('pp', 1), ('csv', 9), ('ip', 7)])
+class TestHoming:
+
+    def test_there_and_back(self, mode: str, number: int) -> None:
+        axis, drive = meet(mode, homing=True)
+        axis.take()
+        assert home(axis) == [('home', True, 'homed')]
+        assert drive.found == 1
+        sent = axis.take()
+        there, back = '605#2F60600006000000', f'605#2F606000{number:02X}000000'
+        start = next(place for place, text in enumerate(sent) if text.startswith('205#1F00')
+                     and place > sent.index(there))
+        assert any(text.startswith('205#0F00') for text in sent[:sent.index(there)])
+        assert sent.index('605#4061600000000000') < start
+        end = max(place for place, text in enumerate(sent[:sent.index(back)])
+                  if text.startswith('205#1F00'))
+        assert [text[:8] for text in sent[end:sent.index(back)] if text.startswith('205#')][1:]
+        assert drive.state == drive.ENABLED
+        assert drive.number(0x6060) == number
+        assert axis.session.state is DriveState.NOT_ARMED
+        if mode != 'csv':       # latched where it is now
+            assert sent[sent.index(back) - 2].endswith('07000000')
+
+    def test_nothing_arms_meanwhile(self, mode: str, number: int) -> None:
+        axis, drive = meet(mode, homing=True)
+        drive.homing = -1
+        home(axis, 0.2)
+        assert axis.session.busy == says('homing')
+        neutral = axis.session.setpoints.items[0].neutral
+        axis.commands(float(neutral))
+        assert axis.session.state is DriveState.NOT_ARMED
+
+    def test_what_ends_it(self, mode: str, number: int) -> None:
+        axis, drive = meet(mode, homing=True, homing_timeout=1.0)
+        drive.homing = -2
+        assert home(axis) == [('home', False, says('homing_failed'))]
+        assert drive.number(0x6060) == number
+        drive.homing = -1
+        assert home(axis, 1.5) == [('home', False, says(
+            'homing_timed_out', timeout=1.0, step='on its way'))]
+        assert drive.number(0x6060) == number
+        assert drive.state == drive.ENABLED
+
+    def test_a_stop_stops_it(self, mode: str, number: int) -> None:
+        axis, drive = meet(mode, homing=True)
+        drive.homing = -1
+        home(axis, 0.2)
+        outcomes = axis.asks(ControlAction.DISABLE, 0.5)
+        assert ('home', False, says('homing_stopped', step='on its way')) in outcomes
+        assert ('disable', True, 'ready to switch on') in outcomes
+        assert drive.number(0x6060) == number
+        assert axis.session.busy == ''
+        assert axis.asks(ControlAction.ENABLE) == [('enable', True, 'operation enabled')]
+
+    def test_when_it_cannot_begin(self, mode: str, number: int) -> None:
+        axis, _ = meet(mode, homing=True)
+        setpoint = axis.session.setpoints.items[0]
+        axis.commands(float(setpoint.neutral))
+        assert home(axis, 0.01) == [('home', False, says('homing_needs_disarmed'))]
+        axis.asks(ControlAction.DISABLE)
+        assert home(axis, 0.01) == [('home', False, says('homing_needs_enabled'))]
+
+    def test_attained_bits_of_before_do_not_count(self, mode: str, number: int) -> None:
+        axis, drive = meet(mode, homing=True)
+        drive.homing = 30
+        control = drive._control
+
+        def keeps(word: int) -> None:
+            control(word)
+            if drive.number(0x6060) == 6 and drive._left == 0:
+                drive.bits = 0x1400
+                drive.becomes(drive.state)
+        drive._control = keeps      # type: ignore[method-assign]
+        assert home(axis, 0.2) == []
+        axis.live(0.5)
+        assert axis.talk.control_outcomes() == [('home', True, 'homed')]
+        assert drive.found == 1

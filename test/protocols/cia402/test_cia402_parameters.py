@@ -1,0 +1,134 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Parameters by SDO: every width, refusals in words, what is longer than four bytes."""
+
+from typing import Any
+
+from builders import parameter, read, RO, text_of, WO, write
+import pytest
+from servo_builders import Axis, TABLE
+
+from drive_can_bridge.core.directory import ParameterDirectory
+from drive_can_bridge.core.events import RequestCompleted
+from drive_can_bridge.core.parameters import Parameter, ParameterType
+from drive_can_bridge.protocols.families import FAMILIES
+
+NAME = parameter('device_name', None, index=0x1008, type=ParameterType.UINT32, access=RO)
+METHOD = parameter('homing_method', None, index=0x6098, subindex=0, type=ParameterType.INT8)
+BYTE = parameter('byte', None, index=0x2001, subindex=1, type=ParameterType.UINT8)
+FLAG = parameter('flag', None, index=0x2002, subindex=0, type=ParameterType.BOOL)
+WORD = parameter('word', None, index=0x2003, subindex=0, type=ParameterType.INT16)
+LONG = parameter('long', None, index=0x2004, subindex=0, type=ParameterType.UINT32)
+ORDER = parameter('order', None, index=0x2005, subindex=0, type=ParameterType.UINT16, access=WO)
+LISTED = (*TABLE, NAME, METHOD, BYTE, FLAG, WORD, LONG, ORDER)
+OBJECTS = {(0x6098, 0): b'\xFF', (0x2001, 1): b'\x80', (0x2002, 0): b'\1',
+           (0x2003, 0): b'\xFE\xFF',
+           (0x2004, 0): b'\1\2\3\x84', (0x2005, 0): b'\0\0', (0x2006, 0): b'\x81'}
+
+
+@pytest.fixture(name='axis')
+def _axis() -> Axis:
+    return Axis(objects=OBJECTS, table=LISTED).online()
+
+
+def outcomes(axis: Axis, request: Any) -> list[object]:
+    axis.deliver(axis.talk.submits(request, axis.now))
+    axis.live(2.0)
+    completed, = axis.talk.events(RequestCompleted)
+    return [text_of(outcome) for outcome in completed.outcomes]
+
+
+def raw(name: str, axis: Axis) -> Parameter:
+    drive = axis.session.configuration
+    found = ParameterDirectory(drive.profile.parameters, lambda text: FAMILIES[
+        'cia402'].raw_parameter(drive, text)).find(name)
+    assert found is not None
+    return found
+
+
+def test_every_width_is_read_by_its_type(axis: Axis) -> None:
+    assert outcomes(axis, read(METHOD, BYTE, FLAG, WORD, LONG)) == [-1, 0x80, 1, -2, 0x84030201]
+    assert [text for text in axis.take() if text[:10] in ('605#409860', '605#400120')] == [
+        '605#4098600000000000', '605#4001200100000000']
+
+
+def test_every_width_is_written(axis: Axis) -> None:
+    assert outcomes(axis, write((METHOD, -2), (BYTE, 7), (FLAG, 0), (WORD, -3), (LONG, 9))) == [
+        'written'] * 5
+    assert [text for text in axis.take() if text.startswith('605#2')] == [
+        '605#2F986000FE000000', '605#2F01200107000000', '605#2F02200000000000',
+        '605#2B032000FDFF0000', '605#2304200009000000']
+
+
+def test_raw_names_take_the_width_that_the_device_answers(axis: Axis) -> None:
+    for name, value in (('x2006.0', 0x81), ('x2003.00', 0xFFFE), ('x2004.00', 0x84030201)):
+        assert outcomes(axis, read(raw(name, axis))) == [value], name
+    axis.take()
+    assert outcomes(axis, write((raw('x2006.0', axis), -1))) == ['written']
+    assert '605#2F062000FF000000' in axis.take()
+    assert outcomes(axis, write((raw('x2006.0', axis), 300))) == [
+        '300 is not representable in 8 bits: -128 to 255']
+
+
+def test_refusals_in_words(axis: Axis) -> None:
+    axis.drive.fixed = {(0x2003, 0): 0x06090031}
+    assert outcomes(axis, write((WORD, 5))) == [
+        'refused by the drive: 06090031h (value too high)']
+    del axis.drive.objects[0x2001, 1]
+    assert outcomes(axis, read(BYTE)) == [
+        'refused by the drive: 06020000h (no such register or object)']
+
+
+def test_another_length_than_the_profile_says(axis: Axis) -> None:
+    axis.drive.objects[0x2003, 0] = b'\5'
+    assert outcomes(axis, read(WORD)) == [
+        'the drive answers with 1 byte, the profile says int16']
+
+
+def test_what_can_only_be_written_has_to_be_listed(axis: Axis) -> None:
+    sdo = axis.drive._sdo
+
+    def write_only(data: bytes) -> bytes:
+        if data[:4] == bytes.fromhex('40072000'):
+            return bytes.fromhex('8007200001000106')
+        return sdo(data)
+    axis.drive._sdo = write_only    # type: ignore[method-assign]
+    (why,) = outcomes(axis, write((raw('x2007.0', axis), 1)))
+    assert 'nobody knows' in str(why)
+    assert not any(text.startswith('605#2B0720') for text in axis.take())
+
+
+def test_texts_are_no_numbers(axis: Axis) -> None:
+    """A device name in segments, as CiA 301 sends them."""
+    answers = {'4008100000000000': '4108100009000000', '6000000000000000': '0053657276696365',
+               '7000000000000000': '1D64730000000000'}
+    sdo = axis.drive._sdo
+    axis.drive._sdo = lambda data: bytes.fromhex(     # type: ignore[method-assign]
+        answers.get(data.hex(), sdo(data).hex()))
+    assert outcomes(axis, read(NAME)) == ['8 bytes: only objects of 1 to 4 bytes are numbers']
+    sent = axis.take()
+    at = sent.index('605#4008100000000000')
+    assert [text for text in sent[at:] if text.startswith('605#')][:3] == [
+        '605#4008100000000000', '605#6000000000000000', '605#7000000000000000']
+
+
+def test_a_drive_that_gives_up_in_the_middle_of_its_segments(axis: Axis) -> None:
+    sdo = axis.drive._sdo
+    axis.drive._sdo = lambda data: bytes.fromhex(     # type: ignore[method-assign]
+        {'4008100000000000': '4108100009000000'}.get(data.hex(), sdo(data).hex()))
+    takes = axis.drive.takes
+    axis.drive.takes = lambda sent: [] if sent.data[:1] == b'\x60' and (   # type: ignore
+        sent.identifier == 0x605) else takes(sent)
+    (why,) = outcomes(axis, read(NAME))
+    assert 'no answer' in str(why)
+    assert '605#8008100000000405' in axis.take()
+
+
+def test_together_or_not_at_all(axis: Axis) -> None:
+    assert all('an SDO carries one object' in str(why) for why in outcomes(
+        axis, write((BYTE, 1), (WORD, 1), atomic=True)))
+
+
+def test_parameters_of_a_drive_that_differs(axis: Axis) -> None:
+    axis = Axis(objects={**OBJECTS, (0x1019, 0): b'\5'}, table=LISTED)
+    axis.start()
+    assert outcomes(axis, read(BYTE)) == [0x80]

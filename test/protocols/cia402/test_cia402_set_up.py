@@ -1,0 +1,290 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""What a drive is told before its first PDO, and what is said where it does not fit."""
+
+from typing import Any
+
+import pytest
+from saying import says
+from servo_builders import Axis, POSITION, TORQUE, VELOCITY
+
+from drive_can_bridge.core.drive_state import DriveState
+from drive_can_bridge.core.events import MappingDiffered, Noted
+from drive_can_bridge.core.sentences import Sentence
+
+RPDO, TPDO = (0x1400, 1), (0x1800, 1)
+#: COB-ID, type and mapping as the bridge writes them for csv with the position
+FITTING = {
+    (0x1400, 1): '05020000', (0x1400, 2): '01', (0x1600, 0): '02', (0x1600, 1): '10004060',
+    (0x1600, 2): '2000FF60', (0x1800, 1): '85010000', (0x1800, 2): '01', (0x1A00, 0): '02',
+    (0x1A00, 1): '10004160', (0x1A00, 2): '20006460'}
+FITS = {place: bytes.fromhex(text) for place, text in FITTING.items()}
+
+
+def meet(mode: str = 'csv', objects: dict[Any, Any] | None = None, **options: Any) -> Axis:
+    axis = Axis(mode, objects, **options)
+    axis.start()
+    return axis
+
+
+def written(axis: Axis) -> list[str]:
+    """Return what was written by SDO, the command left out."""
+    return [text[6:] for text in axis.take() if text.startswith('605#2')]
+
+
+def differs(axis: Axis) -> Sentence:
+    assert axis.session.state is DriveState.MAPPING_DIFFERS
+    assert not any(text.startswith(('205#', '080#')) for text in axis.take())
+    told, = axis.talk.events(MappingDiffered)
+    return told.text
+
+
+def notes(axis: Axis) -> list[str]:
+    return [note.text for note in axis.talk.events(Noted) if note.warning]
+
+
+class TestConfigure:
+
+    def test_in_the_order_of_the_notes_each_read_back(self) -> None:
+        axis = meet()
+        assert axis.session.online
+        sent = axis.take()
+        first = sent.index('605#4000140100000000')
+        assert sent[sent.index('000#8005'):first]       # pre-operational before
+        assert sent[first:first + 14] == [
+            '605#4000140100000000', '605#4000140200000000', '605#2300140105020080',
+            '605#2F00160000000000', '605#2300160110004060', '605#230016022000FF60',
+            '605#2F00160002000000', '605#2F00140201000000', '605#2300140105020000',
+            '605#4000140100000000', '605#4000140200000000', '605#4000160000000000',
+            '605#4000160100000000', '605#4000160200000000']
+        assert sent.index('000#0105') > sent.index('605#2F60600009000000')
+
+    def test_bits_29_and_30_stay_as_they_were_read(self) -> None:
+        axis = meet(objects={RPDO: bytes.fromhex('05020040')})
+        assert '00140105020040' in written(axis)
+        assert axis.session.online
+
+    def test_what_fits_is_not_written(self) -> None:
+        axis = meet(objects=FITS)
+        assert axis.session.online
+        assert written(axis) == ['17100064000000', '60600009000000', '16100158027F00']
+
+    def test_a_fixed_mapping_that_fits(self) -> None:
+        axis = Axis(objects=FITS)
+        axis.drive.fixed = dict.fromkeys(FITS, 0x06010000)
+        axis.start()
+        assert axis.session.online
+
+    def test_a_fixed_mapping_that_does_not(self) -> None:
+        axis = Axis()
+        axis.drive.fixed = {(0x1600, 1): 0x06040041}
+        axis.start()
+        assert differs(axis) == ('1600h.01h refused by the drive: 06040041h (object cannot be '
+                                 'mapped to a PDO)')
+        axis.drive.fixed.clear()
+        axis.live(1.1)
+        assert axis.session.online      # looked at again
+
+    def test_pdos_that_are_not_needed_are_made_invalid(self) -> None:
+        axis = meet(objects={(0x1401, 1): bytes.fromhex('05030000'),
+                             (0x1803, 1): bytes.fromhex('85040040')})
+        sent = written(axis)
+        assert '01140105030080' in sent
+        assert '031801850400C0' in sent
+
+    def test_a_type_1_that_an_rpdo_refuses(self) -> None:
+        axis = Axis()
+        axis.drive.fixed = {(0x1400, 2): 0x06090030}
+        sdo = axis.drive._sdo
+
+        def once(data: bytes) -> bytes:
+            if data[:5] == bytes.fromhex('2F001402FF'):
+                axis.drive.fixed.clear()
+            return sdo(data)
+        axis.drive._sdo = once          # type: ignore[method-assign]
+        axis.start()
+        sent = written(axis)
+        assert sent.index('001402FF000000') == sent.index('00140201000000') + 1
+        assert axis.session.online
+
+    def test_a_type_1_that_a_tpdo_refuses(self) -> None:
+        axis = Axis()
+        axis.drive.fixed = {(0x1800, 2): 0x06090030}
+        axis.start()
+        assert '1800h.02h' in differs(axis)
+
+    def test_two_pdos_each_way(self) -> None:
+        axis = Axis(request_pdos=(1, 3), response_pdos=(2, 4), response=(
+            POSITION, VELOCITY, TORQUE))
+        axis.start()
+        assert axis.session.online
+        sent = axis.take()
+        assert '605#23011A0220006460' in sent
+        assert '605#23031A0120006C60' in sent
+        assert '605#23031A0210007760' in sent
+        sample = axis.talk.samples()[-1]
+        assert sample[1:] == (1000, 0, 0)
+
+
+class TestWithoutWriting:
+
+    def test_verify_reads_only(self) -> None:
+        axis = meet(objects=FITS, mapping='verify')
+        assert axis.session.online
+        assert written(axis) == ['17100064000000', '60600009000000']
+
+    @pytest.mark.parametrize(('place', 'content', 'cycled'), [
+        ((0x1400, 1), '05020040', True),        # bit 30 does not matter
+        ((0x1400, 1), '05020080', False), ((0x1400, 1), '05020020', False),
+        ((0x1400, 2), 'FF', True),              # nor the type of an RPDO
+        ((0x1800, 2), 'FF', False), ((0x1600, 2), '10004260', False),
+        ((0x1A00, 0), '01', False), ((0x1401, 1), '05030000', True),
+        ((0x1005, 0), '80000040', False), ((0x1005, 0), '81000000', False),
+        ((0x1006, 0), '10270000', True), ((0x1006, 0), '11270000', False),
+        ((0x1019, 0), '0A', False), ((0x1019, 0), '00', True)])
+    def test_what_verify_wants(self, place: tuple[int, int], content: str, cycled: bool) -> None:
+        axis = meet(objects={**FITS, place: bytes.fromhex(content)}, mapping='verify')
+        assert axis.session.online is cycled
+        if not cycled:
+            assert f'{place[0]:04X}h.{place[1]:02X}h' in differs(axis)
+
+    def test_assume_does_not_look(self) -> None:
+        axis = Axis(mapping='assume')
+        axis.drive.objects.update(FITS)
+        axis.start()
+        assert axis.session.online
+        assert not any(text[4:].startswith(('400014', '400018', '400510')) for text in axis.take())
+
+
+class TestSync:
+
+    def test_a_drive_that_produces_it_stops_doing_so(self) -> None:
+        axis = meet(objects={(0x1005, 0): bytes.fromhex('80000040'),
+                             (0x1006, 0): bytes.fromhex('20030000')})
+        sent = written(axis)
+        assert '05100080000000' in sent
+        assert '06100010270000' in sent
+        assert axis.session.online
+
+    def test_one_that_counts(self) -> None:
+        axis = meet(objects={(0x1019, 0): b'\x0A'})
+        assert '1019h' in differs(axis)
+
+
+class TestMode:
+
+    def test_one_that_the_drive_does_not_offer(self) -> None:
+        axis = meet(objects={(0x6502, 0): bytes.fromhex('25000000')})
+        assert differs(axis) == says('mode_not_offered', mode='csv', number=9, offered=0x25)
+
+    def test_no_6502h(self) -> None:
+        axis = Axis()
+        del axis.drive.objects[0x6502, 0]
+        axis.start()
+        assert axis.session.online
+
+    @pytest.mark.parametrize(('period', 'sent'), [
+        (0.01, ['C26002FD000000', 'C260010A000000']), (0.0005, ['C26002FC000000',
+                                                                'C2600105000000'])])
+    def test_interpolation_time(self, period: float, sent: list[str]) -> None:
+        axis = meet(objects={(0x60C2, 1): b'\1', (0x60C2, 2): b'\xFE'}, period=period)
+        assert [text for text in written(axis) if text.startswith('C260')] == sent
+
+    def test_a_period_that_it_cannot_say(self) -> None:
+        axis = meet(objects={(0x60C2, 1): b'\1', (0x60C2, 2): b'\xFE'}, period=1 / 300)
+        assert not [text for text in written(axis) if text.startswith('C260')]
+        assert notes(axis) == [says('interpolation_time_left')]
+        assert axis.session.online
+
+
+class TestWatches:
+
+    @pytest.mark.parametrize(('entries', 'wanted'), [
+        (['00000000'], '16100158027F00'), (['64000100', '00000000'], '16100258027F00'),
+        (['64000100', '64007F00'], '16100258027F00')])
+    def test_where_the_bridge_is_entered(self, entries: list[str], wanted: str) -> None:
+        axis = meet(objects={(0x1016, 0): bytes((len(entries),)), **{
+            (0x1016, place): bytes.fromhex(text) for place, text in enumerate(entries, 1)}})
+        sent = axis.log
+        begun = next(at for at, text in sent if text == '77F#05')
+        assert begun <= next(at for at, text in sent if text[6:] == wanted)
+        assert says('nothing_stops') not in notes(axis)
+
+    @pytest.mark.parametrize('objects', [
+        {(0x1016, 1): bytes.fromhex('64000100')}, {(0x6007, 0): bytes(2)}, {(0x1016, 0): b'\0'}])
+    def test_nothing_stops_it(self, objects: dict[Any, Any]) -> None:
+        axis = meet(objects=objects)
+        assert notes(axis).count(says('nothing_stops')) == 1
+        assert axis.session.online
+
+    def test_no_6007h_counts_as_watching(self) -> None:
+        axis = Axis()
+        del axis.drive.objects[0x6007, 0]
+        axis.start()
+        assert says('nothing_stops') not in notes(axis)
+
+    def test_off(self) -> None:
+        axis = meet(bridge_heartbeat=0.0)
+        assert '77F#05' not in axis.take()
+        assert says('nothing_stops') in notes(axis)
+
+    def test_not_known_under_assume(self) -> None:
+        axis = meet(objects=FITS, mapping='assume')
+        assert says('watch_unknown') in notes(axis)
+
+    def test_too_short_under_verify(self) -> None:
+        axis = meet(objects={**FITS, (0x1016, 1): bytes.fromhex('8F017F00')}, mapping='verify')
+        assert '1016h.01h' in differs(axis)
+        axis = meet(objects={**FITS, (0x1016, 1): bytes.fromhex('90017F00')}, mapping='verify')
+        assert axis.session.online
+        assert says('watch_stays', what='1016h.01h') in notes(axis)
+
+    def test_a_drive_without_a_producer_is_not_watched(self) -> None:
+        axis = Axis()
+        del axis.drive.objects[0x1017, 0]
+        axis.drive.number = lambda index, subindex=0: int.from_bytes(   # type: ignore
+            axis.drive.objects.get((index, subindex), b''), 'little')
+        axis.start()
+        axis.live(2.0)
+        assert axis.session.online
+        assert notes(axis).count(says('no_heartbeat_producer')) == 1
+
+
+class TestNoNmt:
+
+    def test_none_is_sent_and_what_fits_is_cycled(self) -> None:
+        axis = Axis(objects=FITS, nmt_start=False)
+        axis.drive.operational = True
+        axis.start()
+        assert axis.session.online
+        assert not any(text.startswith('000#') for text in axis.take())
+
+    def test_written_only_where_the_node_is_found_pre_operational(self) -> None:
+        axis = Axis(nmt_start=False)
+        axis.drive.operational = True
+        axis.start()
+        axis.live(0.5)
+        assert 'not known to be pre-operational' in differs(axis)
+        axis = Axis(nmt_start=False)
+        axis.start()
+        assert '00140105020000' in written(axis)
+        assert not axis.session.online
+        axis.drive.operational = True
+        axis.live(0.5)
+        assert axis.session.online
+
+
+class TestHeldAxes:
+
+    def test_the_position_is_read_before_the_first_pdo(self) -> None:
+        axis = meet('csp')
+        first = next(text for text in axis.take() if text.startswith('205#'))
+        assert first == '205#0600E8030000'
+
+    def test_it_is_told_nothing_but_where_it_is(self) -> None:
+        axis = Axis('csp').enabled()
+        axis.drive.objects[0x6064, 0] = (1005).to_bytes(4, 'little')
+        axis.live(0.1)
+        assert {text for text in axis.take() if text.startswith('205#')} == {'205#0F00E8030000'}
+        axis.commands(1003.0, 1100.0)
+        axis.live(0.02)
+        assert '205#0F004C040000' in axis.take()

@@ -1,0 +1,258 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Whatever was told to run is told to stop: by cycles, by SDO, at the end and after losses."""
+
+from builders import Conversation
+import pytest
+from saying import says
+from servo_builders import Axis, servo
+
+from drive_can_bridge.core.drive_state import DriveState
+from drive_can_bridge.core.events import Noted, StationLost
+
+WATCH_OFF = '605#2316100100000000'
+DISABLE_BY_SDO = '605#2B40600007000000'
+
+
+def running(**options: object) -> Axis:
+    axis = Axis(**options).enabled()    # type: ignore[arg-type]
+    axis.commands(0.0, 100.0)
+    axis.live(0.05)
+    assert axis.drive.objects[0x60FF, 0] == (1000).to_bytes(4, 'little')
+    axis.take()
+    axis.talk.events()
+    return axis
+
+
+def end(axis: Axis) -> list[str]:
+    """End the activation; return the frames from then on."""
+    axis.take()
+    axis.deliver(axis.talk.deactivate(axis.now))
+    axis.live(5.0)
+    assert axis.session.stopped
+    return axis.take()
+
+
+def doubts(axis: Axis) -> list[str]:
+    return [note.text for note in axis.talk.events(Noted) if note.danger]
+
+
+class TestTheEnd:
+
+    def test_a_drive_that_ramps_down_is_waited_for(self) -> None:
+        axis = running()
+        axis.drive.ramp = 50
+        sent = end(axis)
+        cycles = [text for text in sent if text.startswith('205#')]
+        assert cycles.count('205#070000000000') in (50, 51)
+        assert cycles[-1] == '205#060000000000'
+        assert axis.drive.state == axis.drive.READY
+        assert sent[-1] == WATCH_OFF
+        assert doubts(axis) == []
+
+    def test_but_not_for_ever(self) -> None:
+        axis = running(control_timeout=0.5)
+        axis.drive.ramp = 1000
+        began = axis.now
+        sent = end(axis)
+        assert WATCH_OFF not in sent        # so that it stops by itself
+        assert 45 <= sent.count('205#070000000000') <= 55
+        assert doubts(axis)
+        assert axis.now - began < 6
+
+    def test_at_least_three_cycles_of_one_that_is_disabled(self) -> None:
+        axis = Axis().online()
+        sent = end(axis)
+        assert sent.count('205#060000000000') == 3
+        assert sent[-1] == WATCH_OFF
+        assert doubts(axis) == []
+
+    def test_of_one_that_has_fallen_silent(self) -> None:
+        axis = running()
+        axis.mute = True
+        sent = end(axis)
+        assert sent.count('205#070000000000') == 6
+        assert WATCH_OFF not in sent
+        assert doubts(axis)
+
+    def test_heartbeats_of_the_bridge_go_on_until_the_drive_does_not_watch_it(self) -> None:
+        axis = running(control_timeout=2.0)
+        axis.drive.ramp = 100
+        sent = end(axis)
+        assert sent.count('77F#05') >= 4
+        assert '77F#05' not in sent[sent.index(WATCH_OFF):]
+
+    def test_in_the_middle_of_the_set_up(self) -> None:
+        axis = Axis()
+        axis.deliver(axis.talk.bus_up(axis.now))
+        axis.deaf = True
+        axis.deliver(axis.talk.activate(axis.now))
+        axis.live(1.0)
+        sent = end(axis)
+        assert not any(text.startswith('205#') for text in sent)
+        assert doubts(axis) == []
+
+
+class TestFoundEnabled:
+
+    @staticmethod
+    def meet(**options: object) -> Axis:
+        axis = Axis(**options)  # type: ignore[arg-type]
+        axis.drive.operational = True
+        for word in (0x06, 0x07, 0x0F):
+            axis.drive._control(word)
+        axis.drive.told.clear()
+        assert axis.drive.state == axis.drive.ENABLED
+        return axis
+
+    @pytest.mark.parametrize(('option', 'word'), [
+        ('disable_operation', '0700'), ('shutdown', '0600'), ('disable_voltage', '0000')])
+    def test_it_is_disabled_by_sdo_before_anything_else(self, option: str, word: str) -> None:
+        axis = self.meet(disable_word=option)
+        axis.start()
+        sent = [text for text in axis.take() if text.startswith(('605#', '000#', '205#'))]
+        assert sent[:3] == ['605#4041600000000000', f'605#2B406000{word}0000',
+                            '605#4041600000000000']
+        assert axis.session.online
+
+    def test_one_that_takes_its_time_is_waited_for(self) -> None:
+        axis = self.meet()
+        axis.drive.ramp = 1000
+        axis.deliver(axis.talk.bus_up(axis.now))
+        axis.deliver(axis.talk.activate(axis.now))
+        axis.live(1.0)
+        assert not any(text.startswith(('000#', '205#', '605#2F6060')) for text in axis.take())
+        axis.drive.becomes(axis.drive.ON)
+        axis.live(0.3)
+        assert axis.session.online
+
+    def test_one_that_does_not_leave_is_not_cycled_and_named(self) -> None:
+        axis = self.meet(control_timeout=0.5)
+        axis.drive.ramp = 1000
+        axis.deliver(axis.talk.bus_up(axis.now))
+        axis.deliver(axis.talk.activate(axis.now))
+        axis.live(4.0)
+        assert not any(text.startswith(('000#', '205#')) for text in axis.take())
+        assert axis.session.state is DriveState.OFFLINE
+        assert doubts(axis) == [says('may_still_be_running', why=says(
+            'found_running', state='operation enabled'))]
+
+
+class TestLosses:
+
+    def test_a_drive_that_falls_silent_gets_neutral_cycles_then_sdo(self) -> None:
+        axis = running()
+        axis.mute = True
+        axis.live(0.2)
+        sent = [text for text in axis.take() if text.startswith(('205#', '605#'))]
+        quiet = sent.index('605#2B40600007000000')
+        assert set(sent[quiet - 3:quiet]) == {'205#070000000000'}
+        assert not any(text.startswith('205#') for text in sent[quiet:])
+        assert axis.talk.events(StationLost)
+        axis.mute = False
+        axis.live(1.0)
+        assert axis.session.online
+        assert axis.session.state is DriveState.DISABLED
+
+    def test_a_node_that_restarts_is_set_up_anew(self) -> None:
+        axis = running()
+        for each in axis.drive.restarts():
+            axis.says(str(each))
+        axis.live(0.5)
+        lost, = axis.talk.events(StationLost)
+        assert lost.reason == says('device_restarted')
+        assert axis.session.online
+        assert axis.session.state is DriveState.DISABLED
+        sent = axis.take()
+        assert '605#2F60600009000000' in sent
+        assert not any(text.startswith('205#') and text[4:] not in ('060000000000',)
+                       for text in sent[sent.index('605#2F60600009000000'):])
+
+    def test_heartbeats_that_cease(self) -> None:
+        axis = running()
+        axis.says('705#05')
+        axis.drive.objects[0x1017, 0] = b'\0\0'
+        axis.live(0.4)
+        lost, = axis.talk.events(StationLost)
+        assert lost.reason == says('no_heartbeat', timeout=0.35)
+
+    def test_a_node_that_is_not_operational_any_more(self) -> None:
+        axis = running()
+        axis.live(0.2)
+        axis.drive.operational = False
+        axis.says('705#7F')
+        axis.live(0.3)
+        lost, = axis.talk.events(StationLost)
+        assert lost.reason == says('node_state', state='pre-operational')
+        assert axis.session.online
+
+    def test_the_bus_comes_back(self) -> None:
+        axis = running()
+        axis.talk.now = axis.now
+        axis.deliver(axis.talk.bus_down(axis.now))
+        axis.live(0.5)
+        assert axis.take() == []
+        assert axis.drive.state == axis.drive.ENABLED
+        axis.deliver(axis.talk.bus_up(axis.now))
+        axis.live(0.5)
+        sent = [text for text in axis.take() if text.startswith(('205#', '605#'))]
+        assert sent[0] == DISABLE_BY_SDO
+        assert axis.session.online
+        assert axis.session.state is DriveState.DISABLED
+
+    def test_a_process_that_stood_still(self) -> None:
+        axis = running()
+        axis.now += 2.0
+        axis.talk.now = axis.now
+        axis.session.time_lost(axis.now)
+        axis.deliver(axis.talk.sent())
+        axis.live(0.5)
+        assert axis.session.online
+        assert axis.session.state is DriveState.DISABLED
+        assert axis.drive.state == axis.drive.READY
+
+
+def test_nothing_is_sent_where_there_is_nothing_to_be_stopped() -> None:
+    talk = Conversation(servo())
+    talk.bus_up(10.0)
+    talk.deactivate(10.0)
+    assert talk.session.stopped
+    assert talk.session.next_timer() == float('inf')
+
+
+class TestNmt:
+
+    def test_at_most_once_a_second_to_a_drive_that_is_offline(self) -> None:
+        axis = Axis(parameter_timeout=0.05)
+        axis.deaf = True
+        axis.start()
+        axis.live(5.0)
+        sent = [at for at, text in axis.log if text == '000#8005']
+        assert 4 <= len(sent) <= 6
+        assert min(later - at for at, later in zip(sent, sent[1:])) >= 0.999
+
+    def test_nor_to_one_that_answers_sdo_and_sends_no_pdos(self) -> None:
+        axis = Axis()
+        responses = axis.drive.responses
+        axis.drive.responses = lambda *kinds: []    # type: ignore[method-assign]
+        axis.start()
+        axis.live(5.0)
+        sent = [at for at, text in axis.log if text == '000#0105']
+        assert 4 <= len(sent) <= 6
+        axis.drive.responses = responses            # type: ignore[method-assign]
+        axis.live(1.5)
+        assert axis.session.online
+
+    def test_nor_ten_times_a_second_to_one_that_starts_all_the_time(self) -> None:
+        axis = Axis().online()
+        for _ in range(200):
+            axis.says('705#00')
+            axis.live(0.01)
+        sent = axis.take()
+        assert sent.count('000#0105') <= sent.count('000#8005') <= 21
+
+    def test_none_without_nmt_start(self) -> None:
+        axis = Axis(nmt_start=False)
+        axis.deaf = True
+        axis.start()
+        axis.live(3.0)
+        assert not any(text.startswith('000#') for text in axis.take())

@@ -1,0 +1,270 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""One SYNC for all drives of a bus, and the pace that a drive has of its own (event)."""
+
+from typing import Any
+
+from literal_drives import ServoDrive
+from servo_builders import Axis, OBJECTS, servo
+
+from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.control import ControlAction, ControlRequest
+from drive_can_bridge.core.events import ProcessDataReceived
+from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.protocols.families import make_sessions
+
+DELAY = 0.0002
+
+
+class Bus:
+    """Sessions of one bus, served as the exchange serves them: each when it wanted to be."""
+
+    def __init__(self, *drives: DriveConfiguration) -> None:
+        self.sessions = make_sessions(drives)
+        self.drives = {drive.station: ServoDrive(drive.station, OBJECTS) for drive in drives}
+        self.due = [float('inf')] * len(drives)
+        self.now = 10.0
+        self.log: list[tuple[float, str]] = []
+        self.coming: list[tuple[float, Frame]] = []
+        self.events: dict[str, list[Any]] = {drive.name: [] for drive in drives}
+
+    def pump(self, place: int) -> None:
+        session = self.sessions[place]
+        while frames := session.take_frames():
+            session.frames_left(self.now)
+            for sent in frames:
+                self.log.append((round(self.now, 6), str(sent)))
+                for drive in self.drives.values():
+                    self.coming += [(self.now + DELAY, answer) for answer in drive.takes(sent)]
+        self.events[session.configuration.name] += session.take_events()
+        self.due[place] = session.next_timer()
+
+    def start(self, *places: int) -> None:
+        for place in places or range(len(self.sessions)):
+            self.sessions[place].bus_up(self.now)
+            self.sessions[place].activate(self.now)
+            self.pump(place)
+
+    def live(self, duration: float) -> None:
+        end = self.now + duration
+        while True:
+            arrives = min((at for at, _ in self.coming), default=float('inf'))
+            soonest = min(*self.due, arrives)
+            if soonest > end:
+                self.now = end
+                return
+            self.now = max(self.now, soonest)
+            if arrives <= soonest:
+                entry = min(self.coming, key=lambda each: each[0])
+                self.coming.remove(entry)
+                node = entry[1].identifier & 0x7F
+                for place, session in enumerate(self.sessions):
+                    if session.configuration.station == node:
+                        session.receive_frame(entry[1], self.now)
+                        self.pump(place)
+                continue
+            for place, session in enumerate(self.sessions):
+                if self.due[place] <= self.now:
+                    session.handle_timer(self.now)
+                    self.pump(place)
+
+    def asks(self, place: int, action: ControlAction) -> None:
+        self.sessions[place].users.submit(ControlRequest(action), self.now)
+        self.pump(place)
+
+    def rounds(self) -> list[list[str]]:
+        """Return the identifiers of RPDOs and SYNC sent since the last call, round by round."""
+        log, self.log = self.log, []
+        found: list[list[str]] = [[]]
+        for _, text in log:
+            if text.startswith(('20', '080')):
+                found[-1].append(text[:3])
+                if text.startswith('080'):
+                    found.append([])
+        return [entry for entry in found if entry]
+
+
+def bus(count: int = 3, mode: str = 'pv', **options: Any) -> Bus:
+    return Bus(*(servo(mode, name=f'axis_{station}', station=station, **options)
+                 for station in range(1, count + 1)))
+
+
+def online(of: Bus) -> list[bool]:
+    return [session.online for session in of.sessions]
+
+
+class TestRounds:
+
+    def test_all_rpdos_then_sync_once_a_period(self) -> None:
+        one = bus()
+        one.start()
+        one.live(0.5)
+        assert online(one) == [True] * 3
+        one.rounds()
+        before = one.now
+        one.live(1.0)
+        syncs = [at for at, text in one.log if text == '080#' and at > before]
+        assert one.rounds() == [['201', '202', '203', '080']] * 100
+        assert {round(later - at, 5) for at, later in zip(syncs, syncs[1:])} == {0.01}
+
+    def test_one_that_comes_later_joins(self) -> None:
+        one = bus()
+        one.start(0, 2)
+        one.live(0.5)
+        one.rounds()
+        one.start(1)
+        one.live(0.5)
+        rounds = one.rounds()
+        assert online(one) == [True] * 3
+        assert rounds[-10:] == [['201', '202', '203', '080']] * 10
+        assert all(each[-1] == '080' and each.count('080') == 1 for each in rounds)
+        assert {each[0] for each in rounds} == {'201'}
+
+    def test_one_that_is_lost_leaves_the_others_in_peace(self) -> None:
+        one = bus()
+        one.start()
+        one.live(0.5)
+        takes, one.drives[3].takes = one.drives[3].takes, lambda sent: []  # type: ignore
+        one.rounds()
+        one.live(1.0)
+        assert online(one) == [True, True, False]
+        assert one.rounds()[-50:] == [['201', '202', '080']] * 50
+        for session in one.sessions[:2]:
+            assert session.statistics.missed == 0
+        one.drives[3].takes = takes     # type: ignore[method-assign]
+        one.live(2.0)
+        assert online(one) == [True] * 3
+
+    def test_a_stop_waits_for_the_next_sync_in_time(self) -> None:
+        one = bus(period=0.02)
+        one.start()
+        one.live(0.5)
+        one.asks(1, ControlAction.ENABLE)
+        one.live(0.5)
+        one.live(0.012)
+        one.rounds()
+        one.asks(1, ControlAction.DISABLE)
+        assert one.rounds() == []
+        one.live(0.02)
+        assert one.rounds() == [['201', '202', '203', '080']]
+
+    def test_or_brings_a_whole_round_forward(self) -> None:
+        one = bus(period=0.2)
+        one.start()
+        one.live(2.0)
+        for place in (0, 1, 2):
+            one.asks(place, ControlAction.ENABLE)
+        one.live(2.0)
+        one.rounds()
+        while one.rounds() == []:
+            one.live(0.01)
+        one.live(0.1)
+        at = one.now
+        one.rounds()
+        one.asks(1, ControlAction.DISABLE)
+        one.live(0.006)
+        first, *more = one.rounds()
+        assert sorted(first[:3]) == ['201', '202', '203']   # whoever stops, begins
+        assert first[3:] == ['080']
+        assert len(more) < 2
+        assert one.drives[2].state in (ServoDrive.ON, ServoDrive.READY)
+        assert one.drives[1].state == one.drives[3].state == ServoDrive.ENABLED
+        assert one.now - at < 0.05
+        one.live(2.0)
+        assert all(session.statistics.missed == 0 for session in one.sessions)
+
+    def test_a_process_that_is_late_between_two_drives(self) -> None:
+        """One leaves a cycle out, the other does not: they stay in step all the same."""
+        one = bus()
+        one.start()
+        one.live(0.5)
+        one.rounds()
+        act, delays = one.sessions[0].handle_timer, [0.0149, 0.0151, 0.0049, 0.0051]
+
+        def slowly(now: float) -> None:
+            act(now)
+            if delays and round(one.now, 3) % 0.05 < 0.01:
+                one.now += delays.pop()
+        one.sessions[0].handle_timer = slowly       # type: ignore[method-assign]
+        one.live(1.0)
+        assert delays == []
+        assert {tuple(sorted(each)) for each in one.rounds()[-10:]} == {
+            ('080', '201', '202', '203')}
+        assert all(session.statistics.rejected == 0 for session in one.sessions)
+        assert len({session.next_timer() for session in one.sessions}) == 1
+
+    def test_sync_that_the_bus_refuses_is_no_stop(self) -> None:
+        axis = Axis().enabled()
+        axis.talk.refusing = lambda text: text == '080#'
+        axis.deliver(axis.talk.asks(ControlAction.DISABLE, axis.now))
+        axis.live(0.02)
+        assert axis.session.control is not None
+        assert axis.session.control.word_due
+
+    def test_one_heartbeat_for_all_the_smallest(self) -> None:
+        one = Bus(*(servo('pv', name=f'axis_{station}', station=station, bridge_heartbeat=beat)
+                    for station, beat in ((1, 0.5), (2, 0.1), (3, 0.3))))
+        one.start()
+        one.live(2.0)
+        beats = [at for at, text in one.log if text == '77F#05']
+        assert {round(later - at, 3) for at, later in zip(beats, beats[1:])} == {0.1}
+        for station, limit in ((1, 1500), (2, 300), (3, 900)):
+            assert one.drives[station].number(0x1016, 1) == 127 << 16 | limit
+
+
+class TestEvent:
+
+    @staticmethod
+    def meet(**options: Any) -> Axis:
+        axis = Axis('pv', transmission='event', objects={
+            (0x1800, 3): bytes(2), (0x1800, 5): bytes(2)}, **options)
+        takes = axis.drive.takes
+        axis.drive.takes = lambda sent: [   # type: ignore[method-assign]
+            *takes(sent), *(axis.drive.responses(255) if sent.identifier == 0x205 and (
+                axis.drive.operational) else ())]
+        axis.start()
+        return axis
+
+    def test_it_is_set_up_and_cycled_without_sync(self) -> None:
+        axis = self.meet()
+        sent = axis.take()
+        for text in ('605#2F001402FF000000', '605#2F001802FF000000', '605#2B00180332000000',
+                     '605#2B0018050A000000'):
+            assert text in sent, text
+        assert '080#' not in sent
+        assert axis.session.online
+
+    def test_what_comes_by_itself_is_a_sample_and_never_unasked(self) -> None:
+        axis = self.meet()
+        axis.talk.events()
+        for _ in range(5):
+            axis.says('185#3102E8030000')
+        axis.live(0.5)
+        assert len(axis.talk.events(ProcessDataReceived)) > 50
+        assert axis.session.statistics.rejected == axis.session.statistics.late == 0
+        assert axis.session.statistics.missed == 0
+
+    def test_missed_is_a_period_and_a_half_without_a_set(self) -> None:
+        axis = self.meet()
+        before = axis.session.statistics.missed
+        axis.mute = True
+        axis.live(0.044)
+        assert axis.session.statistics.missed - before in (2, 3)
+        axis.live(0.1)
+        assert not axis.session.online
+        axis.mute = False
+        axis.live(1.0)
+        assert axis.session.online
+
+    def test_enabled_and_stopped(self) -> None:
+        axis = self.meet()
+        assert axis.asks(ControlAction.ENABLE) == [('enable', True, 'operation enabled')]
+        axis.commands(0.0, 100.0)
+        axis.live(0.1)
+        assert axis.drive.number(0x60FF) == 1000
+        axis.deliver(axis.talk.deactivate(axis.now))
+        axis.live(3.0)
+        assert axis.session.stopped
+        assert axis.drive.state == axis.drive.READY
+        assert axis.drive.number(0x60FF) == 0
+
+
