@@ -119,7 +119,7 @@ def line_of(text: str, occurrence: int = 1) -> int:
 def test_everything_that_an_entry_can_have(tmp_path: Path) -> None:
     made = bring(tmp_path)
     assert made.profile.description == 'Müller & Söhne Drive 3000'
-    assert made.profile.protocols == ('canopen_pkw', 'cia402')
+    assert made.profile.protocols == ('canopen_pkw',)
     assert made.profile.identity == ('identity_object_vendor_id',)
     assert list(made.parameters) == [
         'device_type', 'producer_heartbeat_time', 'identity_object_vendor_id', 'ramp_time',
