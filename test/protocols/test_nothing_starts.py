@@ -17,11 +17,11 @@ from typing import Any
 
 from any_order import PATIENCE
 from builders import (
-    ACTUAL, CONTROL, Conversation, CURRENT, drive, frame, INT16, LIMIT, parameter, RAM, RO, SPEED,
-    STATUS, WORD,
+    ACTUAL, CONTROL, Conversation, CURRENT, drive, frame, INT16, INT32, LIMIT, parameter, RAM, RO,
+    SPEED, STATUS, WORD,
 )
 from hypothesis import example, given, strategies as st
-from literal_drives import ExtendedDrive, PkwNode, Registers, StandardDrive
+from literal_drives import ExtendedDrive, PkwNode, Registers, ServoDrive, StandardDrive
 import pytest
 from timeline import Timeline
 
@@ -47,6 +47,8 @@ TESYS_CONTROL = ControlTable(
     status_parameter='system_status_1', ready=StatusPattern(1, 1),
     enabled=StatusPattern(0x80, 0x80), fault=StatusPattern(4, 4))
 FREQUENCY = parameter('frequency_setpoint', None, type=INT16)
+TARGET = parameter('target_velocity', None, index=0x60FF, subindex=0, type=INT32, scale=0.1,
+                   unit='rpm')
 
 
 class Motor:
@@ -120,6 +122,30 @@ class Inverter:
         return [frame(f'003#{state}0B0000')]
 
 
+class Servo(ServoDrive):
+    """CiA 402, node 1: its motor runs while its operation is enabled."""
+
+    def __init__(self, motor: Motor) -> None:
+        self.motor = motor
+        super().__init__(1, {(0x60FF, 0): bytes(4), (0x6064, 0): bytes(4)})
+
+    def takes(self, sent: Frame) -> list[Frame]:
+        motor = self.motor
+        if motor.faulty is not (self.state == self.FAULT):
+            self.becomes(self.FAULT if motor.faulty else self.OFF)
+        elif self.state == self.ENABLED and not motor.runs:
+            self.becomes(self.OFF)      # by hand
+        answers = super().takes(sent)
+        motor.setpoint = self.number(0x60FF)
+        motor.faulty = self.state == self.FAULT
+        motor.told(self.state == self.ENABLED)
+        return answers
+
+    def restarts(self) -> list[Frame]:
+        self.objects[0x60FF, 0] = PRESET.to_bytes(4, 'little')
+        return super().restarts()
+
+
 def datamodel(motor: Motor, slot: int = 0) -> MotorRegisters:
     """Return what has its control word in the third request slot, or by number only."""
     table = {51: 0, 209: 0, 210: 0, 122: 50, 123: 51, 124: slot, 125: 0, 126: 209, 127: 210,
@@ -159,6 +185,9 @@ KINDS: dict[str, tuple[Callable[[Motor], Any], Callable[[], DriveConfiguration],
         lambda: drive_of('datamodel_standard', WORD, refresh_interval=0.05), 0.005),
     'PKW, by number': (tesys, tesys_of, 0.0),
     'PKW, with its setpoints': (tesys, lambda: tesys_of(TESYS_WORD), 0.11),
+    'CiA 402': (Servo, lambda: drive(
+        'cia402', mode='pv', table=(TARGET,), request=(TARGET,), response=(), period=PERIOD,
+        parameter_timeout=0.1, heartbeat_producer=0.0, heartbeat_timeout=0.0), 0.0),
     'CANnord': (Inverter, lambda: drive(
         'cannord', table=(FREQUENCY,), request=(FREQUENCY,), response=(), period=PERIOD),
         4 * PERIOD),
@@ -264,7 +293,7 @@ class Story:
             self.motor.runs = False
         else:
             self.motor.loses_power()
-            if isinstance(self.device, PkwNode):
+            if isinstance(self.device, (PkwNode, ServoDrive)):
                 self.device.restarts()
 
     def comes_back(self) -> None:
@@ -273,8 +302,8 @@ class Story:
         if not self.motor.powered:
             self.motor.powered = True
             self.stopped_at = self.talk.now     # another drive, as it were
-            if isinstance(self.device, PkwNode):
-                self.line.took(self.talk.hears('705#00', self.talk.now))
+            if isinstance(self.device, (PkwNode, ServoDrive)):
+                self.line.took(self.talk.hears(f'70{self.device.node}#00', self.talk.now))
 
     def happens(self, what: str, seconds: float) -> None:
         if what in ('trip', 'hand', 'power'):

@@ -295,6 +295,21 @@ def test_objects_by_sdo() -> None:
     assert refused != 'written'
 
 
+@pytest.mark.parametrize(('stored', 'kept'), [(True, 6), (False, 2)])
+def test_what_was_stored_survives_a_loss_of_power(stored: bool, kept: int) -> None:
+    cable = Cable(configuration())
+    cable.run(1.0)
+    option, store = names('quick_stop_option', 'store_parameters')
+    assert cable.outcome(write((option, 6)))[0] != 'no answer'
+    assert cable.drives[0].value('quick_stop_option') == 6
+    if stored:
+        assert 'refused' not in str(cable.outcome(write((store, 0x65766173)))[0])
+    cable.drives[0].fault('restart', cable.now)
+    cable.run(3.0)
+    assert cable.sessions[0].online
+    assert cable.drives[0].value('quick_stop_option') == kept
+
+
 # -- ways out, told by the motor ------------------------------------------------------------------
 
 

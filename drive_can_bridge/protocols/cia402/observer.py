@@ -190,7 +190,7 @@ class Cia402Observer(DriveObserver):
         return [parameter], [parameter.raw_from_word(words[0])] if words else []
 
 
-class NetworkObserver(NmtObserver):
+class NetworkObserver(DriveObserver):
     """
     Watches what is said to all drives of a bus: NMT, SYNC, the heartbeat of the bridge.
 
@@ -199,7 +199,9 @@ class NetworkObserver(NmtObserver):
 
     def __init__(self, drives: Sequence[DriveConfiguration], observers: Sequence[DriveObserver],
                  emit: Emit) -> None:
-        super().__init__({drive.station: drive.name for drive in drives}, emit)
+        super().__init__('', emit)
+        self.handlers |= NmtObserver(
+            {drive.station: drive.name for drive in drives}, emit).handlers
         self._drives = [each for each in observers if isinstance(each, Cia402Observer)]
         self.handlers[network.SYNC_IDENTIFIER] = self._take_sync
         self.handlers |= {network.HEARTBEAT_BASE + drive.options.bridge_node: self._take_bridge

@@ -121,6 +121,12 @@ class Pdo:
             raise RemoteProtocolError(f'PDO {self.number} with {len(data)} data bytes instead of '
                                       f'{self.length}') from None
 
+    def part(self, data: bytes) -> tuple[int, ...]:
+        """Return the raw integers that are there of one that is too short."""
+        lengths = [width(each) for each in self.parameters]
+        whole = sum(sum(lengths[:count + 1]) <= len(data) for count in range(len(lengths)))
+        return self._layout.unpack(data.ljust(self.length, b'\0'))[:whole]
+
 
 def request_pdos(node: int, numbers: Sequence[int],
                  parameters: Sequence[Parameter]) -> list[Pdo]:

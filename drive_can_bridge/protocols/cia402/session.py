@@ -397,7 +397,13 @@ class Cia402Session(Session):
             if place == count - 1 and not exchange.expects('transmit PDO', now, received_at):
                 exchange.wait_out(now)
             return
-        raws = self._responses[place].unpack(data)
+        try:
+            raws = self._responses[place].unpack(data)
+        except RemoteProtocolError as error:
+            self.report.reject(sentences.malformed(str(error)))
+            raws = self._responses[place].part(data)
+            if place < count - 1 or not (raws or place):
+                return
         if count > 1:
             self._set[place] = raws
             if len(self._set) < count:

@@ -200,6 +200,18 @@ class TestRounds:
         assert axis.session.control is not None
         assert axis.session.control.word_due
 
+    def test_a_tpdo_that_is_too_short_brings_what_is_in_it(self) -> None:
+        axis = Axis().online()
+        axis.drive.responses = lambda *kinds: [     # type: ignore[method-assign]
+            Frame(0x185, bytes.fromhex('3102E803'), False)]
+        axis.live(0.1)
+        assert {event.raws for event in axis.talk.events(ProcessDataReceived)} == {(0x231,)}
+        assert axis.session.statistics.rejected == 10
+        axis.drive.responses = lambda *kinds: [     # type: ignore[method-assign]
+            Frame(0x185, b'\x31', False)]
+        axis.live(0.2)
+        assert not axis.session.online
+
     def test_one_heartbeat_for_all_the_smallest(self) -> None:
         one = Bus(*(servo('pv', name=f'axis_{station}', station=station, bridge_heartbeat=beat)
                     for station, beat in ((1, 0.5), (2, 0.1), (3, 0.3))))

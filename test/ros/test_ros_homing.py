@@ -1,0 +1,28 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""``~/home`` of a servo drive: offered where it was asked for, answered when the axis is there."""
+
+from bridges import parameters, StartBridge
+from clients import Client
+from std_srvs.srv import SetBool, Trigger
+
+AXIS = {'bus': 'main', 'protocol': 'cia402', 'station': 1, 'profile': 'cia402_servo',
+        'mode': 'csp', 'period': 0.02, 'cyclic_request': ['target_position'],
+        'cyclic_response': ['actual_position'], 'missed_limit': 100, 'parameter_timeout': 2.0,
+        'control_timeout': 30.0, 'heartbeat_timeout': 0.0, 'bridge_heartbeat': 5.0}
+
+
+
+def test_home(bridge: StartBridge, client: Client) -> None:
+    bridge(parameters(slide={**AXIS, 'homing': True})).online('slide')
+    refused = client.call('/slide/home', Trigger)
+    assert (refused.success, 'enable it first' in refused.message) == (False, True)
+    assert client.call('/slide/enable', SetBool, SetBool.Request(data=True)).success
+    homed = client.call('/slide/home', Trigger)
+    assert (homed.success, homed.message) == (True, 'homed')
+
+
+def test_only_where_it_was_asked_for(bridge: StartBridge, client: Client) -> None:
+    bridge(parameters(slide=AXIS)).online('slide')
+    client.service('/slide/enable', SetBool)
+    names = client.node.get_service_names_and_types_by_node('slide', '/')
+    assert '/slide/home' not in dict(names)
